@@ -1,0 +1,64 @@
+# Everything runs in a private environment: PyPI wheels, ROS 2 Jazzy among them, and this checkout.
+VENV ?= .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+# The first that runs (a pyenv shim may not) and that the ROS wheels are made for.
+SUITS := -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))'
+PYTHON ?= $(shell for python in python3.12 python3.13 python3.11 python3; do \
+	$$python $(SUITS) 2>/dev/null && echo $$python && break; done)
+
+PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
+
+# A test that hangs fails by itself, with its name.
+PYTEST := $(BIN)/python -m pytest --timeout=300
+
+.PHONY: setup demo test test-long test-all lint clean
+
+setup: $(READY)
+
+# The stamp is set last. Without it the environment was interrupted, and pip cannot tell half
+# installed packages from whole ones: it is cleared and filled again, mostly from pip's cache.
+# An editable install leaves data files out: what ament and `ros2 run` look for is linked.
+$(READY): setup.py setup.cfg pyproject.toml package.xml Makefile
+	@python='$(PYTHON)'; \
+	$${python:-false} $(SUITS) 2>/dev/null || { \
+		echo 'This needs Python 3.11, 3.12 or 3.13: sudo apt-get install python3 python3-venv,' \
+			'or name one: make PYTHON=/path/to/python3' >&2; exit 1; }; \
+	$$python -c 'import ensurepip, venv' 2>/dev/null || { \
+		$$python -c 'import sys; print("This needs venv: sudo apt-get install" \
+			" python%d.%d-venv" % sys.version_info[:2])' >&2; exit 1; }; \
+	echo "setting up $(VENV) with $$($$python --version) (about a minute, once)"; \
+	test -e $@ || $$python -m venv --clear $(VENV)
+	@rm -f $@
+	@$(PIP) --upgrade pip
+	@$(PIP) --editable '.[ros,test,dev]'
+	@rm -rf $(VENV)/lib/stickslip_ros $(VENV)/share/stickslip_ros
+	@mkdir $(VENV)/lib/stickslip_ros $(VENV)/share/stickslip_ros
+	@ln -s '$(CURDIR)/config' '$(CURDIR)/package.xml' $(VENV)/share/stickslip_ros
+	@ln -sf '$(CURDIR)/resource/stickslip_ros' $(VENV)/share/ament_index/resource_index/packages
+	@cd $(VENV)/lib/stickslip_ros && for name in $$(../../bin/python -c 'from importlib import metadata; \
+		print(*metadata.distribution("stickslip_ros").entry_points.names)'); \
+		do ln -s ../../bin/$$name; done
+	@touch $@
+
+demo: setup
+	$(BIN)/python -m stickslip_ros.app.demo
+
+test: setup
+	$(PYTEST) -m 'not long'
+
+test-long: setup
+	$(PYTEST) -m long
+
+test-all: setup
+	$(PYTEST)
+
+lint: setup
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/pyright --pythonpath $(BIN)/python
+
+clean:
+	rm -rf .venv .venv-* build install log dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,83 @@
+from glob import glob
+from pathlib import Path
+from xml.etree import ElementTree
+
+from setuptools import find_packages, setup
+from setuptools.command.install_scripts import install_scripts
+
+MANIFEST = ElementTree.parse("package.xml").getroot()
+NAME = MANIFEST.findtext("name")
+
+EXECUTABLES = {
+    "plant_node": "stickslip_ros.nodes.plant:main",
+    "washout_controller_node": "stickslip_ros.nodes.washout_controller:main",
+    "analyzer_node": "stickslip_ros.nodes.analyzer:main",
+    "stickslip": "stickslip_ros.app.main:main",
+}
+
+STUB = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
+
+
+class InstallScripts(install_scripts):
+    """Gives a wheel what ``ros2 run`` looks for: ``lib/<package>/<executable>``.
+
+    colcon has the scripts written there (setup.cfg). A wheel leaves them to pip, which writes them
+    into ``bin/``; so it carries a stub for each, which hands over to its namesake there.
+    """
+
+    def run(self):
+        """Install the scripts, or the stubs for them where the entry points are left to pip."""
+        super().run()
+        if not self.no_ep:
+            return
+        folder = Path(self.get_finalized_command("install").install_data, "lib", NAME)
+        folder.mkdir(parents=True)
+        for executable in EXECUTABLES:
+            stub = folder / executable
+            stub.write_text(STUB)
+            stub.chmod(0o755)
+
+
+setup(
+    name=NAME,
+    version=MANIFEST.findtext("version"),
+    description=MANIFEST.findtext("description"),
+    maintainer=MANIFEST.findtext("maintainer"),
+    maintainer_email=MANIFEST.find("maintainer").get("email"),
+    license=MANIFEST.findtext("license"),
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/config", sorted(glob("config/*.yaml"))),
+    ],
+    entry_points={
+        "console_scripts": [f"{name} = {function}" for name, function in EXECUTABLES.items()]
+    },
+    cmdclass={"install_scripts": InstallScripts},
+    zip_safe=False,
+    python_requires=">=3.11",
+    install_requires=[
+        "heyoka",
+        "matplotlib",
+        "mcap",
+        "numpy",
+        "pydantic>=2",  # another API than 1, which some distributions still ship
+        "pyyaml",
+        "rich",
+        "scipy",
+    ],
+    extras_require={
+        # ROS itself, where none is installed; the message packages come with these two.
+        "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
+        "test": [
+            "hypothesis",
+            "pytest",
+            "pytest-timeout",
+            "rosbags",
+            "setuptools>=70.1",  # the first to make wheels unaided
+        ],
+        "dev": ["colcon-common-extensions", "colcon-ros", "pyright", "ruff"],
+    },
+)

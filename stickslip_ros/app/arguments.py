@@ -1,0 +1,62 @@
+"""Arguments that several commands have."""
+
+import argparse
+from math import isfinite
+from typing import Any
+
+from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario, load_scenario
+from stickslip_ros.versions import versions
+
+
+def add_scenario(parser: argparse.ArgumentParser) -> None:
+    """Add SCENARIO and what modifies it."""
+    parser.add_argument(
+        "scenario",
+        metavar="SCENARIO",
+        help="name of a scenario that ships (paper, feed_drive), or path of a ROS parameter file",
+    )
+    parser.add_argument(
+        "-p",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="NODE.PARAMETER=VALUE",
+        help="override a parameter, as in -p plant.belt_speed=0.2 (SI units; repeatable)",
+    )
+    parser.add_argument("--no-control", action="store_true", help="leave the controller out")
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Add --json."""
+    parser.add_argument(
+        "--json", action="store_true", help="print one JSON object and nothing else"
+    )
+
+
+def scenario_of(
+    arguments: argparse.Namespace, *overrides: str, namespace: str = DEFAULT_NAMESPACE
+) -> Scenario:
+    """Return the scenario that was asked for, `overrides` applied after those given."""
+    control = ["plant.expects_control=false"] if arguments.no_control else []
+    asked = [*arguments.overrides, *control, *overrides]
+    return load_scenario(arguments.scenario, asked, namespace)
+
+
+def made_of(scenario: Scenario) -> dict[str, Any]:
+    """Return what a result was made from, for its JSON."""
+    return {
+        "scenario": {"name": scenario.name, **scenario.as_dict()},
+        "overrides": list(scenario.overrides),
+        "versions": versions(),
+    }
+
+
+def seconds(text: str) -> float:
+    """Parse a time in seconds: finite, zero or more."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not (isfinite(value) and value >= 0.0):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a time in seconds, 0 or more")
+    return value

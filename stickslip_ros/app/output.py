@@ -1,0 +1,88 @@
+"""How figures are shown to a person: tables on standard output, SI with sensible prefixes."""
+
+import json
+import sys
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+_PREFIXES = {1e9: "G", 1e6: "M", 1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "u", 1e-9: "n"}
+
+_LABELS: dict[str, tuple[str, str]] = {
+    "regime": ("regime", ""),
+    "amplitude": ("amplitude", "m"),
+    "velocity_amplitude": ("velocity amplitude", "m/s"),
+    "midpoint": ("midpoint", "m"),
+    "period": ("period", "s"),
+    "frequency": ("frequency", "Hz"),
+    "stick_fraction": ("stick fraction", ""),
+    "cycles": ("cycles measured", ""),
+    "peak_force": ("peak control force", "N"),
+    "resting_force": ("control force at rest", "N"),
+    "samples": ("samples", ""),
+    "lost_samples": ("lost samples", ""),
+    "late_forces": ("late forces", ""),
+    "missed_deadlines": ("missed deadlines", ""),
+    "steps_per_second": ("steps per second", ""),
+    "duration": ("duration", "s"),
+    "complete": ("bag complete", ""),
+    "bag": ("bag", ""),
+}
+
+
+def print_json(values: Mapping[str, Any]) -> None:
+    """Print one JSON object; what is infinite or not a number, JSON does not know, is null."""
+    json.dump(_finite(values), sys.stdout, indent=2, allow_nan=False)
+    print()
+
+
+def print_figures(title: str, columns: Mapping[str, Mapping[str, Any]]) -> None:
+    """Print figures by name, one column for each of `columns`, those that nobody has left out."""
+    table = Table(title=title, title_justify="left")
+    table.add_column("")
+    for heading in columns:
+        table.add_column(heading, justify="right")
+    for name, (label, unit) in _LABELS.items():
+        if any(name in figures for figures in columns.values()):
+            cells = [_text(figures.get(name), unit) for figures in columns.values()]
+            table.add_row(label, *cells)
+    Console(soft_wrap=True).print(table)
+
+
+@contextmanager
+def progress_bar(label: str, total: float | None) -> Generator[Callable[[float], None]]:
+    """Show progress towards `total` on standard error while a person looks at it."""
+    columns = (TextColumn(label), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(label, total=total)
+        yield lambda done: bar.update(task, completed=done)
+
+
+def _text(value: Any, unit: str) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if not isinstance(value, float):
+        return str(value)
+    if not unit:
+        return f"{value:.4g}"
+    scale = next((s for s in _PREFIXES if abs(value) >= s), None)
+    if scale is None:
+        return f"0 {unit}" if value == 0.0 else f"{value:.3g} {unit}"
+    return f"{value / scale:.4g} {_PREFIXES[scale]}{unit}"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not abs(value) < float("inf"):
+        return None
+    return value

@@ -1,0 +1,126 @@
+"""`stickslip run`: the closed loop as ROS 2 nodes, recorded and reported."""
+
+import argparse
+import sys
+from datetime import UTC, datetime
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from stickslip_ros.app.arguments import add_json, add_scenario, made_of, scenario_of, seconds
+from stickslip_ros.app.output import print_figures, print_json, progress_bar
+from stickslip_ros.bags.recorder import check_new_bag
+from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.nodes.bringup import RunOutcome, keep_on_this_machine, run_nodes
+from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario
+from stickslip_ros.scenario.parameters import Pace
+
+NAME = "run"
+HELP = "run a scenario as ROS 2 nodes, record it and report"
+
+INTERRUPTED = 130
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    add_scenario(parser)
+    parser.add_argument(
+        "--duration", type=seconds, metavar="S", help="simulated time, s (default: until Ctrl-C)"
+    )
+    parser.add_argument(
+        "--pace",
+        choices=[str(pace) for pace in Pace],
+        help="keep to the clock, or go on as soon as the force has come (default: the scenario's)",
+    )
+    parser.add_argument(
+        "--composed",
+        action="store_true",
+        help="run the nodes in this process (default: each in its own)",
+    )
+    parser.add_argument(
+        "--bag",
+        type=Path,
+        metavar="DIR",
+        help="directory to record to; must not exist (default: bags/<scenario>-<UTC time>)",
+    )
+    parser.add_argument(
+        "--namespace",
+        default=DEFAULT_NAMESPACE,
+        metavar="NS",
+        help="ROS namespace of the nodes (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--network",
+        action="store_true",
+        help="let other machines see the nodes (default: they are kept on this one)",
+    )
+    add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command; return the exit status."""
+    overrides: list[str] = []
+    if arguments.pace is not None:
+        overrides.append(f"plant.pace={arguments.pace}")
+    if arguments.duration is not None:
+        overrides.append(f"plant.duration={arguments.duration!r}")
+    namespace = _namespace(arguments.namespace)
+    scenario = scenario_of(arguments, *overrides, namespace=namespace)
+    bag = arguments.bag or (Path(scenario.analyzer.bag) if scenario.analyzer.bag else None)
+    bag = bag or default_bag(scenario.name)
+    check_new_bag(bag)
+    reach = keep_on_this_machine(arguments.network)
+    print(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}", file=sys.stderr)
+    figures, interrupted = record(
+        scenario, bag, namespace=namespace, composed=arguments.composed
+    )
+    if arguments.json:
+        print_json({**figures, **made_of(scenario)})
+    else:
+        print_figures(scenario.name, {"": {**figures["report"], **figures}})
+    return INTERRUPTED if interrupted else 0
+
+
+def record(
+    scenario: Scenario, bag: Path, *, namespace: str = DEFAULT_NAMESPACE, composed: bool
+) -> tuple[dict[str, Any], bool]:
+    """Run the nodes into `bag`; return the figures of the run, and whether it was interrupted."""
+    duration = scenario.plant.duration
+    total = duration if duration < float("inf") else None
+    with progress_bar(f"running {scenario.name}", total) as progress:
+        outcome = run_nodes(
+            scenario, namespace=namespace, bag=bag, composed=composed, progress=progress
+        )
+    return _figures(scenario, bag, outcome), outcome.interrupted
+
+
+def default_bag(scenario: str) -> Path:
+    """Return a directory for a new bag that does not exist yet."""
+    name = f"{scenario}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
+    candidates = (Path("bags") / (name + (f"_{n}" if n > 1 else "")) for n in count(1))
+    return next(path for path in candidates if not path.exists())
+
+
+def _figures(scenario: Scenario, bag: Path, outcome: RunOutcome) -> dict[str, Any]:
+    report = report_of_bag(bag, window=scenario.analyzer.window)
+    plant = outcome.plant
+    return {
+        "bag": str(bag),
+        "report": report,
+        "samples": report["samples"],
+        "lost_samples": report["lost_samples"],
+        "late_forces": int(plant.get("late_forces", 0)),
+        "missed_deadlines": int(plant.get("missed_deadlines", 0)),
+        "steps_per_second": float(plant.get("steps_per_second", 0.0)),
+    }
+
+
+def _namespace(text: str) -> str:
+    namespace = "/" + text.strip("/")
+    tokens = namespace.split("/")[1:]
+    if not all(token.isidentifier() and token.isascii() for token in tokens):
+        raise InvalidInputError(
+            f"--namespace {text!r}: must be names of letters, digits and _ joined by /"
+        )
+    return namespace

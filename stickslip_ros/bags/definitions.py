@@ -1,0 +1,79 @@
+"""Definitions and type hashes of installed ROS message types, as rosbag2 stores them in a bag."""
+
+import json
+import os
+import re
+import sys
+from pathlib import Path
+
+from stickslip_ros.errors import BagError
+
+_TYPE_NAME = re.compile(r"(\w+)/msg/(\w+)", re.ASCII)
+_FIELD_TYPE = re.compile(r"\s*([A-Za-z][\w/]*)", re.ASCII)
+_BUILT_IN_TYPES = re.compile(r"bool|byte|char|float(32|64)|u?int(8|16|32|64)|w?string")
+_SEPARATOR = "=" * 80
+
+
+def message_definition(type_name: str) -> str:
+    """Return the text of a message type such as `sensor_msgs/msg/JointState` and of all it holds.
+
+    This is the encoding `ros2msg`: the .msg file, followed by those of the types of its fields,
+    depth first and sorted, each once under its name. Raises BagError for a type that is not
+    installed.
+    """
+    included: set[str] = set()
+
+    def expand(type_name: str) -> str:
+        text = _read(type_name, ".msg")
+        for nested in _nested_types(text, package=type_name.partition("/")[0]):
+            if nested not in included:
+                included.add(nested)
+                text += f"\n{_SEPARATOR}\nMSG: {nested.replace('/msg/', '/')}\n{expand(nested)}"
+        return text
+
+    return expand(type_name)
+
+
+def type_hash(type_name: str) -> str:
+    """Return the hash (`RIHS01_…`) of a message type such as `sensor_msgs/msg/JointState`.
+
+    Raises BagError for a type that is not installed.
+    """
+    description = json.loads(_read(type_name, ".json"))
+    hashes = {entry["type_name"]: entry["hash_string"] for entry in description["type_hashes"]}
+    return hashes[type_name]
+
+
+def _nested_types(definition: str, package: str) -> list[str]:
+    """Return the sorted full names of the types of a definition's fields, but for built-in ones."""
+    nested: set[str] = set()
+    for line in definition.splitlines():
+        field = _FIELD_TYPE.match(line)
+        if field and not _BUILT_IN_TYPES.fullmatch(field[1]):
+            scope, _, name = field[1].rpartition("/")
+            nested.add(f"{scope.removesuffix('/msg') or package}/msg/{name}")
+    return sorted(nested)
+
+
+def _read(type_name: str, suffix: str) -> str:
+    """Read the file that describes a message type from the first prefix that has it."""
+    parts = _TYPE_NAME.fullmatch(type_name)
+    if parts is None:
+        raise BagError(
+            f"'{type_name}' does not name a message type; sensor_msgs/msg/JointState does"
+        )
+    package, name = parts.groups()
+    # The environment's own prefix comes last: ROS wheels install there without any set-up script.
+    prefixes = [
+        *filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)),
+        sys.prefix,
+    ]
+    for prefix in prefixes:
+        path = Path(prefix, "share", package, "msg", name + suffix)
+        if path.is_file():
+            return path.read_text(encoding="utf-8")
+    raise BagError(
+        f"the message type '{type_name}' is not installed: there is no "
+        f"share/{package}/msg/{name}{suffix} in {' or '.join(prefixes)} "
+        "(AMENT_PREFIX_PATH and the Python environment)"
+    )

@@ -1,0 +1,17 @@
+"""The exception family of the package: everything it raises on purpose derives from one class."""
+
+
+class StickslipError(Exception):
+    """Base of every error that stickslip_ros raises on purpose; its text is one clear sentence."""
+
+
+class InvalidInputError(StickslipError):
+    """What came in is refused: it names the thing, its value and what is allowed."""
+
+
+class BagError(InvalidInputError):
+    """A bag that cannot be written where asked, or cannot be read; it names the path."""
+
+
+class RunError(StickslipError):
+    """A run that was started properly but failed: a node died or never became ready."""

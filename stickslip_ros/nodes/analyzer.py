@@ -1,0 +1,228 @@
+"""Analyzer node: records the topics and reports limit-cycle amplitude and stick fraction."""
+
+import json
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+from rcl_interfaces.srv import GetParameters
+from rclpy.client import Client
+from rclpy.parameter import parameter_value_to_python
+from rclpy.publisher import Publisher
+from rclpy.task import Future
+from std_msgs.msg import Float64
+
+from stickslip_ros.bags.messages import (
+    joint_state_columns,
+    pack_header,
+    unpack_header,
+    wrench_columns,
+)
+from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
+from stickslip_ros.errors import BagError, StickslipError
+from stickslip_ros.nodes.managed import OK, WARN, Level, ManagedNode, run_node
+from stickslip_ros.nodes.topics import (
+    AMPLITUDE,
+    APPLIED_DISTURBANCE,
+    CONTROL_FORCE,
+    DEEP,
+    FREQUENCY,
+    JOINT_STATES,
+    RECORDED,
+    RECORDED_EVERY,
+    STICK_FRACTION,
+    Topic,
+)
+from stickslip_ros.physics.samples import RunMeter
+from stickslip_ros.scenario.parameters import NODE_PARAMETERS, AnalyzerParameters, parameters_of
+from stickslip_ros.versions import versions
+
+ColumnsT = TypeVar("ColumnsT")
+
+_PROCESS_PERIOD = 0.1
+
+
+class AnalyzerNode(ManagedNode[AnalyzerParameters]):
+    """Listens to joint_states and control_force; writes a bag, publishes limit_cycle/*."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("analyzer", AnalyzerParameters, **options)
+        self._bags_opened = 0
+
+    def connect(self) -> None:
+        """Refuse a bag that cannot be; listen, and publish what is measured."""
+        if self.parameters.bag:
+            check_new_bag(self._next_bag())
+        self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
+        self._pending: dict[str, list[bytes]] = {}
+        self._channels: dict[str, int] = {}
+        for topic in (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE):
+            self._pending[topic.name] = []
+            self.subscribe(topic, partial(self._on_message, topic.name), DEEP)
+        self._connections.append(self.every(_PROCESS_PERIOD, self._process))
+        self._connections.append(self.every(self.parameters.flush_period, self._flush))
+
+    def start(self) -> None:
+        """Open a bag and start to measure."""
+        self._meter = RunMeter(self.parameters.window)
+        self._cycles = self._unread = 0
+        self._complaint = ""
+        self._recorder = self._open_bag() if self.parameters.bag else None
+        # It exists while there is a recorder to wait for, and the plant sees by it that there is.
+        self._recorded: Publisher = self.create_publisher(
+            RECORDED.type, RECORDED.name, RECORDED.qos()
+        )
+        self._to_ask: dict[str, Client] = {
+            node: self.create_client(GetParameters, f"{node}/get_parameters")
+            for node in NODE_PARAMETERS
+            if node != "analyzer"
+        }
+        self._asked: list[Client] = []
+
+    def stop(self) -> None:
+        """Measure what is left, close the bag with its report, and log the report."""
+        self._process()
+        report = self._meter.report()
+        self.get_logger().info(f"report: {json.dumps(report)}")
+        self.destroy_publisher(self._recorded)
+        for client in [*self._to_ask.values(), *self._asked]:
+            self.destroy_client(client)
+        if self._recorder is not None:
+            self._keep("report", report)
+            self._recorder.close()
+
+    def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
+        """Return the regime, counts of samples, and what is wrong with the bag or a message."""
+        if not self.active:
+            return OK, "", {}
+        report = self._meter.report()
+        figures = {name: report[name] for name in ("regime", "samples", "lost_samples")}
+        if report["lost_samples"] and not self._complaint:
+            return WARN, "samples were lost", figures
+        return (WARN if self._complaint else OK), self._complaint, figures
+
+    def _on_message(self, topic: str, message: bytes) -> None:
+        if not self.active:
+            return
+        try:
+            stamp = unpack_header(message)
+        except StickslipError as error:
+            self._complaint = str(error)
+            return
+        if self._recorder is not None:
+            self._write(topic, message, stamp)
+        pending = self._pending[topic]
+        pending.append(message)
+        if topic == JOINT_STATES.name:
+            if self._unread % RECORDED_EVERY == 0:
+                self._recorded.publish(pack_header(stamp))
+                self._process()
+            self._unread += 1
+
+    def _process(self) -> None:
+        """Decode and measure what has come since the last time."""
+        if not self.active:
+            return
+        states = self._take(JOINT_STATES, joint_state_columns)
+        if states is not None:
+            motion = self._meter.motion
+            for cycle in motion.feed(
+                states.stamp, states.position, states.velocity, states.belt_velocity
+            ):
+                figures = (cycle.amplitude, cycle.stick_fraction, cycle.frequency)
+                for publisher, figure in zip(self._limit_cycle, figures, strict=True):
+                    publisher.publish(Float64(data=figure))
+                self._cycles += 1
+                if self._cycles % self.parameters.window == 0:
+                    self.get_logger().info(f"{motion.measures()}")
+        forces = self._take(CONTROL_FORCE, wrench_columns)
+        if forces is not None:
+            self._meter.force.feed(forces.stamp, forces.force)
+        self._pending[APPLIED_DISTURBANCE.name].clear()
+        self._ask_for_parameters()
+
+    def _take(self, topic: Topic, decode: Callable[[Sequence[bytes]], ColumnsT]) -> ColumnsT | None:
+        """Return the pending messages of a topic as columns; one that is unreadable is dropped."""
+        messages, self._pending[topic.name] = self._pending[topic.name], []
+        try:
+            return decode(messages) if messages else None
+        except StickslipError as error:
+            self._complaint = str(error)
+        readable = [message for message in messages if _can_decode(decode, message)]
+        return decode(readable) if readable else None
+
+    def _next_bag(self) -> Path:
+        suffix = f"_{self._bags_opened + 1}" if self._bags_opened else ""
+        return Path(self.parameters.bag + suffix)
+
+    def _open_bag(self) -> Recorder:
+        recorder = Recorder(self._next_bag(), self.parameters.compression)
+        self._bags_opened += 1
+        for topic in (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE):
+            name = self.resolve_topic_name(topic.name)
+            qos = QosProfile(depth=topic.depth)
+            self._channels[topic.name] = recorder.add_topic(name, topic.type_name, qos)
+        self._recorder = recorder
+        self._keep("versions", versions())
+        self._keep("analyzer", self.parameters.flat())
+        return recorder
+
+    def _keep(self, name: str, values: Mapping[str, Any]) -> None:
+        """Put a table into the bag that says how the recording came about, or what it gave."""
+        if self._recorder is not None:
+            texts = {key: json.dumps(value) for key, value in values.items()}
+            self._recorder.add_metadata(f"stickslip_ros/{name}", texts)
+
+    def _write(self, topic: str, message: bytes, stamp: int) -> None:
+        assert self._recorder is not None
+        try:
+            self._recorder.write(self._channels[topic], message, stamp)
+        except BagError as error:
+            self._give_up_recording(error)
+
+    def _flush(self) -> None:
+        if self.active and self._recorder is not None:
+            try:
+                self._recorder.flush()
+            except BagError as error:
+                self._give_up_recording(error)
+
+    def _give_up_recording(self, error: BagError) -> None:
+        """Go on measuring without a bag."""
+        self._recorder = None
+        self._complaint = str(error)
+        self.get_logger().error(self._complaint)
+
+    def _ask_for_parameters(self) -> None:
+        """Ask plant and controller, as soon as they are there, what they run with."""
+        for node, client in list(self._to_ask.items()):
+            if client.service_is_ready():
+                names = [p.name for p in parameters_of(NODE_PARAMETERS[node])]
+                answer = client.call_async(GetParameters.Request(names=names))
+                answer.add_done_callback(partial(self._on_parameters, node, names))
+                self._asked.append(self._to_ask.pop(node))
+
+    def _on_parameters(self, node: str, names: list[str], answer: Future) -> None:
+        response = answer.result()
+        if self.active and response is not None:
+            values = [parameter_value_to_python(value) for value in response.values]
+            self._keep(node, dict(zip(names, values, strict=False)))
+
+
+def _can_decode(decode: Callable[[Sequence[bytes]], Any], message: bytes) -> bool:
+    try:
+        decode([message])
+    except StickslipError:
+        return False
+    return True
+
+
+def main() -> None:
+    """Run the node as a process."""
+    sys.exit(run_node(AnalyzerNode, AnalyzerParameters))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,287 @@
+"""Bringing the nodes up and down: as processes or composed in one, activated in order."""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import State, Transition, TransitionEvent
+from lifecycle_msgs.srv import ChangeState
+from rclpy.executors import Executor
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from std_msgs.msg import Header
+
+from stickslip_ros.errors import RunError
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.managed import ManagedNode, spin, stop_on_signals
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.topics import DIAGNOSTICS, JOINT_STATES, RECORDED
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.scenario.files import Scenario, parameter_file
+
+_READY_TIMEOUT = 60.0
+_ANSWER_TIMEOUT = 15.0
+_RETRY_PERIOD = 0.02
+_WATCH_PERIOD = 0.1
+_EXIT_TIMEOUT = 5.0
+_LAST_WORDS_TIMEOUT = 2.0
+
+_NODES: dict[str, Callable[..., ManagedNode[Any]]] = {
+    "analyzer": AnalyzerNode,
+    "washout_controller": WashoutControllerNode,
+    "plant": PlantNode,
+}
+"""Every node by its name, in the order of activation."""
+
+Progress = Callable[[float], None]
+"""Told now and then how much time has been simulated, s."""
+
+
+@dataclass
+class RunOutcome:
+    """What a run came to."""
+
+    interrupted: bool = False
+    """Whether SIGINT or SIGTERM ended it."""
+    plant: dict[str, str] = field(default_factory=dict)
+    """The plant's last figures, as in its diagnostics."""
+
+
+def keep_on_this_machine(network: bool) -> str:
+    """Restrict ROS discovery to this machine unless told otherwise; return in words what holds.
+
+    To be called before ROS is initialised. An environment that says something itself is left as
+    it is.
+    """
+    name = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    if network:
+        return "open to the network"
+    said = os.environ.setdefault(name, "LOCALHOST")
+    if said == "LOCALHOST":
+        return "kept on this machine"
+    return f"as the environment says: {name}={said}"
+
+
+def run_nodes(
+    scenario: Scenario,
+    *,
+    namespace: str,
+    bag: Path,
+    composed: bool = False,
+    progress: Progress = lambda _: None,
+) -> RunOutcome:
+    """Run the scenario's nodes until the plant pauses by itself or a signal comes.
+
+    Every node is deactivated, and the bag closed, before this returns or raises RunError (a node
+    died, or did not become ready).
+    """
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        bringup = _Bringup(namespace, progress)
+        try:
+            return bringup.run(_parameters(scenario, bag), composed)
+        finally:
+            bringup.close()
+    finally:
+        rclpy.try_shutdown()
+
+
+def _parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
+    """Return the parameters by node, those of bringup included; the nodes to start are its keys."""
+    values = scenario.as_dict()
+    nodes = [n for n in _NODES if n != "washout_controller" or scenario.plant.expects_control]
+    for node in nodes:
+        values[node] |= {"autostart": False}
+    values["analyzer"]["bag"] = str(bag)
+    # The analyzer only listens until it is active; it is matched by those that write to it.
+    for node in nodes[1:]:
+        values[node]["wait_for"] = [other for other in nodes if other != node]
+    return {node: values[node] for node in nodes}
+
+
+class _Bringup:
+    """A node that manages the others, and the executor that runs it."""
+
+    def __init__(self, namespace: str, progress: Progress) -> None:
+        self._namespace = namespace
+        self._progress = progress
+        self._node = Node("bringup", namespace=namespace)
+        self._executor: Executor = EventsExecutor()
+        self._executor.add_node(self._node)
+        self._stop = Future()
+        stop_on_signals(self._stop, self._executor)
+        self._composed: list[ManagedNode[Any]] = []
+        self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._active: list[str] = []
+        self._failed = Future()
+        self._plant_paused = Future()
+        self._last_words = Future()
+        self._outcome = RunOutcome()
+        self._first_stamp: float | None = None
+        self._node.create_subscription(
+            DIAGNOSTICS.type, DIAGNOSTICS.name, self._on_diagnostics, DIAGNOSTICS.qos()
+        )
+        self._node.create_subscription(
+            TransitionEvent, "plant/transition_event", self._on_plant_transition, 10
+        )
+        self._node.create_subscription(
+            RECORDED.type, RECORDED.name, self._on_recorded, RECORDED.qos()
+        )
+        self._node.create_timer(_WATCH_PERIOD, self._watch_processes)
+
+    def run(self, parameters: Mapping[str, Mapping[str, Any]], composed: bool) -> RunOutcome:
+        with tempfile.TemporaryDirectory(prefix="stickslip_ros_") as directory:
+            if composed:
+                self._compose(parameters)
+            else:
+                self._spawn(parameters, Path(directory))
+            try:
+                for transition in (
+                    Transition.TRANSITION_CONFIGURE,
+                    Transition.TRANSITION_ACTIVATE,
+                ):
+                    for node in parameters:
+                        if not self._ended:
+                            self._change_state(node, transition)
+                self._spin_until(self._plant_paused, None)
+            finally:
+                self._bring_down()
+        if self._failed.done():
+            raise RunError(self._failed.result())
+        self._outcome.interrupted = self._stop.done()
+        return self._outcome
+
+    def close(self) -> None:
+        for node in [*self._composed, self._node]:
+            self._executor.remove_node(node)
+            node.destroy_node()
+
+    @property
+    def _ended(self) -> bool:
+        return self._stop.done() or self._failed.done()
+
+    def _compose(self, parameters: Mapping[str, Mapping[str, Any]]) -> None:
+        for name, values in parameters.items():
+            node = _NODES[name](namespace=self._namespace, overrides=values)
+            self._composed.append(node)
+            self._executor.add_node(node)
+
+    def _spawn(self, parameters: Mapping[str, Mapping[str, Any]], directory: Path) -> None:
+        file = directory / "parameters.yaml"
+        file.write_text(parameter_file(parameters), encoding="utf-8")
+        ros_arguments = ["--params-file", str(file), "-r", f"__ns:={self._namespace}"]
+        for name in parameters:
+            module = _NODES[name].__module__
+            self._processes[name] = subprocess.Popen(
+                [sys.executable, "-m", module, "--ros-args", "--log-level", "warn", *ros_arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=sys.stderr,
+                start_new_session=True,  # Ctrl-C is for this process, which closes the bag first
+            )
+
+    def _change_state(self, node: str, transition: int) -> None:
+        """Take a node through a transition, again and again while it is not ready for it."""
+        deadline = time.monotonic() + _READY_TIMEOUT
+        client = self._node.create_client(ChangeState, f"{node}/change_state")
+        request = ChangeState.Request(transition=Transition(id=transition))
+        while not self._ended:
+            if client.service_is_ready():
+                answer = client.call_async(request)
+                self._spin_until(answer, _ANSWER_TIMEOUT)
+                if answer.done() and answer.result().success:
+                    if transition == Transition.TRANSITION_ACTIVATE:
+                        self._active.append(node)
+                    break
+            if time.monotonic() > deadline:
+                self._fail(f"{node} did not become ready within {_READY_TIMEOUT:g} s")
+            self._spin_for(_RETRY_PERIOD)
+        self._node.destroy_client(client)
+
+    def _bring_down(self) -> None:
+        """Deactivate what is active, the analyzer last, and end the processes."""
+        for node in reversed(self._active):
+            paused = node == "plant" and self._plant_paused.done()
+            if not paused and not self._is_dead(node):
+                self._deactivate(node)
+            if node == "plant" and not self._is_dead(node):
+                self._spin_until(self._last_words, _LAST_WORDS_TIMEOUT, always=True)
+        for process in self._processes.values():
+            process.terminate()
+        for process in self._processes.values():
+            try:
+                process.wait(_EXIT_TIMEOUT)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+    def _deactivate(self, node: str) -> None:
+        client = self._node.create_client(ChangeState, f"{node}/change_state")
+        request = ChangeState.Request(
+            transition=Transition(id=Transition.TRANSITION_DEACTIVATE)
+        )
+        if client.wait_for_service(_ANSWER_TIMEOUT):
+            self._spin_until(client.call_async(request), _ANSWER_TIMEOUT, always=True)
+        self._node.destroy_client(client)
+
+    def _spin_until(self, future: Future, timeout: float | None, *, always: bool = False) -> None:
+        """Run callbacks until the future is done, time is over or, unless `always`, the run is."""
+        until = Future()
+
+        def finish(_: object = None) -> None:
+            if not until.done():
+                until.set_result(None)
+
+        for reason in [future] if always else [future, self._stop, self._failed]:
+            reason.add_done_callback(finish)
+        timer = self._node.create_timer(timeout, finish) if timeout is not None else None
+        spin(self._executor, until)
+        if timer is not None:
+            self._node.destroy_timer(timer)
+
+    def _spin_for(self, duration: float) -> None:
+        self._spin_until(Future(), duration)
+
+    def _is_dead(self, node: str) -> bool:
+        process = self._processes.get(node)
+        return process is not None and process.poll() is not None
+
+    def _watch_processes(self) -> None:
+        for name, process in self._processes.items():
+            status = process.poll()
+            if status is not None:
+                how = f"killed by signal {-status}" if status < 0 else f"exit status {status}"
+                self._fail(f"the node {name} died ({how})")
+
+    def _fail(self, why: str) -> None:
+        if not self._failed.done():
+            self._failed.set_result(why)
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == f"{self._namespace.rstrip('/')}/plant":
+                self._outcome.plant = {entry.key: entry.value for entry in status.values}
+                if self._plant_paused.done() and not self._last_words.done():
+                    self._last_words.set_result(None)
+
+    def _on_plant_transition(self, event: TransitionEvent) -> None:
+        left_active = event.goal_state.id == State.PRIMARY_STATE_INACTIVE and (
+            event.start_state.id == State.TRANSITION_STATE_DEACTIVATING
+        )
+        if left_active and not self._plant_paused.done():
+            self._plant_paused.set_result(None)
+
+    def _on_recorded(self, message: Header) -> None:
+        stamp = message.stamp.sec + message.stamp.nanosec * 1e-9
+        if self._first_stamp is None:
+            self._first_stamp = stamp
+        self._progress(stamp - self._first_stamp)

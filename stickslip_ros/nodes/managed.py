@@ -1,0 +1,411 @@
+"""What every node of this package has: life cycle, parameters from one model, diagnostics."""
+
+import argparse
+import signal
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Generic, TypeVar
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.executors import Executor
+from rclpy.experimental import EventsExecutor
+from rclpy.logging import get_logger
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSCompatibility, qos_check_compatible
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from rclpy.timer import Timer
+from rclpy.utilities import remove_ros_args
+
+from stickslip_ros.errors import InvalidInputError, StickslipError
+from stickslip_ros.nodes.topics import DIAGNOSTICS, Topic
+from stickslip_ros.scenario import parameters
+from stickslip_ros.scenario.parameters import NodeParameters
+
+ParametersT = TypeVar("ParametersT", bound=NodeParameters)
+
+Level = bytes
+OK: Level = DiagnosticStatus.OK
+WARN: Level = DiagnosticStatus.WARN
+ERROR: Level = DiagnosticStatus.ERROR
+
+_DIAGNOSTICS_PERIOD = 1.0
+_AUTOSTART_PERIOD = 0.05
+_SPIN_TIMEOUT = 0.2
+_DELIVERY_TIMEOUT = 1.0
+_OWNED_BY_ROS = ("qos_overrides.", "start_type_description_service")
+
+
+class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
+    """A managed (lifecycle) node whose parameters come from one validated model.
+
+    A subclass says what it does in `connect`, `start`, `stop` and `disconnect`, its life cycle
+    transitions; what they raise is logged and makes the transition fail.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        model: type[ParametersT],
+        *,
+        context: Context | None = None,
+        namespace: str | None = None,
+        overrides: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Declare the parameters: those of the command line, then `overrides` by flat name.
+
+        Raises InvalidInputError for a parameter that is refused.
+        """
+        given = [Parameter(name, value=value) for name, value in (overrides or {}).items()]
+        super().__init__(
+            name,
+            context=context,
+            namespace=namespace,
+            parameter_overrides=given,
+            automatically_declare_parameters_from_overrides=True,
+        )
+        self.stopped = Future()
+        """Done when the node's process may end; carries the refusal, if that was the reason."""
+        self.active = False
+        """Whether the node is in the state active."""
+        self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
+        """Wall time, whatever simulated time does."""
+        self._model = model
+        self.parameters = self._declare(model)
+        """The parameters in force."""
+        self._connections: list[Any] = []
+        self._diagnostics = self.create_publisher(
+            DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos()
+        )
+        self.every(_DIAGNOSTICS_PERIOD, self.publish_diagnostics)
+        self._autostart_timer: Timer | None = None
+        if self.parameters.autostart:
+            self._autostart_timer = self.every(_AUTOSTART_PERIOD, self._autostart)
+
+    @abstractmethod
+    def connect(self) -> None:
+        """Make publishers and subscriptions and prepare what takes time (configure)."""
+
+    @abstractmethod
+    def start(self) -> None:
+        """Begin to work (activate)."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Stop working (deactivate)."""
+
+    def apply_parameters(self) -> None:
+        """Act on `self.parameters` having changed while the node lives."""
+
+    def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
+        """Return the node's health, a sentence on it, and figures."""
+        return OK, "", {}
+
+    def every(self, period: float, callback: Callable[[], None]) -> Timer:
+        """Call back every `period` seconds of wall time."""
+        return self.create_timer(period, callback, clock=self.steady_clock)
+
+    def call_soon(self, callback: Callable[[], None]) -> None:
+        """Call back from the executor, behind what it has to do already; from any thread."""
+        if self.executor is not None:
+            self.executor.create_task(callback)
+
+    def advertise(self, topic: Topic, depth: int | None = None) -> Publisher:
+        """Publish a topic until the node is cleaned up."""
+        publisher = self.create_publisher(topic.type, topic.name, topic.qos(depth))
+        self._connections.append(publisher)
+        return publisher
+
+    def subscribe(
+        self, topic: Topic, callback: Callable[[bytes], None], depth: int | None = None
+    ) -> None:
+        """Pass the serialized messages of a topic to `callback` until the node is cleaned up."""
+        self._connections.append(
+            self.create_subscription(topic.type, topic.name, callback, topic.qos(depth), raw=True)
+        )
+
+    def wait_for_delivery(self, publisher: Publisher) -> None:
+        """Wait, within bounds, until every reader has what was published."""
+        publisher.wait_for_all_acked(Duration(seconds=_DELIVERY_TIMEOUT))
+
+    def publish_diagnostics(self) -> None:
+        """Publish the node's health."""
+        level, message, figures = self.diagnose()
+        status = DiagnosticStatus(
+            level=level,
+            name=self.get_fully_qualified_name(),
+            message=message or self._state_machine.current_state[1],
+            values=[KeyValue(key=key, value=str(value)) for key, value in figures.items()],
+        )
+        array = DiagnosticArray(status=[status])
+        array.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(array)
+
+    def refuse(self, error: InvalidInputError) -> None:
+        """End the process because of what came in."""
+        if not self.stopped.done():
+            self.stopped.set_result(error)
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Connect."""
+        return self._transition(self.connect)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Start, if those waited for are there."""
+        missing = self._unmatched()
+        if missing:
+            self.get_logger().debug(f"not activated: {missing}")
+            return TransitionCallbackReturn.FAILURE
+        result = self._transition(self.start)
+        self.active = result is TransitionCallbackReturn.SUCCESS
+        return result
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop."""
+        return self._transition(self._stop_and_tell)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Disconnect."""
+        return self._transition(self._disconnect)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop if need be, and disconnect."""
+        if self.active:
+            self._transition(self._stop_and_tell)
+        return self._transition(self._disconnect)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Disconnect, to start afresh."""
+        return self._transition(self._disconnect)
+
+    def _stop_and_tell(self) -> None:
+        try:
+            self.stop()
+            self.publish_diagnostics()
+        finally:
+            self.active = False
+
+    def _disconnect(self) -> None:
+        for connection in self._connections:
+            connection.destroy()
+        self._connections.clear()
+
+    def _transition(self, action: Callable[[], None]) -> TransitionCallbackReturn:
+        try:
+            action()
+        except InvalidInputError as error:
+            self.get_logger().error(str(error))
+            if self._autostart_timer is not None:
+                self.refuse(error)
+            return TransitionCallbackReturn.FAILURE
+        except Exception as error:  # rclpy would swallow it without a word
+            self.get_logger().error(f"{type(error).__name__}: {error}")
+            return TransitionCallbackReturn.ERROR
+        return TransitionCallbackReturn.SUCCESS
+
+    def _autostart(self) -> None:
+        """Configure, then try to activate until those waited for are there."""
+        state = self._state_machine.current_state[1]
+        if state == "unconfigured":
+            self.trigger_configure()
+        elif state == "inactive" and self._unmatched():
+            return
+        elif state == "inactive":
+            self.trigger_activate()
+        if self.active or self.stopped.done():
+            assert self._autostart_timer is not None
+            self._autostart_timer.cancel()
+
+    def _unmatched(self) -> str:
+        """Return what is missing of the nodes waited for, or nothing."""
+        waiting_for = {name.rsplit("/", 1)[-1] for name in self.parameters.wait_for}
+        if not waiting_for:
+            return ""
+        publishers = [p for p in self._connections if isinstance(p, Publisher)]
+        found: set[str] = set()
+        for publisher in publishers:
+            readers = [
+                reader
+                for reader in self.get_subscriptions_info_by_topic(publisher.topic_name)
+                if qos_check_compatible(publisher.qos_profile, reader.qos_profile)[0]
+                is not QoSCompatibility.ERROR
+            ]
+            found |= {reader.node_name for reader in readers}
+            if publisher.get_subscription_count() < len(readers):
+                return f"{publisher.topic_name} is not yet matched"
+        absent = waiting_for - found
+        return f"no reader in {', '.join(sorted(absent))}" if absent else ""
+
+    def _declare(self, model: type[ParametersT]) -> ParametersT:
+        given = {
+            name: parameter.value
+            for name, parameter in self.get_parameters_by_prefix("").items()
+            if not name.startswith(_OWNED_BY_ROS)
+        }
+        validated = model.validated(given, self.get_fully_qualified_name())
+        values = validated.flat()
+        known = list(parameters.parameters_of(model))
+        for parameter in known:
+            if parameter.name == "use_sim_time":
+                continue  # declared by rclpy
+            if self.has_parameter(parameter.name):
+                self.undeclare_parameter(parameter.name)
+            self.declare_parameter(
+                parameter.name,
+                _ROS_TYPES[parameter.kind],
+                _descriptor(parameter),
+                ignore_override=True,
+            )
+        floats = {p.name for p in known if p.kind is float}
+        self.set_parameters(
+            [Parameter(p.name, _ROS_TYPES[p.kind], values[p.name]) for p in known]
+        )
+        self.add_pre_set_parameters_callback(lambda new: _with_floats(new, floats))
+        self.add_on_set_parameters_callback(self._check_change)
+        self.add_post_set_parameters_callback(self._take_change)
+        return validated
+
+    def _changed(self, changes: Sequence[Parameter]) -> ParametersT:
+        values = self.parameters.flat() | {
+            change.name: change.value
+            for change in changes
+            if not change.name.startswith(_OWNED_BY_ROS)
+        }
+        return self._model.validated(values, self.get_fully_qualified_name())
+
+    def _check_change(self, changes: list[Parameter]) -> SetParametersResult:
+        fixed = {p.name for p in parameters.parameters_of(self._model) if p.fixed}
+        present = self.parameters.flat()
+        for change in changes:
+            if self.active and change.name in fixed and change.value != present[change.name]:
+                reason = f"{change.name} cannot be changed while the node is active"
+                return SetParametersResult(successful=False, reason=reason)
+        try:
+            self._changed(changes)
+        except InvalidInputError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _take_change(self, changes: list[Parameter]) -> None:
+        self.parameters = self._changed(changes)
+        self.apply_parameters()
+
+
+def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) -> int:
+    """Run one node as a process, until SIGINT or SIGTERM; return the exit status.
+
+    Status 2 says that a parameter or an argument was refused, with the reason on standard error.
+    """
+    parser = argparse.ArgumentParser(
+        description=sys.modules[make.__module__].__doc__,
+        epilog=_parameter_help(model),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--ros-args",
+        metavar="...",
+        help="ROS arguments: -p NAME:=VALUE, --params-file FILE, -r __ns:=/NAMESPACE, -r FROM:=TO",
+    )
+    parser.parse_args(remove_ros_args(sys.argv)[1:])
+    try:
+        rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
+    except Exception as error:  # what rcl could not parse; its first line names it
+        print(f"{parser.prog}: {_first_line(error)}", file=sys.stderr)
+        return 2
+    try:
+        return _run_initialized(make)
+    except InvalidInputError as error:
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        return 2
+    except StickslipError as error:
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        return 1
+    finally:
+        rclpy.try_shutdown()
+
+
+def _run_initialized(make: Callable[[], ManagedNode[Any]]) -> int:
+    node = make()
+    executor = EventsExecutor()
+    executor.add_node(node)
+    stop_on_signals(node.stopped, executor)
+    spin(executor, node.stopped)
+    if node.active:
+        node.trigger_deactivate()
+    refusal = node.stopped.result()
+    executor.remove_node(node)
+    node.destroy_node()
+    if refusal is not None:
+        raise refusal
+    return 0
+
+
+def stop_on_signals(stopped: Future, executor: Executor) -> None:
+    """Let SIGINT and SIGTERM complete `stopped` with None."""
+
+    def stop(*_: object) -> None:
+        if not stopped.done():
+            stopped.set_result(None)
+            executor.wake()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
+
+
+def spin(executor: Executor, until: Future) -> None:
+    """Run callbacks until the future is done; one that raises is logged, and the rest go on."""
+    while not until.done():
+        try:
+            executor.spin_until_future_complete(until, timeout_sec=_SPIN_TIMEOUT)
+        except Exception as error:  # an impossible request from outside ends up here, too
+            get_logger("stickslip_ros").error(f"{type(error).__name__}: {error}")
+
+
+def _with_floats(changes: list[Parameter], floats: set[str]) -> list[Parameter]:
+    """Take whole numbers where numbers are declared, as parameter files and -p do."""
+    return [
+        Parameter(change.name, Parameter.Type.DOUBLE, float(change.value))
+        if change.name in floats and change.type_ is Parameter.Type.INTEGER
+        else change
+        for change in changes
+    ]
+
+
+_ROS_TYPES = {
+    bool: Parameter.Type.BOOL,
+    int: Parameter.Type.INTEGER,
+    float: Parameter.Type.DOUBLE,
+    str: Parameter.Type.STRING,
+    list: Parameter.Type.STRING_ARRAY,
+}
+
+
+def _descriptor(parameter: parameters.Parameter) -> ParameterDescriptor:
+    unit = f" [{parameter.unit}]" if parameter.unit else ""
+    return ParameterDescriptor(
+        name=parameter.name,
+        description=parameter.meaning + unit,
+        additional_constraints=parameter.bounds,
+    )
+
+
+def _parameter_help(model: type[NodeParameters]) -> str:
+    lines = ["parameters:"]
+    for parameter in parameters.parameters_of(model):
+        unit = f" {parameter.unit}" if parameter.unit else ""
+        bounds = f"; {parameter.bounds}" if parameter.bounds else ""
+        lines.append(f"  {parameter.name}  (default {parameter.default}{unit}{bounds})")
+        lines.append(f"      {parameter.meaning}")
+    return "\n".join(lines)
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().split("\n", 1)[0].split(", at ", 1)[0]

@@ -1,0 +1,177 @@
+"""Plant node: integrates the stick-slip motion of the drive and publishes its state."""
+
+import sys
+import threading
+import time
+from math import isfinite
+from typing import Any
+
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
+
+from stickslip_ros.bags.messages import pack_joint_state, pack_wrench, unpack_header, unpack_wrench
+from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode, run_node
+from stickslip_ros.nodes.pacing import LockstepPacer, RealtimePacer
+from stickslip_ros.nodes.topics import (
+    APPLIED_DISTURBANCE,
+    CLOCK,
+    CONTROL_FORCE,
+    DISTURBANCE_FORCE,
+    JOINT_STATES,
+    RECORDED,
+)
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.sampled_loop import NANOSECONDS, Sample, SampledLoop
+from stickslip_ros.scenario.parameters import Pace, PlantParameters
+
+_LOCKSTEP_START = NANOSECONDS
+_HISTORY_SECONDS = 8.0
+
+
+class PlantNode(ManagedNode[PlantParameters]):
+    """Publishes joint_states and takes control_force; one sampled loop, driven by a pacer."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("plant", PlantParameters, **options)
+
+    def connect(self) -> None:
+        """Compile the motion; publish the state, listen to forces and to the recorder."""
+        initial = self.parameters.initial
+        self._motion = Motion(self.parameters.as_drive(), initial.position, initial.velocity)
+        self._next_start = _LOCKSTEP_START
+        self._lock = threading.Lock()
+        depth = max(
+            2 * self.parameters.flow_window, round(_HISTORY_SECONDS * self.parameters.rate)
+        )
+        self._state = self.advertise(JOINT_STATES, min(depth, 100_000))
+        self._applied = self.advertise(APPLIED_DISTURBANCE)
+        self._clock_time = self.advertise(CLOCK) if self.parameters.publish_clock else None
+        self.subscribe(CONTROL_FORCE, self._on_force)
+        self.subscribe(DISTURBANCE_FORCE, self._on_disturbance)
+        self.subscribe(RECORDED, self._on_recorded)
+        self._connections.append(self.create_service(Trigger, "~/reset", self._on_reset))
+
+    def start(self) -> None:
+        """Begin a segment: sample 0 now, further ones as the pacer lets them come."""
+        parameters = self.parameters
+        realtime = parameters.pace is Pace.REALTIME
+        self._loop = SampledLoop(
+            self._motion,
+            parameters.rate,
+            time.time_ns() if realtime else self._next_start,
+            force_delay=parameters.force_delay,
+            force_timeout=parameters.force_timeout,
+            hold_late=realtime,
+            expects_control=parameters.expects_control,
+            disturbance=parameters.as_disturbance(),
+        )
+        self._disturbance = 0.0
+        if realtime:
+            self._pacer = RealtimePacer(
+                self._loop,
+                self._publish,
+                self._end,
+                self._lock,
+                parameters.real_time_factor,
+                self.call_soon,
+            )
+        else:
+            self._pacer = LockstepPacer(self._loop, self._publish, self._end, self)
+        self._pacer.start(parameters.last_sample)
+
+    def stop(self) -> None:
+        """Pause the motion, once the states sent have arrived."""
+        self._pacer.stop()
+        self._next_start = self._loop.stamp(self._loop.sample.number + 1)
+        self.wait_for_delivery(self._state)
+
+    def apply_parameters(self) -> None:
+        """Go on with the new drive and disturbance from the next sample on."""
+        if self.active:
+            with self._lock:
+                self._loop.change_drive(self.parameters.as_drive())
+                self._loop.scenario_disturbance = self.parameters.as_disturbance()
+        elif self._connections:
+            self._motion.drive = self.parameters.as_drive()
+
+    def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
+        """Return counts of samples, late and dropped forces and missed deadlines."""
+        if not hasattr(self, "_loop"):
+            return OK, "", {}
+        loop, pacer = self._loop, self._pacer
+        figures = {
+            "samples": loop.sample.number + 1,
+            "late_forces": loop.late_forces,
+            "missed_deadlines": pacer.missed_deadlines,
+            "steps_per_second": round(pacer.steps_per_second, 1),
+            **{f"dropped: {reason}": count for reason, count in loop.dropped.items()},
+        }
+        if loop.unbounded:
+            return ERROR, "the motion runs away (regime unbounded)", figures
+        if pacer.complaint or loop.dropped:
+            return WARN, pacer.complaint or "forces were dropped", figures
+        return OK, "", figures
+
+    def _publish(self, sample: Sample) -> None:
+        friction = sample.friction_force
+        self._state.publish(
+            pack_joint_state(
+                sample.stamp,
+                (sample.position, sample.belt_position),
+                (sample.velocity, sample.belt_velocity),
+                (friction, -friction),
+            )
+        )
+        if self._loop.disturbance != self._disturbance:
+            self._disturbance = self._loop.disturbance
+            self._applied.publish(pack_wrench(sample.stamp, self._disturbance))
+        if self._clock_time is not None:
+            clock = Clock()
+            clock.clock.sec, clock.clock.nanosec = divmod(sample.stamp, NANOSECONDS)
+            self._clock_time.publish(clock)
+
+    def _end(self) -> None:
+        """Pause by itself: the last sample was reached or the motion runs away."""
+        if self._loop.unbounded:
+            self.get_logger().error("the motion runs away (regime unbounded): plant deactivated")
+        if self.active:
+            self.trigger_deactivate()
+
+    def _on_force(self, message: bytes) -> None:
+        if not self.active:
+            return
+        stamp, force = unpack_wrench(message)
+        with self._lock:
+            self._loop.offer(stamp, force)
+        self._pacer.force_came()
+
+    def _on_disturbance(self, message: bytes) -> None:
+        _, force = unpack_wrench(message)
+        if not self.active or not isfinite(force):
+            self.get_logger().warning(f"disturbance force {force} N dropped")
+            return
+        with self._lock:
+            self._loop.disturb(force)
+
+    def _on_recorded(self, message: bytes) -> None:
+        if self.active:
+            self._pacer.recorder_came_to(unpack_header(message))
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        initial = self.parameters.initial
+        if self.active:
+            with self._lock:
+                self._loop.reset(initial.position, initial.velocity)
+        elif self._connections:
+            self._motion.restart(initial.position, initial.velocity)
+        response.success = True
+        return response
+
+
+def main() -> None:
+    """Run the node as a process."""
+    sys.exit(run_node(PlantNode, PlantParameters))
+
+
+if __name__ == "__main__":
+    main()

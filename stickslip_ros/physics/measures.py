@@ -1,0 +1,254 @@
+"""The cycle measures: amplitude, stick fraction, period and regime of a motion, from its knots."""
+
+from collections import deque
+from dataclasses import asdict, dataclass, replace
+from enum import StrEnum
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from stickslip_ros.physics.knots import Knots
+
+EQUILIBRIUM_SPEED = 1e-3
+"""Speed amplitude, in belt speeds, below which the slide counts as resting in equilibrium."""
+
+UNBOUNDED_BELT_SPEEDS = 1e3
+"""Speed of the slide, in belt speeds, beyond which a sampled motion is said to run away."""
+
+_STALE_PERIODS = 3.0
+"""A motion without a turn for so many of its last periods has stopped cycling."""
+
+
+class Regime(StrEnum):
+    """What kind of motion it is."""
+
+    STICK_SLIP = "stick_slip"
+    PURE_SLIP = "pure_slip"
+    EQUILIBRIUM = "equilibrium"
+    STUCK = "stuck"
+    UNBOUNDED = "unbounded"
+
+
+class Cycle(NamedTuple):
+    """One cycle, from one upward zero crossing of the velocity to the next; SI units."""
+
+    amplitude: float
+    velocity_amplitude: float
+    midpoint: float
+    period: float
+    frequency: float
+    stick_fraction: float
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Means of the last whole cycles; null (None) is what does not exist.
+
+    In equilibrium, stuck and unbounded there is no period and no frequency. While no cycle has
+    been completed and the motion has not come to rest either, the regime too is null.
+    """
+
+    amplitude: float | None
+    """Half the peak-to-peak displacement, m."""
+    velocity_amplitude: float | None
+    """Half the peak-to-peak velocity, m/s."""
+    midpoint: float | None
+    """Middle of the displacement, m."""
+    period: float | None
+    """s"""
+    frequency: float | None
+    """Hz"""
+    stick_fraction: float | None
+    """Stick time over time."""
+    cycles: int
+    """How many cycles the means are over."""
+    regime: Regime | None
+
+    def as_dict(self) -> dict[str, float | int | str | None]:
+        """Return the measures by their names, ready for JSON."""
+        return asdict(self)
+
+
+@dataclass
+class _Stretch:
+    """Ends, extremes and stick time of a stretch of motion that goes on."""
+
+    start: float
+    end: float
+    lowest: float
+    highest: float
+    slowest: float
+    fastest: float
+    stick_time: float = 0.0
+
+    @classmethod
+    def from_knot(cls, knots: Knots, row: int) -> Self:
+        time, position, velocity = (
+            float(column[row]) for column in (knots.time, knots.position, knots.velocity)
+        )
+        return cls(time, time, position, position, velocity, velocity)
+
+    def extend(self, knots: Knots, first: int, last: int) -> None:
+        """Go on to the knot `last`, the one before `first` being the end so far."""
+        if last < first:
+            return
+        rows = slice(first, last + 1)
+        self.end = float(knots.time[last])
+        self.lowest = min(self.lowest, float(knots.position[rows].min()))
+        self.highest = max(self.highest, float(knots.position[rows].max()))
+        self.slowest = min(self.slowest, float(knots.velocity[rows].min()))
+        self.fastest = max(self.fastest, float(knots.velocity[rows].max()))
+        durations = np.diff(knots.time[first - 1 : last + 1])
+        self.stick_time += float(durations[knots.sticking[rows]].sum())
+
+    @property
+    def duration(self) -> float:
+        return self.end - self.start
+
+    def as_cycle(self) -> Cycle:
+        return Cycle(
+            amplitude=(self.highest - self.lowest) / 2.0,
+            velocity_amplitude=(self.fastest - self.slowest) / 2.0,
+            midpoint=(self.highest + self.lowest) / 2.0,
+            period=self.duration,
+            frequency=1.0 / self.duration,
+            stick_fraction=self.stick_time / self.duration,
+        )
+
+
+class CycleMeter:
+    """Measures a motion as it comes, in blocks of knots of any length, in constant memory."""
+
+    def __init__(self, window: int) -> None:
+        """Average over the last `window` cycles at most."""
+        self._cycles: deque[Cycle] = deque(maxlen=window)
+        self._belt_speed = 0.0
+        self._unbounded = False
+        self.interrupt()
+
+    def interrupt(self) -> None:
+        """Drop the cycle under way: the next knot does not continue the motion so far."""
+        self._last = Knots.empty()
+        self._direction = 0.0
+        self._open: _Stretch | None = None
+        self._whole = False
+        self._recent: list[_Stretch] = []
+        self._sticking_since: float | None = None
+
+    def report_run_away(self) -> None:
+        """Say that the motion has left all bounds."""
+        self._unbounded = True
+
+    def feed(self, knots: Knots, belt_speed: float) -> list[Cycle]:
+        """Take the knots that follow, the belt moving at `belt_speed` (m/s).
+
+        Return the cycles that were completed by them.
+        """
+        if len(knots) == 0:
+            return []
+        self._belt_speed = belt_speed
+        first = len(self._last)
+        knots = Knots.concatenate(self._last, knots)
+        if self._open is None:
+            self._open = _Stretch.from_knot(knots, 0)
+            first = 1
+        completed: list[Cycle] = []
+        for edge in self._upward_crossings(knots):
+            self._open.extend(knots, first, edge)
+            if self._whole and self._open.duration > 0.0:
+                completed.append(self._open.as_cycle())
+            self._open = _Stretch.from_knot(knots, edge)
+            self._whole = True
+            self._recent = []
+            first = edge + 1
+        self._open.extend(knots, first, len(knots) - 1)
+        self._follow_recent(knots, first)
+        self._follow_sticking(knots)
+        self._last = knots[len(knots) - 1 :]
+        self._cycles.extend(completed)
+        return completed
+
+    def measures(self) -> Measures:
+        """Return the means over the last whole cycles."""
+        if self._unbounded:
+            return _without_cycles(None, Regime.UNBOUNDED)
+        period = self._cycles[-1].period if self._cycles else 0.0
+        now = self._open.end if self._open else 0.0
+        if self._belt_speed == 0.0 and self._sticking_since is not None:
+            if now - self._sticking_since >= period:
+                return _without_cycles(self._recent_motion(), Regime.STUCK)
+        since_turn = self._open.duration if self._open else 0.0
+        if not self._cycles or since_turn > _STALE_PERIODS * period:
+            recent = self._recent_motion()
+            if recent is None or recent.velocity_amplitude >= self._equilibrium_speed:
+                return _without_cycles(None, None)
+            return _without_cycles(recent, Regime.EQUILIBRIUM)
+        mean = Cycle(*np.mean(self._cycles, axis=0).tolist())
+        if mean.velocity_amplitude < self._equilibrium_speed:
+            return _without_cycles(mean, Regime.EQUILIBRIUM, len(self._cycles))
+        regime = Regime.STICK_SLIP if mean.stick_fraction > 0.0 else Regime.PURE_SLIP
+        return Measures(**mean._asdict(), cycles=len(self._cycles), regime=regime)
+
+    @property
+    def _equilibrium_speed(self) -> float:
+        return EQUILIBRIUM_SPEED * abs(self._belt_speed)
+
+    def _upward_crossings(self, knots: Knots) -> list[int]:
+        """Return the knots at which the velocity goes from negative to positive."""
+        moving = np.flatnonzero(knots.velocity != 0.0)
+        if len(moving) == 0:
+            return []
+        directions = np.concatenate([[self._direction], np.sign(knots.velocity[moving])])
+        self._direction = float(directions[-1])
+        rising = moving[(directions[:-1] < 0.0) & (directions[1:] > 0.0)]
+        before = np.maximum(rising - 1, 0)
+        speed = np.abs(knots.velocity)
+        return np.where(speed[before] <= speed[rising], before, rising).tolist()
+
+    def _follow_recent(self, knots: Knots, first: int) -> None:
+        """Keep the extremes of the last half, at least, of the stretch since the last crossing."""
+        assert self._open is not None
+        if not self._recent:
+            self._recent = [_Stretch.from_knot(knots, first - 1)]
+        current = self._recent[-1]
+        current.extend(knots, first, len(knots) - 1)
+        if current.duration > 0.0 and current.duration >= current.start - self._open.start:
+            self._recent = [current, _Stretch.from_knot(knots, len(knots) - 1)]
+
+    def _recent_motion(self) -> Cycle | None:
+        """Return the latest part of a stretch without crossings, as if it were a cycle."""
+        if not self._recent or self._recent[0].duration <= 0.0:
+            return None
+        merged = replace(self._recent[0])
+        for part in self._recent[1:]:
+            merged.end = part.end
+            merged.lowest = min(merged.lowest, part.lowest)
+            merged.highest = max(merged.highest, part.highest)
+            merged.slowest = min(merged.slowest, part.slowest)
+            merged.fastest = max(merged.fastest, part.fastest)
+            merged.stick_time += part.stick_time
+        return merged.as_cycle()
+
+    def _follow_sticking(self, knots: Knots) -> None:
+        slipping = np.flatnonzero(~knots.sticking[1:])
+        if len(knots) > 1 and not knots.sticking[-1]:
+            self._sticking_since = None
+        elif len(slipping) > 0 or self._sticking_since is None:
+            row = int(slipping[-1]) + 1 if len(slipping) > 0 else 0
+            self._sticking_since = float(knots.time[row]) if len(knots) > 1 else None
+
+
+def _without_cycles(motion: Cycle | None, regime: Regime | None, cycles: int = 0) -> Measures:
+    """Return the measures of a motion that has no period."""
+    if motion is None:
+        return Measures(None, None, None, None, None, None, cycles, regime)
+    return Measures(
+        amplitude=motion.amplitude,
+        velocity_amplitude=motion.velocity_amplitude,
+        midpoint=motion.midpoint,
+        period=None,
+        frequency=None,
+        stick_fraction=motion.stick_fraction,
+        cycles=cycles,
+        regime=regime,
+    )

@@ -1,0 +1,305 @@
+"""The exact stick-slip motion of a drive under a held force, or under continuous control."""
+
+from collections.abc import Callable
+from math import copysign, ulp
+
+import heyoka as hy
+import numpy as np
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.equations import Equations, WashoutGains
+from stickslip_ros.physics.knots import Knots
+
+UNBOUNDED_SPEED = 1e3
+"""Dimensionless speed of the slide beyond which the motion is said to run away."""
+
+_BELT_SPEED_REACHED, _RUN_AWAY = 0, 1
+"""The terminal events of the slipping motion, in heyoka's numbering."""
+
+_NO_GAINS = WashoutGains(1.0, 0.0, 0.0)
+
+
+class Motion:
+    """A drive in motion: stick, slip and the passages between them, to machine precision.
+
+    Slipping is integrated by heyoka's adaptive Taylor method, which finds the instant at which the
+    slide reaches the belt's speed. There it sticks if friction can hold it, |h| <= mu_s N with the
+    reaction h = k x + c v_belt - u, and otherwise passes through or slips the other way. Sticking
+    is motion with the belt until the reaction exceeds that limit.
+
+    All quantities in and out are SI; drive, force and gains may be changed between calls of
+    `advance` and act from then on.
+    """
+
+    def __init__(
+        self,
+        drive: Drive,
+        position: float,
+        velocity: float,
+        *,
+        continuous_control: bool = False,
+        record: bool = False,
+    ) -> None:
+        """Start at `position` (m) and `velocity` (m/s) with no force.
+
+        With `continuous_control` the force is that of the washout controller acting without
+        sampling (eq. 19), its filter at rest; set `gains`. With `record` the knots of the motion
+        are kept for `take_knots`.
+        """
+        self.unbounded = False
+        """Whether the motion has run away; it does not advance any further then."""
+        self._recorded: list[tuple[float, float, float, bool]] | None = [] if record else None
+        self._marks: list[tuple[float, float, float]] = []
+        self._continuous_control = continuous_control
+        self._gains = _NO_GAINS
+        self._force = 0.0
+        self._time = 0.0
+        self._x = self._y = self._w = 0.0
+        self._drive = drive
+        self._compile()
+        self.restart(position, velocity)
+
+    def restart(self, position: float, velocity: float) -> None:
+        """Put the slide at `position` (m) and `velocity` (m/s); force and gains stay."""
+        drive = self._drive
+        self.unbounded = False
+        self._x, self._y = position / drive.length_scale, velocity / drive.speed_scale
+        self._w = self._y / self._gains.corner_frequency
+        self._settle()
+        self._append_knot(0.0, self._x, self._y, sticking=False)
+
+    @property
+    def drive(self) -> Drive:
+        """The drive; a new one keeps the slide's position and velocity."""
+        return self._drive
+
+    @drive.setter
+    def drive(self, drive: Drive) -> None:
+        old, force = self._drive, self.force
+        position, velocity = self.position, self.velocity
+        self._drive = drive
+        if type(drive.friction) is not type(old.friction):
+            self._compile()
+        if drive.speed_scale != old.speed_scale or drive.length_scale != old.length_scale:
+            self._x, self._y = position / drive.length_scale, velocity / drive.speed_scale
+        self._set_parameters()
+        self.force = force
+        self._settle()
+
+    @property
+    def force(self) -> float:
+        """Control and disturbance force on the slide, N, held until it is set again."""
+        return self._force * self._drive.normal_force
+
+    @force.setter
+    def force(self, force: float) -> None:
+        self._force = force / self._drive.normal_force
+        self._set_parameter("force", self._force)
+
+    def set_gains(self, corner_frequency: float, linear: float, cubic: float) -> None:
+        """Set the continuous controller: d (rad/s), k1 (N s/m), k2 (N s^3/m^3), eq. 17 and 18.
+
+        The filter's output goes on without a jump when d changes.
+        """
+        drive = self._drive
+        filter_output = self._gains.filtered(self._y, self._w)
+        self._gains = WashoutGains(
+            corner_frequency / drive.angular_frequency,
+            linear * drive.speed_scale / drive.normal_force,
+            cubic * drive.speed_scale**3 / drive.normal_force,
+        )
+        self._w = (self._y - filter_output) / self._gains.corner_frequency
+        self._set_parameters()
+
+    @property
+    def position(self) -> float:
+        """Displacement of the slide, m."""
+        return self._x * self._drive.length_scale
+
+    @property
+    def velocity(self) -> float:
+        """Velocity of the slide, m/s; exactly the belt's while it sticks."""
+        if self.sticking:
+            return self._drive.belt_speed
+        return self._y * self._drive.speed_scale
+
+    @property
+    def sticking(self) -> bool:
+        """Whether the slide rode the belt at the end of the last advance."""
+        return self._sign == 0.0
+
+    @property
+    def friction_force(self) -> float:
+        """Friction force on the slide, N, under the force held up to now."""
+        if self.sticking:
+            return self._reaction() * self._drive.normal_force
+        relative_speed = (self._y - self._belt_speed) * self._drive.speed_scale
+        coefficient = self._drive.friction.coefficient(relative_speed, self._sign)
+        return float(coefficient) * self._drive.normal_force
+
+    def advance(self, duration: float) -> None:
+        """Integrate over `duration` (s), the force held; stop early if the motion runs away."""
+        if self.unbounded:
+            return
+        end = duration * self._drive.angular_frequency
+        now = 0.0
+        self._settle()
+        while now < end and not self.unbounded:
+            now = self._stick(now, end) if self.sticking else self._slip(now, end)
+        self._time += duration
+
+    def take_knots(self) -> Knots:
+        """Return the knots recorded since the last call."""
+        if not self._recorded:
+            return Knots.empty()
+        time, x, y, sticking = zip(*self._recorded, strict=True)
+        self._recorded.clear()
+        return Knots(
+            np.array(time),
+            np.array(x) * self._drive.length_scale,
+            np.array(y) * self._drive.speed_scale,
+            np.array(sticking),
+        )
+
+    def _reaction(self) -> float:
+        """Return h = X + 2 beta X' - U, dimensionless."""
+        force = self._force
+        if self._continuous_control:
+            force = self._gains.force(self._gains.filtered(self._y, self._w))
+        return self._x + self._damping * self._y - force
+
+    def _settle(self) -> None:
+        """Decide from speed and reaction whether the slide sticks, or which way it slips."""
+        relative_speed = self._y - self._belt_speed
+        if relative_speed != 0.0:
+            self._sign = copysign(1.0, relative_speed)
+            self.unbounded = abs(self._y) > UNBOUNDED_SPEED
+            return
+        reaction = self._reaction()
+        if abs(reaction) <= self._static:
+            self._sign = 0.0
+        else:
+            self._break_away(reaction)
+
+    def _break_away(self, reaction: float) -> None:
+        """Slip from the belt's speed against the reaction.
+
+        The reaction is put some rounding errors beyond the limit, so that the slide does
+        accelerate off the belt's speed and does not land at the instant it leaves.
+        """
+        self._sign = -copysign(1.0, reaction)
+        margin = 8.0 * ulp(abs(self._x) + abs(reaction) + abs(self._force) + self._static)
+        if abs(reaction) < self._static + margin:
+            self._x += copysign(margin, reaction)
+
+    def _stick(self, now: float, end: float) -> float:
+        """Ride the belt until the reaction exceeds its limit, or to `end`; return the time."""
+        breaks, now = self._propagate(self._sticking, now, end)
+        self._y = self._belt_speed
+        self._append_knot(now, self._x, self._y, sticking=True)
+        if breaks is not None:
+            self._break_away(self._reaction())
+        return now
+
+    def _slip(self, now: float, end: float) -> float:
+        """Slip until the belt's speed is reached, or to `end`; return the time."""
+        self._slipping.pars[self._equations.index["sign"]] = self._sign
+        event, now = self._propagate(self._slipping, now, end)
+        if event == _BELT_SPEED_REACHED:
+            self._y = self._belt_speed
+        for instant, x, y in self._marks:
+            self._append_knot(instant, x, y, sticking=False)
+        self._marks.clear()
+        self._append_knot(now, self._x, self._y, sticking=False)
+        if event == _BELT_SPEED_REACHED:
+            self._settle()
+        elif event is not None:
+            self.unbounded = True
+        return now
+
+    def _propagate(
+        self, integrator: hy.taylor_adaptive, now: float, end: float
+    ) -> tuple[int | None, float]:
+        """Integrate the state from `now` to `end`; return what event ended it, and when."""
+        state = integrator.state
+        state[0], state[1] = self._x, self._y
+        if self._continuous_control:
+            state[2] = self._w
+        integrator.time = now
+        integrator.reset_cooldowns()
+        outcome = integrator.propagate_until(end)[0]
+        self._x, self._y = float(state[0]), float(state[1])
+        if self._continuous_control:
+            self._w = float(state[2])
+        if outcome == hy.taylor_outcome.time_limit:
+            return None, end
+        if outcome == hy.taylor_outcome.err_nf_state:
+            return _RUN_AWAY, now
+        return -int(outcome) - 1, float(integrator.time)
+
+    def _append_knot(self, now: float, x: float, y: float, *, sticking: bool) -> None:
+        if self._recorded is not None:
+            time = self._time + now / self._drive.angular_frequency
+            self._recorded.append((time, x, y, sticking))
+
+    def _compile(self) -> None:
+        equations = Equations(type(self._drive.friction), self._continuous_control)
+        initial = [0.0] * len(equations.slip)
+        falling = hy.event_direction.negative
+        runs_away = UNBOUNDED_SPEED**2 - equations.slip[0][1] ** 2
+        markers = []
+        if self._recorded is not None:
+            markers = [
+                hy.nt_event(equations.slip[0][1], callback=_marker(self._marks, turning=True)),
+                hy.nt_event(equations.acceleration, callback=_marker(self._marks)),
+            ]
+        self._equations = equations
+        self._slipping = hy.taylor_adaptive(
+            equations.slip,
+            initial,
+            t_events=[
+                hy.t_event(equations.sign * equations.relative_speed, direction=falling),
+                hy.t_event(runs_away, direction=falling),
+            ],
+            nt_events=markers,
+        )
+        self._sticking = hy.taylor_adaptive(
+            equations.stick,
+            initial,
+            t_events=[
+                hy.t_event(equations.static - equations.reaction, direction=falling),
+                hy.t_event(equations.static + equations.reaction, direction=falling),
+            ],
+        )
+        self._set_parameters()
+
+    def _set_parameters(self) -> None:
+        values = self._equations.parameters(self._drive)
+        self._belt_speed = values["belt_speed"]
+        self._damping = values["damping"]
+        self._static = values["static"]
+        values |= {"force": self._force, **vars(self._gains)}
+        for name, value in values.items():
+            self._set_parameter(name, value)
+
+    def _set_parameter(self, name: str, value: float) -> None:
+        index = self._equations.index[name]
+        for parameters in (self._slipping.pars, self._sticking.pars):
+            if index < len(parameters):  # heyoka keeps those up to the last one an equation uses
+                parameters[index] = value
+
+
+def _marker(
+    marks: list[tuple[float, float, float]], *, turning: bool = False
+) -> Callable[[hy.taylor_adaptive, float, int], None]:
+    """Return a callback that notes the state at an event; at a turning point Y is zero.
+
+    A plain function, not a method: heyoka copies its callbacks, and with a method its object.
+    """
+
+    def mark(integrator: hy.taylor_adaptive, now: float, _: int) -> None:
+        integrator.update_d_output(now)
+        x, y = integrator.d_output[:2].tolist()
+        marks.append((now, x, 0.0 if turning else y))
+
+    return mark

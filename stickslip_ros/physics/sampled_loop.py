@@ -1,0 +1,205 @@
+"""The sampled loop: samples out, forces in, with hold, delay and time-outs, as a state machine.
+
+It knows no clock and no messages: whoever drives it decides when to advance. The plant node and
+`simulate` run this same loop.
+"""
+
+from collections import Counter, deque
+from enum import StrEnum
+from fractions import Fraction
+from math import floor, isfinite
+from typing import NamedTuple
+
+from stickslip_ros.physics.disturbance import Disturbance
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.motion import Motion
+
+NANOSECONDS = 1_000_000_000
+
+
+class Sample(NamedTuple):
+    """State of the drive at a sample instant, SI units."""
+
+    number: int
+    stamp: int
+    """ns"""
+    position: float
+    velocity: float
+    friction_force: float
+    """On the slide, under the force held up to this instant, N."""
+    belt_position: float
+    belt_velocity: float
+
+
+class Verdict(StrEnum):
+    """What became of a force that was offered."""
+
+    ACCEPTED = "accepted"
+    NOT_FINITE = "not finite"
+    NO_STAMP = "zero stamp"
+    UNKNOWN_STAMP = "stamp of no sample"
+    ANSWERED = "already answered stamp"
+    TOO_LATE = "answers a sample that has passed"
+
+
+class SampledLoop:
+    """A motion that is sampled at a fixed rate and driven by forces that answer the samples.
+
+    Force n, the answer to sample n, acts from n T + delay to (n + 1) T + delay, T = 1/rate.
+    Where it is missing when the loop advances, the newest one is held on if `hold_late` is set
+    (as in real time) and not older than `force_timeout`; otherwise there is no force.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        rate: float,
+        start: int,
+        *,
+        force_delay: float = 0.0,
+        force_timeout: float = float("inf"),
+        hold_late: bool = False,
+        expects_control: bool = True,
+        disturbance: Disturbance | None = None,
+    ) -> None:
+        """Take sample 0 of `motion` at the stamp `start` (ns); rate in Hz, times in s."""
+        self.period = 1.0 / rate
+        """T, s."""
+        self.late_forces = 0
+        """Samples whose force had not come when it was due."""
+        self.dropped: Counter[Verdict] = Counter()
+        """Forces refused, by reason."""
+        self.controller_present = expects_control
+        """Whether an answer to the present sample may be hoped for: one came since the last gap."""
+        self._motion = motion
+        self._start = start
+        self._stamp_step = Fraction(NANOSECONDS) / Fraction(rate)
+        self._whole_delay, self._split = _whole_and_rest(force_delay / self.period)
+        self._force_timeout = force_timeout
+        self._hold_late = hold_late
+        self._expects_control = expects_control
+        self._slots = deque([0.0] * (self._whole_delay + 2), maxlen=self._whole_delay + 2)
+        self._newest: tuple[int, float] = (-1, 0.0)
+        self.scenario_disturbance = disturbance or Disturbance()
+        """Disturbance of the scenario; a new one acts from the next sample on."""
+        self._asked_disturbance = 0.0
+        self.disturbance = self._disturbance_at(0)
+        """Disturbance force that acts from the present sample to the next, N."""
+        self._next_drive: Drive | None = None
+        self._next_start: tuple[float, float] | None = None
+        self.sample = self._take_sample(0, 0.0)
+        """The present sample."""
+
+    @property
+    def answered(self) -> bool:
+        """Whether the force for the present sample has come."""
+        return self._newest[0] == self.sample.number
+
+    @property
+    def unbounded(self) -> bool:
+        """Whether the motion has run away."""
+        return self._motion.unbounded
+
+    def stamp(self, number: int) -> int:
+        """Return the stamp (ns) of sample `number`."""
+        return self._start + round(number * self._stamp_step)
+
+    def offer(self, stamp: int, force: float) -> Verdict:
+        """Take `force` (N) as the answer to the sample of that stamp (ns), if it is one."""
+        verdict = self._judge(stamp, force)
+        if verdict is Verdict.ACCEPTED:
+            self._newest = (self.number(stamp), force)
+        else:
+            self.dropped[verdict] += 1
+        if verdict in (Verdict.ACCEPTED, Verdict.TOO_LATE):
+            self.controller_present = self._expects_control
+        return verdict
+
+    def disturb(self, force: float) -> None:
+        """Add a disturbance of `force` (N) from the next sample on, until it is set again."""
+        self._asked_disturbance = force
+
+    def change_drive(self, drive: Drive) -> None:
+        """Go on with this drive from the next sample on."""
+        self._next_drive = drive
+
+    def reset(self, position: float, velocity: float) -> None:
+        """Put the slide at `position` (m) and `velocity` (m/s) at the next sample."""
+        self._next_start = (position, velocity)
+
+    def advance(self) -> Sample:
+        """Move on to the next sample with the forces that have come, and return it."""
+        self._slots.append(self._force_of_present_sample())
+        motion = self._motion
+        if self._split > 0.0:
+            motion.force = self._slots[0] + self.disturbance
+            motion.advance(self._split * self.period)
+        motion.force = self._slots[1] + self.disturbance
+        motion.advance((1.0 - self._split) * self.period)
+        belt_position = self.sample.belt_position + motion.drive.belt_speed * self.period
+        self.sample = self._take_sample(self.sample.number + 1, belt_position)
+        return self.sample
+
+    def _take_sample(self, number: int, belt_position: float) -> Sample:
+        motion = self._motion
+        friction_force = motion.friction_force
+        if self._next_drive is not None:
+            motion.drive, self._next_drive = self._next_drive, None
+        if self._next_start is not None:
+            start, self._next_start = self._next_start, None
+            motion.restart(*start)
+        self.disturbance = self._disturbance_at(number)
+        return Sample(
+            number=number,
+            stamp=self.stamp(number),
+            position=motion.position,
+            velocity=motion.velocity,
+            friction_force=friction_force,
+            belt_position=belt_position,
+            belt_velocity=motion.drive.belt_speed,
+        )
+
+    def _disturbance_at(self, number: int) -> float:
+        scenario = self.scenario_disturbance.force(number * self.period, self.period)
+        return scenario + self._asked_disturbance
+
+    def _force_of_present_sample(self) -> float:
+        number, force = self._newest
+        present = self.sample.number
+        if number == present:
+            return force
+        if self._expects_control:
+            self.late_forces += 1
+        if not self._hold_late:
+            self.controller_present = False
+            return 0.0
+        age = (present - number) * self.period
+        return force if number >= 0 and age <= self._force_timeout else 0.0
+
+    def _judge(self, stamp: int, force: float) -> Verdict:
+        if not isfinite(force):
+            return Verdict.NOT_FINITE
+        if stamp == 0:
+            return Verdict.NO_STAMP
+        number = self.number(stamp)
+        if not 0 <= number <= self.sample.number or self.stamp(number) != stamp:
+            return Verdict.UNKNOWN_STAMP
+        if number <= self._newest[0]:
+            return Verdict.ANSWERED
+        if number < self.sample.number and not self._hold_late:
+            return Verdict.TOO_LATE
+        return Verdict.ACCEPTED
+
+    def number(self, stamp: int) -> int:
+        """Return the number of the sample whose stamp is nearest."""
+        if stamp == self.sample.stamp:
+            return self.sample.number
+        return round((stamp - self._start) / self._stamp_step)
+
+
+def _whole_and_rest(delay: float) -> tuple[int, float]:
+    """Split a delay in periods; what is whole but for rounding counts as whole."""
+    whole = round(delay)
+    if abs(delay - whole) < 1e-9:
+        return whole, 0.0
+    return floor(delay), delay - floor(delay)

@@ -1,0 +1,65 @@
+"""The washout control law, for measurements that come at instants and are held in between."""
+
+from dataclasses import dataclass
+from math import expm1
+
+from stickslip_ros.physics.equations import WashoutGains
+
+
+@dataclass(frozen=True)
+class WashoutParameters:
+    """Constants of the law in SI units, eq. 17 and 18."""
+
+    corner_frequency: float
+    """Corner frequency d of the filter, rad/s."""
+    linear_gain: float
+    """k1, N s/m."""
+    cubic_gain: float
+    """k2, N s^3/m^3."""
+    force_limit: float = float("inf")
+    """Largest magnitude of the force, N."""
+    start_after: float = 0.0
+    """Time from the first measurement during which the force is zero, s."""
+
+    @property
+    def gains(self) -> WashoutGains:
+        """The corner frequency and the gains."""
+        return WashoutGains(self.corner_frequency, self.linear_gain, self.cubic_gain)
+
+
+class Washout:
+    """Washout filter and force, eq. 17 and 18, discretised exactly for a held measurement.
+
+    The filter w' = y - d w, v = y - d w is kept as z = d w, the low-passed speed, z' = d (y - z),
+    so that its output does not jump when the corner frequency is changed.
+    """
+
+    def __init__(self, parameters: WashoutParameters) -> None:
+        self.parameters = parameters
+        """May be replaced at any time; acts from the next measurement on."""
+        self._stamp: int | None = None
+        self._first_stamp = 0
+        self._velocity = 0.0
+        self._low_passed = 0.0
+
+    def answer(self, stamp: int, velocity: float) -> float | None:
+        """Return the force (N) for the slide's `velocity` (m/s) measured at `stamp` (ns).
+
+        The filter starts at rest on the first measurement, and again where time goes back. A
+        stamp that was answered already gets None.
+        """
+        parameters = self.parameters
+        if self._stamp is None or stamp < self._stamp:
+            self._first_stamp = stamp
+            self._low_passed = velocity
+        elif stamp == self._stamp:
+            return None
+        else:
+            exponent = -parameters.corner_frequency * ((stamp - self._stamp) * 1e-9)
+            self._low_passed -= expm1(exponent) * (self._velocity - self._low_passed)
+        self._stamp = stamp
+        self._velocity = velocity
+        if (stamp - self._first_stamp) * 1e-9 < parameters.start_after:
+            return 0.0
+        force = parameters.gains.force(velocity - self._low_passed)
+        return max(-parameters.force_limit, min(parameters.force_limit, force))

@@ -1,0 +1,212 @@
+"""Scenarios: ROS parameter files, found by name or path, with overrides."""
+
+import re
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from os import environ, pathsep
+from pathlib import Path
+from typing import Any, cast
+
+import yaml
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.scenario.parameters import (
+    NODE_PARAMETERS,
+    AnalyzerParameters,
+    NodeParameters,
+    PlantParameters,
+    WashoutControllerParameters,
+    parameters_of,
+)
+
+DEFAULT_NAMESPACE = "/feed_drive"
+
+_PARAMETERS_KEY = "ros__parameters"
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What one run is made of: the parameters of every node, and where they come from."""
+
+    name: str
+    overrides: tuple[str, ...]
+    plant: PlantParameters
+    washout_controller: WashoutControllerParameters
+    analyzer: AnalyzerParameters
+
+    def as_dict(self) -> dict[str, dict[str, Any]]:
+        """Return every node's parameters by node and flat name."""
+        return {node: parameters.flat() for node, parameters in self._nodes()}
+
+    def _nodes(self) -> Iterator[tuple[str, NodeParameters]]:
+        for node in NODE_PARAMETERS:
+            yield node, getattr(self, node)
+
+
+def parameter_file(values: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the text of a ROS parameter file with those values by node and flat name.
+
+    Empty lists are left out: a parameter file cannot say of what type they are.
+    """
+    sections = {
+        f"/**/{node}": {
+            _PARAMETERS_KEY: {name: value for name, value in parameters.items() if value != []}
+        }
+        for node, parameters in values.items()
+    }
+    return yaml.safe_dump(sections, sort_keys=False)
+
+
+def load_scenario(
+    name_or_path: str, overrides: Sequence[str] = (), namespace: str = DEFAULT_NAMESPACE
+) -> Scenario:
+    """Load the scenario of that name in config/, or of that path.
+
+    `overrides` are texts NODE.PARAMETER=VALUE, the value written as in the file. Sections apply to
+    the nodes in `namespace` as ROS applies them. Raises InvalidInputError for anything unknown,
+    ill-typed or out of bounds.
+    """
+    path = _find(name_or_path)
+    values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
+    for pattern, parameters in _sections(path):
+        _apply(values, path, pattern, parameters, namespace)
+    sources = {node: f"{path}, {node}" for node in NODE_PARAMETERS}
+    for node, parameters in values.items():
+        NODE_PARAMETERS[node].validated(parameters, sources[node])
+    for override in overrides:
+        node, parameter, value = _parse_override(override)
+        values[node][parameter] = value
+        sources[node] = f"{path} with -p {override}, {node}"
+    models: dict[str, Any] = {
+        node: NODE_PARAMETERS[node].validated(parameters, sources[node])
+        for node, parameters in values.items()
+    }
+    return Scenario(name=path.stem, overrides=tuple(overrides), **models)
+
+
+def config_directories() -> list[Path]:
+    """Return the existing directories in which scenarios are found by name."""
+    prefixes = [Path(entry) for entry in environ.get("AMENT_PREFIX_PATH", "").split(pathsep) if entry]
+    installed = [prefix / "share/stickslip_ros/config" for prefix in [*prefixes, Path(sys.prefix)]]
+    source_tree = Path(__file__).parents[2] / "config"
+    return [directory for directory in [source_tree, *installed] if directory.is_dir()]
+
+
+def _find(name_or_path: str) -> Path:
+    if "/" not in name_or_path and not name_or_path.endswith((".yaml", ".yml")):
+        for directory in config_directories():
+            path = directory / f"{name_or_path}.yaml"
+            if path.is_file():
+                return path
+        known = sorted({path.stem for d in config_directories() for path in d.glob("*.yaml")})
+        raise InvalidInputError(
+            f"unknown scenario {name_or_path!r}: known by name are {', '.join(known)}; "
+            "a file is given by its path ending in .yaml"
+        )
+    path = Path(name_or_path)
+    if not path.is_file():
+        raise InvalidInputError(f"no scenario file {name_or_path}")
+    return path
+
+
+class _RosLoader(yaml.SafeLoader):
+    """Reads scalars as rcl does, which takes 1e3 for a number and knows no dates."""
+
+
+_RosLoader.yaml_implicit_resolvers = {}
+_DIGITS = "0123456789"
+for _tag, _pattern, _first in (
+    ("bool", r"true|True|TRUE|false|False|FALSE|yes|Yes|YES|no|No|NO|on|On|ON|off|Off|OFF", "tTfFyYnNoO"),
+    ("int", r"[-+]?(0|[1-9][0-9]*|0[0-7]+|0x[0-9a-fA-F]+)", "-+" + _DIGITS),
+    ("float", r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)", "-+." + _DIGITS),
+    ("null", r"~|null|Null|NULL|", "~nN\0"),
+):  # fmt: skip
+    _RosLoader.add_implicit_resolver(
+        f"tag:yaml.org,2002:{_tag}", re.compile(f"^(?:{_pattern})$"), list(_first)
+    )
+
+
+def _parse_yaml(text: str, source: str) -> Any:
+    try:
+        return yaml.load(text, Loader=_RosLoader)  # noqa: S506 - derives from SafeLoader
+    except yaml.YAMLError as error:
+        reason = " ".join(str(error).split())
+        raise InvalidInputError(f"{source} is not YAML: {reason}") from None
+
+
+def _sections(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the node name pattern and the parameters, flat, of each section of the file."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidInputError(f"cannot read scenario {path}: {error}") from None
+    yield from _walk(_parse_yaml(text, str(path)), "", path)
+
+
+def _walk(tree: Any, name: str, path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    if not isinstance(tree, dict) or not tree:
+        raise InvalidInputError(
+            f"{path}: expected node names with {_PARAMETERS_KEY} below, found {tree!r:.60} "
+            f"at {name or 'the top'}"
+        )
+    for key, below in cast(dict[Any, Any], tree).items():
+        if key != _PARAMETERS_KEY:
+            yield from _walk(below, f"{name}/{str(key).strip('/')}", path)
+        elif isinstance(below, dict):
+            yield name, dict(_flatten(cast(dict[Any, Any], below)))
+        else:
+            raise InvalidInputError(f"{path}: {name}: {_PARAMETERS_KEY} must be names and values")
+
+
+def _flatten(values: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in values.items():
+        if isinstance(value, dict):
+            yield from _flatten(cast(dict[Any, Any], value), f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+def _apply(
+    values: dict[str, dict[str, Any]],
+    path: Path,
+    pattern: str,
+    parameters: Mapping[str, Any],
+    namespace: str,
+) -> None:
+    """Give the parameters of a section to every node that it matches."""
+    tokens = {"**": r"(/\w+)*", "*": r"/\w+"}
+    expression = "".join(tokens.get(t, "/" + re.escape(t)) for t in pattern.split("/")[1:])
+    nodes = [
+        node
+        for node in NODE_PARAMETERS
+        if re.fullmatch(expression, f"{namespace.rstrip('/')}/{node}")
+    ]
+    if not nodes:
+        raise InvalidInputError(
+            f"{path}: section {pattern} matches no node; in namespace {namespace} there are "
+            f"{', '.join(NODE_PARAMETERS)}"
+        )
+    for_all = len(nodes) > 1
+    for name, value in parameters.items():
+        takers = [n for n in nodes if not for_all or name in _names(n)]
+        if not takers:
+            raise InvalidInputError(f"{path}: section {pattern}: no node has a parameter {name}")
+        for node in takers:
+            values[node][name] = value
+
+
+def _names(node: str) -> set[str]:
+    return {parameter.name for parameter in parameters_of(NODE_PARAMETERS[node])}
+
+
+def _parse_override(override: str) -> tuple[str, str, Any]:
+    target, equals, text = override.partition("=")
+    node, _, parameter = target.partition(".")
+    if not equals or not parameter:
+        raise InvalidInputError(f"-p {override}: must be NODE.PARAMETER=VALUE")
+    if node not in NODE_PARAMETERS:
+        raise InvalidInputError(
+            f"-p {override}: unknown node {node}; known are {', '.join(NODE_PARAMETERS)}"
+        )
+    return node, parameter, _parse_yaml(text, f"-p {override}: the value")

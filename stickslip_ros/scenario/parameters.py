@@ -1,0 +1,353 @@
+"""The parameters of each node: name, unit, bounds, default and meaning stand here once.
+
+ROS declarations, scenario files, overrides, messages and the documentation derive from these
+models. A nested field `friction.static` is the ROS parameter of that name.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from math import isinf
+from typing import Any, Literal, Self, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic.fields import FieldInfo
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.disturbance import Disturbance, DisturbanceKind
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.friction import LAWS, FrictionLaw
+from stickslip_ros.physics.washout import WashoutParameters
+
+LawName = StrEnum("LawName", {name.upper(): name for name in LAWS})
+
+
+class Pace(StrEnum):
+    """What the plant waits for between samples: the clock, or the answer to the last one."""
+
+    REALTIME = "realtime"
+    LOCKSTEP = "lockstep"
+
+
+def _field(
+    default: Any, meaning: str, unit: str | None = None, *, fixed: bool = False, **bounds: Any
+) -> Any:
+    """Describe a parameter; `fixed` ones cannot be changed while the node is active."""
+    extra = {"unit": unit, "fixed": fixed}
+    return Field(default, description=meaning, json_schema_extra=extra, **bounds)
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True
+    )
+
+
+class Friction(_Model):
+    """Friction law and its coefficients; a law uses those that its formula names."""
+
+    law: LawName = _field(LawName("stribeck"), "Friction law.", strict=False)
+    static: float = _field(0.4, "Static (break-away) coefficient mu_s.", ge=0.0)
+    minimum: float = _field(0.25, "Smallest kinetic coefficient mu_m (stribeck).", ge=0.0)
+    minimum_speed: float = _field(
+        0.5, "Relative speed v_m of the smallest coefficient (stribeck).", "m/s", gt=0.0
+    )
+    slope: float = _field(0.45, "Fall of the coefficient with relative speed (linear).", "s/m")
+    kinetic: float = _field(0.25, "Kinetic coefficient mu_k (exponential).", ge=0.0)
+    decay_speed: float = _field(
+        0.5, "Speed v_s over which the static coefficient decays (exponential).", "m/s", gt=0.0
+    )
+    viscous: float = _field(0.0, "Rise of the coefficient with speed (exponential).", "s/m")
+
+    @model_validator(mode="after")
+    def _static_is_largest(self) -> Self:
+        """Refuse a kinetic coefficient of the law in use that is above the static one."""
+        lower = {LawName("stribeck"): "minimum", LawName("exponential"): "kinetic"}.get(self.law)
+        if lower is not None and getattr(self, lower) > self.static:
+            message = f"{lower} = {getattr(self, lower)} must not exceed static = {self.static}"
+            raise ValueError(message)
+        return self
+
+    def as_law(self) -> FrictionLaw:
+        """Return the friction law in SI units."""
+        law = LAWS[self.law]
+        return law(*[getattr(self, name) for name in law.constants()])
+
+
+class Initial(_Model):
+    """State of the slide at the first sample."""
+
+    position: float = _field(0.0, "Displacement of the slide at the start.", "m")
+    velocity: float = _field(0.0, "Velocity of the slide at the start.", "m/s")
+
+
+class DisturbanceParameters(_Model):
+    """A disturbance force on the slide that is part of the scenario."""
+
+    kind: DisturbanceKind = _field(
+        DisturbanceKind.NONE,
+        "Time course: none, step, impulse (one sample long) or sine.",
+        strict=False,
+    )
+    amplitude: float = _field(0.0, "Amplitude of the disturbance.", "N")
+    start: float = _field(0.0, "Simulated time at which it starts.", "s", ge=0.0)
+    duration: float = _field(
+        float("inf"), "How long it lasts.", "s", ge=0.0, allow_inf_nan=True
+    )
+    frequency: float = _field(1.0, "Frequency of the sine.", "Hz", gt=0.0)
+
+
+class NodeParameters(_Model):
+    """Parameters that every node has."""
+
+    autostart: bool = _field(True, "Configure and activate at start.", fixed=True)
+    wait_for: list[str] = _field(
+        [], "Nodes whose subscriptions and publishers must be there before activation.", fixed=True
+    )
+    use_sim_time: bool = _field(False, "Let ROS time follow /clock.")
+
+    @classmethod
+    def validated(cls, values: Mapping[str, Any], source: str) -> Self:
+        """Return the parameters given by their flat names, the rest at their defaults.
+
+        Raises InvalidInputError naming `source`, parameter, value and what is allowed.
+        """
+        known = {parameter.name for parameter in parameters_of(cls)}
+        for name, value in values.items():
+            if name not in known:
+                raise InvalidInputError(
+                    f"{source}: unknown parameter {name} = {value!r}; "
+                    f"known are {', '.join(sorted(known))}"
+                )
+        try:
+            return cls.model_validate(_nested(values))
+        except ValidationError as error:
+            raise InvalidInputError(f"{source}: {_explain(cls, error, values)}") from None
+
+    def flat(self) -> dict[str, Any]:
+        """Return the values by their flat names, as plain Python types."""
+        return dict(_flat(self.model_dump(mode="python")))
+
+
+class PlantParameters(NodeParameters):
+    """Parameters of the plant node."""
+
+    mass: float = _field(1.0, "Mass of the slide.", "kg", gt=0.0)
+    damping: float = _field(0.02, "Viscous damping of the transmission.", "N s/m", ge=0.0)
+    stiffness: float = _field(1.0, "Stiffness of the transmission.", "N/m", gt=0.0)
+    normal_force: float = _field(1.0, "Force pressing slide and belt together.", "N", gt=0.0)
+    belt_speed: float = _field(0.4, "Speed of the belt (feed speed), of either sign.", "m/s")
+    friction: Friction = Friction()
+    initial: Initial = Initial()
+    rate: float = _field(100.0, "Samples per second.", "Hz", fixed=True, gt=0.0, le=1e9)
+    pace: Pace = _field(
+        Pace.LOCKSTEP,
+        "Whether the plant keeps to the clock or waits for the answer to each sample.",
+        strict=False,
+        fixed=True,
+    )
+    real_time_factor: float = _field(
+        1.0, "Simulated over wall time in pace realtime.", fixed=True, gt=0.0
+    )
+    force_delay: float = _field(
+        0.0, "Delay from a sample to the start of its force.", "s", fixed=True, ge=0.0
+    )
+    force_timeout: float = _field(
+        0.1, "Age up to which a force is held on in pace realtime.", "s", fixed=True, ge=0.0
+    )
+    reply_timeout: float = _field(
+        10.0, "Wall time that lockstep waits for a force or a reader.", "s", fixed=True, gt=0.0
+    )
+    expects_control: bool = _field(True, "Whether a controller is to answer.", fixed=True)
+    flow_window: int = _field(
+        1000, "Samples by which lockstep may run ahead of the recorder.", "samples", fixed=True,
+        ge=200, le=100_000,
+    )  # fmt: skip
+    duration: float = _field(
+        float("inf"),
+        "Simulated time after which the plant pauses by itself.",
+        "s",
+        fixed=True,
+        ge=0.0,
+        allow_inf_nan=True,
+    )
+    publish_clock: bool = _field(False, "Publish simulated time on /clock.", fixed=True)
+    disturbance: DisturbanceParameters = DisturbanceParameters()
+
+    @model_validator(mode="after")
+    def _delay_is_bounded(self) -> Self:
+        """Refuse a delay that would keep more than a million forces waiting."""
+        if self.force_delay * self.rate > 1e6:
+            message = f"force_delay = {self.force_delay} s must not exceed 1e6 periods of rate"
+            raise ValueError(message)
+        return self
+
+    @property
+    def last_sample(self) -> int | None:
+        """Number of the sample with which the plant pauses by itself, if it does."""
+        return None if isinf(self.duration) else round(self.duration * self.rate)
+
+    def as_drive(self) -> Drive:
+        """Return the drive."""
+        return Drive(
+            mass=self.mass,
+            damping=self.damping,
+            stiffness=self.stiffness,
+            normal_force=self.normal_force,
+            belt_speed=self.belt_speed,
+            friction=self.friction.as_law(),
+        )
+
+    def as_disturbance(self) -> Disturbance:
+        """Return the disturbance of the scenario."""
+        return Disturbance(**dict(self.disturbance))
+
+
+class WashoutControllerParameters(NodeParameters):
+    """Parameters of the washout controller node."""
+
+    corner_frequency: float = _field(2.0, "Corner frequency d of the filter.", "rad/s", gt=0.0)
+    linear_gain: float = _field(-1.0, "Linear gain k1; negative takes energy out.", "N s/m")
+    cubic_gain: float = _field(-1.0, "Cubic gain k2.", "N s^3/m^3")
+    force_limit: float = _field(
+        float("inf"), "Largest magnitude of the force.", "N", ge=0.0, allow_inf_nan=True
+    )
+    start_after: float = _field(
+        0.0, "Time from the first sample during which the force is zero.", "s", ge=0.0
+    )
+
+    def as_washout(self) -> WashoutParameters:
+        """Return the constants of the control law."""
+        names = (name for name in type(self).model_fields if name not in NodeParameters.model_fields)
+        return WashoutParameters(**{name: getattr(self, name) for name in names})
+
+
+class AnalyzerParameters(NodeParameters):
+    """Parameters of the analyzer node."""
+
+    bag: str = _field("", "Directory to record to; empty: none.", fixed=True)
+    window: int = _field(20, "Cycles to average over.", "cycles", fixed=True, ge=1, le=100_000)
+    flush_period: float = _field(
+        1.0, "Wall time after which what was recorded is on disk.", "s", fixed=True, gt=0.0
+    )
+    compression: Literal["lz4", "zstd", "none"] = _field(
+        "lz4", "Compression of the bag.", fixed=True
+    )
+
+
+NODE_PARAMETERS: dict[str, type[NodeParameters]] = {
+    "plant": PlantParameters,
+    "washout_controller": WashoutControllerParameters,
+    "analyzer": AnalyzerParameters,
+}
+"""The parameter model of every node by the node's name."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What is known of one parameter."""
+
+    name: str
+    """Flat name, such as friction.static."""
+    kind: type
+    """bool, int, float, str or list (of str)."""
+    default: Any
+    unit: str | None
+    meaning: str
+    fixed: bool
+    """Whether it cannot be changed while the node is active."""
+    choices: tuple[str, ...]
+    """What a parameter of kind str may be; empty: anything."""
+    bounds: str
+    """What is allowed, in words; empty: anything finite."""
+
+
+def parameters_of(model: type[BaseModel], prefix: str = "") -> Iterator[Parameter]:
+    """Yield the parameters of a node's model in the order of their definition."""
+    for name, field in model.model_fields.items():
+        kind = field.annotation
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            yield from parameters_of(kind, f"{prefix}{name}.")
+        else:
+            yield _parameter(prefix + name, field)
+
+
+def _parameter(name: str, field: FieldInfo) -> Parameter:
+    kind: Any = field.annotation
+    choices: tuple[str, ...] = ()
+    if isinstance(kind, type) and issubclass(kind, StrEnum):
+        choices, kind = tuple(kind), str
+    elif get_args(kind) and all(isinstance(choice, str) for choice in get_args(kind)):
+        choices, kind = get_args(kind), str
+    elif kind == list[str]:
+        kind = list
+    extra: Any = field.json_schema_extra
+    return Parameter(
+        name=name,
+        kind=kind,
+        default=str(field.default) if kind is str else field.default,
+        unit=extra["unit"],
+        meaning=field.description or "",
+        fixed=extra["fixed"],
+        choices=choices,
+        bounds=_bounds(field, choices),
+    )
+
+
+_COMPARISONS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
+
+
+def _bounds(field: FieldInfo, choices: tuple[str, ...]) -> str:
+    if choices:
+        return "one of " + ", ".join(choices)
+    return " and ".join(
+        f"{words} {getattr(constraint, name):g}"
+        for constraint in field.metadata
+        for name, words in _COMPARISONS.items()
+        if hasattr(constraint, name)
+    )
+
+
+def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    nested: dict[str, Any] = {}
+    for name, value in values.items():
+        group, _, rest = name.rpartition(".")
+        (nested.setdefault(group, {}) if group else nested)[rest] = value
+    return nested
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{name}.")
+        else:
+            yield prefix + name, str(value) if isinstance(value, StrEnum) else value
+
+
+_KIND_NAMES = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a finite number",
+    str: "a string",
+    list: "a list of strings",
+}
+
+
+def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str, Any]) -> str:
+    """Return in one line which values are refused, and what is allowed."""
+    known = {parameter.name: parameter for parameter in parameters_of(model)}
+    complaints: list[str] = []
+    for detail in error.errors():
+        place = [part for part in detail["loc"] if isinstance(part, str)]
+        name = ".".join(place)
+        if name not in known:
+            complaints.append(f"{name} {detail['msg'].removeprefix('Value error, ')}".strip())
+            continue
+        parameter = known[name]
+        allowed = _KIND_NAMES[parameter.kind]
+        if parameter.bounds:
+            allowed = parameter.bounds if parameter.choices else f"{allowed} {parameter.bounds}"
+        unit = f" {parameter.unit}" if parameter.unit else ""
+        value = values.get(name, detail["input"])
+        complaints.append(f"{name} = {value!r} is refused: must be {allowed}{unit}")
+    return "; ".join(complaints)

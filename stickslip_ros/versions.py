@@ -1,0 +1,17 @@
+"""What a result was made with."""
+
+import platform
+from importlib import metadata
+
+_PACKAGES = ("stickslip_ros", "heyoka", "numpy", "mcap", "rclpy")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python, of this package and of what its figures depend on."""
+    found = {"python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return found

@@ -1,0 +1,344 @@
+import os
+import resource
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import Reader
+
+from stickslip_ros.bags.definitions import message_definition, type_hash
+from stickslip_ros.bags.messages import pack_joint_state, pack_wrench
+from stickslip_ros.bags.reader import Recording
+from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
+from stickslip_ros.errors import BagError
+
+JOINT_STATES = "/feed_drive/joint_states"
+FORCES = "/feed_drive/control_force"
+QOS = QosProfile(depth=2000)
+
+
+def record(directory, count, **options):
+    """Write `count` pairs of joint state and force, 1 ms apart from 1 s on."""
+    with Recorder(directory, **options) as recorder:
+        states = recorder.add_topic(JOINT_STATES, "sensor_msgs/msg/JointState", QOS)
+        forces = recorder.add_topic(FORCES, "geometry_msgs/msg/WrenchStamped", QOS)
+        for number in range(count):
+            stamp = 10**9 + number * 10**6
+            recorder.write(states, pack_joint_state(stamp, (number, 0), (0, 0), (0, 0)), stamp)
+            recorder.write(forces, pack_wrench(stamp, -number), stamp)
+
+
+def information(directory):
+    return yaml.safe_load((directory / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+
+
+@pytest.mark.parametrize("compression", ["lz4", "zstd", "none"])
+def test_rosbags_reads_what_was_recorded(tmp_path, compression):
+    bag = tmp_path / "bag"
+    record(bag, 3, compression=compression)
+    with AnyReader([bag]) as reader:
+        assert (reader.start_time, reader.end_time) == (10**9, 10**9 + 2 * 10**6 + 1)
+        assert [
+            (connection.topic, stamp, reader.deserialize(data, connection.msgtype))
+            for connection, stamp, data in reader.messages()
+            if connection.topic == FORCES
+        ] == [(FORCES, 10**9 + number * 10**6, force(reader, number)) for number in range(3)]
+        positions = [
+            reader.deserialize(data, connection.msgtype).position[0]
+            for connection, _, data in reader.messages()
+            if connection.topic == JOINT_STATES
+        ]
+        assert positions == [0.0, 1.0, 2.0]
+
+
+def force(reader, number):
+    types = reader.typestore.types
+    time = types["builtin_interfaces/msg/Time"](sec=1, nanosec=number * 10**6)
+    zero = types["geometry_msgs/msg/Vector3"](x=0.0, y=0.0, z=0.0)
+    return types["geometry_msgs/msg/WrenchStamped"](
+        header=types["std_msgs/msg/Header"](stamp=time, frame_id="slide"),
+        wrench=types["geometry_msgs/msg/Wrench"](
+            force=types["geometry_msgs/msg/Vector3"](x=-float(number), y=0.0, z=0.0), torque=zero
+        ),
+    )
+
+
+def test_rosbags_finds_types_hashes_and_qos(tmp_path):
+    bag = tmp_path / "bag"
+    record(bag, 1)
+    for path in (bag, bag / "bag_0.mcap"):
+        with Reader(path) as reader:
+            connection = reader.topics[JOINT_STATES].connections[0]
+            assert connection.msgtype == "sensor_msgs/msg/JointState"
+            assert connection.msgdef.data == message_definition("sensor_msgs/msg/JointState")
+            (qos,) = connection.ext.offered_qos_profiles
+            assert (qos.history.name, qos.depth) == ("KEEP_LAST", 2000)
+            assert (qos.reliability.name, qos.durability.name) == ("RELIABLE", "VOLATILE")
+    with Reader(bag) as reader:
+        assert {connection.topic: connection.digest for connection in reader.connections} == {
+            JOINT_STATES: type_hash("sensor_msgs/msg/JointState"),
+            FORCES: type_hash("geometry_msgs/msg/WrenchStamped"),
+        }
+
+
+def test_metadata_yaml_is_that_of_rosbag2(tmp_path):
+    bag = tmp_path / "bag"
+    record(bag, 3, custom_data={"scenario": "paper"})
+    unlimited = {"sec": 9223372036, "nsec": 854775807}
+    qos = {
+        "history": "keep_last",
+        "depth": 2000,
+        "reliability": "reliable",
+        "durability": "volatile",
+        "deadline": unlimited,
+        "lifespan": unlimited,
+        "liveliness": "automatic",
+        "liveliness_lease_duration": unlimited,
+        "avoid_ros_namespace_conventions": False,
+    }
+    types = {
+        JOINT_STATES: "sensor_msgs/msg/JointState",
+        FORCES: "geometry_msgs/msg/WrenchStamped",
+    }
+    start = {"nanoseconds_since_epoch": 10**9}
+    duration = {"nanoseconds": 2 * 10**6}
+    assert information(bag) == {
+        "version": 9,
+        "storage_identifier": "mcap",
+        "duration": duration,
+        "starting_time": start,
+        "message_count": 6,
+        "topics_with_message_count": [
+            {
+                "topic_metadata": {
+                    "name": topic,
+                    "type": type_name,
+                    "serialization_format": "cdr",
+                    "offered_qos_profiles": [qos],
+                    "type_description_hash": type_hash(type_name),
+                },
+                "message_count": 3,
+            }
+            for topic, type_name in types.items()
+        ],
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": ["bag_0.mcap"],
+        "files": [
+            {
+                "path": "bag_0.mcap",
+                "starting_time": start,
+                "duration": duration,
+                "message_count": 6,
+            }
+        ],
+        "custom_data": {"scenario": "paper"},
+        "ros_distro": "jazzy",
+    }
+    assert sorted(path.name for path in bag.iterdir()) == ["bag_0.mcap", "metadata.yaml"]
+
+
+def test_the_file_itself_is_that_of_rosbag2(tmp_path):
+    record(tmp_path / "bag", 1, custom_data={"scenario": "paper"})
+    with (tmp_path / "bag" / "bag_0.mcap").open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        assert reader.get_header().profile == "ros2"
+        (record_of_rosbag2,) = reader.iter_metadata()
+        for schema, channel, message in reader.iter_messages():
+            assert schema.encoding == "ros2msg"
+            assert channel.message_encoding == "cdr"
+            assert channel.metadata["topic_type_hash"] == type_hash(schema.name)
+            (qos,) = yaml.safe_load(channel.metadata["offered_qos_profiles"])
+            assert qos["depth"] == 2000
+            assert (message.log_time, message.publish_time) == (10**9, 10**9)
+    assert record_of_rosbag2.name == "rosbag2"
+    serialized = yaml.safe_load(record_of_rosbag2.metadata["serialized_metadata"])
+    assert serialized.keys() == information(tmp_path / "bag").keys()
+    assert serialized["version"] == 9
+    assert serialized["ros_distro"] == "jazzy"
+    assert serialized["custom_data"] == {"scenario": "paper"}
+
+
+def test_an_empty_bag_is_a_bag(tmp_path):
+    record(tmp_path / "bag", 0)
+    assert information(tmp_path / "bag")["message_count"] == 0
+    with Reader(tmp_path / "bag") as reader:
+        assert set(reader.topics) == {JOINT_STATES, FORCES}
+        assert list(reader.messages()) == []
+
+
+def test_duration_spans_stamps_in_any_order(tmp_path):
+    with Recorder(tmp_path / "bag") as recorder:
+        channel = recorder.add_topic(FORCES, "geometry_msgs/msg/WrenchStamped", QOS)
+        for stamp in (50, 20, 90, 30):
+            recorder.write(channel, pack_wrench(stamp, 0.0), stamp)
+    assert information(tmp_path / "bag")["starting_time"] == {"nanoseconds_since_epoch": 20}
+    assert information(tmp_path / "bag")["duration"] == {"nanoseconds": 70}
+
+
+def test_a_topic_may_come_late(tmp_path):
+    with Recorder(tmp_path / "bag") as recorder:
+        first = recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+        recorder.write(first, bytes(12), 1)
+        recorder.flush()
+        second = recorder.add_topic("/b", "std_msgs/msg/Float64", QOS)
+        recorder.write(second, bytes(12), 2)
+    with Reader(tmp_path / "bag") as reader:
+        assert [connection.topic for connection, _, _ in reader.messages()] == ["/a", "/b"]
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from stickslip_ros.bags.recorder import QosProfile, Recorder
+recorder = Recorder(Path(sys.argv[1]))
+channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QosProfile(depth=1))
+for stamp in range(3000):
+    recorder.write(channel, bytes(12), stamp)
+recorder.flush()
+recorder.write(channel, bytes(12), 3000)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_killed_recorder_has_kept_what_it_flushed(tmp_path):
+    bag = tmp_path / "bag"
+    repository = Path(__file__).parents[2]
+    killed = subprocess.run([sys.executable, "-c", KILLED, bag], cwd=repository, check=False)
+    assert killed.returncode == -signal.SIGKILL
+    with Recording(bag) as recording:
+        assert [stamp for _, stamp, _ in recording.messages("/a")] == list(range(3000))
+        assert not recording.complete
+
+
+def test_the_bag_is_closed_when_an_error_passes(tmp_path):
+    with pytest.raises(KeyError), Recorder(tmp_path / "bag"):
+        raise KeyError
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.complete
+
+
+@pytest.mark.parametrize("stamp", [-1, 2**63])
+def test_a_message_that_is_refused_leaves_the_bag_whole(tmp_path, stamp):
+    with Recorder(tmp_path / "bag") as recorder:
+        channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+        recorder.write(channel, bytes(12), 7)
+        with pytest.raises(BagError, match=f"stamp {stamp} ns"):
+            recorder.write(channel, bytes(12), stamp)
+        recorder.write(channel, bytes(12), 8)
+    with Reader(tmp_path / "bag") as reader:
+        assert [stamp for _, stamp, _ in reader.messages()] == [7, 8]
+
+
+def test_a_topic_is_added_once(tmp_path):
+    with Recorder(tmp_path / "bag") as recorder:
+        recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+        with pytest.raises(BagError, match="/a is in the bag"):
+            recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+        with pytest.raises(BagError, match="not installed"):
+            recorder.add_topic("/b", "std_msgs/msg/Nothing", QOS)
+
+
+def test_a_closed_recorder_takes_nothing_more(tmp_path):
+    recorder = Recorder(tmp_path / "bag")
+    channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+    recorder.close()
+    content = (tmp_path / "bag" / "bag_0.mcap").read_bytes()
+    for refused in (
+        lambda: recorder.write(channel, bytes(12), 1),
+        lambda: recorder.add_topic("/b", "std_msgs/msg/Float64", QOS),
+        lambda: recorder.attach("a", b"", "text/plain"),
+        lambda: recorder.add_metadata("a", {}),
+        recorder.flush,
+    ):
+        with pytest.raises(BagError, match="is closed"):
+            refused()
+    recorder.close()
+    assert (tmp_path / "bag" / "bag_0.mcap").read_bytes() == content
+
+
+@pytest.fixture
+def full_disk():
+    """Let no file grow beyond 100 kB: what fails is what fails on a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.mark.usefixtures("full_disk")
+def test_a_full_disk_ends_the_recording_and_keeps_what_was_written(tmp_path):
+    recorder = Recorder(tmp_path / "bag", compression="none")
+    channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+    with pytest.raises(BagError, match="cannot be written any more"):  # noqa: PT012
+        for stamp in range(100_000):
+            recorder.write(channel, bytes(12), stamp)
+            if stamp % 100 == 99:
+                recorder.flush()
+    with pytest.raises(BagError, match="is closed"):
+        recorder.write(channel, bytes(12), 1)
+    recorder.close()
+    with Recording(tmp_path / "bag") as recording:
+        stamps = [stamp for _, stamp, _ in recording.messages("/a")]
+        assert not recording.complete
+    assert len(stamps) >= 1000
+    assert stamps == list(range(len(stamps)))
+
+
+def test_parents_are_made(tmp_path):
+    check_new_bag(tmp_path / "a" / "b" / "bag")
+    assert list(tmp_path.iterdir()) == []
+    record(tmp_path / "a" / "b" / "bag", 1)
+    with Reader(tmp_path / "a" / "b" / "bag") as reader:
+        assert reader.message_count == 2
+
+
+def test_the_file_has_the_name_of_the_directory_however_that_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    record(Path("x/../bag/."), 1)
+    assert (tmp_path / "bag" / "bag_0.mcap").is_file()
+
+
+def tree(directory):
+    return sorted((path, path.lstat().st_mtime_ns) for path in directory.rglob("*"))
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["file", "directory", "link", "dangling", "file/bag", "file/parent/bag", "dangling/bag"],
+)
+def test_a_path_that_cannot_become_a_bag_is_refused(tmp_path, name):
+    (tmp_path / "file").write_text("precious")
+    (tmp_path / "directory").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "directory")
+    (tmp_path / "dangling").symlink_to(tmp_path / "nothing")
+    before = tree(tmp_path)
+    for refuse in (check_new_bag, Recorder):
+        with pytest.raises(BagError, match=str(tmp_path / name)):
+            refuse(tmp_path / name)
+    assert tree(tmp_path) == before
+
+
+@pytest.mark.parametrize("name", [f"parent/{'a' * 250}", f"{'a' * 300}/bag", "nul\0nul"])
+def test_a_bag_that_fails_to_open_leaves_nothing_behind(tmp_path, name):
+    with pytest.raises(BagError, match="cannot be created"):
+        Recorder(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_parent_that_may_not_be_written_to_is_refused(tmp_path):
+    tmp_path.chmod(0o500)
+    for refuse in (check_new_bag, Recorder):
+        with pytest.raises(BagError, match="may not be written to"):
+            refuse(tmp_path / "bag")
+
+
+def test_a_file_system_that_takes_no_directories_is_refused():
+    with pytest.raises(BagError, match="/proc/bag cannot be created"):
+        Recorder(Path("/proc/bag"))

@@ -1,0 +1,71 @@
+from importlib import metadata
+from pathlib import Path
+
+import catkin_pkg.package
+import pytest
+from packaging.requirements import Requirement
+
+PACKAGE = "stickslip_ros"
+SOURCE = Path(__file__).parents[2]
+
+# What package.xml calls what setup.py names: rosdep keys, where there are any.
+KEYS = {
+    "heyoka": set(),
+    "hypothesis": {"python3-hypothesis"},
+    "matplotlib": {"python3-matplotlib"},
+    "mcap": set(),
+    "numpy": {"python3-numpy"},
+    "pydantic": {"python3-pydantic"},
+    "pytest": {"python3-pytest"},
+    "pytest-timeout": {"python3-pytest-timeout"},
+    "pyyaml": {"python3-yaml"},
+    "rich": {"python3-rich"},
+    "ros-jazzy-common-interfaces": {
+        "diagnostic_msgs",
+        "geometry_msgs",
+        "sensor_msgs",
+        "std_msgs",
+        "std_srvs",
+    },
+    "ros-jazzy-rclpy": {
+        "ament_index_python",
+        "builtin_interfaces",
+        "lifecycle_msgs",
+        "rcl_interfaces",
+        "rclpy",
+        "rosgraph_msgs",
+    },
+    "rosbags": {"python3-rosbags-pip"},
+    "scipy": {"python3-scipy"},
+    "setuptools": {"python3-setuptools"},
+}
+
+
+@pytest.fixture
+def manifest():
+    """package.xml, which catkin_pkg refuses where it is not valid."""
+    return catkin_pkg.package.parse_package(SOURCE)
+
+
+def required(extra):
+    """What setup.py asks for with an extra ("" for none): names on PyPI."""
+    requirements = [Requirement(text) for text in metadata.requires(PACKAGE)]
+    chosen = f'extra == "{extra}"' if extra else "None"
+    return {each.name for each in requirements if str(each.marker) == chosen}
+
+
+def test_both_ask_for_the_same_to_run(manifest):
+    named = required("") | required("ros")
+    keys = set().union(*(KEYS[name] for name in named))
+    assert {each.name for each in manifest.exec_depends} == keys
+
+
+def test_both_ask_for_the_same_to_test(manifest):
+    keys = set().union(*(KEYS[name] for name in required("test")))
+    assert {each.name for each in manifest.test_depends} == keys
+
+
+def test_the_manifest_tells_what_has_no_key():
+    text = (SOURCE / "package.xml").read_text()
+    keyless = sorted(name for name in required("") if not KEYS[name])
+    assert f"for want of a rosdep key: {', '.join(keyless)}." in text
