@@ -1,6 +1,7 @@
 """`stickslip`: the entry script; every command has its own file."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 
@@ -26,7 +27,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         subparser.set_defaults(run=command.run)
     chosen = parser.parse_args(arguments)
     try:
-        status = chosen.run(chosen)
+        status: int = chosen.run(chosen)
+        sys.stdout.flush()
     except InvalidInputError as error:
         print(f"stickslip {chosen.command}: {error}", file=sys.stderr)
         status = 2
@@ -35,6 +37,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         status = 1
     except KeyboardInterrupt:
         status = run.INTERRUPTED
+    except BrokenPipeError:  # whoever read our output has seen enough
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - the interpreter flushes it at exit
+        status = 0
     sys.exit(status)
 
 

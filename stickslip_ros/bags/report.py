@@ -1,15 +1,28 @@
-"""The report of a recorded run: its measures and counts, from the bag."""
+"""A recorded run from its bag: as columns, and as a report of its measures and counts."""
 
+from collections.abc import Iterator, Sequence
+from dataclasses import fields
+
+from math import isinf
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from stickslip_ros.bags.messages import joint_state_columns, wrench_columns
+import numpy as np
+
+from stickslip_ros.bags.messages import (
+    JointStateColumns,
+    WrenchColumns,
+    joint_state_columns,
+    wrench_columns,
+)
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.knots import BoolArray
 from stickslip_ros.physics.samples import IntArray, RunMeter
 
 DEFAULT_WINDOW = 20
+
+ColumnsT = TypeVar("ColumnsT", JointStateColumns, WrenchColumns)
 
 
 def report_of_bag(
@@ -21,7 +34,7 @@ def report_of_bag(
 ) -> dict[str, Any]:
     """Return measures, counts and completeness of the recording at `path`, ready for JSON.
 
-    Only what lies from `start` to `end` (s after the first joint state) is measured, over the last
+    Only what lies from `start` on and before `end` (s after the first joint state) is measured, over the last
     `window` whole cycles of it. Raises BagError for what is no bag or holds no joint states, and
     InvalidInputError for an empty part.
     """
@@ -30,28 +43,50 @@ def report_of_bag(
     meter = RunMeter(window)
     first: int | None = None
     with Recording(path) as recording:
-        states = recording.topic_of_type("sensor_msgs/msg/JointState", suffix="joint_states")
-        control = states.removesuffix("joint_states") + "control_force"
-        for block in recording.blocks(states, control):
-            if states in block:
-                columns = joint_state_columns(block[states].messages)
-                if first is None:
-                    first = int(columns.stamp[0])
-                rows = _within(columns.stamp, first, start, end)
-                meter.motion.feed(
-                    columns.stamp[rows],
-                    columns.position[rows],
-                    columns.velocity[rows],
-                    columns.belt_velocity[rows],
-                )
-            if control in block and first is not None:
-                forces = wrench_columns(block[control].messages)
-                rows = _within(forces.stamp, first, start, end)
-                meter.force.feed(forces.stamp[rows], forces.force[rows])
+        for states, forces in _column_blocks(recording):
+            if first is None and len(states.stamp):
+                first = int(states.stamp[0])
+            if first is None:
+                continue
+            rows = _within(states.stamp, first, start, end)
+            meter.motion.feed(
+                states.stamp[rows],
+                states.position[rows],
+                states.velocity[rows],
+                states.belt_velocity[rows],
+            )
+            rows = _within(forces.stamp, first, start, end)
+            meter.force.feed(forces.stamp[rows], forces.force[rows])
         complete = recording.complete
     return {**meter.report(), "complete": complete}
 
 
+def read_columns(path: Path) -> tuple[JointStateColumns, WrenchColumns]:
+    """Return the joint states and the control forces of the recording at `path`, all at once.
+
+    Raises BagError for what is no bag or holds no joint states.
+    """
+    with Recording(path) as recording:
+        states, forces = zip(*_column_blocks(recording), strict=True)
+    return _joined(JointStateColumns, states), _joined(WrenchColumns, forces)
+
+
+def _column_blocks(recording: Recording) -> Iterator[tuple[JointStateColumns, WrenchColumns]]:
+    states = recording.topic_of_type("sensor_msgs/msg/JointState", suffix="joint_states")
+    control = states.removesuffix("joint_states") + "control_force"
+    topics = [topic for topic in (states, control) if topic in recording.topics]
+    for block in recording.blocks(*topics):
+        messages = block[control].messages if control in block else []
+        yield joint_state_columns(block[states].messages), wrench_columns(messages)
+
+
+def _joined(kind: type[ColumnsT], blocks: Sequence[ColumnsT]) -> ColumnsT:
+    """Return blocks of columns, dataclasses of arrays, as one."""
+    names = [field.name for field in fields(kind)]
+    return kind(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
+
+
 def _within(stamp: IntArray, first: int, start: float, end: float) -> BoolArray:
-    since = (stamp - first) * 1e-9
-    return (since >= start) & (since <= end)
+    """Return which stamps lie from `start` on and before `end`, s after `first` (ns)."""
+    since = stamp - first
+    return (since >= round(start * 1e9)) & (since < (end * 1e9 if isinf(end) else round(end * 1e9)))

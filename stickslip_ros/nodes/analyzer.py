@@ -136,12 +136,17 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
                     publisher.publish(Float64(data=figure))
                 self._cycles += 1
                 if self._cycles % self.parameters.window == 0:
-                    self.get_logger().info(f"{motion.measures()}")
+                    self._log_measures()
         forces = self._take(CONTROL_FORCE, wrench_columns)
         if forces is not None:
             self._meter.force.feed(forces.stamp, forces.force)
         self._pending[APPLIED_DISTURBANCE.name].clear()
         self._ask_for_parameters()
+
+    def _log_measures(self) -> None:
+        figures = self._meter.motion.measures().as_dict()
+        text = ", ".join(f"{name} {value}" for name, value in figures.items() if value is not None)
+        self.get_logger().info(text)
 
     def _take(self, topic: Topic, decode: Callable[[Sequence[bytes]], ColumnsT]) -> ColumnsT | None:
         """Return the pending messages of a topic as columns; one that is unreadable is dropped."""

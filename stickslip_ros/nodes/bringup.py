@@ -29,6 +29,7 @@ from stickslip_ros.nodes.topics import DIAGNOSTICS, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.scenario.files import Scenario, parameter_file
 
+_LOGGING = ["--ros-args", "--log-level", "warn"]
 _READY_TIMEOUT = 60.0
 _ANSWER_TIMEOUT = 15.0
 _RETRY_PERIOD = 0.02
@@ -85,7 +86,7 @@ def run_nodes(
     Every node is deactivated, and the bag closed, before this returns or raises RunError (a node
     died, or did not become ready).
     """
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=_LOGGING, signal_handler_options=SignalHandlerOptions.NO)
     try:
         bringup = _Bringup(namespace, progress)
         try:
@@ -179,11 +180,11 @@ class _Bringup:
     def _spawn(self, parameters: Mapping[str, Mapping[str, Any]], directory: Path) -> None:
         file = directory / "parameters.yaml"
         file.write_text(parameter_file(parameters), encoding="utf-8")
-        ros_arguments = ["--params-file", str(file), "-r", f"__ns:={self._namespace}"]
+        ros_arguments = [*_LOGGING, "--params-file", str(file), "-r", f"__ns:={self._namespace}"]
         for name in parameters:
             module = _NODES[name].__module__
             self._processes[name] = subprocess.Popen(
-                [sys.executable, "-m", module, "--ros-args", "--log-level", "warn", *ros_arguments],
+                [sys.executable, "-m", module, *ros_arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=sys.stderr,
                 start_new_session=True,  # Ctrl-C is for this process, which closes the bag first

@@ -15,6 +15,9 @@ EQUILIBRIUM_SPEED = 1e-3
 UNBOUNDED_BELT_SPEEDS = 1e3
 """Speed of the slide, in belt speeds, beyond which a sampled motion is said to run away."""
 
+_NOISE = 1e-9
+"""Share of the belt speed, or of the fastest motion seen, below which speeds are rounding."""
+
 _STALE_PERIODS = 3.0
 """A motion without a turn for so many of its last periods has stopped cycling."""
 
@@ -123,6 +126,7 @@ class CycleMeter:
         """Average over the last `window` cycles at most."""
         self._cycles: deque[Cycle] = deque(maxlen=window)
         self._belt_speed = 0.0
+        self._fastest = 0.0
         self._unbounded = False
         self.interrupt()
 
@@ -195,14 +199,15 @@ class CycleMeter:
 
     def _upward_crossings(self, knots: Knots) -> list[int]:
         """Return the knots at which the velocity goes from negative to positive."""
-        moving = np.flatnonzero(knots.velocity != 0.0)
+        speed = np.abs(knots.velocity)
+        self._fastest = max(self._fastest, float(speed.max()))
+        moving = np.flatnonzero(speed > _NOISE * max(self._fastest, abs(self._belt_speed)))
         if len(moving) == 0:
             return []
         directions = np.concatenate([[self._direction], np.sign(knots.velocity[moving])])
         self._direction = float(directions[-1])
         rising = moving[(directions[:-1] < 0.0) & (directions[1:] > 0.0)]
         before = np.maximum(rising - 1, 0)
-        speed = np.abs(knots.velocity)
         return np.where(speed[before] <= speed[rising], before, rising).tolist()
 
     def _follow_recent(self, knots: Knots, first: int) -> None:

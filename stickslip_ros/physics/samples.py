@@ -30,12 +30,10 @@ class SampleMeter:
         """Samples seen."""
         self.lost_samples = 0
         """Samples that the stamps say are missing."""
-        self.duration = 0.0
-        """Simulated time covered, s."""
         self._meter = CycleMeter(window)
         self._last: tuple[IntArray, FloatArray, FloatArray, FloatArray] | None = None
         self._step = 0
-        self._time = 0.0
+        self._elapsed = 0
 
     def feed(
         self,
@@ -68,6 +66,11 @@ class SampleMeter:
         self._last = tuple(column[-1:] for column in columns)
         return cycles
 
+    @property
+    def duration(self) -> float:
+        """Simulated time covered, s."""
+        return self._elapsed * 1e-9
+
     def measures(self) -> Measures:
         """Return the means over the last whole cycles."""
         return self._meter.measures()
@@ -99,9 +102,8 @@ class SampleMeter:
         velocity: FloatArray,
         belt_velocity: FloatArray,
     ) -> list[Cycle]:
-        time = self._time + (stamp - stamp[0]) * 1e-9
-        self.duration += float(time[-1] - time[0])
-        self._time = float(time[-1])
+        time = (self._elapsed + stamp - stamp[0]) * 1e-9
+        self._elapsed += int(stamp[-1] - stamp[0])
         knots: Knots = knots_from_samples(time, position, velocity, belt_velocity)
         if self._last is not None:
             knots = knots[1:]  # the sample carried over was fed with its own block

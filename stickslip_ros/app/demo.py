@@ -1,0 +1,74 @@
+"""`make demo`: the washout filter kills the vibration of a feed drive, through real ROS topics."""
+
+import sys
+from pathlib import Path
+
+from stickslip_ros.app.output import print_figures
+from stickslip_ros.app.run import default_bag, record
+from stickslip_ros.bags.report import read_columns, report_of_bag
+from stickslip_ros.errors import StickslipError
+from stickslip_ros.nodes.bringup import keep_on_this_machine
+from stickslip_ros.plots.run_picture import RunColumns, draw_control_coming_on
+from stickslip_ros.scenario.files import load_scenario
+
+_SCENARIO = "feed_drive"
+_DURATION = 10.0
+_SHOWN_AROUND = (0.5, 1.0)
+_FIGURES = (
+    "amplitude", "stick_fraction", "frequency", "regime", "peak_force", "resting_force"
+)  # fmt: skip
+
+
+def main() -> None:
+    """Run the demonstration and exit with its status."""
+    try:
+        _demonstrate()
+    except StickslipError as error:
+        sys.exit(f"demo: {error}")
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+def _demonstrate() -> None:
+    scenario = load_scenario(
+        _SCENARIO, ["plant.pace=lockstep", f"plant.duration={_DURATION}"]
+    )
+    switched_on = scenario.washout_controller.start_after
+    bag = default_bag(_SCENARIO)
+    reach = keep_on_this_machine(network=False)
+    print(
+        f"{_DURATION:g} s of {_SCENARIO} in lockstep: plant, washout controller and analyzer as "
+        f"ROS 2 nodes, {reach}; the controller acts from {switched_on:g} s on"
+    )
+    figures, interrupted = record(scenario, bag, composed=True)
+    if interrupted:
+        raise KeyboardInterrupt
+    parts = {
+        f"before ({switched_on:g} s)": report_of_bag(bag, end=switched_on),
+        f"after ({_DURATION - switched_on:g} s)": report_of_bag(bag, start=switched_on),
+    }
+    print_figures(
+        f"{figures['samples']} samples, {figures['lost_samples']} lost, "
+        f"{figures['steps_per_second']:.0f} steps per second",
+        {title: {name: part[name] for name in _FIGURES} for title, part in parts.items()},
+    )
+    picture = bag.with_suffix(".png")
+    draw_control_coming_on(picture, _columns(bag), switched_on, _SHOWN_AROUND)
+    print(f"bag:     {bag}\npicture: {picture}")
+
+
+def _columns(bag: Path) -> RunColumns:
+    states, forces = read_columns(bag)
+    first = states.stamp[0]
+    return RunColumns(
+        time=(states.stamp - first) * 1e-9,
+        position=states.position,
+        velocity=states.velocity,
+        belt_velocity=states.belt_velocity,
+        force_time=(forces.stamp - first) * 1e-9,
+        force=forces.force,
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,92 @@
+"""The picture of a run in which the control comes on: what it was like before, and after."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from stickslip_ros.physics.knots import FloatArray
+
+# Okabe and Ito's palette, which the colour-blind can tell apart.
+_BLUE, _ORANGE, _GREEN, _GREY = "#0072B2", "#D55E00", "#009E73", "#999999"
+_PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"))
+
+
+@dataclass(frozen=True)
+class RunColumns:
+    """A recorded run as columns, times in s from the first sample, SI units."""
+
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    belt_velocity: FloatArray
+    force_time: FloatArray
+    force: FloatArray
+
+
+def draw_control_coming_on(
+    path: Path, run: RunColumns, switched_on: float, around: tuple[float, float]
+) -> None:
+    """Write displacement and force around `switched_on` (s), and both phase portraits, to `path`.
+
+    `around` is how long before and after it is shown over time, s. The format follows the ending.
+    """
+    figure = Figure(figsize=(10.0, 8.5), layout="constrained")
+    grid = figure.add_gridspec(3, 2, height_ratios=(2.0, 1.0, 2.4))
+    displacement = figure.add_subplot(grid[0, :])
+    force = figure.add_subplot(grid[1, :], sharex=displacement)
+    before = figure.add_subplot(grid[2, 0])
+    after = figure.add_subplot(grid[2, 1], sharex=before, sharey=before)
+
+    length, length_prefix = _scale(run.position)
+    speed, speed_prefix = _scale(run.velocity)
+    start, end = switched_on - around[0], switched_on + around[1]
+    _draw_displacement(displacement, run, length, (start, end))
+    displacement.set_ylabel(f"displacement ({length_prefix}m)")
+    displacement.tick_params(labelbottom=False)
+    shown = (run.force_time >= start) & (run.force_time <= end)
+    force.step(run.force_time[shown], run.force[shown], where="post", color=_ORANGE, lw=0.8)
+    force.set_ylabel("control force (N)")
+    force.set_xlabel("time (s)")
+    force.set_xlim(start, end)
+    for axes in (displacement, force):
+        axes.axvline(switched_on, color="black", lw=1.0, ls=":")
+
+    belt = float(run.belt_velocity[-1])
+    late = run.time >= switched_on
+    settled = ~late & (run.time >= switched_on / 2.0)
+    for axes, rows, colour, title in (
+        (before, settled, _BLUE, f"before: {switched_on / 2.0:g} s to {switched_on:g} s"),
+        (after, late, _GREEN, f"after: {switched_on:g} s to {run.time[-1]:g} s"),
+    ):
+        axes.axhline(belt / speed, color=_GREY, ls="--", lw=1.0, label="belt speed")
+        axes.plot(run.position[rows] / length, run.velocity[rows] / speed, color=colour, lw=0.9)
+        axes.set_title(title, fontsize=10)
+        axes.set_xlabel(f"displacement ({length_prefix}m)")
+    after.plot(
+        run.position[-1] / length, run.velocity[-1] / speed, "o", color="black", ms=5, label="end"
+    )
+    after.legend(loc="lower left", fontsize=8)
+    before.set_ylabel(f"velocity ({speed_prefix}m/s)")
+    figure.savefig(path, dpi=130)
+
+
+def _draw_displacement(
+    axes: Axes, run: RunColumns, length: float, span: tuple[float, float]
+) -> None:
+    shown = (run.time >= span[0]) & (run.time <= span[1])
+    sticking = run.velocity[shown] == run.belt_velocity[shown]
+    axes.fill_between(
+        run.time[shown], 0.0, 1.0, where=sticking, transform=axes.get_xaxis_transform(),
+        color=_GREY, alpha=0.4, lw=0.0, label="slide sticks to the belt",
+    )  # fmt: skip
+    axes.plot(run.time[shown], run.position[shown] / length, color=_BLUE, lw=1.0)
+    axes.legend(loc="upper right", fontsize=8)
+
+
+def _scale(values: FloatArray) -> tuple[float, str]:
+    """Return the unit, and its prefix, in which the largest of the values is 1 or more."""
+    largest = float(np.max(np.abs(values)))
+    return next((scale for scale in _PREFIXES if largest >= scale[0]), _PREFIXES[-1])
