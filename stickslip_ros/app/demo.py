@@ -30,9 +30,7 @@ def main() -> None:
 
 
 def _demonstrate() -> None:
-    scenario = load_scenario(
-        _SCENARIO, ["plant.pace=lockstep", f"plant.duration={_DURATION}"]
-    )
+    scenario = load_scenario(_SCENARIO, ["plant.pace=lockstep", f"plant.duration={_DURATION}"])
     switched_on = scenario.washout_controller.start_after
     bag = default_bag(_SCENARIO)
     reach = keep_on_this_machine(network=False)

@@ -58,7 +58,9 @@ def progress_bar(label: str, total: float | None) -> Generator[Callable[[float],
     """Show progress towards `total` on standard error while a person looks at it."""
     columns = (TextColumn(label), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
         task = bar.add_task(label, total=total)
         yield lambda done: bar.update(task, completed=done)
 

@@ -72,9 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_new_bag(bag)
     reach = keep_on_this_machine(arguments.network)
     print(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}", file=sys.stderr)
-    figures, interrupted = record(
-        scenario, bag, namespace=namespace, composed=arguments.composed
-    )
+    figures, interrupted = record(scenario, bag, namespace=namespace, composed=arguments.composed)
     if arguments.json:
         print_json({**figures, **made_of(scenario)})
     else:

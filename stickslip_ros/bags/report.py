@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
-
 from math import isinf
 from pathlib import Path
 from typing import Any, TypeVar
@@ -34,9 +33,9 @@ def report_of_bag(
 ) -> dict[str, Any]:
     """Return measures, counts and completeness of the recording at `path`, ready for JSON.
 
-    Only what lies from `start` on and before `end` (s after the first joint state) is measured, over the last
-    `window` whole cycles of it. Raises BagError for what is no bag or holds no joint states, and
-    InvalidInputError for an empty part.
+    Only what lies from `start` on and before `end` (s after the first joint state) is measured,
+    over the last `window` whole cycles of it. Raises BagError for what is no bag or holds no joint
+    states, and InvalidInputError for an empty part.
     """
     if not start < end:
         raise InvalidInputError(f"the part from {start} s to {end} s is empty")

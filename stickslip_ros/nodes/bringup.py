@@ -23,9 +23,9 @@ from std_msgs.msg import Header
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.managed import ManagedNode, spin, stop_on_signals
+from stickslip_ros.nodes.managed import PARENT_VARIABLE, ManagedNode, spin, stop_on_signals
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.topics import DIAGNOSTICS, JOINT_STATES, RECORDED
+from stickslip_ros.nodes.topics import DIAGNOSTICS, RECORDED
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.scenario.files import Scenario, parameter_file
 
@@ -166,6 +166,7 @@ class _Bringup:
         for node in [*self._composed, self._node]:
             self._executor.remove_node(node)
             node.destroy_node()
+        self._executor.shutdown()
 
     @property
     def _ended(self) -> bool:
@@ -185,6 +186,7 @@ class _Bringup:
             module = _NODES[name].__module__
             self._processes[name] = subprocess.Popen(
                 [sys.executable, "-m", module, *ros_arguments],
+                env=os.environ | {PARENT_VARIABLE: str(os.getpid())},
                 stdin=subprocess.DEVNULL,
                 stdout=sys.stderr,
                 start_new_session=True,  # Ctrl-C is for this process, which closes the bag first
@@ -199,7 +201,8 @@ class _Bringup:
             if client.service_is_ready():
                 answer = client.call_async(request)
                 self._spin_until(answer, _ANSWER_TIMEOUT)
-                if answer.done() and answer.result().success:
+                response = answer.result() if answer.done() else None
+                if response is not None and response.success:
                     if transition == Transition.TRANSITION_ACTIVATE:
                         self._active.append(node)
                     break
@@ -227,9 +230,7 @@ class _Bringup:
 
     def _deactivate(self, node: str) -> None:
         client = self._node.create_client(ChangeState, f"{node}/change_state")
-        request = ChangeState.Request(
-            transition=Transition(id=Transition.TRANSITION_DEACTIVATE)
-        )
+        request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
         if client.wait_for_service(_ANSWER_TIMEOUT):
             self._spin_until(client.call_async(request), _ANSWER_TIMEOUT, always=True)
         self._node.destroy_client(client)

@@ -1,11 +1,13 @@
 """What every node of this package has: life cycle, parameters from one model, diagnostics."""
 
 import argparse
+import ctypes
+import os
 import signal
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -15,8 +17,8 @@ from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
-from rclpy.logging import get_logger
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.logging import get_logger
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSCompatibility, qos_check_compatible
@@ -37,6 +39,9 @@ OK: Level = DiagnosticStatus.OK
 WARN: Level = DiagnosticStatus.WARN
 ERROR: Level = DiagnosticStatus.ERROR
 
+PARENT_VARIABLE = "STICKSLIP_ROS_PARENT"
+
+_PR_SET_PDEATHSIG = 1
 _DIAGNOSTICS_PERIOD = 1.0
 _AUTOSTART_PERIOD = 0.05
 _SPIN_TIMEOUT = 0.2
@@ -202,9 +207,10 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
         try:
             action()
         except InvalidInputError as error:
-            self.get_logger().error(str(error))
             if self._autostart_timer is not None:
                 self.refuse(error)
+            else:
+                self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
         except Exception as error:  # rclpy would swallow it without a word
             self.get_logger().error(f"{type(error).__name__}: {error}")
@@ -246,7 +252,7 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
 
     def _declare(self, model: type[ParametersT]) -> ParametersT:
         given = {
-            name: parameter.value
+            name: cast(Parameter, parameter).value
             for name, parameter in self.get_parameters_by_prefix("").items()
             if not name.startswith(_OWNED_BY_ROS)
         }
@@ -265,9 +271,7 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
                 ignore_override=True,
             )
         floats = {p.name for p in known if p.kind is float}
-        self.set_parameters(
-            [Parameter(p.name, _ROS_TYPES[p.kind], values[p.name]) for p in known]
-        )
+        self.set_parameters([Parameter(p.name, _ROS_TYPES[p.kind], values[p.name]) for p in known])
         self.add_pre_set_parameters_callback(lambda new: _with_floats(new, floats))
         self.add_on_set_parameters_callback(self._check_change)
         self.add_post_set_parameters_callback(self._take_change)
@@ -314,8 +318,9 @@ def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) 
         metavar="...",
         help="ROS arguments: -p NAME:=VALUE, --params-file FILE, -r __ns:=/NAMESPACE, -r FROM:=TO",
     )
-    parser.parse_args(remove_ros_args(sys.argv)[1:])
+    die_with_parent()
     try:
+        parser.parse_args(remove_ros_args(sys.argv)[1:])
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # what rcl could not parse; its first line names it
         print(f"{parser.prog}: {_first_line(error)}", file=sys.stderr)
@@ -343,9 +348,24 @@ def _run_initialized(make: Callable[[], ManagedNode[Any]]) -> int:
     refusal = node.stopped.result()
     executor.remove_node(node)
     node.destroy_node()
+    executor.shutdown()
     if refusal is not None:
         raise refusal
     return 0
+
+
+def die_with_parent() -> None:
+    """Be sent SIGTERM when the process named in the environment as the parent is no more.
+
+    Whoever starts nodes as processes sets PARENT_VARIABLE to its own process id, so that none is
+    left running when it is killed. Linux only; elsewhere it does nothing.
+    """
+    parent = os.environ.pop(PARENT_VARIABLE, "")
+    if not parent or sys.platform != "linux":
+        return
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != int(parent):
+        sys.exit(1)
 
 
 def stop_on_signals(stopped: Future, executor: Executor) -> None:
@@ -372,7 +392,7 @@ def spin(executor: Executor, until: Future) -> None:
 def _with_floats(changes: list[Parameter], floats: set[str]) -> list[Parameter]:
     """Take whole numbers where numbers are declared, as parameter files and -p do."""
     return [
-        Parameter(change.name, Parameter.Type.DOUBLE, float(change.value))
+        Parameter(change.name, Parameter.Type.DOUBLE, float(cast(int, change.value)))
         if change.name in floats and change.type_ is Parameter.Type.INTEGER
         else change
         for change in changes

@@ -40,9 +40,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._motion = Motion(self.parameters.as_drive(), initial.position, initial.velocity)
         self._next_start = _LOCKSTEP_START
         self._lock = threading.Lock()
-        depth = max(
-            2 * self.parameters.flow_window, round(_HISTORY_SECONDS * self.parameters.rate)
-        )
+        depth = max(2 * self.parameters.flow_window, round(_HISTORY_SECONDS * self.parameters.rate))
         self._state = self.advertise(JOINT_STATES, min(depth, 100_000))
         self._applied = self.advertise(APPLIED_DISTURBANCE)
         self._clock_time = self.advertise(CLOCK) if self.parameters.publish_clock else None

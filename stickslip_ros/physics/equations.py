@@ -1,4 +1,4 @@
-"""The equations of motion, eq. 5 and 19 of the paper, as symbolic expressions: they stand here once.
+"""The equations of motion, eq. 5 and 19 of the paper, as symbolic expressions.
 
 Everything is dimensionless (see `Drive`). The integrator of the motion is compiled from these
 expressions; whatever needs derivatives of the right-hand side takes them from these too.

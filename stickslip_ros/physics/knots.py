@@ -100,9 +100,7 @@ def _with_stick_edges(knots: Knots, stuck: BoolArray, belt_velocity: FloatArray)
     slip_time = np.clip(slip_time, 0.0, step)
     stick_time = step - slip_time
     instant = np.where(landing, slip_time, stick_time)
-    riding_from = np.where(
-        landing, knots.position[edges + 1] - belt * step, knots.position[edges]
-    )
+    riding_from = np.where(landing, knots.position[edges + 1] - belt * step, knots.position[edges])
     edge_knots = Knots(knots.time[edges] + instant, riding_from + belt * instant, belt, ~landing)
     sticking = knots.sticking.copy()
     sticking[edges + 1] = landing

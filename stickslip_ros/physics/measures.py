@@ -178,9 +178,9 @@ class CycleMeter:
             return _without_cycles(None, Regime.UNBOUNDED)
         period = self._cycles[-1].period if self._cycles else 0.0
         now = self._open.end if self._open else 0.0
-        if self._belt_speed == 0.0 and self._sticking_since is not None:
-            if now - self._sticking_since >= period:
-                return _without_cycles(self._recent_motion(), Regime.STUCK)
+        since = self._sticking_since
+        if self._belt_speed == 0.0 and since is not None and now - since >= period:
+            return _without_cycles(self._recent_motion(), Regime.STUCK)
         since_turn = self._open.duration if self._open else 0.0
         if not self._cycles or since_turn > _STALE_PERIODS * period:
             recent = self._recent_motion()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from math import copysign, ulp
+from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -217,9 +218,7 @@ class Motion:
             self.unbounded = True
         return now
 
-    def _propagate(
-        self, integrator: hy.taylor_adaptive, now: float, end: float
-    ) -> tuple[int | None, float]:
+    def _propagate(self, integrator: Any, now: float, end: float) -> tuple[int | None, float]:
         """Integrate the state from `now` to `end`; return what event ended it, and when."""
         state = integrator.state
         state[0], state[1] = self._x, self._y
@@ -291,13 +290,13 @@ class Motion:
 
 def _marker(
     marks: list[tuple[float, float, float]], *, turning: bool = False
-) -> Callable[[hy.taylor_adaptive, float, int], None]:
+) -> Callable[[Any, float, int], None]:
     """Return a callback that notes the state at an event; at a turning point Y is zero.
 
     A plain function, not a method: heyoka copies its callbacks, and with a method its object.
     """
 
-    def mark(integrator: hy.taylor_adaptive, now: float, _: int) -> None:
+    def mark(integrator: Any, now: float, _: int) -> None:
         integrator.update_d_output(now)
         x, y = integrator.d_output[:2].tolist()
         marks.append((now, x, 0.0 if turning else y))

@@ -1,11 +1,11 @@
 """Measures from samples: stamps become time and losses, samples become knots, knots cycles."""
 
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from stickslip_ros.physics.knots import FloatArray, Knots, knots_from_samples
+from stickslip_ros.physics.knots import BoolArray, FloatArray, Knots, knots_from_samples
 from stickslip_ros.physics.measures import UNBOUNDED_BELT_SPEEDS, Cycle, CycleMeter, Measures
 
 IntArray = npt.NDArray[np.int64]
@@ -15,6 +15,26 @@ _LONGEST_GAP = 10
 
 _RESTING_SHARE = 0.1
 _FORCE_BLOCK = 256
+
+
+class _Rows(NamedTuple):
+    stamp: IntArray
+    position: FloatArray
+    velocity: FloatArray
+    belt_velocity: FloatArray
+
+    def select(self, rows: slice | BoolArray) -> Self:
+        return type(self)(
+            self.stamp[rows], self.position[rows], self.velocity[rows], self.belt_velocity[rows]
+        )
+
+    def followed_by(self, rows: Self) -> Self:
+        return type(self)(
+            np.concatenate([self.stamp, rows.stamp]),
+            np.concatenate([self.position, rows.position]),
+            np.concatenate([self.velocity, rows.velocity]),
+            np.concatenate([self.belt_velocity, rows.belt_velocity]),
+        )
 
 
 class SampleMeter:
@@ -31,7 +51,7 @@ class SampleMeter:
         self.lost_samples = 0
         """Samples that the stamps say are missing."""
         self._meter = CycleMeter(window)
-        self._last: tuple[IntArray, FloatArray, FloatArray, FloatArray] | None = None
+        self._last: _Rows | None = None
         self._step = 0
         self._elapsed = 0
 
@@ -46,24 +66,20 @@ class SampleMeter:
 
         Rows that are not finite count as lost. Return the cycles completed by them.
         """
-        columns = (stamp, position, velocity, belt_velocity)
         finite = np.isfinite(position) & np.isfinite(velocity) & np.isfinite(belt_velocity)
-        if not finite.all():
-            columns = tuple(column[finite] for column in columns)
-        self.samples += len(columns[0])
+        rows = _Rows(stamp, position, velocity, belt_velocity).select(finite)
+        self.samples += len(rows.stamp)
         if self._last is not None:
-            columns = tuple(
-                np.concatenate([old, new]) for old, new in zip(self._last, columns, strict=True)
-            )
-        if len(columns[0]) == 0:
+            rows = self._last.followed_by(rows)
+        if len(rows.stamp) == 0:
             return []
         cycles: list[Cycle] = []
-        starts = self._segment_starts(columns[0])
-        for start, end in zip([0, *starts], [*starts, len(columns[0])], strict=True):
+        starts = self._segment_starts(rows.stamp)
+        for start, end in zip([0, *starts], [*starts, len(rows.stamp)], strict=True):
             if start > 0:
                 self._begin_segment()
-            cycles += self._feed_segment(*(column[start:end] for column in columns))
-        self._last = tuple(column[-1:] for column in columns)
+            cycles += self._feed_segment(rows.select(slice(start, end)))
+        self._last = rows.select(slice(-1, None))
         return cycles
 
     @property
@@ -95,13 +111,8 @@ class SampleMeter:
         continues = on_grid & (periods <= _LONGEST_GAP)
         return (np.flatnonzero(~continues) + 1).tolist()
 
-    def _feed_segment(
-        self,
-        stamp: IntArray,
-        position: FloatArray,
-        velocity: FloatArray,
-        belt_velocity: FloatArray,
-    ) -> list[Cycle]:
+    def _feed_segment(self, rows: _Rows) -> list[Cycle]:
+        stamp, position, velocity, belt_velocity = rows
         time = (self._elapsed + stamp - stamp[0]) * 1e-9
         self._elapsed += int(stamp[-1] - stamp[0])
         knots: Knots = knots_from_samples(time, position, velocity, belt_velocity)

@@ -1,4 +1,4 @@
-"""The closed loop without ROS: the sampled loop, or the paper's continuous one, and its measures."""
+"""The closed loop without ROS, sampled or continuous as in the paper, and its measures."""
 
 from collections.abc import Callable
 

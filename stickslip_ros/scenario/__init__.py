@@ -1,0 +1,1 @@
+"""Parameters of the nodes and the files they come in."""

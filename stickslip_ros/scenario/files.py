@@ -87,7 +87,9 @@ def load_scenario(
 
 def config_directories() -> list[Path]:
     """Return the existing directories in which scenarios are found by name."""
-    prefixes = [Path(entry) for entry in environ.get("AMENT_PREFIX_PATH", "").split(pathsep) if entry]
+    prefixes = [
+        Path(entry) for entry in environ.get("AMENT_PREFIX_PATH", "").split(pathsep) if entry
+    ]
     installed = [prefix / "share/stickslip_ros/config" for prefix in [*prefixes, Path(sys.prefix)]]
     source_tree = Path(__file__).parents[2] / "config"
     return [directory for directory in [source_tree, *installed] if directory.is_dir()]
@@ -115,21 +117,27 @@ class _RosLoader(yaml.SafeLoader):
 
 
 _RosLoader.yaml_implicit_resolvers = {}
-_DIGITS = "0123456789"
-for _tag, _pattern, _first in (
-    ("bool", r"true|True|TRUE|false|False|FALSE|yes|Yes|YES|no|No|NO|on|On|ON|off|Off|OFF", "tTfFyYnNoO"),
-    ("int", r"[-+]?(0|[1-9][0-9]*|0[0-7]+|0x[0-9a-fA-F]+)", "-+" + _DIGITS),
-    ("float", r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)", "-+." + _DIGITS),
-    ("null", r"~|null|Null|NULL|", "~nN\0"),
-):  # fmt: skip
+_BOOLEANS = [
+    spelling
+    for word in ("true", "false", "yes", "no", "on", "off")
+    for spelling in (word, word.capitalize(), word.upper())
+]
+_SCALARS = {
+    "bool": "|".join(_BOOLEANS),
+    "int": r"[-+]?(0|[1-9][0-9]*|0[0-7]+|0x[0-9a-fA-F]+)",
+    "float": r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?"
+    r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
+    "null": "~|null|Null|NULL|",
+}
+for _tag, _pattern in _SCALARS.items():
     _RosLoader.add_implicit_resolver(
-        f"tag:yaml.org,2002:{_tag}", re.compile(f"^(?:{_pattern})$"), list(_first)
+        f"tag:yaml.org,2002:{_tag}", re.compile(f"^(?:{_pattern})$"), None
     )
 
 
 def _parse_yaml(text: str, source: str) -> Any:
     try:
-        return yaml.load(text, Loader=_RosLoader)  # noqa: S506 - derives from SafeLoader
+        return yaml.load(text, Loader=_RosLoader)
     except yaml.YAMLError as error:
         reason = " ".join(str(error).split())
         raise InvalidInputError(f"{source} is not YAML: {reason}") from None

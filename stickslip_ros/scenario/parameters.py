@@ -4,13 +4,13 @@ ROS declarations, scenario files, overrides, messages and the documentation deri
 models. A nested field `friction.static` is the ROS parameter of that name.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from math import isinf
-from typing import Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
 from stickslip_ros.errors import InvalidInputError
@@ -18,8 +18,6 @@ from stickslip_ros.physics.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.friction import LAWS, FrictionLaw
 from stickslip_ros.physics.washout import WashoutParameters
-
-LawName = StrEnum("LawName", {name.upper(): name for name in LAWS})
 
 
 class Pace(StrEnum):
@@ -30,11 +28,23 @@ class Pace(StrEnum):
 
 
 def _field(
-    default: Any, meaning: str, unit: str | None = None, *, fixed: bool = False, **bounds: Any
+    default: Any,
+    meaning: str,
+    unit: str | None = None,
+    *,
+    fixed: bool = False,
+    choices: Iterable[str] = (),
+    **bounds: Any,
 ) -> Any:
     """Describe a parameter; `fixed` ones cannot be changed while the node is active."""
-    extra = {"unit": unit, "fixed": fixed}
+    extra: Any = {"unit": unit, "fixed": fixed, "choices": tuple(choices)}
     return Field(default, description=meaning, json_schema_extra=extra, **bounds)
+
+
+def _known_law(name: str) -> str:
+    if name not in LAWS:
+        raise ValueError(f"no law {name}")
+    return name
 
 
 class _Model(BaseModel):
@@ -46,7 +56,9 @@ class _Model(BaseModel):
 class Friction(_Model):
     """Friction law and its coefficients; a law uses those that its formula names."""
 
-    law: LawName = _field(LawName("stribeck"), "Friction law.", strict=False)
+    law: Annotated[str, AfterValidator(_known_law)] = _field(
+        "stribeck", "Friction law.", choices=LAWS
+    )
     static: float = _field(0.4, "Static (break-away) coefficient mu_s.", ge=0.0)
     minimum: float = _field(0.25, "Smallest kinetic coefficient mu_m (stribeck).", ge=0.0)
     minimum_speed: float = _field(
@@ -62,7 +74,7 @@ class Friction(_Model):
     @model_validator(mode="after")
     def _static_is_largest(self) -> Self:
         """Refuse a kinetic coefficient of the law in use that is above the static one."""
-        lower = {LawName("stribeck"): "minimum", LawName("exponential"): "kinetic"}.get(self.law)
+        lower = {"stribeck": "minimum", "exponential": "kinetic"}.get(self.law)
         if lower is not None and getattr(self, lower) > self.static:
             message = f"{lower} = {getattr(self, lower)} must not exceed static = {self.static}"
             raise ValueError(message)
@@ -87,13 +99,12 @@ class DisturbanceParameters(_Model):
     kind: DisturbanceKind = _field(
         DisturbanceKind.NONE,
         "Time course: none, step, impulse (one sample long) or sine.",
+        choices=DisturbanceKind,
         strict=False,
     )
     amplitude: float = _field(0.0, "Amplitude of the disturbance.", "N")
     start: float = _field(0.0, "Simulated time at which it starts.", "s", ge=0.0)
-    duration: float = _field(
-        float("inf"), "How long it lasts.", "s", ge=0.0, allow_inf_nan=True
-    )
+    duration: float = _field(float("inf"), "How long it lasts.", "s", ge=0.0, allow_inf_nan=True)
     frequency: float = _field(1.0, "Frequency of the sine.", "Hz", gt=0.0)
 
 
@@ -143,6 +154,7 @@ class PlantParameters(NodeParameters):
     pace: Pace = _field(
         Pace.LOCKSTEP,
         "Whether the plant keeps to the clock or waits for the answer to each sample.",
+        choices=Pace,
         strict=False,
         fixed=True,
     )
@@ -218,7 +230,9 @@ class WashoutControllerParameters(NodeParameters):
 
     def as_washout(self) -> WashoutParameters:
         """Return the constants of the control law."""
-        names = (name for name in type(self).model_fields if name not in NodeParameters.model_fields)
+        names = (
+            name for name in type(self).model_fields if name not in NodeParameters.model_fields
+        )
         return WashoutParameters(**{name: getattr(self, name) for name in names})
 
 
@@ -231,7 +245,7 @@ class AnalyzerParameters(NodeParameters):
         1.0, "Wall time after which what was recorded is on disk.", "s", fixed=True, gt=0.0
     )
     compression: Literal["lz4", "zstd", "none"] = _field(
-        "lz4", "Compression of the bag.", fixed=True
+        "lz4", "Compression of the bag.", fixed=True, choices=("lz4", "zstd", "none")
     )
 
 
@@ -273,15 +287,11 @@ def parameters_of(model: type[BaseModel], prefix: str = "") -> Iterator[Paramete
 
 
 def _parameter(name: str, field: FieldInfo) -> Parameter:
-    kind: Any = field.annotation
-    choices: tuple[str, ...] = ()
-    if isinstance(kind, type) and issubclass(kind, StrEnum):
-        choices, kind = tuple(kind), str
-    elif get_args(kind) and all(isinstance(choice, str) for choice in get_args(kind)):
-        choices, kind = get_args(kind), str
-    elif kind == list[str]:
-        kind = list
     extra: Any = field.json_schema_extra
+    choices = tuple(str(choice) for choice in extra["choices"])
+    kind: Any = str if choices else field.annotation
+    if kind == list[str]:
+        kind = list
     return Parameter(
         name=name,
         kind=kind,

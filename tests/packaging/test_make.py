@@ -1,4 +1,6 @@
+import os
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,10 +11,12 @@ SOURCE = Path(__file__).parents[2]
 @pytest.fixture
 def set_up(tmp_path):
     """Asks make for an environment made by a given Python."""
+    # The make that runs the tests hands its own variables on.
+    environment = {name: value for name, value in os.environ.items() if name != "MAKEFLAGS"}
 
     def run(python):
         command = ["make", "--silent", f"VENV={tmp_path / 'venv'}", f"PYTHON={python}"]
-        return subprocess.run(command, cwd=SOURCE, capture_output=True, text=True)
+        return subprocess.run(command, cwd=SOURCE, env=environment, capture_output=True, text=True)
 
     return run
 
@@ -24,7 +28,7 @@ def fake_python(tmp_path):
     def make(pattern, action):
         python = tmp_path / "python3"
         python.write_text(
-            f'#!/bin/sh\ncase "$*" in {pattern}) {action};; *) exec python3 "$@";; esac\n'
+            f'#!/bin/sh\ncase "$*" in {pattern}) {action};; *) exec {sys.executable} "$@";; esac\n'
         )
         python.chmod(0o755)
         return python

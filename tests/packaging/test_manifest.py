@@ -69,3 +69,10 @@ def test_the_manifest_tells_what_has_no_key():
     text = (SOURCE / "package.xml").read_text()
     keyless = sorted(name for name in required("") if not KEYS[name])
     assert f"for want of a rosdep key: {', '.join(keyless)}." in text
+
+
+def test_the_docs_install_in_a_workspace_all_that_is_asked_for():
+    requirements = [Requirement(text) for text in metadata.requires(PACKAGE)]
+    line = (SOURCE / "docs" / "installing.md").read_text().split("--ignore-installed ")[1]
+    written = line.splitlines()[0].replace("'", "").split()
+    assert {str(each) for each in requirements if not each.marker} == set(written)

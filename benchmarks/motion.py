@@ -1,0 +1,212 @@
+"""How much faster than scipy is the stick-slip motion, at no less accuracy?
+
+Ours: `Motion.advance` over 190 natural periods from rest (drive with m = k = N = 1, damping 0.02,
+Stribeck friction 0.4/0.25/0.5), nothing recorded. Peer: scipy's solve_ivp (DOP853, rtol 1e-11,
+atol 1e-12) with the same stick and slip modes and its own event location, timed over 19 periods;
+times are per natural period.
+
+The errors are those of displacement and velocity after all 190 periods, the larger one, against the
+same motion by its Taylor series in decimal arithmetic of 40 digits.
+
+A tick is what the plant does per sample: a new force, then a step of 1 or 10 ms. Peer: a bare heyoka
+integrator of the same slipping motion with the same two terminal events.
+"""
+
+import time
+from collections.abc import Callable
+from decimal import Decimal, localcontext
+from math import copysign, pi
+
+import heyoka as hy
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from benchmarks.slices import Row, by_turns, compare_times, show
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.friction import Stribeck
+from stickslip_ros.physics.motion import UNBOUNDED_SPEED, Motion
+
+DAMPING, STATIC, MINIMUM, MINIMUM_SPEED = 0.02, 0.4, 0.25, 0.5
+SLOPE = 3.0 * (STATIC - MINIMUM) / (2.0 * MINIMUM_SPEED)
+CUBIC = (STATIC - MINIMUM) / (2.0 * MINIMUM_SPEED**3)
+BELT_SPEEDS = (0.2, 0.4)
+PURE_SLIP_SPEED = 1.0
+"""Belt speed at which the motion from rest does not stick: ticks of one kind."""
+
+PERIODS, SCIPY_PERIODS = 190, 19
+ROUNDS, MOTIONS, TICKS = 9, 20, 2000
+RTOL, ATOL = 1e-11, 1e-12
+
+State = tuple[float, float]
+
+
+def motion(belt_speed: float) -> Motion:
+    friction = Stribeck(STATIC, MINIMUM, MINIMUM_SPEED)
+    return Motion(Drive(1.0, DAMPING, 1.0, 1.0, belt_speed, friction), 0.0, 0.0)
+
+
+def by_scipy(belt_speed: float, end: float) -> State:
+    """Return displacement and velocity at the time `end`, from rest."""
+
+    def slip(_: float, state: np.ndarray, sign: float) -> State:
+        x, y = state
+        r = y - belt_speed
+        return y, -STATIC * sign + SLOPE * r - CUBIC * r**3 - DAMPING * y - x
+
+    def stick(_: float, state: np.ndarray) -> State:
+        return state[1], 0.0
+
+    def lands(_: float, state: np.ndarray, sign: float) -> float:
+        return sign * (state[1] - belt_speed)
+
+    def breaks(_: float, state: np.ndarray) -> float:
+        return STATIC - abs(state[0] + DAMPING * state[1])
+
+    for event in (lands, breaks):
+        event.terminal, event.direction = True, -1.0
+    options = {"method": "DOP853", "rtol": RTOL, "atol": ATOL}
+    now, state, sign = 0.0, np.zeros(2), -1.0
+    while True:
+        if sign:
+            part = solve_ivp(slip, (now, end), state, events=lands, args=(sign,), **options)
+        else:
+            part = solve_ivp(stick, (now, end), state, events=breaks, **options)
+        now, state = part.t[-1], part.y[:, -1]
+        if part.status == 0:
+            return float(state[0]), float(state[1])
+        state[1] = belt_speed
+        reaction = state[0] + DAMPING * belt_speed
+        sign = 0.0 if sign and abs(reaction) <= STATIC else -copysign(1.0, reaction)
+
+
+def by_series(belt_speed: float, end: float) -> State:
+    """Return what `by_scipy` does, the numbers above taken for exactly what they are in binary."""
+    damping, static, slope, cubic = (Decimal(c) for c in (DAMPING, STATIC, SLOPE, CUBIC))
+    order, longest = 36, Decimal("0.25")
+
+    def slip(x0: Decimal, y0: Decimal, sign: int) -> tuple[list[Decimal], list[Decimal]]:
+        x, y, r, square = [x0], [y0], [y0 - belt], []
+        for k in range(order):
+            square.append(sum(r[i] * r[k - i] for i in range(k + 1)))
+            cube = sum(square[i] * r[k - i] for i in range(k + 1))
+            constant = -static * sign if k == 0 else 0
+            x.append(y[k] / (k + 1))
+            y.append((constant + slope * r[k] - cubic * cube - damping * y[k] - x[k]) / (k + 1))
+            r.append(y[-1])
+        return x, y
+
+    with localcontext() as context:
+        context.prec = 40
+        belt, left = Decimal(belt_speed), Decimal(end)
+        x, y, sign = Decimal(0), Decimal(0), -1
+        while left > 0:
+            if sign == 0:
+                step = min(left, max(Decimal(0), (static - damping * belt - x) / belt))
+                x, left, sign = x + belt * step, left - step, -1
+                continue
+            series = slip(x, y, sign)
+            step = min(left, longest)
+            if sign * (_at(series[1], step) - belt) < 0:
+                step = _crossing(series[1], belt, step)
+                x, y, left = _at(series[0], step), belt, left - step
+                reaction = x + damping * belt
+                sign = 0 if abs(reaction) <= static else -int(copysign(1.0, reaction))
+            else:
+                x, y, left = _at(series[0], step), _at(series[1], step), left - step
+        return float(x), float(y)
+
+
+def _at(series: list[Decimal], step: Decimal) -> Decimal:
+    value = Decimal(0)
+    for coefficient in reversed(series):
+        value = value * step + coefficient
+    return value
+
+
+def _crossing(series: list[Decimal], value: Decimal, end: Decimal) -> Decimal:
+    """Return the step, before `end` and near it, at which the series has the value."""
+    slopes = [k * coefficient for k, coefficient in enumerate(series)][1:]
+    for _ in range(12):
+        end -= (_at(series, end) - value) / _at(slopes, end)
+    return end
+
+
+def bare_integrator() -> hy.taylor_adaptive:
+    """Return what `motion(PURE_SLIP_SPEED)` integrates, the force as parameter 0."""
+    x, y = hy.make_vars("x", "y")
+    r = y - PURE_SLIP_SPEED
+    acceleration = STATIC + SLOPE * r - CUBIC * r * r * r - DAMPING * y - x + hy.par[0]
+    events = [hy.t_event(-r), hy.t_event(UNBOUNDED_SPEED**2 - y**2)]
+    return hy.taylor_adaptive([(x, y), (y, acceleration)], [0.0, 0.0], t_events=events)
+
+
+def timed(run: Callable[[], object], count: int) -> Callable[[], float]:
+    """Return what runs it and says how long it took, s, divided by `count`."""
+
+    def measure() -> float:
+        start = time.perf_counter()
+        run()
+        return (time.perf_counter() - start) / count
+
+    return measure
+
+
+def motion_rows(belt_speed: float) -> list[Row]:
+    ours = motion(belt_speed)
+    period = 2.0 * pi
+    end = PERIODS * period
+
+    def run_ours() -> None:
+        for _ in range(MOTIONS):
+            ours.restart(0.0, 0.0)
+            ours.advance(end)
+
+    run_ours()
+    exact = by_series(belt_speed, end)
+    our_error = error((ours.position, ours.velocity), exact)
+    scipy_error = error(by_scipy(belt_speed, end), exact)
+    times = by_turns(
+        ROUNDS,
+        timed(run_ours, MOTIONS * PERIODS),
+        timed(lambda: by_scipy(belt_speed, SCIPY_PERIODS * period), SCIPY_PERIODS),
+    )
+    what = f"belt speed {belt_speed}"
+    return [
+        compare_times(f"{what}, natural period", *times, required=300.0),
+        Row(f"{what}, error", "1", our_error, scipy_error, scipy_error / our_error, 1.0),
+    ]
+
+
+def error(state: State, exact: State) -> float:
+    return max(abs(a - b) for a, b in zip(state, exact, strict=True))
+
+
+def tick_row(step: float) -> Row:
+    ours, bare = motion(PURE_SLIP_SPEED), bare_integrator()
+    forces = [0.001 * (n % 2) for n in range(TICKS)]
+
+    def run_ours() -> None:
+        for force in forces:
+            ours.force = force
+            ours.advance(step)
+
+    def run_bare() -> None:
+        now = float(bare.time)
+        for force in forces:
+            now += step
+            bare.pars[0] = force
+            bare.propagate_until(now)
+
+    times = by_turns(3 * ROUNDS, timed(run_ours, TICKS), timed(run_bare, TICKS))
+    return compare_times(f"tick of {1e3 * step:g} ms, bare heyoka", *times)
+
+
+def measure() -> list[Row]:
+    return [
+        *(row for belt_speed in BELT_SPEEDS for row in motion_rows(belt_speed)),
+        *(tick_row(step) for step in (1e-3, 1e-2)),
+    ]
+
+
+if __name__ == "__main__":
+    show(__doc__, measure)

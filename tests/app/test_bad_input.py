@@ -1,0 +1,70 @@
+"""What came in is refused in one clear line, with status 2, and leaves nothing behind."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.app.conftest import Run
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("simulate", "nosuch"), ("unknown scenario 'nosuch'", "feed_drive, paper")),
+        (("run", "./nosuch.yaml"), ("no scenario file ./nosuch.yaml",)),
+        (("run", "paper", "-p", "plantt.mass=1"), ("unknown node plantt", "plant")),
+        (("run", "paper", "-p", "plant.masss=1"), ("unknown parameter masss", "mass")),
+        (("simulate", "paper", "-p", "plant.mass=heavy"), ("plant: mass = 'heavy'", "number")),
+        (("run", "paper", "-p", "plant.mass=-1"), ("paper.yaml", "mass = -1", "above 0 kg")),
+        (("run", "paper", "-p", "plant.belt_speed=.nan"), ("belt_speed = nan", "finite")),
+        (("run", "paper", "-p", "plant.mass"), ("NODE.PARAMETER=VALUE",)),
+        (("run", "paper", "--namespace", "a b"), ("--namespace 'a b'",)),
+        (("run", "paper", "--bag", "/proc/none/bag"), ("/proc/none/bag",)),
+        (("run", "paper", "--bag", "."), ("exists already",)),
+        (("report", "nosuch"), ("nosuch",)),
+        (("report", "."), (".mcap",)),
+        (
+            ("simulate", "paper", "--continuous-control", "-p", "plant.force_delay=0.1"),
+            ("--continuous-control", "plant.force_delay", "0.1"),
+        ),
+    ],
+)
+def test_one_line_and_status_2(
+    stickslip: Run, tmp_path: Path, arguments: tuple[str, ...], named: tuple[str, ...]
+) -> None:
+    done = stickslip(*arguments)
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    for text in named:
+        assert text in line
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (),
+        ("nosuch",),
+        ("simulate",),
+        ("simulate", "paper", "--duration", "-1"),
+        ("simulate", "paper", "--duration", "nan"),
+        ("run", "paper", "--pace", "slow"),
+        ("report", "bag", "--from", "x"),
+    ],
+)
+def test_a_wrong_call_shows_the_usage(stickslip: Run, arguments: tuple[str, ...]) -> None:
+    done = stickslip(*arguments)
+    assert done.returncode == 2
+    assert "usage: stickslip" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_an_existing_bag_is_left_as_it_is(stickslip: Run, tmp_path: Path) -> None:
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    (bag / "precious").write_text("data")
+    done = stickslip("run", "paper", "--bag", "bag", "--duration", "1")
+    assert done.returncode == 2
+    assert "exists already" in done.stderr
+    assert [file.name for file in tmp_path.rglob("*")] == ["bag", "precious"]

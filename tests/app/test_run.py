@@ -1,0 +1,135 @@
+"""`stickslip run`: the closed loop through the middleware, started as a user starts it."""
+
+import json
+import os
+import signal
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from stickslip_ros.bags.messages import joint_state_columns
+from stickslip_ros.bags.reader import Recording
+from tests.app.conftest import Run
+from tests.nodes.graph import PATIENCE, wait_for
+
+# Amplitude and stick fraction of the uncontrolled limit cycle at some belt speeds.
+REFERENCE = {
+    0.2: (0.318603222, 0.285506954),
+    0.3: (0.394200937, 0.204072402),
+    0.4: (0.434086183, 0.100062954),
+    0.46: (0.337968726, 0.0),
+}
+
+
+@pytest.mark.parametrize("belt_speed", REFERENCE)
+def test_figures_from_samples_are_those_of_the_limit_cycle(
+    stickslip: Run, belt_speed: float
+) -> None:
+    speed = f"plant.belt_speed={belt_speed}"
+    # Close to the Hopf speed the limit cycle is approached slowly.
+    duration = "1500" if belt_speed == 0.46 else "300"
+    done = stickslip(
+        "run", "paper", "--no-control", "--composed", "-p", speed, "--duration", duration, "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout)
+    amplitude, stick_fraction = REFERENCE[belt_speed]
+    assert figures["report"]["amplitude"] == pytest.approx(amplitude, rel=1e-4)
+    assert figures["report"]["stick_fraction"] == pytest.approx(stick_fraction, abs=2e-3)
+    assert figures["samples"] == int(duration) * 100 + 1
+    assert figures["lost_samples"] == figures["late_forces"] == figures["missed_deadlines"] == 0
+    assert figures["scenario"]["plant"]["belt_speed"] == belt_speed
+    assert figures["report"]["complete"]
+
+
+def test_processes_and_composed_give_the_same_bytes(stickslip: Run, tmp_path: Path) -> None:
+    payloads: dict[str, list[bytes]] = {}
+    for how in ("processes", "composed"):
+        flags = ["--composed"] if how == "composed" else []
+        done = stickslip("run", "paper", "--duration", "5", "--bag", how, *flags)
+        assert done.returncode == 0, done.stderr
+        with Recording(tmp_path / how) as recording:
+            for topic in ("joint_states", "control_force"):
+                messages = recording.messages(f"/feed_drive/{topic}")
+                payloads[f"{how} {topic}"] = [message for _, _, message in messages]
+    for topic in ("joint_states", "control_force"):
+        assert len(payloads[f"composed {topic}"]) == 501
+        assert payloads[f"processes {topic}"] == payloads[f"composed {topic}"]
+
+
+def test_the_washout_kills_the_vibration_of_the_feed_drive(
+    stickslip: Run, tmp_path: Path
+) -> None:
+    arguments = ["feed_drive", "--pace", "lockstep", "--duration", "7", "--bag", "bag"]
+    assert stickslip("run", *arguments, "--composed").returncode == 0
+    before = json.loads(stickslip("report", "bag", "--to", "5", "--json").stdout)
+    after = json.loads(stickslip("report", "bag", "--from", "6", "--json").stdout)
+    whole = json.loads(stickslip("report", "bag", "--json").stdout)
+    assert before["regime"] == "stick_slip"
+    assert after["amplitude"] < 0.01 * before["amplitude"]
+    assert 50.0 < whole["peak_force"] < 150.0
+    with Recording(tmp_path / "bag") as recording:
+        messages = [m for _, _, m in recording.messages("/feed_drive/joint_states")]
+    position = joint_state_columns(messages).position
+    assert float(position[6000:].max() - position[6000:].min()) < 0.02 * before["amplitude"]
+
+
+def test_ctrl_c_closes_the_bag(
+    start_stickslip: Callable[..., subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    process = start_stickslip("run", "feed_drive", "--bag", "bag", "--json")
+    wait_for_samples(process, tmp_path / "bag")
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130, errors
+    assert json.loads(output)["report"]["complete"]
+
+
+def test_a_node_that_dies_is_named_and_the_bag_closed(
+    start_stickslip: Callable[..., subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    process = start_stickslip("run", "feed_drive", "--bag", "bag")
+    wait_for_samples(process, tmp_path / "bag")
+    for child in children(process.pid):
+        if b"stickslip_ros.nodes.washout_controller" in Path(f"/proc/{child}/cmdline").read_bytes():
+            os.kill(child, signal.SIGKILL)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert "washout_controller died (killed by signal 9)" in errors
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.complete
+
+
+def test_no_node_outlives_a_run_that_is_killed(
+    start_stickslip: Callable[..., subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    process = start_stickslip("run", "feed_drive", "--bag", "bag")
+    wait_for_samples(process, tmp_path / "bag")
+    nodes = children(process.pid)
+    assert len(nodes) == 3
+    process.kill()
+    process.wait()
+    wait_for(lambda: not any(is_running(node) for node in nodes), "the nodes end")
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.complete
+
+
+def is_running(pid: int) -> bool:
+    status = Path(f"/proc/{pid}/stat")
+    return status.exists() and status.read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+def children(pid: int) -> list[int]:
+    return [
+        int(child)
+        for task in Path(f"/proc/{pid}/task").iterdir()
+        for child in (task / "children").read_text().split()
+    ]
+
+
+def wait_for_samples(process: subprocess.Popen[str], bag: Path) -> None:
+    """Wait until a running recorder has flushed some samples."""
+    wait_for(lambda: sum(file.stat().st_size for file in bag.glob("*.mcap")) > 20_000, "samples")
+    assert process.poll() is None

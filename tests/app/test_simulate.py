@@ -1,0 +1,47 @@
+"""`stickslip simulate`: the limit cycles of the paper's drive, from the command line."""
+
+import json
+
+import pytest
+
+from tests.app.conftest import Run
+
+# belt speed: amplitude, speed amplitude, stick fraction, period, midpoint (damping 0.02).
+REFERENCE = {
+    0.2: (0.318603222, 0.259152231, 0.285506954, 7.06772953, 0.261039897),
+    0.3: (0.394200937, 0.346695251, 0.204072402, 6.61204441, 0.275610715),
+    0.4: (0.434086183, 0.414381028, 0.100062954, 6.39242362, 0.326321421),
+    0.46: (0.337968726, 0.335036166, 0.0, 6.36478480, 0.313080028),
+}
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.parametrize("belt_speed", REFERENCE)
+def test_reference_limit_cycles(stickslip: Run, belt_speed: float, direction: float) -> None:
+    speed = f"plant.belt_speed={direction * belt_speed}"
+    duration = ("--duration", "3000") if belt_speed == 0.46 else ()
+    done = stickslip("simulate", "paper", "--no-control", "-p", speed, "--json", *duration)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    amplitude, speed_amplitude, stick_fraction, period, midpoint = REFERENCE[belt_speed]
+    assert found["amplitude"] == pytest.approx(amplitude, abs=1e-7)
+    assert found["velocity_amplitude"] == pytest.approx(speed_amplitude, abs=1e-7)
+    assert found["period"] == pytest.approx(period, abs=1e-7)
+    assert found["stick_fraction"] == pytest.approx(stick_fraction, abs=1e-6)
+    assert found["midpoint"] == pytest.approx(direction * midpoint, abs=1e-7)
+    assert found["regime"] == ("stick_slip" if stick_fraction else "pure_slip")
+
+
+def test_continuous_and_sampled_control_quench_the_feed_drive(stickslip: Run) -> None:
+    for flags in ((), ("--continuous-control",)):
+        done = stickslip("simulate", "feed_drive", "--json", *flags)
+        assert json.loads(done.stdout)["regime"] == "equilibrium"
+
+
+def test_a_motion_that_runs_away_is_a_result(stickslip: Run) -> None:
+    law = ("-p", "plant.friction.law=linear", "-p", "plant.friction.slope=0.9")
+    done = stickslip("simulate", "paper", "--no-control", "-p", "plant.belt_speed=0.2", *law, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["regime"] == "unbounded"
+    assert found["period"] is None

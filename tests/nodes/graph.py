@@ -1,0 +1,126 @@
+"""Nodes of a test, composed in this process, in a ROS domain that no other test uses."""
+
+import fcntl
+import tempfile
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+import rclpy
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+
+from stickslip_ros.nodes.managed import ManagedNode, spin
+
+PATIENCE = 60.0
+"""How long a test waits, s, for what should happen at once on an idle machine."""
+
+_DOMAINS = range(1, 102)
+
+
+@contextmanager
+def own_domain() -> Generator[int]:
+    """Hold a ROS domain that no other test on this machine has, whichever process it is in."""
+    for domain in _DOMAINS:
+        lock = Path(tempfile.gettempdir()) / f"stickslip_ros_test_domain_{domain}"
+        with lock.open("w") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+            yield domain
+            return
+    raise RuntimeError("every ROS domain is taken by a test")
+
+
+def wait_for(condition: Callable[[], object], what: str) -> None:
+    """Wait until the condition, which other processes bring about, holds; fail if it never does."""
+    nothing = Event()
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, f"waited {PATIENCE} s in vain: {what}"
+        nothing.wait(0.02)
+
+
+class Graph:
+    """Nodes on one executor, run only while the test waits for something."""
+
+    def __init__(self, domain: int) -> None:
+        self.context = Context()
+        rclpy.init(
+            args=[],
+            context=self.context,
+            domain_id=domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        self.executor = EventsExecutor(context=self.context)
+        self.observer = Node("observer", context=self.context, namespace="/test")
+        self.executor.add_node(self.observer)
+        self._nodes: list[Node] = [self.observer]
+
+    def add(self, node: type[ManagedNode[Any]], **parameters: Any) -> Any:
+        """Add one of our nodes in the namespace /test."""
+        made = node(context=self.context, namespace="/test", overrides=parameters)
+        self.adopt(made)
+        return made
+
+    def adopt(self, node: Node) -> None:
+        """Add a node that exists already."""
+        self._nodes.append(node)
+        self.executor.add_node(node)
+
+    def wait_until(self, condition: Callable[[], object], what: str) -> None:
+        """Run the nodes until the condition holds; fail with `what` if it does not in time."""
+        done = Future()
+        clock = Clock(clock_type=ClockType.STEADY_TIME)
+        started = clock.now()
+
+        def check() -> None:
+            waited = (clock.now() - started).nanoseconds * 1e-9
+            if not done.done() and (condition() or waited > PATIENCE):
+                done.set_result(None)
+
+        timer = self.observer.create_timer(0.01, check, clock=clock)
+        spin(self.executor, done)
+        self.observer.destroy_timer(timer)
+        assert condition(), f"waited {PATIENCE} s in vain: {what}"
+
+    def call(self, kind: Any, name: str, request: Any) -> Any:
+        """Call a service and return its answer."""
+        client = self.observer.create_client(kind, name)
+        self.wait_until(client.service_is_ready, f"service {name}")
+        answer = client.call_async(request)
+        self.wait_until(answer.done, f"answer of {name}")
+        self.observer.destroy_client(client)
+        return answer.result()
+
+    def deactivate(self, name: str) -> None:
+        """Deactivate one of our nodes as others do, behind the messages it has to take already."""
+        request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
+        assert self.call(ChangeState, f"/test/{name}/change_state", request).success
+
+    def listen(self, topic: Any, raw: bool = False) -> list[Any]:
+        """Return a list to which every message of a topic will be appended."""
+        heard: list[Any] = []
+        name = topic.name if topic.name.startswith("/") else f"/test/{topic.name}"
+        self.observer.create_subscription(
+            topic.type, name, heard.append, topic.qos(10_000), raw=raw
+        )
+        return heard
+
+    def close(self) -> None:
+        """Take everything down."""
+        for node in reversed(self._nodes):
+            self.executor.remove_node(node)
+            node.destroy_node()
+        self.executor.shutdown()
+        rclpy.shutdown(context=self.context)

@@ -1,0 +1,91 @@
+"""The analyzer node on the real middleware."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from stickslip_ros.bags.messages import joint_state_columns, pack_wrench
+from stickslip_ros.bags.reader import Recording
+from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.topics import AMPLITUDE, DISTURBANCE_FORCE, JOINT_STATES, STICK_FRACTION
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from tests.nodes.graph import Graph
+
+
+def run_to_the_end(graph: Graph, bag: Path, **plant_parameters: object) -> None:
+    """Run plant and analyzer until the plant pauses by itself, and the analyzer has closed."""
+    analyzer = graph.add(AnalyzerNode, bag=str(bag))
+    graph.wait_until(lambda: analyzer.active, "analyzer active")
+    plant = graph.add(PlantNode, wait_for=["analyzer"], **plant_parameters)
+    graph.wait_until(lambda: plant.active, "plant active")
+    graph.wait_until(lambda: not plant.active, "plant pauses")
+    graph.deactivate("analyzer")
+
+
+def test_it_records_the_bytes_it_hears_and_measures_them(graph: Graph, tmp_path: Path) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    amplitudes, fractions = graph.listen(AMPLITUDE), graph.listen(STICK_FRACTION)
+    parameters = {"expects_control": False, "belt_speed": 0.2, "duration": 60.0}
+    run_to_the_end(graph, tmp_path / "bag", **parameters)
+    graph.wait_until(lambda: len(heard) == 6001 and len(amplitudes) > 5, "all is heard")
+
+    with Recording(tmp_path / "bag") as recording:
+        recorded = [m for _, _, m in recording.messages("/test/joint_states")]
+        stored = recording.metadata("stickslip_ros/report")
+        plant = recording.metadata("stickslip_ros/plant")
+        assert recording.complete
+    assert recorded == [bytes(message) for message in heard]
+    assert joint_state_columns(recorded).stamp[-1] == 61_000_000_000
+    report = report_of_bag(tmp_path / "bag")
+    assert report["lost_samples"] == 0
+    assert report["samples"] == 6001
+    assert stored is not None
+    assert json.loads(stored["amplitude"]) == pytest.approx(report["amplitude"], rel=1e-12)
+    assert amplitudes[-1].data == pytest.approx(0.318603222, rel=1e-4)
+    assert fractions[-1].data == pytest.approx(0.285506954, abs=2e-3)
+    assert plant is not None
+    assert json.loads(plant["belt_speed"]) == 0.2
+
+
+def test_activated_again_it_opens_a_further_bag(graph: Graph, tmp_path: Path) -> None:
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    for name in ("bag", "bag_2", "bag_3"):
+        graph.wait_until(lambda: analyzer.active, "analyzer active")
+        analyzer.trigger_deactivate()
+        assert (tmp_path / name / "metadata.yaml").is_file()
+        analyzer.trigger_activate()
+
+
+def test_a_bag_that_exists_is_refused_and_left_alone(graph: Graph, tmp_path: Path) -> None:
+    (tmp_path / "bag").mkdir()
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    graph.wait_until(analyzer.stopped.done, "refusal")
+    assert "exists already" in str(analyzer.stopped.result())
+    assert not analyzer.active
+    assert list((tmp_path / "bag").iterdir()) == []
+
+
+def test_the_closed_loop_is_answered_without_loss(graph: Graph, tmp_path: Path) -> None:
+    controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    graph.wait_until(lambda: controller.active and analyzer.active, "both active")
+    plant = graph.add(
+        PlantNode, wait_for=["analyzer", "washout_controller"], belt_speed=0.45, duration=20.0
+    )
+    tap = graph.observer.create_publisher(
+        DISTURBANCE_FORCE.type, f"/test/{DISTURBANCE_FORCE.name}", DISTURBANCE_FORCE.qos()
+    )
+    graph.wait_until(lambda: plant.active and tap.get_subscription_count() == 1, "plant active")
+    tap.publish(pack_wrench(0, 0.01))
+    graph.wait_until(lambda: not plant.active, "plant pauses")
+    graph.deactivate("washout_controller")
+    graph.deactivate("analyzer")
+    with Recording(tmp_path / "bag") as recording:
+        states = [stamp for _, stamp, _ in recording.messages("/test/joint_states")]
+        forces = [stamp for _, stamp, _ in recording.messages("/test/control_force")]
+        disturbances = list(recording.messages("/test/applied_disturbance"))
+    assert states == forces == [1_000_000_000 + n * 10_000_000 for n in range(2001)]
+    assert len(disturbances) == 1

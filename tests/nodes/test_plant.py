@@ -1,0 +1,237 @@
+"""The plant node on the real middleware."""
+
+from math import nan
+
+import numpy as np
+import pytest
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
+
+from stickslip_ros.bags.messages import (
+    joint_state_columns,
+    pack_header,
+    pack_wrench,
+    unpack_wrench,
+)
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.topics import (
+    APPLIED_DISTURBANCE,
+    CONTROL_FORCE,
+    DIAGNOSTICS,
+    DISTURBANCE_FORCE,
+    JOINT_STATES,
+    RECORDED,
+)
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.sampled_loop import SampledLoop
+from stickslip_ros.scenario.parameters import PlantParameters
+from tests.nodes.graph import Graph
+
+SECOND = 1_000_000_000
+
+
+def answers(graph: Graph):
+    """Return a publisher of control forces, matched with the plant."""
+    publisher = graph.observer.create_publisher(
+        CONTROL_FORCE.type, f"/test/{CONTROL_FORCE.name}", CONTROL_FORCE.qos()
+    )
+    graph.wait_until(lambda: publisher.get_subscription_count() == 1, "plant listens to forces")
+    return publisher
+
+
+def test_without_control_the_samples_are_those_of_the_loop(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    plant = graph.add(PlantNode, expects_control=False, duration=3.0, wait_for=["observer"])
+    graph.wait_until(lambda: len(heard) == 301 and not plant.active, "301 samples")
+
+    parameters = PlantParameters()
+    loop = SampledLoop(Motion(parameters.as_drive(), 0.0, 0.0), 100.0, SECOND)
+    samples = [loop.sample] + [loop.advance() for _ in range(300)]
+    columns = joint_state_columns(heard)
+    assert columns.stamp.tolist() == [sample.stamp for sample in samples]
+    assert columns.position.tolist() == [sample.position for sample in samples]
+    assert columns.velocity.tolist() == [sample.velocity for sample in samples]
+    assert columns.effort.tolist() == [sample.friction_force for sample in samples]
+    assert columns.belt_velocity.tolist() == [0.4] * 301
+
+
+def test_lockstep_waits_for_the_answer_to_each_sample(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    plant = graph.add(PlantNode, wait_for=["observer"])
+    force = answers(graph)
+    graph.wait_until(lambda: len(heard) == 1, "sample 0")
+    for stamp, value in ((0, 1.0), (SECOND + 1, 1.0), (9 * SECOND, 1.0), (SECOND, nan)):
+        force.publish(pack_wrench(stamp, value))
+    graph.wait_until(lambda: plant._loop.dropped.total() == 4, "four bad forces are dropped")
+    assert len(heard) == 1
+    force.publish(pack_wrench(SECOND, 0.25))
+    graph.wait_until(lambda: len(heard) == 2, "sample 1")
+    assert plant._loop.late_forces == 0
+
+
+def test_a_missing_controller_is_given_up_and_taken_back(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    diagnostics = graph.listen(DIAGNOSTICS)
+    plant = graph.add(PlantNode, wait_for=["observer"], reply_timeout=0.2)
+    graph.wait_until(lambda: len(heard) > 200, "the plant goes on without forces")
+    controller = graph.add(WashoutControllerNode)
+    graph.wait_until(lambda: plant._loop.controller_present, "the controller is taken back")
+    late = plant._loop.late_forces
+    reached = plant._loop.sample.number
+    graph.wait_until(lambda: plant._loop.sample.number > reached + 500, "500 samples more")
+    assert plant._loop.late_forces == late
+    assert controller.active
+    plant.publish_diagnostics()
+    graph.wait_until(
+        lambda: any(
+            "no control force" in status.message
+            for array in diagnostics
+            for status in array.status
+            if status.name == "/test/plant"
+        ),
+        "the gap is in the diagnostics",
+    )
+
+
+def test_it_runs_no_further_ahead_of_the_recorder_than_the_window(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    recorded = graph.observer.create_publisher(
+        RECORDED.type, f"/test/{RECORDED.name}", RECORDED.qos()
+    )
+    plant = graph.add(
+        PlantNode, expects_control=False, wait_for=["observer"], flow_window=200, duration=10.0
+    )
+    graph.wait_until(lambda: len(heard) == 200, "the window is used up")
+    recorded.publish(pack_header(SECOND + 99 * SECOND // 100))
+    graph.wait_until(lambda: len(heard) == 300, "the window moves on by 100")
+    assert plant.active
+    graph.observer.destroy_publisher(recorded)
+    graph.wait_until(lambda: len(heard) == 1001, "a recorder that went away is not waited for")
+
+
+def test_activated_again_it_starts_a_new_segment_where_it_stopped(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    plant = graph.add(PlantNode, expects_control=False, wait_for=["observer"], duration=1.0)
+    graph.wait_until(lambda: len(heard) == 101 and not plant.active, "first segment")
+    plant.trigger_activate()
+    graph.wait_until(lambda: len(heard) == 202 and not plant.active, "second segment")
+    columns = joint_state_columns(heard)
+    assert np.diff(columns.stamp).tolist() == [SECOND // 100] * 201
+    assert columns.position[101] == columns.position[100]
+    assert columns.position[201] > columns.position[101] > 0.0
+
+
+def test_reset_returns_to_the_initial_state_and_time_goes_on(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    parameters = {"initial.position": 0.1, "wait_for": ["observer"]}
+    graph.add(PlantNode, **parameters)
+    force = answers(graph)
+    graph.wait_until(lambda: len(heard) == 1, "sample 0")
+    force.publish(pack_wrench(SECOND, 0.0))
+    graph.wait_until(lambda: len(heard) == 2, "sample 1")
+    assert graph.call(Trigger, "/test/plant/reset", Trigger.Request()).success
+    force.publish(pack_wrench(SECOND + SECOND // 100, 0.0))
+    graph.wait_until(lambda: len(heard) == 3, "sample 2")
+    columns = joint_state_columns(heard)
+    assert columns.position[1] != 0.1
+    assert columns.position[2] == 0.1
+    assert columns.stamp[2] == SECOND + 2 * SECOND // 100
+
+
+def test_a_disturbance_acts_from_the_next_sample_and_is_told(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    applied = graph.listen(APPLIED_DISTURBANCE, raw=True)
+    plant = graph.add(PlantNode, wait_for=["observer"])
+    force = answers(graph)
+    tap = graph.observer.create_publisher(
+        DISTURBANCE_FORCE.type, f"/test/{DISTURBANCE_FORCE.name}", DISTURBANCE_FORCE.qos()
+    )
+    graph.wait_until(lambda: tap.get_subscription_count() == 1, "plant listens to disturbances")
+    graph.wait_until(lambda: len(heard) == 1, "sample 0")
+    tap.publish(pack_wrench(0, 0.5))
+    graph.wait_until(lambda: plant._loop._asked_disturbance == 0.5, "the disturbance came")
+    force.publish(pack_wrench(SECOND, 0.0))
+    graph.wait_until(lambda: applied, "the disturbance is told")
+    assert unpack_wrench(applied[0]) == (SECOND + SECOND // 100, 0.5)
+
+
+def test_parameters_change_all_at_once_or_not_at_all(graph: Graph) -> None:
+    graph.add(PlantNode, wait_for=["observer"])
+    heard = graph.listen(JOINT_STATES, raw=True)
+    force = answers(graph)
+    graph.wait_until(lambda: len(heard) == 1, "sample 0")
+
+    def set_atomically(**values: object) -> object:
+        request = SetParametersAtomically.Request(
+            parameters=[
+                Parameter(name.replace("__", "."), value=value).to_parameter_msg()
+                for name, value in values.items()
+            ]
+        )
+        kind, name = SetParametersAtomically, "/test/plant/set_parameters_atomically"
+        return graph.call(kind, name, request).result
+
+    refused = set_atomically(belt_speed=0.2, mass=-1.0)
+    assert not refused.successful
+    assert "mass = -1.0" in refused.reason
+    assert "above 0" in refused.reason
+    assert not set_atomically(belt_speed="fast").successful
+    assert not set_atomically(belt_speed=nan).successful
+    fixed = set_atomically(rate=10.0)
+    assert not fixed.successful
+    assert "rate cannot be changed while the node is active" in fixed.reason
+    assert not set_atomically(friction__minimum=0.5).successful
+    assert set_atomically(belt_speed=1, friction__static=0.5, friction__minimum=0.45).successful
+
+    force.publish(pack_wrench(SECOND, 0.0))
+    graph.wait_until(lambda: len(heard) == 2, "sample 1")
+    columns = joint_state_columns(heard)
+    assert columns.belt_velocity.tolist() == [0.4, 1.0]
+
+
+def test_a_motion_that_runs_away_deactivates_the_plant(graph: Graph) -> None:
+    diagnostics = graph.listen(DIAGNOSTICS)
+    parameters = {
+        "friction.law": "linear",
+        "friction.slope": 2.0,
+        "initial.position": 0.1,
+        "belt_speed": 0.2,
+        "expects_control": False,
+    }
+    plant = graph.add(PlantNode, **parameters)
+    graph.wait_until(
+        lambda: any(
+            "unbounded" in status.message for array in diagnostics for status in array.status
+        ),
+        "the reason is in the diagnostics",
+    )
+    assert not plant.active
+
+
+def test_realtime_keeps_the_stamps_on_the_grid_and_holds_late_forces(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    plant = graph.add(
+        PlantNode, pace="realtime", rate=200.0, duration=0.5, wait_for=["observer"]
+    )
+    graph.wait_until(lambda: len(heard) == 101 and not plant.active, "half a second")
+    columns = joint_state_columns(heard)
+    assert np.diff(columns.stamp).tolist() == [SECOND // 200] * 100
+    assert plant._loop.late_forces == 100
+
+
+@pytest.mark.parametrize("factor", [5.0])
+def test_the_real_time_factor_scales_the_pace(graph: Graph, factor: float) -> None:
+    plant = graph.add(
+        PlantNode,
+        pace="realtime",
+        rate=100.0,
+        duration=2.0,
+        real_time_factor=factor,
+        expects_control=False,
+    )
+    graph.wait_until(lambda: hasattr(plant, "_pacer") and not plant.active, "two seconds")
+    # It can be slower on a busy machine, never faster.
+    assert plant._pacer.steps_per_second <= 100.0 * factor * 1.01
+    assert plant._loop.late_forces == 0

@@ -1,0 +1,83 @@
+"""The washout controller node on the real middleware."""
+
+from math import nan
+
+import pytest
+from rclpy.parameter import Parameter
+
+from stickslip_ros.bags.messages import pack_joint_state, unpack_wrench
+from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.physics.washout import Washout, WashoutParameters
+from tests.nodes.graph import Graph
+
+SECOND = 1_000_000_000
+
+
+class Loop:
+    """Sends joint states to a controller and hears its forces."""
+
+    def __init__(self, graph: Graph, **parameters: object) -> None:
+        self.graph = graph
+        self.forces = graph.listen(CONTROL_FORCE, raw=True)
+        self.controller = graph.add(WashoutControllerNode, wait_for=["observer"], **parameters)
+        self.states = graph.observer.create_publisher(
+            JOINT_STATES.type, f"/test/{JOINT_STATES.name}", JOINT_STATES.qos()
+        )
+        graph.wait_until(
+            lambda: self.controller.active and self.states.get_subscription_count() == 1,
+            "controller listens",
+        )
+
+    def send(self, stamp: int, velocity: float) -> None:
+        """Send a state, without waiting for the answer."""
+        self.states.publish(pack_joint_state(stamp, (0.0, 0.0), (velocity, 0.4), (0.0, 0.0)))
+
+    def answer(self, stamp: int, velocity: float) -> tuple[int, float]:
+        """Send a state and return stamp and force of the answer."""
+        heard = len(self.forces)
+        self.send(stamp, velocity)
+        self.graph.wait_until(lambda: len(self.forces) > heard, f"answer to {stamp}")
+        return unpack_wrench(self.forces[-1])
+
+
+def test_each_state_is_answered_with_the_force_of_the_law(graph: Graph) -> None:
+    loop = Loop(graph, corner_frequency=3.0, linear_gain=-2.0, cubic_gain=-0.5)
+    law = Washout(WashoutParameters(3.0, -2.0, -0.5))
+    for number, velocity in enumerate((0.1, 0.3, -0.2, 0.05)):
+        stamp = SECOND + number * 7_000_000
+        assert loop.answer(stamp, velocity) == (stamp, law.answer(stamp, velocity))
+    assert unpack_wrench(loop.forces[0])[1] == 0.0
+
+
+def test_what_is_not_a_finite_state_is_dropped_and_diagnosed(graph: Graph) -> None:
+    loop = Loop(graph)
+    loop.answer(SECOND, 0.1)
+    loop.send(2 * SECOND, nan)
+    graph.wait_until(lambda: "velocity nan" in loop.controller.diagnose()[1], "NaN is dropped")
+    loop.states.publish(b"\x00\x01\x00\x00 nothing")
+    graph.wait_until(lambda: "ends after" in loop.controller.diagnose()[1], "garbage is dropped")
+    stamp, _ = loop.answer(3 * SECOND, 0.1)
+    assert stamp == 3 * SECOND
+    assert len(loop.forces) == 2
+
+
+def test_an_inactive_controller_is_silent(graph: Graph) -> None:
+    loop = Loop(graph)
+    loop.controller.trigger_deactivate()
+    loop.send(SECOND, 0.1)
+    loop.controller.trigger_activate()
+    stamp, force = loop.answer(2 * SECOND, 0.3)
+    assert (stamp, force) == (2 * SECOND, 0.0)
+    assert len(loop.forces) == 1
+
+
+def test_gains_change_while_running(graph: Graph) -> None:
+    loop = Loop(graph, corner_frequency=1e-9, linear_gain=-1.0, cubic_gain=0.0)
+    loop.answer(SECOND, 0.0)
+    assert loop.answer(2 * SECOND, 0.5)[1] == pytest.approx(-0.5, rel=1e-6)
+    loop.controller.set_parameters([Parameter("linear_gain", value=-4)])
+    assert loop.answer(3 * SECOND, 0.5)[1] == pytest.approx(-2.0, rel=1e-6)
+    (refused,) = loop.controller.set_parameters([Parameter("corner_frequency", value=0.0)])
+    assert not refused.successful
+    assert "corner_frequency = 0.0" in refused.reason

@@ -1,0 +1,53 @@
+"""The motion's limit cycles against those of another integrator."""
+
+from dataclasses import replace
+
+import pytest
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.measures import CycleMeter, Measures, Regime
+from stickslip_ros.physics.motion import Motion
+from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, LimitCycle
+
+# In natural periods. The slowest transient, at belt speed 0.46, dies out e-fold in four.
+TRANSIENT, MEASURED = 400, 40
+
+
+def settled(drive: Drive) -> Measures:
+    """The measures of what the drive does from rest, after the transient."""
+    motion = Motion(drive, 0.0, 0.0, record=True)
+    motion.advance(TRANSIENT * drive.natural_period)
+    motion.take_knots()
+    motion.advance(MEASURED * drive.natural_period)
+    meter = CycleMeter(window=MEASURED)
+    meter.feed(motion.take_knots(), drive.belt_speed)
+    return meter.measures()
+
+
+def check(measured: Measures, cycle: LimitCycle, length: float = 1.0, time: float = 1.0) -> None:
+    assert measured.cycles > 30
+    assert measured.regime is (Regime.STICK_SLIP if cycle.stick_fraction else Regime.PURE_SLIP)
+    assert measured.amplitude == pytest.approx(cycle.amplitude * length, rel=1e-8)
+    assert measured.velocity_amplitude == pytest.approx(
+        cycle.velocity_amplitude * length / time, rel=1e-8
+    )
+    assert measured.stick_fraction == pytest.approx(cycle.stick_fraction, abs=1e-8)
+    assert measured.period == pytest.approx(cycle.period * time, rel=1e-8)
+    assert measured.frequency == pytest.approx(1.0 / (cycle.period * time), rel=1e-8)
+    assert measured.midpoint == pytest.approx(cycle.midpoint * length, rel=1e-8)
+
+
+@pytest.mark.parametrize("cycle", LIMIT_CYCLES, ids=lambda cycle: f"belt speed {cycle.belt_speed}")
+def test_limit_cycle_of_the_paper(cycle: LimitCycle) -> None:
+    check(settled(replace(PAPER, belt_speed=cycle.belt_speed)), cycle)
+
+
+@pytest.mark.parametrize("cycle", LIMIT_CYCLES, ids=lambda cycle: f"belt speed {cycle.belt_speed}")
+def test_a_reversed_belt_mirrors_the_motion(cycle: LimitCycle) -> None:
+    mirrored = cycle._replace(midpoint=-cycle.midpoint)
+    check(settled(replace(PAPER, belt_speed=-cycle.belt_speed)), mirrored)
+
+
+def test_limit_cycle_in_si_units() -> None:
+    (at_04,) = (cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.4)
+    check(settled(FEED_DRIVE), at_04, length=1e-3, time=1e-2)
