@@ -61,12 +61,11 @@ setup(
     install_requires=[
         "heyoka",
         "matplotlib",
-        "mcap",
+        "mcap>=1.5",  # the first whose writer can close a chunk on demand
         "numpy",
         "pydantic>=2",  # another API than 1, which some distributions still ship
         "pyyaml",
         "rich",
-        "scipy",
     ],
     extras_require={
         # ROS itself, where none is installed; the message packages come with these two.
@@ -76,6 +75,7 @@ setup(
             "pytest",
             "pytest-timeout",
             "rosbags",
+            "scipy",  # the solver that the motion is compared with
             "setuptools>=70.1",  # the first to make wheels unaided
         ],
         "dev": ["colcon-common-extensions", "colcon-ros", "pyright", "ruff"],

@@ -1,6 +1,7 @@
 """Writing a bag: a directory with one MCAP file and, once closed, `metadata.yaml`."""
 
 import os
+import tempfile
 from collections.abc import Generator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
@@ -53,14 +54,18 @@ class QosProfile:
 
 
 def check_new_bag(path: Path) -> None:
-    """Raise BagError for a path at which no bag can be created; creates nothing."""
+    """Raise BagError for a path at which no bag can be created; leaves nothing behind."""
     if os.path.lexists(path):
         raise BagError(f"the bag {path} exists already, and nothing is ever overwritten")
     parent = next(parent for parent in _absolute(path).parents if os.path.lexists(parent))
     if not parent.is_dir():
         raise BagError(f"the bag {path} cannot be created: {parent} is not a directory")
-    if not os.access(parent, os.W_OK | os.X_OK):
-        raise BagError(f"the bag {path} cannot be created: {parent} may not be written to")
+    try:
+        os.rmdir(tempfile.mkdtemp(dir=parent))  # what permissions alone do not tell
+    except OSError as error:
+        raise BagError(
+            f"the bag {path} cannot be created: {parent} cannot be written to ({error.strerror})"
+        ) from None
 
 
 class Recorder:

@@ -30,7 +30,7 @@ from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.scenario.files import Scenario, parameter_file
 
 _LOGGING = ["--ros-args", "--log-level", "warn"]
-_READY_TIMEOUT = 60.0
+_READY_TIMEOUT = 30.0
 _ANSWER_TIMEOUT = 15.0
 _RETRY_PERIOD = 0.02
 _WATCH_PERIOD = 0.1

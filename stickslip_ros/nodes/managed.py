@@ -87,6 +87,7 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
         self.parameters = self._declare(model)
         """The parameters in force."""
         self._connections: list[Any] = []
+        self._last_refusal = ""
         self._diagnostics = self.create_publisher(
             DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos()
         )
@@ -209,8 +210,9 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
         except InvalidInputError as error:
             if self._autostart_timer is not None:
                 self.refuse(error)
-            else:
-                self.get_logger().error(str(error))
+            elif str(error) != self._last_refusal:  # whoever brings us up may try again and again
+                self._last_refusal = str(error)
+                self.get_logger().error(self._last_refusal)
             return TransitionCallbackReturn.FAILURE
         except Exception as error:  # rclpy would swallow it without a word
             self.get_logger().error(f"{type(error).__name__}: {error}")

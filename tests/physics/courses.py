@@ -129,7 +129,9 @@ def courses(draw: st.DrawFn) -> Course:
         friction=draw(friction_laws()).scaled(1.0 / speed),
     )
     velocity = draw(st.one_of(st.just(belt), st.floats(-2.0, 2.0))) * speed
-    pieces = draw(st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(0.1, 8.0)), min_size=1, max_size=4))
+    pieces = draw(
+        st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(0.1, 8.0)), min_size=1, max_size=4)
+    )
     return Course(
         drive,
         draw(st.floats(-3.0, 3.0)) * length,

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.motion import Motion
 from tests.physics.courses import Course, courses
 
 # Gauss-Legendre quadrature: eight nodes are exact to rounding for what changes by a factor of e, or
@@ -144,14 +143,14 @@ cuts = st.lists(st.floats(0.0, 1.0), max_size=30)
 
 
 @given(courses(), cuts)
-@settings(max_examples=100)
+@settings(max_examples=40)
 def test_cutting_into_steps_changes_nothing(course: Course, cuts: list[float]) -> None:
     check_cutting(course, cuts)
 
 
 @pytest.mark.long
 @given(courses(), cuts)
-@settings(max_examples=3000)
+@settings(max_examples=1000)
 def test_cutting_many_motions_into_steps_changes_nothing(course: Course, cuts: list[float]) -> None:
     check_cutting(course, cuts)
 

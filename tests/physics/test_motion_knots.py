@@ -1,0 +1,78 @@
+"""The knots a motion marks: its turning points and velocity extremes, exactly."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+
+from stickslip_ros.physics.friction import Coulomb
+from stickslip_ros.physics.knots import Knots
+from stickslip_ros.physics.motion import Motion
+from tests.physics.drives import FEED_DRIVE, PAPER
+
+# On a fast belt Coulomb friction is constant: a free vibration about mu_s with amplitude 0.3.
+FREE = replace(PAPER, damping=0.0, belt_speed=1.0, friction=Coulomb(0.4))
+
+
+def test_turning_points_have_a_velocity_of_exactly_zero() -> None:
+    motion = Motion(FREE, 0.7, 0.0, record=True)
+    motion.advance(10.0)
+    knots = motion.take_knots()
+    turning = knots[knots.velocity == 0.0]
+    assert np.unique(np.round(turning.time, 9)) == pytest.approx([0.0, pi, 2 * pi, 3 * pi])
+    assert turning.time[-1] == pytest.approx(3.0 * pi, rel=1e-13)
+    assert turning.position[-1] == pytest.approx(0.1, rel=1e-13)
+
+
+def test_velocity_extremes_are_knots() -> None:
+    motion = Motion(FREE, 0.7, 0.0, record=True)
+    motion.advance(10.0)
+    knots = motion.take_knots()
+    fastest = knots[np.abs(np.abs(knots.velocity) - 0.3) < 1e-13]
+    assert fastest.time == pytest.approx([pi / 2, 3 * pi / 2, 5 * pi / 2], rel=1e-12)
+    assert fastest.position == pytest.approx([0.4, 0.4, 0.4], rel=1e-12)
+
+
+@pytest.mark.parametrize("step", [0.001, 0.01])
+def test_no_sampled_state_is_beyond_the_knots(step: float) -> None:
+    """Between neighbouring knots displacement and speed have no extremes."""
+    drive = replace(FEED_DRIVE, belt_speed=0.02)
+    coarse = Motion(drive, 0.0, 0.0, record=True)
+    coarse.advance(0.3)
+    knots = coarse.take_knots()
+    sampled = Motion(drive, 0.0, 0.0)
+    slack = 1e-12
+    for number in range(1, round(0.3 / step)):
+        sampled.advance(step)
+        after = int(np.searchsorted(knots.time, number * step))
+        for value, column in (
+            (sampled.position / drive.length_scale, knots.position / drive.length_scale),
+            (sampled.velocity / drive.speed_scale, knots.velocity / drive.speed_scale),
+        ):
+            low, high = sorted(column[after - 1 : after + 1])
+            assert low - slack <= value <= high + slack
+
+
+def test_knots_are_in_si_units_and_end_where_the_motion_is() -> None:
+    motion = Motion(FEED_DRIVE, 0.0, 0.0, record=True)
+    motion.advance(0.05)
+    motion.advance(0.02)
+    knots = motion.take_knots()
+    assert knots.time[0] == 0.0
+    assert knots.time[-1] == pytest.approx(0.07, rel=1e-14)
+    assert knots.position[-1] == motion.position
+    assert knots.velocity[-1] == motion.velocity
+
+
+def test_knots_are_taken_once() -> None:
+    motion = Motion(PAPER, 0.0, 0.0, record=True)
+    motion.advance(1.0)
+    assert len(motion.take_knots()) > 1
+    assert len(motion.take_knots()) == 0
+
+
+def test_a_motion_that_does_not_record_has_none() -> None:
+    motion = Motion(PAPER, 0.0, 0.0)
+    motion.advance(10.0)
+    assert len(motion.take_knots()) == len(Knots.empty())
