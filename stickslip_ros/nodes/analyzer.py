@@ -22,7 +22,8 @@ from stickslip_ros.bags.messages import (
 )
 from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
 from stickslip_ros.errors import BagError, StickslipError
-from stickslip_ros.nodes.managed import OK, WARN, Level, ManagedNode, run_node
+from stickslip_ros.nodes.managed import OK, WARN, Level, ManagedNode
+from stickslip_ros.nodes.process import run_node
 from stickslip_ros.nodes.topics import (
     AMPLITUDE,
     APPLIED_DISTURBANCE,

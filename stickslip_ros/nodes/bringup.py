@@ -23,8 +23,9 @@ from std_msgs.msg import Header
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.managed import PARENT_VARIABLE, ManagedNode, spin, stop_on_signals
+from stickslip_ros.nodes.managed import ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.process import PARENT_VARIABLE, spin, stop_on_signals
 from stickslip_ros.nodes.topics import DIAGNOSTICS, RECORDED
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.scenario.files import Scenario, parameter_file

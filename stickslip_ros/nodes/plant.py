@@ -10,8 +10,9 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from stickslip_ros.bags.messages import pack_joint_state, pack_wrench, unpack_header, unpack_wrench
-from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode, run_node
+from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.pacing import LockstepPacer, RealtimePacer
+from stickslip_ros.nodes.process import run_node
 from stickslip_ros.nodes.topics import (
     APPLIED_DISTURBANCE,
     CLOCK,

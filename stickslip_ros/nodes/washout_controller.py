@@ -6,7 +6,8 @@ from typing import Any
 
 from stickslip_ros.bags.messages import pack_wrench, unpack_joint_state
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.nodes.managed import OK, WARN, Level, ManagedNode, run_node
+from stickslip_ros.nodes.managed import OK, WARN, Level, ManagedNode
+from stickslip_ros.nodes.process import run_node
 from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.physics.washout import Washout
 from stickslip_ros.scenario.parameters import WashoutControllerParameters

@@ -59,9 +59,7 @@ def test_processes_and_composed_give_the_same_bytes(stickslip: Run, tmp_path: Pa
         assert payloads[f"processes {topic}"] == payloads[f"composed {topic}"]
 
 
-def test_the_washout_kills_the_vibration_of_the_feed_drive(
-    stickslip: Run, tmp_path: Path
-) -> None:
+def test_the_washout_kills_the_vibration_of_the_feed_drive(stickslip: Run, tmp_path: Path) -> None:
     arguments = ["feed_drive", "--pace", "lockstep", "--duration", "7", "--bag", "bag"]
     assert stickslip("run", *arguments, "--composed").returncode == 0
     before = json.loads(stickslip("report", "bag", "--to", "5", "--json").stdout)

@@ -40,7 +40,9 @@ def test_continuous_and_sampled_control_quench_the_feed_drive(stickslip: Run) ->
 
 def test_a_motion_that_runs_away_is_a_result(stickslip: Run) -> None:
     law = ("-p", "plant.friction.law=linear", "-p", "plant.friction.slope=0.9")
-    done = stickslip("simulate", "paper", "--no-control", "-p", "plant.belt_speed=0.2", *law, "--json")
+    done = stickslip(
+        "simulate", "paper", "--no-control", "-p", "plant.belt_speed=0.2", *law, "--json"
+    )
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["regime"] == "unbounded"

@@ -17,6 +17,7 @@ from stickslip_ros.bags.messages import (
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.topics import (
     APPLIED_DISTURBANCE,
+    CLOCK,
     CONTROL_FORCE,
     DIAGNOSTICS,
     DISTURBANCE_FORCE,
@@ -212,17 +213,25 @@ def test_a_motion_that_runs_away_deactivates_the_plant(graph: Graph) -> None:
 
 def test_realtime_keeps_the_stamps_on_the_grid_and_holds_late_forces(graph: Graph) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
-    plant = graph.add(
-        PlantNode, pace="realtime", rate=200.0, duration=0.5, wait_for=["observer"]
-    )
+    plant = graph.add(PlantNode, pace="realtime", rate=200.0, duration=0.5, wait_for=["observer"])
     graph.wait_until(lambda: len(heard) == 101 and not plant.active, "half a second")
     columns = joint_state_columns(heard)
     assert np.diff(columns.stamp).tolist() == [SECOND // 200] * 100
     assert plant._loop.late_forces == 100
 
 
-@pytest.mark.parametrize("factor", [5.0])
-def test_the_real_time_factor_scales_the_pace(graph: Graph, factor: float) -> None:
+def test_the_clock_follows_the_stamps(graph: Graph) -> None:
+    heard = graph.listen(CLOCK)
+    graph.add(
+        PlantNode, publish_clock=True, expects_control=False, duration=0.5, wait_for=["observer"]
+    )
+    graph.wait_until(lambda: len(heard) == 51, "51 samples")
+    times = [message.clock.sec * SECOND + message.clock.nanosec for message in heard]
+    assert times == [SECOND + n * SECOND // 100 for n in range(51)]
+
+
+def test_the_real_time_factor_scales_the_pace(graph: Graph) -> None:
+    factor = 5.0
     plant = graph.add(
         PlantNode,
         pace="realtime",

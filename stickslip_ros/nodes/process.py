@@ -1,0 +1,126 @@
+"""Running nodes: one as a process, and the spinning that every executor here needs."""
+
+import argparse
+import ctypes
+import os
+import signal
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from rclpy.executors import Executor
+from rclpy.experimental import EventsExecutor
+from rclpy.logging import get_logger
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from rclpy.utilities import remove_ros_args
+
+from stickslip_ros.errors import InvalidInputError, StickslipError
+from stickslip_ros.nodes.managed import ManagedNode
+from stickslip_ros.scenario.parameters import NodeParameters, parameters_of
+
+PARENT_VARIABLE = "STICKSLIP_ROS_PARENT"
+
+_PR_SET_PDEATHSIG = 1
+_SPIN_TIMEOUT = 0.2
+
+
+def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) -> int:
+    """Run one node as a process, until SIGINT or SIGTERM; return the exit status.
+
+    Status 2 says that a parameter or an argument was refused, with the reason on standard error.
+    """
+    parser = argparse.ArgumentParser(
+        description=sys.modules[make.__module__].__doc__,
+        epilog=_parameter_help(model),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--ros-args",
+        metavar="...",
+        help="ROS arguments: -p NAME:=VALUE, --params-file FILE, -r __ns:=/NAMESPACE, -r FROM:=TO",
+    )
+    die_with_parent()
+    try:
+        parser.parse_args(remove_ros_args(sys.argv)[1:])
+        rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
+    except Exception as error:  # what rcl could not parse; its first line names it
+        print(f"{parser.prog}: {_first_line(error)}", file=sys.stderr)
+        return 2
+    try:
+        return _run_initialized(make)
+    except InvalidInputError as error:
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        return 2
+    except StickslipError as error:
+        print(f"{parser.prog}: {error}", file=sys.stderr)
+        return 1
+    finally:
+        rclpy.try_shutdown()
+
+
+def _run_initialized(make: Callable[[], ManagedNode[Any]]) -> int:
+    node = make()
+    executor = EventsExecutor()
+    executor.add_node(node)
+    stop_on_signals(node.stopped, executor)
+    spin(executor, node.stopped)
+    if node.active:
+        node.trigger_deactivate()
+    refusal = node.stopped.result()
+    executor.remove_node(node)
+    node.destroy_node()
+    executor.shutdown()
+    if refusal is not None:
+        raise refusal
+    return 0
+
+
+def die_with_parent() -> None:
+    """Be sent SIGTERM when the process named in the environment as the parent is no more.
+
+    Whoever starts nodes as processes sets PARENT_VARIABLE to its own process id, so that none is
+    left running when it is killed. Linux only; elsewhere it does nothing.
+    """
+    parent = os.environ.pop(PARENT_VARIABLE, "")
+    if not parent or sys.platform != "linux":
+        return
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != int(parent):
+        sys.exit(1)
+
+
+def stop_on_signals(stopped: Future, executor: Executor) -> None:
+    """Let SIGINT and SIGTERM complete `stopped` with None."""
+
+    def stop(*_: object) -> None:
+        if not stopped.done():
+            stopped.set_result(None)
+            executor.wake()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
+
+
+def spin(executor: Executor, until: Future) -> None:
+    """Run callbacks until the future is done; one that raises is logged, and the rest go on."""
+    while not until.done():
+        try:
+            executor.spin_until_future_complete(until, timeout_sec=_SPIN_TIMEOUT)
+        except Exception as error:  # an impossible request from outside ends up here, too
+            get_logger("stickslip_ros").error(f"{type(error).__name__}: {error}")
+
+
+def _parameter_help(model: type[NodeParameters]) -> str:
+    lines = ["parameters:"]
+    for parameter in parameters_of(model):
+        unit = f" {parameter.unit}" if parameter.unit else ""
+        bounds = f"; {parameter.bounds}" if parameter.bounds else ""
+        lines.append(f"  {parameter.name}  (default {parameter.default}{unit}{bounds})")
+        lines.append(f"      {parameter.meaning}")
+    return "\n".join(lines)
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().split("\n", 1)[0].split(", at ", 1)[0]
