@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -48,7 +48,9 @@ def print_figures(title: str, columns: Mapping[str, Mapping[str, Any]]) -> None:
         table.add_column(heading, justify="right")
     for name, (label, unit) in _LABELS.items():
         if any(name in figures for figures in columns.values()):
-            cells = [_text(figures.get(name), unit) for figures in columns.values()]
+            values = [figures.get(name) for figures in columns.values()]
+            scale, prefix = _prefix(values) if unit else (1.0, "")
+            cells = [_text(value, scale, f" {prefix}{unit}".rstrip()) for value in values]
             table.add_row(label, *cells)
     Console(soft_wrap=True).print(table)
 
@@ -65,19 +67,18 @@ def progress_bar(label: str, total: float | None) -> Generator[Callable[[float],
         yield lambda done: bar.update(task, completed=done)
 
 
-def _text(value: Any, unit: str) -> str:
+def _prefix(values: Iterable[Any]) -> tuple[float, str]:
+    """Return the scale, and its prefix, for a row of values: that of the largest."""
+    largest = max((abs(value) for value in values if isinstance(value, float)), default=0.0)
+    return next(((scale, p) for scale, p in _PREFIXES.items() if largest >= scale), (1.0, ""))
+
+
+def _text(value: Any, scale: float, unit: str) -> str:
     if value is None:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if not isinstance(value, float):
-        return str(value)
-    if not unit:
-        return f"{value:.4g}"
-    scale = next((s for s in _PREFIXES if abs(value) >= s), None)
-    if scale is None:
-        return f"0 {unit}" if value == 0.0 else f"{value:.3g} {unit}"
-    return f"{value / scale:.4g} {_PREFIXES[scale]}{unit}"
+    return f"{value / scale:.4g}{unit}" if isinstance(value, float) else str(value)
 
 
 def _finite(value: Any) -> Any:
