@@ -36,6 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"stickslip {chosen.command}: {error}", file=sys.stderr)
         status = 1
     except KeyboardInterrupt:
+        print(f"stickslip {chosen.command}: interrupted", file=sys.stderr)
         status = run.INTERRUPTED
     except BrokenPipeError:  # whoever read our output has seen enough
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - the interpreter flushes it at exit

@@ -11,7 +11,7 @@ from stickslip_ros.app.arguments import add_json, add_scenario, made_of, scenari
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.bags.report import report_of_bag
-from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.nodes.bringup import RunOutcome, keep_on_this_machine, run_nodes
 from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario
 from stickslip_ros.scenario.parameters import Pace
@@ -83,14 +83,22 @@ def run(arguments: argparse.Namespace) -> int:
 def record(
     scenario: Scenario, bag: Path, *, namespace: str = DEFAULT_NAMESPACE, composed: bool
 ) -> tuple[dict[str, Any], bool]:
-    """Run the nodes into `bag`; return the figures of the run, and whether it was interrupted."""
+    """Run the nodes into `bag`; return the figures of the run, and whether it was interrupted.
+
+    Raises KeyboardInterrupt where nothing was recorded before that.
+    """
     duration = scenario.plant.duration
     total = duration if duration < float("inf") else None
     with progress_bar(f"running {scenario.name}", total) as progress:
         outcome = run_nodes(
             scenario, namespace=namespace, bag=bag, composed=composed, progress=progress
         )
-    return _figures(scenario, bag, outcome), outcome.interrupted
+    try:
+        return _figures(scenario, bag, outcome), outcome.interrupted
+    except BagError:
+        if outcome.interrupted:  # before the first sample
+            raise KeyboardInterrupt from None
+        raise
 
 
 def default_bag(scenario: str) -> Path:
