@@ -26,8 +26,9 @@ from sensor_msgs.msg import JointState
 
 from benchmarks.slices import Row, by_turns, compare_rates, show
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.managed import ManagedNode, spin
+from stickslip_ros.nodes.managed import ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.process import spin
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.scenario.files import load_scenario
 
@@ -59,9 +60,7 @@ class ClosedLoop:
         duration = SAMPLES / scenario.plant.rate
         listeners = ["analyzer", "washout_controller"]
         self._plant = Plant(
-            overrides=scenario.plant.flat()
-            | common
-            | {"duration": duration, "wait_for": listeners}
+            overrides=scenario.plant.flat() | common | {"duration": duration, "wait_for": listeners}
         )
         self._analyzer = AnalyzerNode(
             overrides=scenario.analyzer.flat() | common | {"bag": str(bag)}

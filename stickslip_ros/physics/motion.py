@@ -1,7 +1,7 @@
 """The exact stick-slip motion of a drive under a held force, or under continuous control."""
 
 from collections.abc import Callable
-from math import copysign, ulp
+from math import copysign, inf, nextafter, ulp
 from typing import Any
 
 import heyoka as hy
@@ -186,9 +186,11 @@ class Motion:
         """Slip from the belt's speed against the reaction.
 
         The reaction is put some rounding errors beyond the limit, so that the slide does
-        accelerate off the belt's speed and does not land at the instant it leaves.
+        accelerate off the belt's speed and does not land at the instant it leaves. It starts with
+        the next speed to the belt's: heyoka misses an event in a step that begins on one.
         """
         self._sign = -copysign(1.0, reaction)
+        self._y = nextafter(self._belt_speed, copysign(inf, self._sign))
         margin = 8.0 * ulp(abs(self._x) + abs(reaction) + abs(self._force) + self._static)
         if abs(reaction) < self._static + margin:
             self._x += copysign(margin, reaction)
@@ -245,7 +247,8 @@ class Motion:
         equations = Equations(type(self._drive.friction), self._continuous_control)
         initial = [0.0] * len(equations.slip)
         falling = hy.event_direction.negative
-        runs_away = UNBOUNDED_SPEED**2 - equations.slip[0][1] ** 2
+        # Of the order of one: heyoka's error is relative to the largest of states and events.
+        runs_away = 1.0 - (equations.slip[0][1] / UNBOUNDED_SPEED) ** 2
         markers = []
         if self._recorded is not None:
             markers = [

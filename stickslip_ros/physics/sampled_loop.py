@@ -73,7 +73,8 @@ class SampledLoop:
         """Whether an answer to the present sample may be hoped for: one came since the last gap."""
         self._motion = motion
         self._start = start
-        self._stamp_step = Fraction(NANOSECONDS) / Fraction(rate)
+        # So many samples take so many ns, exactly.
+        self._nanoseconds, self._samples = (NANOSECONDS / Fraction(rate)).as_integer_ratio()
         self._whole_delay, self._split = _whole_and_rest(force_delay / self.period)
         self._force_timeout = force_timeout
         self._hold_late = hold_late
@@ -102,7 +103,7 @@ class SampledLoop:
 
     def stamp(self, number: int) -> int:
         """Return the stamp (ns) of sample `number`."""
-        return self._start + round(number * self._stamp_step)
+        return self._start + _rounded(number * self._nanoseconds, self._samples)
 
     def offer(self, stamp: int, force: float) -> Verdict:
         """Take `force` (N) as the answer to the sample of that stamp (ns), if it is one."""
@@ -194,7 +195,14 @@ class SampledLoop:
         """Return the number of the sample whose stamp is nearest."""
         if stamp == self.sample.stamp:
             return self.sample.number
-        return round((stamp - self._start) / self._stamp_step)
+        return _rounded((stamp - self._start) * self._samples, self._nanoseconds)
+
+
+def _rounded(numerator: int, denominator: int) -> int:
+    """Return the quotient rounded to the nearest whole number, a half to the even one."""
+    whole, rest = divmod(numerator, denominator)
+    excess = 2 * rest - denominator
+    return whole + (excess > 0 or (excess == 0 and whole % 2))
 
 
 def _whole_and_rest(delay: float) -> tuple[int, float]:
