@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
-from math import pi, sin
+from math import isfinite, pi, sin
 
 
 class DisturbanceKind(StrEnum):
@@ -29,14 +29,19 @@ class Disturbance:
     frequency: float = 1.0
     """Of the sine, Hz."""
 
-    def force(self, time: float, period: float) -> float:
-        """Return the force (N) of the sample at `time` (s), samples being `period` (s) apart."""
-        since = time - self.start
-        # Half a period of grace: the sample nearest to the start is the first that acts.
-        since_nearest = since + period / 2.0
-        duration = period if self.kind is DisturbanceKind.IMPULSE else self.duration
-        if self.kind is DisturbanceKind.NONE or not 0.0 <= since_nearest < duration:
+    def force(self, number: int, period: float) -> float:
+        """Return the force (N) of sample `number`, samples being `period` (s) apart.
+
+        The first sample that it acts on is the one nearest to the start.
+        """
+        first = round(self.start / period)
+        samples = self.duration / period
+        if self.kind is DisturbanceKind.IMPULSE:
+            samples = 1.0
+        elif isfinite(samples):
+            samples = round(samples)
+        if self.kind is DisturbanceKind.NONE or not first <= number < first + samples:
             return 0.0
         if self.kind is DisturbanceKind.SINE:
-            return self.amplitude * sin(2.0 * pi * self.frequency * since)
+            return self.amplitude * sin(2.0 * pi * self.frequency * (number * period - self.start))
         return self.amplitude

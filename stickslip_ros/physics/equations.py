@@ -18,7 +18,7 @@ X, Y, W = hy.make_vars("x", "y", "w")
 
 @dataclass(frozen=True)
 class WashoutGains:
-    """Washout controller in dimensionless form, eq. 17 and 18."""
+    """Corner frequency and gains of a washout controller, eq. 17 and 18."""
 
     corner_frequency: Any
     """Corner frequency d of the filter."""
@@ -26,6 +26,14 @@ class WashoutGains:
     """Linear gain k1."""
     cubic: Any
     """Cubic gain k2."""
+
+    def scaled(self, drive: Drive) -> "WashoutGains":
+        """Return in dimensionless form what is given in SI units."""
+        return WashoutGains(
+            self.corner_frequency / drive.angular_frequency,
+            self.linear * drive.speed_scale / drive.normal_force,
+            self.cubic * drive.speed_scale**3 / drive.normal_force,
+        )
 
     def filtered(self, speed: Any, state: Any) -> Any:
         """Return the filter's output v = y - d w, eq. 17."""

@@ -211,14 +211,23 @@ class CycleMeter:
         return np.where(speed[before] <= speed[rising], before, rising).tolist()
 
     def _follow_recent(self, knots: Knots, first: int) -> None:
-        """Keep the extremes of the last half, at least, of the stretch since the last crossing."""
+        """Keep the extremes of the last half, at least, of the stretch since the last crossing.
+
+        Whenever the stretch has doubled, what went before the last doubling is forgotten.
+        """
         assert self._open is not None
         if not self._recent:
             self._recent = [_Stretch.from_knot(knots, first - 1)]
-        current = self._recent[-1]
-        current.extend(knots, first, len(knots) - 1)
-        if current.duration > 0.0 and current.duration >= current.start - self._open.start:
-            self._recent = [current, _Stretch.from_knot(knots, len(knots) - 1)]
+        row, last = first, len(knots) - 1
+        while row <= last:
+            current = self._recent[-1]
+            due = 2.0 * current.start - self._open.start
+            side = "left" if due > current.start else "right"
+            doubled = row + int(np.searchsorted(knots.time[row:], due, side))
+            current.extend(knots, row, min(doubled, last))
+            if doubled <= last:
+                self._recent = [current, _Stretch.from_knot(knots, doubled)]
+            row = doubled + 1
 
     def _recent_motion(self) -> Cycle | None:
         """Return the latest part of a stretch without crossings, as if it were a cycle."""

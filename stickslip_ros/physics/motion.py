@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 from math import copysign, inf, nextafter, ulp
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import heyoka as hy
 import numpy as np
 
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.equations import Equations, WashoutGains
-from stickslip_ros.physics.knots import Knots
+from stickslip_ros.physics.knots import FloatArray, Knots
 
 UNBOUNDED_SPEED = 1e3
 """Dimensionless speed of the slide beyond which the motion is said to run away."""
@@ -17,7 +17,20 @@ UNBOUNDED_SPEED = 1e3
 _BELT_SPEED_REACHED, _RUN_AWAY = 0, 1
 """The terminal events of the slipping motion, in heyoka's numbering."""
 
-_NO_GAINS = WashoutGains(1.0, 0.0, 0.0)
+_NO_EVENT = int(hy.taylor_outcome.time_limit)
+_NOT_FINITE = int(hy.taylor_outcome.err_nf_state)
+
+
+class _Integrator(NamedTuple):
+    """A compiled integrator, and views of its arrays: making them costs as much as a short step."""
+
+    taylor: Any
+    state: FloatArray
+    parameters: FloatArray
+
+    @classmethod
+    def of(cls, taylor: Any) -> Self:
+        return cls(taylor, taylor.state, taylor.pars)
 
 
 class Motion:
@@ -52,7 +65,8 @@ class Motion:
         self._recorded: list[tuple[float, float, float, bool]] | None = [] if record else None
         self._marks: list[tuple[float, float, float]] = []
         self._continuous_control = continuous_control
-        self._gains = _NO_GAINS
+        self._controller = WashoutGains(drive.angular_frequency, 0.0, 0.0)
+        self._gains = self._controller.scaled(drive)
         self._force = 0.0
         self._time = 0.0
         self._x = self._y = self._w = 0.0
@@ -77,12 +91,13 @@ class Motion:
     @drive.setter
     def drive(self, drive: Drive) -> None:
         old, force = self._drive, self.force
-        position, velocity = self.position, self.velocity
+        position, velocity, filter_output = self.position, self.velocity, self._filter_output
         self._drive = drive
         if type(drive.friction) is not type(old.friction):
             self._compile()
         if drive.speed_scale != old.speed_scale or drive.length_scale != old.length_scale:
             self._x, self._y = position / drive.length_scale, velocity / drive.speed_scale
+        self._scale_controller(filter_output)
         self._set_parameters()
         self.force = force
         self._settle()
@@ -102,14 +117,9 @@ class Motion:
 
         The filter's output goes on without a jump when d changes.
         """
-        drive = self._drive
-        filter_output = self._gains.filtered(self._y, self._w)
-        self._gains = WashoutGains(
-            corner_frequency / drive.angular_frequency,
-            linear * drive.speed_scale / drive.normal_force,
-            cubic * drive.speed_scale**3 / drive.normal_force,
-        )
-        self._w = (self._y - filter_output) / self._gains.corner_frequency
+        filter_output = self._filter_output
+        self._controller = WashoutGains(corner_frequency, linear, cubic)
+        self._scale_controller(filter_output)
         self._set_parameters()
 
     @property
@@ -162,6 +172,17 @@ class Motion:
             np.array(sticking),
         )
 
+    @property
+    def _filter_output(self) -> float:
+        """What the washout filter lets through of the speed, m/s."""
+        return self._gains.filtered(self._y, self._w) * self._drive.speed_scale
+
+    def _scale_controller(self, filter_output: float) -> None:
+        """Make the controller dimensionless, its filter letting `filter_output` (m/s) through."""
+        self._gains = self._controller.scaled(self._drive)
+        filtered = filter_output / self._drive.speed_scale
+        self._w = (self._y - filtered) / self._gains.corner_frequency
+
     def _reaction(self) -> float:
         """Return h = X + 2 beta X' - U, dimensionless."""
         force = self._force
@@ -177,10 +198,14 @@ class Motion:
             self.unbounded = abs(self._y) > UNBOUNDED_SPEED
             return
         reaction = self._reaction()
-        if abs(reaction) <= self._static:
-            self._sign = 0.0
-        else:
+        if abs(reaction) > self._static:
             self._break_away(reaction)
+            return
+        self._sign = 0.0
+        # Some rounding errors inside the limit: heyoka misses an event that a step begins on.
+        margin = self._rounding(reaction)
+        if self._static - abs(reaction) < margin:
+            self._x -= copysign(margin, reaction)
 
     def _break_away(self, reaction: float) -> None:
         """Slip from the belt's speed against the reaction.
@@ -191,9 +216,12 @@ class Motion:
         """
         self._sign = -copysign(1.0, reaction)
         self._y = nextafter(self._belt_speed, copysign(inf, self._sign))
-        margin = 8.0 * ulp(abs(self._x) + abs(reaction) + abs(self._force) + self._static)
+        margin = self._rounding(reaction)
         if abs(reaction) < self._static + margin:
             self._x += copysign(margin, reaction)
+
+    def _rounding(self, reaction: float) -> float:
+        return 8.0 * ulp(abs(self._x) + abs(reaction) + abs(self._force) + self._static)
 
     def _stick(self, now: float, end: float) -> float:
         """Ride the belt until the reaction exceeds its limit, or to `end`; return the time."""
@@ -206,7 +234,7 @@ class Motion:
 
     def _slip(self, now: float, end: float) -> float:
         """Slip until the belt's speed is reached, or to `end`; return the time."""
-        self._slipping.pars[self._equations.index["sign"]] = self._sign
+        self._slipping.parameters[self._equations.index["sign"]] = self._sign
         event, now = self._propagate(self._slipping, now, end)
         if event == _BELT_SPEED_REACHED:
             self._y = self._belt_speed
@@ -220,23 +248,25 @@ class Motion:
             self.unbounded = True
         return now
 
-    def _propagate(self, integrator: Any, now: float, end: float) -> tuple[int | None, float]:
+    def _propagate(
+        self, integrator: _Integrator, now: float, end: float
+    ) -> tuple[int | None, float]:
         """Integrate the state from `now` to `end`; return what event ended it, and when."""
-        state = integrator.state
+        taylor, state, _ = integrator
         state[0], state[1] = self._x, self._y
         if self._continuous_control:
             state[2] = self._w
-        integrator.time = now
-        integrator.reset_cooldowns()
-        outcome = integrator.propagate_until(end)[0]
+        taylor.time = now
+        outcome = int(taylor.propagate_until(end)[0])
         self._x, self._y = float(state[0]), float(state[1])
         if self._continuous_control:
             self._w = float(state[2])
-        if outcome == hy.taylor_outcome.time_limit:
+        if outcome == _NO_EVENT:
             return None, end
-        if outcome == hy.taylor_outcome.err_nf_state:
+        taylor.reset_cooldowns()  # what it integrates next is another slip or stick
+        if outcome == _NOT_FINITE:
             return _RUN_AWAY, now
-        return -int(outcome) - 1, float(integrator.time)
+        return -outcome - 1, float(taylor.time)
 
     def _append_knot(self, now: float, x: float, y: float, *, sticking: bool) -> None:
         if self._recorded is not None:
@@ -247,8 +277,9 @@ class Motion:
         equations = Equations(type(self._drive.friction), self._continuous_control)
         initial = [0.0] * len(equations.slip)
         falling = hy.event_direction.negative
-        # Of the order of one: heyoka's error is relative to the largest of states and events.
-        runs_away = 1.0 - (equations.slip[0][1] / UNBOUNDED_SPEED) ** 2
+        # It runs away in the direction it slips in. Of the order of one, since heyoka's error is
+        # relative to the largest of states and events.
+        runs_away = 1.0 - equations.sign * equations.slip[0][1] / UNBOUNDED_SPEED
         markers = []
         if self._recorded is not None:
             markers = [
@@ -256,7 +287,7 @@ class Motion:
                 hy.nt_event(equations.acceleration, callback=_marker(self._marks)),
             ]
         self._equations = equations
-        self._slipping = hy.taylor_adaptive(
+        slipping = hy.taylor_adaptive(
             equations.slip,
             initial,
             t_events=[
@@ -264,8 +295,9 @@ class Motion:
                 hy.t_event(runs_away, direction=falling),
             ],
             nt_events=markers,
+            fast_math=True,  # a quarter faster; the error stays below 2e-12 over 190 periods
         )
-        self._sticking = hy.taylor_adaptive(
+        sticking = hy.taylor_adaptive(
             equations.stick,
             initial,
             t_events=[
@@ -273,6 +305,7 @@ class Motion:
                 hy.t_event(equations.static + equations.reaction, direction=falling),
             ],
         )
+        self._slipping, self._sticking = _Integrator.of(slipping), _Integrator.of(sticking)
         self._set_parameters()
 
     def _set_parameters(self) -> None:
@@ -286,7 +319,7 @@ class Motion:
 
     def _set_parameter(self, name: str, value: float) -> None:
         index = self._equations.index[name]
-        for parameters in (self._slipping.pars, self._sticking.pars):
+        for parameters in (self._slipping.parameters, self._sticking.parameters):
             if index < len(parameters):  # heyoka keeps those up to the last one an equation uses
                 parameters[index] = value
 

@@ -161,7 +161,7 @@ class SampledLoop:
         )
 
     def _disturbance_at(self, number: int) -> float:
-        scenario = self.scenario_disturbance.force(number * self.period, self.period)
+        scenario = self.scenario_disturbance.force(number, self.period)
         return scenario + self._asked_disturbance
 
     def _force_of_present_sample(self) -> float:

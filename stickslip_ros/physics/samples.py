@@ -1,5 +1,6 @@
 """Measures from samples: stamps become time and losses, samples become knots, knots cycles."""
 
+from collections import deque
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -14,7 +15,6 @@ _LONGEST_GAP = 10
 """Periods over which a motion may still be interpolated."""
 
 _RESTING_SHARE = 0.1
-_FORCE_BLOCK = 256
 
 
 class _Rows(NamedTuple):
@@ -37,6 +37,76 @@ class _Rows(NamedTuple):
         )
 
 
+class _Grid:
+    """The grid of instants that samples are on, found from their stamps, and what it misses.
+
+    Stamps are rounded to the nanosecond. The period is known all the better the more of it were
+    seen, so that a long gap of a whole number of periods can be told from one between segments.
+    """
+
+    def __init__(self) -> None:
+        self._lost_before = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        self._shortest = 0
+        self._covered = 0
+        self._periods = 0
+        self._intervals = 0
+
+    @property
+    def lost(self) -> int:
+        """How many instants of the grid had no sample."""
+        return self._lost_before + self._periods - self._intervals
+
+    def breaks(self, stamp: IntArray) -> list[int]:
+        """Follow the stamps (ns), the first of them known; return where the motion is cut.
+
+        That is where a new segment begins, which is no loss, and behind a gap that is too long to
+        interpolate over.
+        """
+        breaks: list[int] = []
+        start = 0
+        while start < len(stamp):
+            steps = np.diff(stamp[start:])
+            self._learn(steps[steps > 0])
+            long = (steps <= 0) | (steps > (_LONGEST_GAP + 0.5) * self._shortest)
+            gap = int(np.argmax(long)) if long.any() else len(steps)
+            self._follow(steps[:gap])
+            start += gap + 1
+            if gap < len(steps):
+                breaks.append(start)
+                self._jump(int(steps[gap]))
+        return breaks
+
+    def _learn(self, steps: IntArray) -> None:
+        """Take the shortest step so far for the period; what was counted may have been more."""
+        if len(steps) == 0:
+            return
+        shortest = int(steps.min())
+        if self._shortest and shortest < 0.75 * self._shortest:
+            self._periods *= round(self._shortest / shortest)
+        self._shortest = min(self._shortest, shortest) if self._shortest else shortest
+
+    def _follow(self, steps: IntArray) -> None:
+        self._covered += int(steps.sum())
+        self._periods += int(np.rint(steps / self._shortest).sum()) if len(steps) else 0
+        self._intervals += len(steps)
+
+    def _jump(self, gap: int) -> None:
+        """Count a long gap as loss if it is on the grid, otherwise begin a new one."""
+        if gap > 0 and self._periods > 0:
+            period = self._covered / self._periods
+            periods = round(gap / period)
+            if abs(gap - periods * period) <= 1.0 + periods / self._periods:
+                self._covered += gap
+                self._periods += periods
+                self._intervals += 1
+                return
+        self._lost_before = self.lost
+        self._begin()
+
+
 class SampleMeter:
     """Measures a motion from its samples, fed in blocks of columns of any length.
 
@@ -48,11 +118,9 @@ class SampleMeter:
         """Average over the last `window` cycles at most."""
         self.samples = 0
         """Samples seen."""
-        self.lost_samples = 0
-        """Samples that the stamps say are missing."""
+        self._grid = _Grid()
         self._meter = CycleMeter(window)
         self._last: _Rows | None = None
-        self._step = 0
         self._elapsed = 0
 
     def feed(
@@ -74,13 +142,19 @@ class SampleMeter:
         if len(rows.stamp) == 0:
             return []
         cycles: list[Cycle] = []
-        starts = self._segment_starts(rows.stamp)
+        starts = self._grid.breaks(rows.stamp)
         for start, end in zip([0, *starts], [*starts, len(rows.stamp)], strict=True):
             if start > 0:
-                self._begin_segment()
+                self._meter.interrupt()
+                self._last = None
             cycles += self._feed_segment(rows.select(slice(start, end)))
         self._last = rows.select(slice(-1, None))
         return cycles
+
+    @property
+    def lost_samples(self) -> int:
+        """Samples that the stamps say are missing."""
+        return self._grid.lost
 
     @property
     def duration(self) -> float:
@@ -90,26 +164,6 @@ class SampleMeter:
     def measures(self) -> Measures:
         """Return the means over the last whole cycles."""
         return self._meter.measures()
-
-    def _begin_segment(self) -> None:
-        self._meter.interrupt()
-        self._last = None
-        self._step = 0
-
-    def _segment_starts(self, stamp: IntArray) -> list[int]:
-        """Count what was lost; return the rows that do not continue the row before."""
-        steps = np.diff(stamp)
-        forward = steps[steps > 0]
-        if len(forward) == 0:
-            return (np.flatnonzero(steps <= 0) + 1).tolist()
-        shortest = int(forward.min())
-        self._step = min(self._step, shortest) if self._step else shortest
-        periods = np.rint(steps / self._step)
-        # Stamps are rounded to the nanosecond, and so is the period taken from them.
-        on_grid = (steps > 0) & (np.abs(steps - periods * self._step) <= periods + 1.0)
-        self.lost_samples += int((periods[on_grid] - 1.0).sum())
-        continues = on_grid & (periods <= _LONGEST_GAP)
-        return (np.flatnonzero(~continues) + 1).tolist()
 
     def _feed_segment(self, rows: _Rows) -> list[Cycle]:
         stamp, position, velocity, belt_velocity = rows
@@ -129,29 +183,39 @@ class ForceMeter:
     """Measures the control force, fed in blocks of columns of any length."""
 
     def __init__(self) -> None:
-        self._largest: list[tuple[int, float]] = []
+        self._first: int | None = None
+        self._peak = 0.0
+        self._latest: deque[tuple[IntArray, FloatArray]] = deque()
 
     def feed(self, stamp: IntArray, force: FloatArray) -> None:
         """Take the forces that follow: stamps in ns, forces in N, equal lengths."""
         if len(stamp) == 0:
             return
-        starts = np.arange(0, len(stamp), _FORCE_BLOCK)
-        largest = np.maximum.reduceat(np.abs(force), starts)
-        self._largest += zip(stamp[starts].tolist(), largest.tolist(), strict=True)
+        if self._first is None:
+            self._first = int(stamp[0])
+        magnitude = np.abs(force)
+        self._peak = max(self._peak, float(magnitude.max()))
+        self._latest.append((stamp, magnitude))
+        resting_since = self._resting_since(self._first)
+        while self._latest[0][0][-1] < resting_since:
+            self._latest.popleft()
 
     @property
     def peak_force(self) -> float | None:
         """Largest magnitude of the force, N; None without forces."""
-        return max((force for _, force in self._largest), default=None)
+        return None if self._first is None else self._peak
 
     @property
     def resting_force(self) -> float | None:
         """Largest magnitude over the last tenth of the time, N; None without forces."""
-        if not self._largest:
+        if self._first is None:
             return None
-        first, last = self._largest[0][0], self._largest[-1][0]
-        since = last - _RESTING_SHARE * (last - first)
-        return max(force for stamp, force in self._largest if stamp >= since)
+        since = self._resting_since(self._first)
+        return max(float(force[stamp >= since].max(initial=0.0)) for stamp, force in self._latest)
+
+    def _resting_since(self, first: int) -> float:
+        last = int(self._latest[-1][0][-1])
+        return last - _RESTING_SHARE * (last - first)
 
 
 class RunMeter:

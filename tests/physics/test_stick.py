@@ -8,7 +8,7 @@ from dataclasses import replace
 from math import sqrt
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.friction import Coulomb
@@ -57,12 +57,9 @@ def test_a_start_at_the_limit_sticks_only_if_the_belt_relieves_the_spring(direct
     assert relieving.sticking
 
 
-@given(
-    st.floats(0.0, 0.5),
-    st.floats(0.05, 1.0),
-    st.floats(-1.0, 1.0),
-    st.integers(-3, 3),
-)
+@given(st.floats(0.0, 0.5), st.floats(0.05, 1.0), st.floats(-1.0, 1.0), st.integers(-3, 3))
+@example(damping=0.1, belt=0.3, force=0.0, rounding=1)
+@example(damping=0.15, belt=0.4, force=0.1, rounding=0)
 def test_rounding_at_the_limit_does_not_hold_the_slide_for_ever(
     damping: float, belt: float, force: float, rounding: int
 ) -> None:

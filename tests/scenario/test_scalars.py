@@ -1,6 +1,6 @@
 """Scalars are read as rcl reads them, which is neither YAML 1.1 nor what PyYAML makes of it."""
 
-from math import isnan
+from math import isfinite, isnan
 from pathlib import Path
 from typing import Any
 
@@ -8,11 +8,12 @@ import pytest
 import yaml
 
 from stickslip_ros.scenario.files import load_scenario
-from tests.scenario.files import scenario_file, section
+from tests.scenario.conftest import ReadByRos
+from tests.scenario.files import refusal, scenario_file, section
 
 INF, NAN = float("inf"), float("nan")
 
-SCALARS: dict[str, Any] = {
+FINITE: dict[str, Any] = {
     "1e3": 1000.0,
     "1E3": 1000.0,
     "1.0e6": 1e6,
@@ -26,12 +27,6 @@ SCALARS: dict[str, Any] = {
     "-0x10": -16,
     "010": 8,
     "08": 8.0,
-    ".inf": INF,
-    "-.Inf": -INF,
-    "inf": INF,
-    "-inf": -INF,
-    ".nan": NAN,
-    "nan": NAN,
     "true": True,
     "True": True,
     "yes": True,
@@ -53,45 +48,52 @@ SCALARS: dict[str, Any] = {
     "stribeck": "stribeck",
     "[a, b]": ["a", "b"],
 }
+NOT_FINITE = {".inf": INF, "-.Inf": -INF, "inf": INF, "-inf": -INF, ".nan": NAN, "nan": NAN}
+
+# A parameter that takes what the scalar is; whole numbers are taken for numbers.
+TAKERS = {
+    bool: ("plant", "use_sim_time"),
+    str: ("analyzer", "bag"),
+    list: ("plant", "wait_for"),
+    int: ("plant", "initial.position"),
+    float: ("plant", "initial.position"),
+}
 
 
 def same(one: Any, other: Any) -> bool:
-    both_nan = isinstance(one, float) and isinstance(other, float) and isnan(one) and isnan(other)
-    return type(one) is type(other) and (one == other or both_nan)
+    """Whether both are of one type and equal, NaN being NaN."""
+    if isinstance(one, float) and isnan(one):
+        return isinstance(other, float) and isnan(other)
+    return type(one) is type(other) and one == other
 
 
-def test_ros_reads_them_so(tmp_path: Path) -> None:
-    pytest.importorskip("rclpy")
-    from tests.scenario.ros import parameters_by_ros
-
-    lines = ", ".join(f"p{number}: {text}" for number, text in enumerate(SCALARS))
-    read = parameters_by_ros(scenario_file(tmp_path, section("/**", f"{{{lines}}}")))
-    for number, (text, value) in enumerate(SCALARS.items()):
+def test_ros_reads_them_so(tmp_path: Path, read_by_ros: ReadByRos) -> None:
+    scalars = FINITE | NOT_FINITE
+    lines = [f"\n    p{number}: {text}" for number, text in enumerate(scalars)]
+    read = read_by_ros(scenario_file(tmp_path, section("/**", "".join(lines))))
+    for number, (text, value) in enumerate(scalars.items()):
         assert same(read[f"p{number}"], value), text
 
 
-# A parameter of each type, and what a scalar must be for it.
-TYPES = [("plant", "use_sim_time", bool), ("analyzer", "window", int), ("analyzer", "bag", str)]
-
-
-@pytest.mark.parametrize(("text", "value"), SCALARS.items(), ids=SCALARS.keys())
+@pytest.mark.parametrize(("text", "value"), FINITE.items(), ids=FINITE.keys())
 def test_a_scenario_reads_them_so(tmp_path: Path, text: str, value: Any) -> None:
-    node, name, given = {
-        bool: ("plant", "use_sim_time", value),
-        str: ("analyzer", "bag", value),
-        list: ("plant", "wait_for", value),
-        int: ("plant", "initial.position", float(value) if isinstance(value, int) else value),
-        float: ("plant", "initial.position", value),
-    }[type(value)]
-    if isinstance(value, float) and not abs(value) < INF:
-        # Only a duration may be infinite, and nothing may be NaN; what is refused is shown.
-        from tests.scenario.files import refusal
-
-        path = scenario_file(tmp_path, section(f"/**/{node}", f"{{{name}: {text}}}"))
-        assert f"{name} = {value!r} is refused" in refusal(path)
-        return
+    node, name = TAKERS[type(value)]
     path = scenario_file(tmp_path, section(f"/**/{node}", f"{{{name}: {text}}}"))
+    given = float(value) if type(value) is int else value
     assert same(load_scenario(path).as_dict()[node][name], given)
+
+
+@pytest.mark.parametrize(("text", "value"), NOT_FINITE.items(), ids=NOT_FINITE.keys())
+def test_a_scenario_reads_what_is_not_finite_so(tmp_path: Path, text: str, value: float) -> None:
+    """To be refused nearly everywhere."""
+    path = scenario_file(tmp_path, section("/**/plant", f"{{mass: {text}}}"))
+    assert f"mass = {value!r} is refused" in refusal(path)
+
+
+@pytest.mark.parametrize("text", [".inf", "inf"])
+def test_a_duration_may_be_infinite(tmp_path: Path, text: str) -> None:
+    path = scenario_file(tmp_path, section("/**/plant", f"{{duration: {text}}}"))
+    assert not isfinite(load_scenario(path).plant.duration)
 
 
 def test_pyyaml_alone_would_not() -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.scenario.files import load_scenario
+from tests.scenario.conftest import ReadByRos
 from tests.scenario.files import refusal, scenario_file, section
 
 # By namespace: patterns that match its plant, and that do not.
@@ -47,15 +48,11 @@ def test_a_section_that_matches_no_node_is_refused(
     assert f"in namespace {namespace} there are plant, washout_controller, analyzer" in message
 
 
-def test_ros_agrees(tmp_path: Path) -> None:
-    """The same patterns, matched by rcl."""
-    pytest.importorskip("rclpy")
-    from tests.scenario.ros import parameters_by_ros
-
+def test_ros_agrees(tmp_path: Path, read_by_ros: ReadByRos) -> None:
     for namespace, pattern in matching + not_matching:
         path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))
-        applies = (namespace, pattern) in matching
-        assert bool(parameters_by_ros(path, namespace)) == applies, (namespace, pattern)
+        expected = {"mass": 7.0} if (namespace, pattern) in matching else {}
+        assert read_by_ros(path, namespace) == expected, (namespace, pattern)
 
 
 def test_a_section_for_all_gives_to_each_what_it_has(tmp_path: Path) -> None:
@@ -67,7 +64,10 @@ def test_a_section_for_all_gives_to_each_what_it_has(tmp_path: Path) -> None:
     assert (scenario.plant.mass, scenario.analyzer.window) == (7.0, 5)
 
 
-@pytest.mark.parametrize("patterns", [("/**", "/**/plant"), ("/**/plant", "/**")])
+in_turn = pytest.mark.parametrize("patterns", [("/**", "/**/plant"), ("/**/plant", "/**")])
+
+
+@in_turn
 def test_the_later_section_counts(tmp_path: Path, patterns: tuple[str, str]) -> None:
     text = section(patterns[0], "{mass: 7.0, rate: 50.0}") + section(patterns[1], "{mass: 8.0}")
     path = scenario_file(tmp_path, text)
@@ -75,13 +75,12 @@ def test_the_later_section_counts(tmp_path: Path, patterns: tuple[str, str]) -> 
     assert (plant.mass, plant.rate) == (8.0, 50.0)
 
 
-def test_ros_lets_the_later_section_count_too(tmp_path: Path) -> None:
-    pytest.importorskip("rclpy")
-    from tests.scenario.ros import parameters_by_ros
-
-    for patterns in [("/**", "/**/plant"), ("/**/plant", "/**")]:
-        text = section(patterns[0], "{mass: 7.0}") + section(patterns[1], "{mass: 8.0}")
-        assert parameters_by_ros(scenario_file(tmp_path, text)) == {"mass": 8.0}
+@in_turn
+def test_ros_lets_the_later_section_count_too(
+    tmp_path: Path, patterns: tuple[str, str], read_by_ros: ReadByRos
+) -> None:
+    text = section(patterns[0], "{mass: 7.0, rate: 50.0}") + section(patterns[1], "{mass: 8.0}")
+    assert read_by_ros(scenario_file(tmp_path, text)) == {"mass": 8.0, "rate": 50.0}
 
 
 def test_names_may_be_nested(tmp_path: Path) -> None:
