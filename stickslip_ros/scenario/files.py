@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import environ, pathsep
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import yaml
 
@@ -55,7 +55,7 @@ def parameter_file(values: Mapping[str, Mapping[str, Any]]) -> str:
         }
         for node, parameters in values.items()
     }
-    return yaml.safe_dump(sections, sort_keys=False)
+    return yaml.dump(sections, Dumper=_QuotingDumper, sort_keys=False)
 
 
 def load_scenario(
@@ -71,15 +71,17 @@ def load_scenario(
     values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
     for pattern, parameters in _sections(path):
         _apply(values, path, pattern, parameters, namespace)
-    sources = {node: f"{path}, {node}" for node in NODE_PARAMETERS}
     for node, parameters in values.items():
-        NODE_PARAMETERS[node].validated(parameters, sources[node])
+        NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
+    given = dict.fromkeys(NODE_PARAMETERS, "")
     for override in overrides:
         node, parameter, value = _parse_override(override)
         values[node][parameter] = value
-        sources[node] = f"{path} with -p {override}, {node}"
+        given[node] += f" -p {override}"
     models: dict[str, Any] = {
-        node: NODE_PARAMETERS[node].validated(parameters, sources[node])
+        node: NODE_PARAMETERS[node].validated(
+            parameters, f"{path} with{given[node]}, {node}" if given[node] else f"{path}, {node}"
+        )
         for node, parameters in values.items()
     }
     return Scenario(name=path.stem, overrides=tuple(overrides), **models)
@@ -113,26 +115,47 @@ def _find(name_or_path: str) -> Path:
 
 
 class _RosLoader(yaml.SafeLoader):
-    """Reads scalars as rcl does, which takes 1e3 for a number and knows no dates."""
+    """Reads scalars as rcl does, which takes 1e3 for a number and knows no dates.
+
+    Like rcl it refuses aliases, with which a small file could unfold into a boundless one.
+    """
+
+    bool_values: ClassVar[dict[str, bool]] = {**yaml.SafeLoader.bool_values, "y": True, "n": False}
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        if self.check_event(yaml.AliasEvent):
+            event = self.peek_event()
+            raise yaml.YAMLError(f"aliases are not taken, line {event.start_mark.line + 1}")
+        return super().compose_node(parent, index)
 
 
 _RosLoader.yaml_implicit_resolvers = {}
 _BOOLEANS = [
     spelling
-    for word in ("true", "false", "yes", "no", "on", "off")
+    for word in ("true", "false", "yes", "no", "on", "off", "y", "n")
     for spelling in (word, word.capitalize(), word.upper())
 ]
 _SCALARS = {
     "bool": "|".join(_BOOLEANS),
     "int": r"[-+]?(0|[1-9][0-9]*|0[0-7]+|0x[0-9a-fA-F]+)",
     "float": r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?"
-    r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
+    r"|[-+]?\.?(inf|Inf|INF)|[-+]?\.?(nan|NaN|NAN)",
     "null": "~|null|Null|NULL|",
 }
 for _tag, _pattern in _SCALARS.items():
     _RosLoader.add_implicit_resolver(
         f"tag:yaml.org,2002:{_tag}", re.compile(f"^(?:{_pattern})$"), None
     )
+
+
+class _QuotingDumper(yaml.SafeDumper):
+    """Quotes every string, so that no reader takes it for anything else."""
+
+
+_QuotingDumper.add_representer(
+    str,
+    lambda dumper, text: dumper.represent_scalar("tag:yaml.org,2002:str", text, style='"'),
+)
 
 
 def _parse_yaml(text: str, source: str) -> Any:
