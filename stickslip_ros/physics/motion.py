@@ -1,7 +1,7 @@
 """The exact stick-slip motion of a drive under a held force, or under continuous control."""
 
 from collections.abc import Callable
-from math import copysign, inf, nextafter, ulp
+from math import copysign, ulp
 from typing import Any, NamedTuple, Self
 
 import heyoka as hy
@@ -198,43 +198,33 @@ class Motion:
             self.unbounded = abs(self._y) > UNBOUNDED_SPEED
             return
         reaction = self._reaction()
-        if abs(reaction) > self._static:
-            self._break_away(reaction)
-            return
-        self._sign = 0.0
-        # Some rounding errors inside the limit: heyoka misses an event that a step begins on.
-        margin = self._rounding(reaction)
-        if self._static - abs(reaction) < margin:
-            self._x -= copysign(margin, reaction)
+        self._sign = -copysign(1.0, reaction) if abs(reaction) > self._static else 0.0
 
-    def _break_away(self, reaction: float) -> None:
-        """Slip from the belt's speed against the reaction.
-
-        The reaction is put some rounding errors beyond the limit, so that the slide does
-        accelerate off the belt's speed and does not land at the instant it leaves. It starts with
-        the next speed to the belt's: heyoka misses an event in a step that begins on one.
-        """
-        self._sign = -copysign(1.0, reaction)
-        self._y = nextafter(self._belt_speed, copysign(inf, self._sign))
-        margin = self._rounding(reaction)
-        if abs(reaction) < self._static + margin:
-            self._x += copysign(margin, reaction)
-
-    def _rounding(self, reaction: float) -> float:
-        return 8.0 * ulp(abs(self._x) + abs(reaction) + abs(self._force) + self._static)
+    # heyoka misses an event in a step that begins on one. Where a phase begins at a limit of its
+    # own, it is therefore begun some rounding errors away from it.
 
     def _stick(self, now: float, end: float) -> float:
         """Ride the belt until the reaction exceeds its limit, or to `end`; return the time."""
+        reaction = self._reaction()
+        margin = self._rounding(reaction)
+        if abs(reaction) > self._static - margin:
+            self._x -= copysign(margin, reaction)
         breaks, now = self._propagate(self._sticking, now, end)
         self._y = self._belt_speed
         self._append_knot(now, self._x, self._y, sticking=True)
         if breaks is not None:
-            self._break_away(self._reaction())
+            self._sign = -copysign(1.0, self._reaction())
         return now
 
     def _slip(self, now: float, end: float) -> float:
         """Slip until the belt's speed is reached, or to `end`; return the time."""
         self._slipping.parameters[self._equations.index["sign"]] = self._sign
+        if self._y == self._belt_speed:
+            reaction = self._reaction()
+            margin = self._rounding(reaction)
+            if abs(reaction) < self._static + margin:
+                self._x -= copysign(margin, self._sign)
+            self._y += copysign(max(ulp(self._belt_speed), ulp(1.0)), self._sign)
         event, now = self._propagate(self._slipping, now, end)
         if event == _BELT_SPEED_REACHED:
             self._y = self._belt_speed
@@ -247,6 +237,9 @@ class Motion:
         elif event is not None:
             self.unbounded = True
         return now
+
+    def _rounding(self, reaction: float) -> float:
+        return 8.0 * ulp(abs(self._x) + abs(reaction) + abs(self._force) + self._static)
 
     def _propagate(
         self, integrator: _Integrator, now: float, end: float

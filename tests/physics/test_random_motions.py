@@ -28,6 +28,9 @@ class Works:
     def add(self, duration: float, speeds: tuple[float, float]) -> None:
         """Go on for `duration` (s) while the motion is smooth and its speed between those two."""
         panels = max(1, int(np.ceil(duration * max(self._rate(speed) for speed in speeds))))
+        # The exponential law changes within its decay speed, however fast that is passed.
+        decay_speed = getattr(self.course.drive.friction, "decay_speed", np.inf)
+        panels = max(panels, int(np.ceil(4.0 * abs(speeds[1] - speeds[0]) / decay_speed)))
         for _ in range(panels):
             self._add_panel(duration / panels)
 
