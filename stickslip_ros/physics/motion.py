@@ -11,6 +11,10 @@ from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.equations import Equations, WashoutGains
 from stickslip_ros.physics.knots import FloatArray, Knots
 
+# heyoka warns on standard output, which is for results, where a marker's polynomial is nothing but
+# rounding, as in equilibrium.
+hy.set_logger_level_error()
+
 UNBOUNDED_SPEED = 1e3
 """Dimensionless speed of the slide beyond which the motion is said to run away."""
 

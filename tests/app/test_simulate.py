@@ -38,6 +38,12 @@ def test_continuous_and_sampled_control_quench_the_feed_drive(stickslip: Run) ->
         assert json.loads(done.stdout)["regime"] == "equilibrium"
 
 
+def test_json_is_all_there_is_on_standard_output_at_rest_too(stickslip: Run) -> None:
+    speed = ("-p", "plant.belt_speed=0.7")
+    done = stickslip("simulate", "paper", "--no-control", *speed, "--duration", "3000", "--json")
+    assert json.loads(done.stdout)["regime"] == "equilibrium"
+
+
 def test_a_motion_that_runs_away_is_a_result(stickslip: Run) -> None:
     law = ("-p", "plant.friction.law=linear", "-p", "plant.friction.slope=0.9")
     done = stickslip(

@@ -53,6 +53,13 @@ def still(stamp: npt.NDArray[np.int64]) -> Samples:
     return Samples(stamp, rest, rest, rest + 1.0)
 
 
+def in_blocks(first: Samples, second: Samples, blocks: int) -> list[Samples]:
+    """One after the other, as one block or as two."""
+    if blocks == 2:
+        return [first, second]
+    return [Samples(*map(np.concatenate, zip(first, second, strict=True)))]
+
+
 def test_measures_of_a_limit_cycle() -> None:
     meter = SampleMeter(window=20)
     cycles = meter.feed(*limit_cycle())
@@ -146,14 +153,24 @@ def test_a_new_segment_is_no_loss(gap: float) -> None:
     assert meter.duration == pytest.approx(2 * 4.999, rel=1e-15)
 
 
+@pytest.mark.parametrize("rates", [(100, 1000), (1000, 100), (100, 150)])
+@pytest.mark.parametrize("blocks", [1, 2])
+def test_a_new_segment_may_have_another_rate(rates: tuple[int, int], blocks: int) -> None:
+    first = still(stamps(rates[0], 100))
+    second = still(stamps(rates[1], 100, start=int(first.stamp[-1]) + 1_234_567_800))
+    meter = SampleMeter(window=20)
+    for part in in_blocks(first, second, blocks):
+        meter.feed(*part)
+    assert meter.samples == 200
+    assert meter.lost_samples == 0
+
+
 @pytest.mark.parametrize("blocks", [1, 2])
 def test_stamps_that_go_back_start_a_new_segment(blocks: int) -> None:
     samples = limit_cycle()
-    twice = [samples.rows(slice(0, 5000)), samples.rows(slice(1000, 6000))]
-    if blocks == 1:
-        twice = [Samples(*map(np.concatenate, zip(*twice, strict=True)))]
+    twice = samples.rows(slice(0, 5000)), samples.rows(slice(1000, 6000))
     meter = SampleMeter(window=20)
-    cycles = [cycle for part in twice for cycle in meter.feed(*part)]
+    cycles = [cycle for part in in_blocks(*twice, blocks) for cycle in meter.feed(*part)]
     assert meter.samples == 10_000
     assert meter.lost_samples == 0
     assert [cycle.period for cycle in cycles] == pytest.approx([7.06772953] * len(cycles), rel=1e-6)
