@@ -8,8 +8,8 @@ times are per natural period.
 The errors are those of displacement and velocity after all 190 periods, the larger one, against the
 same motion by its Taylor series in decimal arithmetic of 40 digits.
 
-A tick is what the plant does per sample: a new force, then a step of 1 or 10 ms. Peer: a bare heyoka
-integrator of the same slipping motion with the same two terminal events.
+A tick is what the plant does per sample: a new force, then a step of 1 or 10 ms. Peer: a heyoka
+integrator by itself, of the same slipping motion with the same two terminal events.
 """
 
 import time

@@ -54,7 +54,7 @@ def compare_times(
 
 
 def show(question: str | None, make_rows: Callable[[], list[Row]]) -> None:
-    """Parse the command line of a benchmark, run it and print its table, or with --json its rows."""
+    """Parse the command line of a benchmark, run it, print its table, or with --json its rows."""
     parser = argparse.ArgumentParser(
         description=question, formatter_class=argparse.RawDescriptionHelpFormatter
     )
