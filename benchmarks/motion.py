@@ -136,7 +136,7 @@ def bare_integrator() -> hy.taylor_adaptive:
     x, y = hy.make_vars("x", "y")
     r = y - PURE_SLIP_SPEED
     acceleration = STATIC + SLOPE * r - CUBIC * r * r * r - DAMPING * y - x + hy.par[0]
-    events = [hy.t_event(-r), hy.t_event(UNBOUNDED_SPEED**2 - y**2)]
+    events = [hy.t_event(-r), hy.t_event(1.0 + y / UNBOUNDED_SPEED)]
     return hy.taylor_adaptive([(x, y), (y, acceleration)], [0.0, 0.0], t_events=events)
 
 

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -42,7 +43,7 @@ def print_json(values: Mapping[str, Any]) -> None:
 
 def print_figures(title: str, columns: Mapping[str, Mapping[str, Any]]) -> None:
     """Print figures by name, one column for each of `columns`, those that nobody has left out."""
-    table = Table(title=title, title_justify="left")
+    table = Table(title=escape(title), title_justify="left")
     table.add_column("")
     for heading in columns:
         table.add_column(heading, justify="right")
@@ -51,7 +52,7 @@ def print_figures(title: str, columns: Mapping[str, Mapping[str, Any]]) -> None:
             values = [figures.get(name) for figures in columns.values()]
             scale, prefix = _prefix(values) if unit else (1.0, "")
             cells = [_text(value, scale, f" {prefix}{unit}".rstrip()) for value in values]
-            table.add_row(label, *cells)
+            table.add_row(label, *map(escape, cells))
     Console(soft_wrap=True).print(table)
 
 

@@ -2,17 +2,18 @@
 
 import argparse
 import sys
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from stickslip_ros.app.arguments import add_json, add_scenario, made_of, scenario_of, seconds
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.bags.report import report_of_bag
-from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.nodes.bringup import RunOutcome, keep_on_this_machine, run_nodes
+from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario
 from stickslip_ros.scenario.parameters import Pace
 
@@ -70,13 +71,15 @@ def run(arguments: argparse.Namespace) -> int:
     bag = arguments.bag or (Path(scenario.analyzer.bag) if scenario.analyzer.bag else None)
     bag = bag or default_bag(scenario.name)
     check_new_bag(bag)
-    reach = keep_on_this_machine(arguments.network)
+    reach = ros_bringup().keep_on_this_machine(arguments.network)
     print(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}", file=sys.stderr)
     figures, interrupted = record(scenario, bag, namespace=namespace, composed=arguments.composed)
     if arguments.json:
         print_json({**figures, **made_of(scenario)})
     else:
         print_figures(scenario.name, {"": {**figures["report"], **figures}})
+    if not figures["report"]["complete"]:
+        raise RunError(f"the bag {bag} could not be written to its end")
     return INTERRUPTED if interrupted else 0
 
 
@@ -90,15 +93,27 @@ def record(
     duration = scenario.plant.duration
     total = duration if duration < float("inf") else None
     with progress_bar(f"running {scenario.name}", total) as progress:
-        outcome = run_nodes(
+        outcome = ros_bringup().run_nodes(
             scenario, namespace=namespace, bag=bag, composed=composed, progress=progress
         )
     try:
-        return _figures(scenario, bag, outcome), outcome.interrupted
+        return _figures(bag, outcome.plant), outcome.interrupted
     except BagError:
         if outcome.interrupted:  # before the first sample
             raise KeyboardInterrupt from None
         raise
+
+
+def ros_bringup() -> ModuleType:
+    """Return the module that brings nodes up; the commands that need no ROS do without."""
+    try:
+        from stickslip_ros.nodes import bringup
+    except ModuleNotFoundError as error:
+        raise RunError(
+            f"running nodes needs ROS 2, of which {error.name} is not installed: "
+            "pip install 'stickslip_ros[ros]', or source an installed ROS 2"
+        ) from None
+    return bringup
 
 
 def default_bag(scenario: str) -> Path:
@@ -108,9 +123,8 @@ def default_bag(scenario: str) -> Path:
     return next(path for path in candidates if not path.exists())
 
 
-def _figures(scenario: Scenario, bag: Path, outcome: RunOutcome) -> dict[str, Any]:
-    report = report_of_bag(bag, window=scenario.analyzer.window)
-    plant = outcome.plant
+def _figures(bag: Path, plant: Mapping[str, str]) -> dict[str, Any]:
+    report = report_of_bag(bag)
     return {
         "bag": str(bag),
         "report": report,

@@ -1,6 +1,7 @@
 """`stickslip simulate`: the closed loop without ROS, measured on the motion itself."""
 
 import argparse
+from math import isfinite
 
 from stickslip_ros.app.arguments import add_json, add_scenario, made_of, scenario_of, seconds
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
@@ -25,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration",
         type=seconds,
         metavar="S",
-        help=f"simulated time, s (default: {_DEFAULT_PERIODS:g} natural periods)",
+        help=f"simulated time, s (default: the scenario's, else {_DEFAULT_PERIODS:g} periods)",
     )
     parser.add_argument(
         "--continuous-control",
@@ -40,7 +41,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     scenario = scenario_of(arguments)
     duration = arguments.duration
-    if duration is None:
+    if duration is None and isfinite(scenario.plant.duration):
+        duration = scenario.plant.duration
+    elif duration is None:
         duration = _DEFAULT_PERIODS * scenario.plant.as_drive().natural_period
     with progress_bar(f"simulating {duration:g} s", 1.0) as progress:
         measures = simulate(

@@ -15,11 +15,13 @@ from stickslip_ros.bags.messages import (
     wrench_columns,
 )
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.physics.knots import BoolArray
 from stickslip_ros.physics.samples import IntArray, RunMeter
 
-DEFAULT_WINDOW = 20
+_DEFAULT_WINDOW = 20
+"""Cycles to average over for a bag of somebody else's."""
+_LARGEST_WINDOW = 100_000
 
 ColumnsT = TypeVar("ColumnsT", JointStateColumns, WrenchColumns)
 
@@ -29,19 +31,19 @@ def report_of_bag(
     *,
     start: float = 0.0,
     end: float = float("inf"),
-    window: int = DEFAULT_WINDOW,
+    window: int | None = None,
 ) -> dict[str, Any]:
     """Return measures, counts and completeness of the recording at `path`, ready for JSON.
 
     Only what lies from `start` on and before `end` (s after the first joint state) is measured,
-    over the last `window` whole cycles of it. Raises BagError for what is no bag or holds no joint
-    states, and InvalidInputError for an empty part.
+    over the last `window` whole cycles of it (None: as many as the analyzer did). Raises BagError
+    for what is no bag or holds no joint states, and InvalidInputError for an empty part.
     """
     if not start < end:
         raise InvalidInputError(f"the part from {start} s to {end} s is empty")
-    meter = RunMeter(window)
     first: int | None = None
     with Recording(path) as recording:
+        meter = RunMeter(window or _window_at_recording(recording))
         for states, forces in _column_blocks(recording):
             if first is None and len(states.stamp):
                 first = int(states.stamp[0])
@@ -57,6 +59,10 @@ def report_of_bag(
             rows = _within(forces.stamp, first, start, end)
             meter.force.feed(forces.stamp[rows], forces.force[rows])
         complete = recording.complete
+    if first is None:
+        raise BagError(f"the bag {path} holds no joint states")
+    if meter.motion.samples == 0:
+        raise InvalidInputError(f"the part from {start} s to {end} s of {path} holds no samples")
     return {**meter.report(), "complete": complete}
 
 
@@ -66,8 +72,20 @@ def read_columns(path: Path) -> tuple[JointStateColumns, WrenchColumns]:
     Raises BagError for what is no bag or holds no joint states.
     """
     with Recording(path) as recording:
-        states, forces = zip(*_column_blocks(recording), strict=True)
+        blocks = list(_column_blocks(recording))
+    if not blocks:
+        raise BagError(f"the bag {path} holds no joint states")
+    states, forces = zip(*blocks, strict=True)
     return _joined(JointStateColumns, states), _joined(WrenchColumns, forces)
+
+
+def _window_at_recording(recording: Recording) -> int:
+    kept = recording.metadata("stickslip_ros/analyzer") or {}
+    try:
+        window = int(kept["window"])
+    except (KeyError, ValueError):
+        return _DEFAULT_WINDOW
+    return window if 0 < window <= _LARGEST_WINDOW else _DEFAULT_WINDOW
 
 
 def _column_blocks(recording: Recording) -> Iterator[tuple[JointStateColumns, WrenchColumns]]:

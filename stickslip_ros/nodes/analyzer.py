@@ -33,6 +33,7 @@ from stickslip_ros.nodes.topics import (
     JOINT_STATES,
     RECORDED,
     RECORDED_EVERY,
+    RECORDED_TOPICS,
     STICK_FRACTION,
     Topic,
 )
@@ -59,7 +60,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
         self._pending: dict[str, list[bytes]] = {}
         self._channels: dict[str, int] = {}
-        for topic in (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE):
+        for topic in RECORDED_TOPICS:
             self._pending[topic.name] = []
             self.subscribe(topic, partial(self._on_message, topic.name), DEEP)
         self._connections.append(self.every(_PROCESS_PERIOD, self._process))
@@ -90,9 +91,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self.destroy_publisher(self._recorded)
         for client in [*self._to_ask.values(), *self._asked]:
             self.destroy_client(client)
-        if self._recorder is not None:
-            self._keep("report", report)
-            self._recorder.close()
+        self._keep("report", report)
+        self._close_bag()
 
     def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
         """Return the regime, counts of samples, and what is wrong with the bag or a message."""
@@ -111,6 +111,9 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             stamp = unpack_header(message)
         except StickslipError as error:
             self._complaint = str(error)
+            return
+        if stamp <= 0:
+            self._complaint = f"a message on {topic} with the stamp {stamp} ns was dropped"
             return
         if self._recorder is not None:
             self._write(topic, message, stamp)
@@ -166,7 +169,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def _open_bag(self) -> Recorder:
         recorder = Recorder(self._next_bag(), self.parameters.compression)
         self._bags_opened += 1
-        for topic in (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE):
+        for topic in RECORDED_TOPICS:
             name = self.resolve_topic_name(topic.name)
             qos = QosProfile(depth=topic.depth)
             self._channels[topic.name] = recorder.add_topic(name, topic.type_name, qos)
@@ -177,9 +180,13 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def _keep(self, name: str, values: Mapping[str, Any]) -> None:
         """Put a table into the bag that says how the recording came about, or what it gave."""
-        if self._recorder is not None:
-            texts = {key: json.dumps(value) for key, value in values.items()}
+        if self._recorder is None:
+            return
+        texts = {key: json.dumps(value) for key, value in values.items()}
+        try:
             self._recorder.add_metadata(f"stickslip_ros/{name}", texts)
+        except BagError as error:
+            self._give_up_recording(error)
 
     def _write(self, topic: str, message: bytes, stamp: int) -> None:
         assert self._recorder is not None
@@ -197,9 +204,17 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def _give_up_recording(self, error: BagError) -> None:
         """Go on measuring without a bag."""
-        self._recorder = None
         self._complaint = str(error)
         self.get_logger().error(self._complaint)
+        self._close_bag()
+
+    def _close_bag(self) -> None:
+        recorder, self._recorder = self._recorder, None
+        if recorder is not None:
+            try:
+                recorder.close()
+            except BagError as error:
+                self.get_logger().error(str(error))
 
     def _ask_for_parameters(self) -> None:
         """Ask plant and controller, as soon as they are there, what they run with."""

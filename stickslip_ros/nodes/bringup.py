@@ -1,6 +1,7 @@
 """Bringing the nodes up and down: as processes or composed in one, activated in order."""
 
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -13,7 +14,7 @@ from typing import Any
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import State, Transition, TransitionEvent
-from lifecycle_msgs.srv import ChangeState
+from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
@@ -23,7 +24,7 @@ from std_msgs.msg import Header
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.managed import ManagedNode
+from stickslip_ros.nodes.managed import STATE, ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.process import PARENT_VARIABLE, spin, stop_on_signals
 from stickslip_ros.nodes.topics import DIAGNOSTICS, RECORDED
@@ -60,13 +61,14 @@ class RunOutcome:
 
 
 def keep_on_this_machine(network: bool) -> str:
-    """Restrict ROS discovery to this machine unless told otherwise; return in words what holds.
+    """Restrict ROS discovery to this machine, or open it; return in words what holds.
 
-    To be called before ROS is initialised. An environment that says something itself is left as
-    it is.
+    To be called before ROS is initialised. What the environment says holds, unless `network` asks
+    for more.
     """
     name = "ROS_AUTOMATIC_DISCOVERY_RANGE"
     if network:
+        os.environ[name] = "SUBNET"
         return "open to the network"
     said = os.environ.setdefault(name, "LOCALHOST")
     if said == "LOCALHOST":
@@ -121,7 +123,7 @@ class _Bringup:
         self._executor: Executor = EventsExecutor()
         self._executor.add_node(self._node)
         self._stop = Future()
-        stop_on_signals(self._stop, self._executor)
+        self._signal_handlers = stop_on_signals(self._stop, self._executor)
         self._composed: list[ManagedNode[Any]] = []
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
         self._active: list[str] = []
@@ -168,6 +170,8 @@ class _Bringup:
             self._executor.remove_node(node)
             node.destroy_node()
         self._executor.shutdown()
+        for number, handler in self._signal_handlers.items():
+            signal.signal(number, handler)
 
     @property
     def _ended(self) -> bool:
@@ -230,11 +234,23 @@ class _Bringup:
                 process.wait()
 
     def _deactivate(self, node: str) -> None:
-        client = self._node.create_client(ChangeState, f"{node}/change_state")
-        request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
+        """Deactivate a node, unless somebody else has: rclpy leaves that request unanswered."""
+        state = self._ask(GetState, f"{node}/get_state", GetState.Request())
+        if state is not None and state.current_state.id == State.PRIMARY_STATE_ACTIVE:
+            deactivate = Transition(id=Transition.TRANSITION_DEACTIVATE)
+            request = ChangeState.Request(transition=deactivate)
+            self._ask(ChangeState, f"{node}/change_state", request)
+
+    def _ask(self, kind: Any, name: str, request: Any) -> Any:
+        """Call a service and return its answer, None if none comes."""
+        client = self._node.create_client(kind, name)
+        answer = None
         if client.wait_for_service(_ANSWER_TIMEOUT):
-            self._spin_until(client.call_async(request), _ANSWER_TIMEOUT, always=True)
+            future = client.call_async(request)
+            self._spin_until(future, _ANSWER_TIMEOUT, always=True)
+            answer = future.result() if future.done() else None
         self._node.destroy_client(client)
+        return answer
 
     def _spin_until(self, future: Future, timeout: float | None, *, always: bool = False) -> None:
         """Run callbacks until the future is done, time is over or, unless `always`, the run is."""
@@ -273,7 +289,8 @@ class _Bringup:
         for status in message.status:
             if status.name == f"{self._namespace.rstrip('/')}/plant":
                 self._outcome.plant = {entry.key: entry.value for entry in status.values}
-                if self._plant_paused.done() and not self._last_words.done():
+                pausing = self._outcome.plant[STATE] in ("deactivating", "inactive")
+                if pausing and self._active and not self._last_words.done():
                     self._last_words.set_result(None)
 
     def _on_plant_transition(self, event: TransitionEvent) -> None:

@@ -28,6 +28,9 @@ OK: Level = DiagnosticStatus.OK
 WARN: Level = DiagnosticStatus.WARN
 ERROR: Level = DiagnosticStatus.ERROR
 
+STATE = "state"
+"""Key under which a node's diagnostics say in which state of its life cycle it is."""
+
 _DIAGNOSTICS_PERIOD = 1.0
 _AUTOSTART_PERIOD = 0.05
 _DELIVERY_TIMEOUT = 1.0
@@ -134,7 +137,10 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
             level=level,
             name=self.get_fully_qualified_name(),
             message=message or self._state_machine.current_state[1],
-            values=[KeyValue(key=key, value=str(value)) for key, value in figures.items()],
+            values=[
+                KeyValue(key=key, value=str(value))
+                for key, value in {STATE: self._state_machine.current_state[1], **figures}.items()
+            ],
         )
         array = DiagnosticArray(status=[status])
         array.header.stamp = self.get_clock().now().to_msg()
@@ -201,6 +207,7 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
             return TransitionCallbackReturn.FAILURE
         except Exception as error:  # rclpy would swallow it without a word
             self.get_logger().error(f"{type(error).__name__}: {error}")
+            self._end_autostart()
             return TransitionCallbackReturn.ERROR
         return TransitionCallbackReturn.SUCCESS
 
@@ -214,8 +221,12 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
         elif state == "inactive":
             self.trigger_activate()
         if self.active or self.stopped.done():
-            assert self._autostart_timer is not None
+            self._end_autostart()
+
+    def _end_autostart(self) -> None:
+        if self._autostart_timer is not None:
             self._autostart_timer.cancel()
+            self._autostart_timer = None
 
     def _unmatched(self) -> str:
         """Return what is missing of the nodes waited for, or nothing."""

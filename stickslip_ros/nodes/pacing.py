@@ -85,9 +85,9 @@ class LockstepPacer(Pacer):
         self._watchdog = node.every(min(0.1, self._reply_timeout / 10.0), self._watch)
 
     def start(self, last: int | None) -> None:
-        """Publish sample 0 and go on when it is answered."""
+        """Publish sample 0 and go on, once the node is active, when it is answered."""
         super().start(last)
-        self._proceed()
+        self._schedule()
 
     def stop(self) -> None:
         """Publish no further sample."""
@@ -97,6 +97,7 @@ class LockstepPacer(Pacer):
     def force_came(self) -> None:
         """Go on if the force was the one waited for."""
         if self._loop.answered:
+            self.complaint = ""
             self._proceed()
 
     def recorder_came_to(self, stamp: int) -> None:
@@ -117,6 +118,10 @@ class LockstepPacer(Pacer):
                 self._end()
                 return
             self._publish(loop.advance())
+        self._schedule()
+
+    def _schedule(self) -> None:
+        """Go on behind the callbacks that are due."""
         if not self._scheduled:
             self._scheduled = True
             self._node.call_soon(self._proceed_scheduled)
@@ -193,6 +198,13 @@ class RealtimePacer(Pacer):
         self._thread.join()
 
     def _run(self) -> None:
+        try:
+            self._keep_deadlines()
+        except Exception as error:  # it would end the thread without a word
+            self.complaint = f"{type(error).__name__}: {error}"
+            self._call_soon(self._end)
+
+    def _keep_deadlines(self) -> None:
         loop = self._loop
         while self._running:
             if loop.sample.number >= self._last or loop.unbounded:

@@ -40,6 +40,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         initial = self.parameters.initial
         self._motion = Motion(self.parameters.as_drive(), initial.position, initial.velocity)
         self._next_start = _LOCKSTEP_START
+        self._disturbance = 0.0
         self._lock = threading.Lock()
         depth = max(2 * self.parameters.flow_window, round(_HISTORY_SECONDS * self.parameters.rate))
         self._state = self.advertise(JOINT_STATES, min(depth, 100_000))
@@ -64,7 +65,6 @@ class PlantNode(ManagedNode[PlantParameters]):
             expects_control=parameters.expects_control,
             disturbance=parameters.as_disturbance(),
         )
-        self._disturbance = 0.0
         if realtime:
             self._pacer = RealtimePacer(
                 self._loop,
@@ -147,7 +147,8 @@ class PlantNode(ManagedNode[PlantParameters]):
     def _on_disturbance(self, message: bytes) -> None:
         _, force = unpack_wrench(message)
         if not self.active or not isfinite(force):
-            self.get_logger().warning(f"disturbance force {force} N dropped")
+            why = "not finite" if self.active else "the plant is not active"
+            self.get_logger().warning(f"disturbance force {force} N dropped: {why}")
             return
         with self._lock:
             self._loop.disturb(force)

@@ -91,16 +91,15 @@ def die_with_parent() -> None:
         sys.exit(1)
 
 
-def stop_on_signals(stopped: Future, executor: Executor) -> None:
-    """Let SIGINT and SIGTERM complete `stopped` with None."""
+def stop_on_signals(stopped: Future, executor: Executor) -> dict[signal.Signals, Any]:
+    """Let SIGINT and SIGTERM complete `stopped` with None; return the handlers there were."""
 
     def stop(*_: object) -> None:
         if not stopped.done():
             stopped.set_result(None)
             executor.wake()
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, stop)
+    return {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
 
 
 def spin(executor: Executor, until: Future) -> None:

@@ -149,6 +149,7 @@ class SampledLoop:
         if self._next_start is not None:
             start, self._next_start = self._next_start, None
             motion.restart(*start)
+            friction_force = motion.friction_force
         self.disturbance = self._disturbance_at(number)
         return Sample(
             number=number,

@@ -14,6 +14,9 @@ IntArray = npt.NDArray[np.int64]
 _LONGEST_GAP = 10
 """Periods over which a motion may still be interpolated."""
 
+_FEW_STEPS = 10
+"""Steps after which the period is taken as known."""
+
 _RESTING_SHARE = 0.1
 
 
@@ -49,7 +52,7 @@ class _Grid:
         self._begin()
 
     def _begin(self) -> None:
-        self._shortest = 0
+        self._step = 0
         self._covered = 0
         self._periods = 0
         self._intervals = 0
@@ -69,29 +72,43 @@ class _Grid:
         start = 0
         while start < len(stamp):
             steps = np.diff(stamp[start:])
-            self._learn(steps[steps > 0])
-            long = (steps <= 0) | (steps > (_LONGEST_GAP + 0.5) * self._shortest)
-            gap = int(np.argmax(long)) if long.any() else len(steps)
-            self._follow(steps[:gap])
-            start += gap + 1
-            if gap < len(steps):
+            if self._step == 0 and len(steps) > 0:
+                self._step = int(steps[0])
+            odd = self._odd(steps)
+            end = int(np.argmax(odd)) if odd.any() else len(steps)
+            self._follow(steps[:end])
+            if end < len(steps) and self._reconsider(int(steps[end])):
+                start += end
+                continue
+            start += end + 1
+            if end < len(steps):
                 breaks.append(start)
-                self._jump(int(steps[gap]))
+                self._jump(int(steps[end]))
         return breaks
 
-    def _learn(self, steps: IntArray) -> None:
-        """Take the shortest step so far for the period; what was counted may have been more."""
-        if len(steps) == 0:
-            return
-        shortest = int(steps.min())
-        if self._shortest and shortest < 0.75 * self._shortest:
-            self._periods *= round(self._shortest / shortest)
-        self._shortest = min(self._shortest, shortest) if self._shortest else shortest
+    def _odd(self, steps: IntArray) -> BoolArray:
+        """Return which steps are not a few whole periods."""
+        if self._step <= 0:
+            return np.ones(len(steps), dtype=bool)
+        periods = np.rint(steps / self._step)
+        off_grid = np.abs(steps - periods * self._step) > periods + 1.0
+        return off_grid | (periods < 1.0) | (periods > _LONGEST_GAP)
 
     def _follow(self, steps: IntArray) -> None:
-        self._covered += int(steps.sum())
-        self._periods += int(np.rint(steps / self._shortest).sum()) if len(steps) else 0
-        self._intervals += len(steps)
+        if len(steps) > 0:
+            self._covered += int(steps.sum())
+            self._periods += int(np.rint(steps / self._step).sum())
+            self._intervals += len(steps)
+
+    def _reconsider(self, step: int) -> bool:
+        """Take the first few steps for several periods each if a shorter one fits into them."""
+        times = round(self._step / step) if step > 0 else 0
+        fits = times > 1 and abs(self._step - times * step) <= times + 1
+        if not fits or self._intervals > _FEW_STEPS:
+            return False
+        self._periods *= times
+        self._step = step
+        return True
 
     def _jump(self, gap: int) -> None:
         """Count a long gap as loss if it is on the grid, otherwise begin a new one."""
@@ -188,16 +205,22 @@ class ForceMeter:
         self._latest: deque[tuple[IntArray, FloatArray]] = deque()
 
     def feed(self, stamp: IntArray, force: FloatArray) -> None:
-        """Take the forces that follow: stamps in ns, forces in N, equal lengths."""
+        """Take the forces that follow: stamps in ns, forces in N, equal lengths.
+
+        What is not finite is left out; where time goes back, the time at rest is that from there.
+        """
+        finite = np.isfinite(force)
+        stamp, force = stamp[finite], force[finite]
         if len(stamp) == 0:
             return
-        if self._first is None:
-            self._first = int(stamp[0])
+        if self._first is None or stamp[-1] < self._first:
+            self._first = int(stamp.min())
+            self._latest.clear()
         magnitude = np.abs(force)
         self._peak = max(self._peak, float(magnitude.max()))
         self._latest.append((stamp, magnitude))
         resting_since = self._resting_since(self._first)
-        while self._latest[0][0][-1] < resting_since:
+        while len(self._latest) > 1 and self._latest[0][0].max() < resting_since:
             self._latest.popleft()
 
     @property
@@ -214,7 +237,7 @@ class ForceMeter:
         return max(float(force[stamp >= since].max(initial=0.0)) for stamp, force in self._latest)
 
     def _resting_since(self, first: int) -> float:
-        last = int(self._latest[-1][0][-1])
+        last = int(self._latest[-1][0].max())
         return last - _RESTING_SHARE * (last - first)
 
 

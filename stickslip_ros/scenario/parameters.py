@@ -113,7 +113,9 @@ class NodeParameters(_Model):
 
     autostart: bool = _field(True, "Configure and activate at start.", fixed=True)
     wait_for: list[str] = _field(
-        [], "Nodes whose subscriptions and publishers must be there before activation.", fixed=True
+        [],
+        "Nodes that must be there to read what this one writes before it is activated.",
+        fixed=True,
     )
     use_sim_time: bool = _field(False, "Let ROS time follow /clock.")
 
@@ -173,7 +175,7 @@ class PlantParameters(NodeParameters):
     expects_control: bool = _field(True, "Whether a controller is to answer.", fixed=True)
     flow_window: int = _field(
         1000, "Samples by which lockstep may run ahead of the recorder.", "samples", fixed=True,
-        ge=200, le=100_000,
+        ge=200, le=5_000,
     )  # fmt: skip
     duration: float = _field(
         float("inf"),

@@ -10,7 +10,13 @@ from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.topics import AMPLITUDE, DISTURBANCE_FORCE, JOINT_STATES, STICK_FRACTION
+from stickslip_ros.nodes.topics import (
+    AMPLITUDE,
+    CONTROL_FORCE,
+    DISTURBANCE_FORCE,
+    JOINT_STATES,
+    STICK_FRACTION,
+)
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
 
@@ -66,6 +72,25 @@ def test_a_bag_that_exists_is_refused_and_left_alone(graph: Graph, tmp_path: Pat
     assert "exists already" in str(analyzer.stopped.result())
     assert not analyzer.active
     assert list((tmp_path / "bag").iterdir()) == []
+
+
+def test_a_message_without_a_proper_stamp_does_not_end_the_recording(
+    graph: Graph, tmp_path: Path
+) -> None:
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    force = graph.observer.create_publisher(
+        CONTROL_FORCE.type, f"/test/{CONTROL_FORCE.name}", CONTROL_FORCE.qos()
+    )
+    graph.wait_until(
+        lambda: analyzer.active and force.get_subscription_count() == 1, "analyzer listens"
+    )
+    for stamp in (-1_000_000_000, 0, 5_000_000_000, 3_000_000_000):
+        force.publish(pack_wrench(stamp, 1.0))
+    graph.deactivate("analyzer")
+    with Recording(tmp_path / "bag") as recording:
+        recorded = [stamp for _, stamp, _ in recording.messages("/test/control_force")]
+        assert recording.complete
+    assert recorded == [5_000_000_000, 3_000_000_000]
 
 
 def test_the_closed_loop_is_answered_without_loss(graph: Graph, tmp_path: Path) -> None:

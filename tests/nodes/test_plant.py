@@ -76,13 +76,6 @@ def test_a_missing_controller_is_given_up_and_taken_back(graph: Graph) -> None:
     diagnostics = graph.listen(DIAGNOSTICS)
     plant = graph.add(PlantNode, wait_for=["observer"], reply_timeout=0.2)
     graph.wait_until(lambda: len(heard) > 200, "the plant goes on without forces")
-    controller = graph.add(WashoutControllerNode)
-    graph.wait_until(lambda: plant._loop.controller_present, "the controller is taken back")
-    late = plant._loop.late_forces
-    reached = plant._loop.sample.number
-    graph.wait_until(lambda: plant._loop.sample.number > reached + 500, "500 samples more")
-    assert plant._loop.late_forces == late
-    assert controller.active
     plant.publish_diagnostics()
     graph.wait_until(
         lambda: any(
@@ -93,6 +86,14 @@ def test_a_missing_controller_is_given_up_and_taken_back(graph: Graph) -> None:
         ),
         "the gap is in the diagnostics",
     )
+    controller = graph.add(WashoutControllerNode)
+    graph.wait_until(lambda: plant._loop.controller_present, "the controller is taken back")
+    late = plant._loop.late_forces
+    reached = plant._loop.sample.number
+    graph.wait_until(lambda: plant._loop.sample.number > reached + 500, "500 samples more")
+    assert plant._loop.late_forces == late
+    assert controller.active
+    assert plant.diagnose()[1] == ""
 
 
 def test_it_runs_no_further_ahead_of_the_recorder_than_the_window(graph: Graph) -> None:
@@ -121,6 +122,14 @@ def test_activated_again_it_starts_a_new_segment_where_it_stopped(graph: Graph) 
     assert np.diff(columns.stamp).tolist() == [SECOND // 100] * 201
     assert columns.position[101] == columns.position[100]
     assert columns.position[201] > columns.position[101] > 0.0
+
+
+@pytest.mark.parametrize("duration", [0.0, 0.3])
+def test_a_run_shorter_than_a_batch_ends(graph: Graph, duration: float) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    plant = graph.add(PlantNode, expects_control=False, wait_for=["observer"], duration=duration)
+    graph.wait_until(lambda: len(heard) == 1 + round(100 * duration), "every sample")
+    graph.wait_until(lambda: not plant.active, "the plant pauses")
 
 
 def test_reset_returns_to_the_initial_state_and_time_goes_on(graph: Graph) -> None:
