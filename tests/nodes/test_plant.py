@@ -3,6 +3,7 @@
 from math import nan
 
 import numpy as np
+import pytest
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
