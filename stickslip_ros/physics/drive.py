@@ -1,6 +1,7 @@
 """The drive: a mass on a spring and a damper, pressed onto a moving belt."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import pi, sqrt
 
 from stickslip_ros.physics.friction import FrictionLaw
@@ -27,7 +28,7 @@ class Drive:
     friction: FrictionLaw
     """Friction law, its speeds in m/s."""
 
-    @property
+    @cached_property
     def angular_frequency(self) -> float:
         """Natural angular frequency w0 = sqrt(k/m), rad/s: one over the scale of time."""
         return sqrt(self.stiffness / self.mass)
@@ -37,12 +38,12 @@ class Drive:
         """Period of the undamped free vibration, s."""
         return 2.0 * pi / self.angular_frequency
 
-    @property
+    @cached_property
     def length_scale(self) -> float:
         """Scale of length L = N/k, m."""
         return self.normal_force / self.stiffness
 
-    @property
+    @cached_property
     def speed_scale(self) -> float:
         """Scale of speed V = w0 L, m/s."""
         return self.angular_frequency * self.length_scale
