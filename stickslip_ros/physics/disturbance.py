@@ -34,13 +34,15 @@ class Disturbance:
 
         The first sample that it acts on is the one nearest to the start.
         """
+        if self.kind is DisturbanceKind.NONE:
+            return 0.0
         first = round(self.start / period)
         samples = self.duration / period
         if self.kind is DisturbanceKind.IMPULSE:
             samples = 1.0
         elif isfinite(samples):
             samples = round(samples)
-        if self.kind is DisturbanceKind.NONE or not first <= number < first + samples:
+        if not first <= number < first + samples:
             return 0.0
         if self.kind is DisturbanceKind.SINE:
             return self.amplitude * sin(2.0 * pi * self.frequency * (number * period - self.start))

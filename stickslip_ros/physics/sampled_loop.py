@@ -107,12 +107,14 @@ class SampledLoop:
 
     def offer(self, stamp: int, force: float) -> Verdict:
         """Take `force` (N) as the answer to the sample of that stamp (ns), if it is one."""
-        verdict = self._judge(stamp, force)
+        number = self.number(stamp)
+        verdict = self._judge(number, stamp, force)
         if verdict is Verdict.ACCEPTED:
-            self._newest = (self.number(stamp), force)
-        else:
-            self.dropped[verdict] += 1
-        if verdict in (Verdict.ACCEPTED, Verdict.TOO_LATE):
+            self._newest = (number, force)
+            self.controller_present = self._expects_control
+            return verdict
+        self.dropped[verdict] += 1
+        if verdict is Verdict.TOO_LATE:
             self.controller_present = self._expects_control
         return verdict
 
@@ -152,13 +154,13 @@ class SampledLoop:
             friction_force = motion.friction_force
         self.disturbance = self._disturbance_at(number)
         return Sample(
-            number=number,
-            stamp=self.stamp(number),
-            position=motion.position,
-            velocity=motion.velocity,
-            friction_force=friction_force,
-            belt_position=belt_position,
-            belt_velocity=motion.drive.belt_speed,
+            number,
+            self.stamp(number),
+            motion.position,
+            motion.velocity,
+            friction_force,
+            belt_position,
+            motion.drive.belt_speed,
         )
 
     def _disturbance_at(self, number: int) -> float:
@@ -178,12 +180,11 @@ class SampledLoop:
         age = (present - number) * self.period
         return force if number >= 0 and age <= self._force_timeout else 0.0
 
-    def _judge(self, stamp: int, force: float) -> Verdict:
+    def _judge(self, number: int, stamp: int, force: float) -> Verdict:
         if not isfinite(force):
             return Verdict.NOT_FINITE
         if stamp == 0:
             return Verdict.NO_STAMP
-        number = self.number(stamp)
         if not 0 <= number <= self.sample.number or self.stamp(number) != stamp:
             return Verdict.UNKNOWN_STAMP
         if number <= self._newest[0]:

@@ -1,6 +1,7 @@
 """The washout control law, for measurements that come at instants and are held in between."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import expm1
 
 from stickslip_ros.physics.equations import WashoutGains
@@ -21,7 +22,7 @@ class WashoutParameters:
     start_after: float = 0.0
     """Time from the first measurement during which the force is zero, s."""
 
-    @property
+    @cached_property
     def gains(self) -> WashoutGains:
         """The corner frequency and the gains."""
         return WashoutGains(self.corner_frequency, self.linear_gain, self.cubic_gain)
