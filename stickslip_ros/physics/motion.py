@@ -1,7 +1,7 @@
 """The exact stick-slip motion of a drive under a held force, or under continuous control."""
 
 from collections.abc import Callable
-from math import copysign, ulp
+from math import copysign, inf, ulp
 from typing import Any, NamedTuple, Self
 
 import heyoka as hy
@@ -72,7 +72,7 @@ class Motion:
         self._controller = WashoutGains(drive.angular_frequency, 0.0, 0.0)
         self._gains = self._controller.scaled(drive)
         self._force = 0.0
-        self._time = 0.0
+        self._time = self._knot_time = 0.0
         self._x = self._y = self._w = 0.0
         self._drive = drive
         self._compile()
@@ -254,7 +254,10 @@ class Motion:
         if self._continuous_control:
             state[2] = self._w
         taylor.time = now
-        outcome = int(taylor.propagate_until(end)[0])
+        if self._sudden_speed == inf:
+            outcome = int(taylor.propagate_until(end)[0])
+        else:
+            outcome = int(taylor.propagate_until(end, max_delta_t=self._longest_step())[0])
         self._x, self._y = float(state[0]), float(state[1])
         if self._continuous_control:
             self._w = float(state[2])
@@ -265,10 +268,20 @@ class Motion:
             return _RUN_AWAY, now
         return -outcome - 1, float(taylor.time)
 
+    def _longest_step(self) -> float:
+        """Return the time in which the slide's speed changes by the law's sudden speed, at least.
+
+        heyoka judges a step by what the series shows where it starts. An exponential that is next
+        to nothing there, and rises before the step ends, would not be seen.
+        """
+        acceleration = abs(self._reaction()) + abs(self._x) + abs(self._y) + self._static
+        return self._sudden_speed / acceleration if acceleration > 0.0 else inf
+
     def _append_knot(self, now: float, x: float, y: float, *, sticking: bool) -> None:
         if self._recorded is not None:
             time = self._time + now / self._drive.angular_frequency
-            self._recorded.append((time, x, y, sticking))
+            self._knot_time = max(self._knot_time, time)  # not back by the rounding of a step
+            self._recorded.append((self._knot_time, x, y, sticking))
 
     def _compile(self) -> None:
         equations = Equations(type(self._drive.friction), self._continuous_control)
@@ -310,6 +323,7 @@ class Motion:
         self._belt_speed = values["belt_speed"]
         self._damping = values["damping"]
         self._static = values["static"]
+        self._sudden_speed = self._drive.friction.sudden_speed / self._drive.speed_scale
         values |= {"force": self._force, **vars(self._gains)}
         for name, value in values.items():
             self._set_parameter(name, value)

@@ -117,6 +117,20 @@ def test_a_motion_that_never_turns_ends_in_equilibrium() -> None:
     check_equilibrium(measured(recorded(OVERDAMPED, 0.0, 0.0, 60.0), 0.4), 0.2584)
 
 
+def test_cycles_of_long_ago_do_not_count() -> None:
+    """Ten periods ago it cycled; since then, strongly damped, it never turned."""
+    motion = Motion(PAPER, 0.0, 0.0, record=True)
+    meter = CycleMeter(window=20)
+    motion.advance(60.0)
+    meter.feed(motion.take_knots(), 0.4)
+    assert meter.measures().regime is Regime.STICK_SLIP
+    motion.drive = OVERDAMPED
+    for _ in range(60):
+        motion.advance(1.0)
+    meter.feed(motion.take_knots(), 0.4)
+    check_equilibrium(meter.measures(), 0.2584)
+
+
 def test_the_approach_to_equilibrium_is_not_yet_equilibrium() -> None:
     measures = measured(recorded(OVERDAMPED, 0.0, 0.0, 3.0), 0.4)
     assert measures.regime is None

@@ -83,6 +83,16 @@ def test_restart_puts_the_slide_somewhere_else_and_keeps_the_force() -> None:
     assert motion.velocity == fresh.velocity
 
 
+def test_restart_puts_the_filter_of_the_continuous_controller_to_rest() -> None:
+    motion = Motion(FEED_DRIVE, 0.0, 0.0, continuous_control=True)
+    motion.set_gains(20.0, -3000.0, 0.0)
+    motion.advance(0.3)
+    assert abs(control_force(motion)) > 1.0
+    motion.restart(1e-4, -0.08)
+    # It has let nothing through of the constant speed that it is taken to have seen.
+    assert control_force(motion) == pytest.approx(0.0, abs=1e-2)
+
+
 def test_friction_is_that_under_the_force_held_up_to_now() -> None:
     """Stuck at x = 0.2, friction balances spring, damper and force."""
     motion = Motion(PAPER, 0.0, 0.4)

@@ -4,9 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.friction import Exponential, Stribeck
 from tests.physics.courses import Course, courses
 
 # Gauss-Legendre quadrature: eight nodes are exact to rounding for what changes by a factor of e, or
@@ -145,7 +147,19 @@ def check_cutting(course: Course, cuts: list[float]) -> None:
 cuts = st.lists(st.floats(0.0, 1.0), max_size=30)
 
 
+# Friction rises from nothing to its static coefficient within a hundredth of the time that the
+# rest of the motion takes to change: a step of the integrator must not be longer.
+SUDDEN = Course(
+    drive=Drive(1.0, 0.0, 1.0, 1.0, 1.0, Exponential(1.0, 0.0, 0.21875, -0.5)),
+    position=0.0,
+    velocity=1.0,
+    forces=(0.0, 0.0, 1.0),
+    durations=(2.0, 2.0, 8.0),
+)
+
+
 @given(courses(), cuts)
+@example(course=SUDDEN, cuts=[])
 @settings(max_examples=40)
 def test_cutting_into_steps_changes_nothing(course: Course, cuts: list[float]) -> None:
     check_cutting(course, cuts)
@@ -158,7 +172,18 @@ def test_cutting_many_motions_into_steps_changes_nothing(course: Course, cuts: l
     check_cutting(course, cuts)
 
 
+# Where a step ends, time is the sum of the steps, and a knot of the next one may follow at once.
+ROUNDED = Course(
+    drive=Drive(1.0, 0.0, 1e8, 1.0, 0.0, Stribeck(1.0, 0.0, 1e-4)),
+    position=0.0,
+    velocity=0.0,
+    forces=(0.0, 0.0),
+    durations=(9.112469373472214e-05, 1e-4),
+)
+
+
 @given(courses(), cuts)
+@example(course=ROUNDED, cuts=[0.71875, 2.2250738585e-313])
 @settings(max_examples=50)
 def test_knots_never_run_back(course: Course, cuts: list[float]) -> None:
     motion = course.motion()

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields, replace
+from math import inf
 from typing import Any, ClassVar, Self
 
 
@@ -27,6 +28,11 @@ class FrictionLaw(ABC):
         `sign` stands apart so that the branch stays smooth, and can be followed by an
         integrator, up to and beyond v_r = 0.
         """
+
+    @property
+    def sudden_speed(self) -> float:
+        """Speed within which the coefficient may change by a factor; infinite for polynomials."""
+        return inf
 
     def scaled(self, speed: float) -> Self:
         """Return the same law with speeds measured in units of `speed` (m/s)."""

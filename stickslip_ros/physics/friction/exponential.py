@@ -27,6 +27,11 @@ class Exponential(FrictionLaw):
     viscous: Any
     """Viscous rise mu_v of the coefficient with speed, s/m."""
 
+    @property
+    def sudden_speed(self) -> float:
+        """The decay speed."""
+        return float(self.decay_speed)
+
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
         """Return mu(v_r)."""
         speed = relative_speed * sign
