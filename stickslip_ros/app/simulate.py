@@ -8,7 +8,7 @@ from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures import CycleMeter, Measures
 from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.sampled_loop import NANOSECONDS, SampledLoop
+from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.simulation import Progress, simulate_continuous, simulate_sampled
 from stickslip_ros.physics.washout import Washout
 from stickslip_ros.scenario.files import Scenario
@@ -78,7 +78,7 @@ def simulate(
         loop = SampledLoop(
             motion,
             plant.rate,
-            NANOSECONDS,
+            LOCKSTEP_START,
             force_delay=plant.force_delay,
             expects_control=plant.expects_control,
             disturbance=plant.as_disturbance(),

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stickslip_ros.errors import BagError
+from stickslip_ros.physics.samples import NANOSECONDS
 
 SLIDE = "slide"
 BELT = "belt"
 
-_NANOSECONDS_PER_SECOND = 1_000_000_000
 _LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 
 
@@ -120,8 +120,8 @@ def pack_joint_state(
     try:
         return _JOINT_STATE.pack(
             _LITTLE_ENDIAN,
-            stamp // _NANOSECONDS_PER_SECOND,
-            stamp % _NANOSECONDS_PER_SECOND,
+            stamp // NANOSECONDS,
+            stamp % NANOSECONDS,
             _JOINT_STATE_FRAME,
             _JOINT_STATE_SLIDE,
             _JOINT_STATE_BELT,
@@ -144,8 +144,8 @@ def pack_wrench(stamp: int, force_x: float) -> bytes:
     try:
         return _WRENCH.pack(
             _LITTLE_ENDIAN,
-            stamp // _NANOSECONDS_PER_SECOND,
-            stamp % _NANOSECONDS_PER_SECOND,
+            stamp // NANOSECONDS,
+            stamp % NANOSECONDS,
             _WRENCH_FRAME,
             force_x,
         )
@@ -159,7 +159,7 @@ def pack_header(stamp: int) -> bytes:
     Raises BagError for a stamp that ROS time (32-bit seconds) does not hold.
     """
     try:
-        return _HEADER.pack(_LITTLE_ENDIAN, *divmod(stamp, _NANOSECONDS_PER_SECOND), _name(""))
+        return _HEADER.pack(_LITTLE_ENDIAN, *divmod(stamp, NANOSECONDS), _name(""))
     except struct.error as error:
         raise _unpackable("header", stamp, error) from error
 
@@ -198,7 +198,7 @@ def unpack_joint_state(data: bytes) -> JointStateSample:
             effort_count,
         ) == _JOINT_STATE_CONSTANTS:
             return JointStateSample(
-                sec * _NANOSECONDS_PER_SECOND + nanosec,
+                sec * NANOSECONDS + nanosec,
                 position,
                 velocity,
                 effort,
@@ -216,7 +216,7 @@ def unpack_wrench(data: bytes) -> tuple[int, float]:
     if len(data) == _WRENCH.size:
         encapsulation, sec, nanosec, frame, force = _WRENCH.unpack(data)
         if (encapsulation, frame) == _WRENCH_CONSTANTS:
-            return sec * _NANOSECONDS_PER_SECOND + nanosec, force
+            return sec * NANOSECONDS + nanosec, force
     message = _Decoder(data, "wrench")
     return message.header_stamp(), message.doubles(6)[0]
 
@@ -228,7 +228,7 @@ def unpack_header(data: bytes) -> int:
     """
     if data[:4] == _LITTLE_ENDIAN and len(data) >= _STAMP.size:
         _, sec, nanosec = _STAMP.unpack_from(data)
-        return sec * _NANOSECONDS_PER_SECOND + nanosec
+        return sec * NANOSECONDS + nanosec
     return _Decoder(data, "header").header_stamp()
 
 
@@ -297,7 +297,7 @@ def _table(
 
 
 def _stamps(table: NDArray[np.void]) -> NDArray[np.int64]:
-    return table["sec"].astype(np.int64) * _NANOSECONDS_PER_SECOND + table["nanosec"]
+    return table["sec"].astype(np.int64) * NANOSECONDS + table["nanosec"]
 
 
 def _unpackable(kind: str, stamp: int, error: struct.error) -> BagError:
@@ -367,7 +367,7 @@ class _Decoder:
             f"{self._byte_order}iI", self._body, self._advance(alignment=4, size=8)
         )
         self.string()
-        return sec * _NANOSECONDS_PER_SECOND + nanosec
+        return sec * NANOSECONDS + nanosec
 
     def count(self) -> int:
         """Read an unsigned 32-bit number, the length of what follows."""

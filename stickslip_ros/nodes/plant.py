@@ -22,10 +22,10 @@ from stickslip_ros.nodes.topics import (
     RECORDED,
 )
 from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.sampled_loop import NANOSECONDS, Sample, SampledLoop
+from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, Sample, SampledLoop
+from stickslip_ros.physics.samples import NANOSECONDS
 from stickslip_ros.scenario.parameters import Pace, PlantParameters
 
-_LOCKSTEP_START = NANOSECONDS
 _HISTORY_SECONDS = 8.0
 
 
@@ -39,7 +39,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         """Compile the motion; publish the state, listen to forces and to the recorder."""
         initial = self.parameters.initial
         self._motion = Motion(self.parameters.as_drive(), initial.position, initial.velocity)
-        self._next_start = _LOCKSTEP_START
+        self._next_start = LOCKSTEP_START
         self._disturbance = 0.0
         self._lock = threading.Lock()
         depth = max(2 * self.parameters.flow_window, round(_HISTORY_SECONDS * self.parameters.rate))

@@ -269,7 +269,7 @@ class Motion:
         return -outcome - 1, float(taylor.time)
 
     def _longest_step(self) -> float:
-        """Return the time in which the slide's speed changes by the law's sudden speed, at least.
+        """Return a time in which the slide's speed changes by the law's sudden speed at most.
 
         heyoka judges a step by what the series shows where it starts. An exponential that is next
         to nothing there, and rises before the step ends, would not be seen.

@@ -13,8 +13,10 @@ from typing import NamedTuple
 from stickslip_ros.physics.disturbance import Disturbance
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.samples import NANOSECONDS
 
-NANOSECONDS = 1_000_000_000
+LOCKSTEP_START = NANOSECONDS
+"""Stamp of the first sample where no clock gives one, ns; ROS takes zero for "not set"."""
 
 
 class Sample(NamedTuple):

@@ -11,6 +11,9 @@ from stickslip_ros.physics.measures import UNBOUNDED_BELT_SPEEDS, Cycle, CycleMe
 
 IntArray = npt.NDArray[np.int64]
 
+NANOSECONDS = 1_000_000_000
+"""In a second: what stamps count."""
+
 _LONGEST_GAP = 10
 """Periods over which a motion may still be interpolated."""
 
