@@ -66,6 +66,7 @@ setup(
         "pydantic>=2",  # another API than 1, which some distributions still ship
         "pyyaml",
         "rich",
+        "scipy",
     ],
     extras_require={
         # ROS itself, where none is installed; the message packages come with these two.
@@ -75,7 +76,6 @@ setup(
             "pytest",
             "pytest-timeout",
             "rosbags",
-            "scipy",  # the solver that the motion is compared with
             "setuptools>=70.1",  # the first to make wheels unaided
         ],
         "dev": ["colcon-common-extensions", "colcon-ros", "pyright", "ruff"],
