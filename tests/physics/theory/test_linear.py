@@ -1,0 +1,105 @@
+"""The derivatives at the equilibrium against differences of the law, and Routh and Hurwitz."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.equations import WashoutGains
+from stickslip_ros.physics.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
+from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants, jacobians
+from tests.physics.drives import FEED_DRIVE, PAPER
+
+LAWS = [
+    Stribeck(0.4, 0.25, 0.5),
+    Coulomb(0.4),
+    Linear(0.4, 0.45),
+    Exponential(0.4, 0.25, 0.3, 0.05),
+]
+
+
+def test_the_paper_at_its_equilibrium() -> None:
+    expansion = expand(PAPER)
+    assert expansion is not None
+    assert expansion.equilibrium == pytest.approx([0.4 - 0.45 * 0.4 + 0.6 * 0.4**3, 0.0])
+    trace = 0.45 - 0.02 - 1.8 * 0.4**2
+    assert expansion.jacobian == pytest.approx(np.array([[0.0, 1.0], [-1.0, trace]]), abs=1e-15)
+    assert expansion.eigenvalues == pytest.approx(np.roots([1.0, -trace, 1.0]), abs=1e-14)
+    assert not expansion.stable
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_derivatives_are_those_of_the_law(law: FrictionLaw) -> None:
+    speed, step = 0.37, 1e-2
+    drive = replace(PAPER, friction=law, belt_speed=speed)
+    expansion = expand(drive)
+    assert expansion is not None
+
+    # Central differences of orders 1 to 3, sixth order accurate, of mu(v_r) at v_r = -speed.
+    offsets = np.arange(-4, 5)
+    powers = np.vander(offsets * step, increasing=True).T
+    values = law.coefficient(offsets * step - speed, -1.0)
+    slope, curvature, third = (
+        np.linalg.solve(powers, factor * np.eye(9)[order]) @ values
+        for order, factor in ((1, 1.0), (2, 2.0), (3, 6.0))
+    )
+    assert expansion.equilibrium[0] == pytest.approx(values[4], rel=1e-15)
+    assert expansion.jacobian[1, 1] == pytest.approx(slope - drive.damping, abs=1e-9)
+    assert expansion.quadratic[1, 1, 1] == pytest.approx(curvature, abs=1e-7)
+    assert expansion.cubic[1, 1, 1, 1] == pytest.approx(third, abs=1e-5)
+    assert expansion.jacobian_by_belt_speed[1, 1] == pytest.approx(-curvature, abs=1e-7)
+    for tensor in (expansion.quadratic, expansion.cubic):
+        assert np.count_nonzero(tensor) <= 1
+
+
+def test_units_do_not_matter() -> None:
+    gains = WashoutGains(20.0, -3000.0, -5e4)
+    si, unit = expand(FEED_DRIVE, gains), expand(PAPER, gains.scaled(FEED_DRIVE))
+    assert si is not None
+    assert unit is not None
+    assert si.jacobian == pytest.approx(unit.jacobian, abs=1e-14)
+    assert si.cubic == pytest.approx(unit.cubic, abs=1e-12)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+def test_a_reversed_belt_mirrors_the_equilibrium(law: FrictionLaw) -> None:
+    drive = replace(PAPER, friction=law)
+    there, back = expand(drive), expand(replace(drive, belt_speed=-drive.belt_speed))
+    assert there is not None
+    assert back is not None
+    assert back.equilibrium[0] == -there.equilibrium[0]
+    assert back.jacobian == pytest.approx(there.jacobian)
+    assert back.quadratic == pytest.approx(-there.quadratic)
+    assert back.cubic == pytest.approx(there.cubic)
+
+
+def test_nothing_smooth_surrounds_a_slide_on_a_belt_at_rest() -> None:
+    assert expand(replace(PAPER, belt_speed=0.0)) is None
+
+
+def test_many_belt_speeds_at_once_are_those_one_by_one() -> None:
+    speeds = np.array([0.1, 0.4, 0.9])
+    gains = WashoutGains(2.0, -0.5, -1.0)
+    for found, speed in zip(jacobians(PAPER, gains, speeds), speeds, strict=True):
+        single = expand(replace(PAPER, belt_speed=float(speed)), gains)
+        assert single is not None
+        assert np.array_equal(found, single.jacobian)
+
+
+@given(st.sampled_from([2, 3]), st.lists(st.floats(-2.0, 2.0), min_size=9, max_size=9))
+def test_routh_and_hurwitz_agree_with_the_eigenvalues(order: int, entries: list[float]) -> None:
+    matrix = np.array(entries[: order * order]).reshape(order, order)
+    growth = float(np.linalg.eigvals(matrix).real.max())
+    assume(abs(growth) > 1e-6)
+    assert bool(np.all(hurwitz_determinants(matrix) > 0.0)) == (growth < 0.0)
+
+
+def test_continuous_control_is_the_jacobian_of_the_paper() -> None:
+    drive = Drive(1.0, 0.01, 1.0, 1.0, 0.49, Stribeck(0.4, 0.25, 0.5))
+    expansion = expand(drive, WashoutGains(2.0, -0.3, 7.0))
+    assert expansion is not None
+    rows = [[0.0, 1.0, 0.0], [-1.0, 0.44 - 1.8 * 0.49**2 - 0.3, 0.6], [0.0, 1.0, -2.0]]
+    assert expansion.jacobian == pytest.approx(np.array(rows), abs=1e-15)
