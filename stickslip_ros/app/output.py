@@ -43,17 +43,27 @@ def print_json(values: Mapping[str, Any]) -> None:
 
 def print_figures(title: str, columns: Mapping[str, Mapping[str, Any]]) -> None:
     """Print figures by name, one column for each of `columns`, those that nobody has left out."""
-    table = Table(title=escape(title), title_justify="left")
-    table.add_column("")
-    for heading in columns:
-        table.add_column(heading, justify="right")
+    rows: list[list[str]] = []
     for name, (label, unit) in _LABELS.items():
         if any(name in figures for figures in columns.values()):
-            values = [figures.get(name) for figures in columns.values()]
-            scale, prefix = _prefix(values) if unit else (1.0, "")
-            cells = [_text(value, scale, f" {prefix}{unit}".rstrip()) for value in values]
-            table.add_row(label, *map(escape, cells))
+            rows.append([label, *quantities([f.get(name) for f in columns.values()], unit)])
+    print_table(title, ["", *columns], rows)
+
+
+def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table of which the first column stands to the left and the others to the right."""
+    table = Table(title=escape(title), title_justify="left")
+    for number, heading in enumerate(headings):
+        table.add_column(escape(heading), justify="right" if number else "left")
+    for row in rows:
+        table.add_row(*map(escape, row))
     Console(soft_wrap=True).print(table)
+
+
+def quantities(values: Sequence[Any], unit: str) -> list[str]:
+    """Return values to show with their unit, all with the SI prefix that suits the largest."""
+    scale, prefix = _prefix(values) if unit else (1.0, "")
+    return [_text(value, scale, f" {prefix}{unit}".rstrip()) for value in values]
 
 
 @contextmanager
