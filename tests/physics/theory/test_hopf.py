@@ -4,7 +4,7 @@ from dataclasses import replace
 from math import sqrt
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.drive import Drive
@@ -66,6 +66,7 @@ def test_the_general_theory_agrees_with_the_closed_forms(drive: Drive) -> None:
     assert expansion is not None
     assert expansion.equilibrium[0] == pytest.approx(cubic.equilibrium, rel=1e-12, abs=1e-12)
     assert expansion.jacobian[1, 1] == pytest.approx(cubic.trace, rel=1e-12, abs=1e-12)
+    assume(cubic.hopf_speed is None or cubic.hopf_speed > 1e-5)  # lower ones are not looked for
     points = hopf_points(drive)
     assert (cubic.hopf_speed is None) == (points == [])
     for point in points:

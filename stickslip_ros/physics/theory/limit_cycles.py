@@ -1,0 +1,366 @@
+"""Limit cycles as solutions of a boundary-value problem, stable or not, with Floquet multipliers.
+
+They are found by shooting on the event-exact motion: the state after one period is to be the state
+it began with (Seydel, Practical Bifurcation and Stability Analysis, ch. 7). A cycle is cut where
+the slide turns upward: X' = 0 and X'' > 0. Inside everything is dimensionless (see `Drive`) but
+durations; arguments and results are SI.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import isclose
+from typing import Any, Self
+
+import numpy as np
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.equations import WashoutGains
+from stickslip_ros.physics.knots import FloatArray, Knots
+from stickslip_ros.physics.measures import EQUILIBRIUM_SPEED, CycleMeter, Measures
+from stickslip_ros.physics.motion import UNBOUNDED_SPEED
+from stickslip_ros.physics.theory.averaging import averaged_growth
+from stickslip_ros.physics.theory.linear import SPEED
+from stickslip_ros.physics.theory.returns import follow, longest_return, release_position
+from stickslip_ros.physics.theory.roots import zero_between
+from stickslip_ros.physics.theory.sensitivity import SensitiveMotion
+
+_ROUNDING = 1e-13
+"""Share of the displacement below which a difference is rounding."""
+
+_TOLERANCE = 1e-12
+"""Share of the displacement by which a cycle may miss its start."""
+
+_ISOLATED = 1e-10
+"""Distance of a multiplier from 1 within which the orbit is one of a family, no limit cycle."""
+
+_NEAR = 1e-6
+"""Share within which a turn of a run, or a measured period, is to agree with the one before it."""
+
+_NEWTON_STEPS, _HALVINGS = 40, 10
+
+_SMALLEST_CYCLE = 1e-6
+"""Distance from the equilibrium, in belt speeds, below which a cycle is taken for it."""
+
+_INNERMOST = 1e-4
+"""Least distance from the equilibrium to look at, in the smallest speed that matters."""
+
+_CORNER = 1e-6
+"""Share of its distance within which the cycle that sticks is looked for."""
+
+_RATIO, _RATIO_WITHOUT_TURNS = 1.1, 2.0
+"""Of one distance to the next, while the slide comes back and before, near an overdamped rest."""
+
+_FRICTION_SCALES = 10.0
+"""Static forces and belt speeds beyond which averaging says whether there can be a cycle."""
+
+_BISECTIONS = 60
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """A periodic motion, from one upward turning point to the next; SI units."""
+
+    position: float
+    """Displacement at the turning point, m."""
+    filter_state: float | None
+    """State W of the washout filter there, m; None in the open loop."""
+    period: float
+    """s"""
+    multipliers: tuple[complex, ...]
+    """Floquet multipliers without the trivial one, the largest first; zero where it sticks."""
+    measures: Measures
+    """Of one cycle."""
+
+    @property
+    def stable(self) -> bool:
+        """Whether what starts nearby comes back to it."""
+        return all(abs(multiplier) < 1.0 for multiplier in self.multipliers)
+
+
+def shoot(
+    drive: Drive,
+    position: float,
+    period: float,
+    *,
+    gains: WashoutGains | None = None,
+    filter_state: float = 0.0,
+) -> LimitCycle | None:
+    """Return the limit cycle near a guess; None where Newton's method does not arrive at one.
+
+    The guess is a displacement (m) at an upward turning point, a period (s) and, under continuous
+    control (eq. 19) with `gains` (SI), the state of the filter (m). Orbits that are one of a
+    family, or take several turns to close, do not count.
+    """
+    if drive.belt_speed == 0.0:
+        return None
+    motion = SensitiveMotion(drive, gains)
+    state = np.array([position, 0.0, filter_state])[: motion.order] / drive.length_scale
+    return _solve(motion, state, period)
+
+
+def limit_cycle_of_run(
+    drive: Drive,
+    position: float,
+    velocity: float = 0.0,
+    *,
+    gains: WashoutGains | None = None,
+    turns: int = 200,
+) -> LimitCycle | None:
+    """Return the limit cycle that the motion from `position` (m) and `velocity` (m/s) leads to.
+
+    It runs until it repeats itself, for so many upward turns at most, the filter at rest at first;
+    from there a cycle is shot at. None where the motion settles or runs away, or where Newton's
+    method does not arrive.
+    """
+    if drive.belt_speed == 0.0:
+        return None
+    motion = SensitiveMotion(drive, gains)
+    motion.restart(position, velocity)
+    state, duration = motion.state, 0.0
+    for _ in range(turns):
+        found = _next_turn(motion, state)
+        if found is None:
+            return None
+        before = state
+        state, duration = found
+        if motion.rate[SPEED] < EQUILIBRIUM_SPEED * abs(drive.belt_speed) / drive.speed_scale:
+            return None
+        if np.abs(state - before).max() < _NEAR * np.abs(state).max():
+            break
+    return _solve(motion, state, duration)
+
+
+def limit_cycles(drive: Drive) -> list[LimitCycle]:
+    """Return all limit cycles of the open loop, stable and unstable, from the smallest on.
+
+    The motion is planar, so that a cycle surrounds the equilibrium and crosses the half-line
+    X' = 0, X < X_eq once. From one such crossing to the next the half-line is mapped to itself;
+    the cycles are where this map leaves a point alone. It is followed outwards as long as the
+    slide comes back. There are no cycles on a belt at rest.
+    """
+    if drive.belt_speed == 0.0:
+        return []
+    returns = _ReturnMap(drive)
+    distances = [zero_between(returns.growth, *bracket) for bracket in returns.brackets()]
+    cycles = [returns.cycle(distance) for distance in distances]
+    return [cycle for cycle in cycles if cycle is not None]
+
+
+class _ReturnMap:
+    """The map from a distance below the equilibrium, the slide turning upward, to the next one."""
+
+    def __init__(self, drive: Drive) -> None:
+        self._motion = SensitiveMotion(drive)
+        self._equilibrium = float(self._motion.rate[SPEED])
+        speed = min(abs(drive.belt_speed), drive.friction.sudden_speed) / drive.speed_scale
+        self._innermost = _INNERMOST * min(speed, 1.0)
+        self._outermost = _outermost(drive)
+
+    def growth(self, distance: float) -> float:
+        """Return by how much the distance grows; -`distance` where the slide turns no more."""
+        found = _next_turn(self._motion, self._state(distance))
+        if found is None:
+            return UNBOUNDED_SPEED if self._motion.unbounded else -distance
+        growth = (self._equilibrium - float(found[0][0])) - distance
+        return 0.0 if abs(growth) < _ROUNDING * (distance + abs(self._equilibrium)) else growth
+
+    def cycle(self, distance: float) -> LimitCycle | None:
+        """Return the limit cycle at that distance."""
+        state = self._state(distance)
+        found = _next_turn(self._motion, state)
+        return None if found is None else _solve(self._motion, state, found[1])
+
+    def brackets(self) -> Iterator[tuple[float, float]]:
+        """Yield pairs of distances between which the growth changes sign."""
+        inner, inner_growth, inner_slope = 0.0, 0.0, 0.0
+        outer, turned = self._innermost, False
+        corners = self._corners()
+        while outer < self._outermost:
+            further = outer * (_RATIO if turned else _RATIO_WITHOUT_TURNS)
+            outer = min([further, *(corner for corner in corners if corner > outer)])
+            growth, slope = self.growth(outer), self._slope()
+            turns = growth != -outer
+            if self._motion.unbounded or (turned and not turns):
+                return
+            turned = turns
+            if growth == 0.0:
+                continue
+            if growth * inner_growth < 0.0:
+                yield inner, outer
+            elif inner_slope * inner_growth < 0.0 < slope * growth:
+                peak = self._peak(inner, outer, growth)
+                if peak is not None:
+                    yield inner, peak
+                    yield peak, outer
+            inner, inner_growth, inner_slope = outer, growth, slope
+
+    def _corners(self) -> list[float]:
+        """Return two distances, just within and without that of a cycle that sticks, if any.
+
+        Within it the growth may rise as suddenly as the law. Every slide that stuck comes there.
+        """
+        drive = self._motion.drive
+        position = release_position(drive) / drive.length_scale
+        released = np.array([position, drive.belt_speed / drive.speed_scale])
+        found = _next_turn(self._motion, released)
+        if found is None:
+            return []
+        distance = self._equilibrium - float(found[0][0])
+        return [distance * (1.0 - _CORNER), distance * (1.0 + _CORNER)]
+
+    def _peak(self, inner: float, outer: float, growth: float) -> float | None:
+        """Return a distance at which the growth has another sign than at both ends, if any.
+
+        From either end it comes nearer to zero, and is nearest where its slope changes sign.
+        """
+        for _ in range(_BISECTIONS):
+            middle = (inner + outer) / 2.0
+            if self.growth(middle) * growth < 0.0:
+                return middle
+            if self._slope() * growth < 0.0:
+                inner = middle
+            else:
+                outer = middle
+        return None
+
+    def _slope(self) -> float:
+        """Return the derivative of the growth found last; the time of the turn has no part in it.
+
+        There Y = X' is zero.
+        """
+        return float(self._motion.transition[0, 0]) - 1.0
+
+    def _state(self, distance: float) -> FloatArray:
+        return np.array([self._equilibrium - distance, 0.0])
+
+
+def _outermost(drive: Drive) -> float:
+    """Return a distance beyond which there are no limit cycles.
+
+    Against a distance of many N/k friction is weak, unless it damps strongly, and averaging is
+    right about whether the vibration grows.
+    """
+    belt_speed = abs(drive.belt_speed) / drive.speed_scale
+    amplitudes = np.geomspace(belt_speed, UNBOUNDED_SPEED, 200)
+    growing = amplitudes[averaged_growth(drive, belt_speed, amplitudes) > 0.0]
+    by_friction = _FRICTION_SCALES * (belt_speed + drive.friction.static)
+    return max(by_friction, 2.0 * float(growing.max(initial=0.0)))
+
+
+def _next_turn(motion: SensitiveMotion, state: FloatArray) -> tuple[FloatArray, float] | None:
+    """Return state and time (s) of the next upward turn, or None; the motion is left there."""
+    motion.start(state)
+    turns = (_first_turn(knots) for knots in follow(motion))
+    turn = next((turn for turn in turns if turn is not None), None)
+    if turn is None:
+        return None
+    motion.start(state)
+    motion.advance(turn)
+    end = motion.state
+    end[SPEED] = 0.0
+    return end, turn
+
+
+def _first_turn(knots: Knots) -> float | None:
+    before, at, after = knots.velocity[:-2], knots.velocity[1:-1], knots.velocity[2:]
+    upward = np.flatnonzero((before < 0.0) & (at == 0.0) & (after > 0.0))
+    return float(knots.time[upward[0] + 1]) if len(upward) > 0 else None
+
+
+@dataclass(frozen=True)
+class _Shot:
+    """A motion from an upward turning point over a guessed period, and where it ends."""
+
+    unknowns: FloatArray
+    """The state at the start, with the period in the place of the speed, which is zero."""
+    residual: FloatArray
+    """The state at the end less that at the start."""
+    miss: float
+    """Its largest component, as a share of the displacement, at the start, from zero or rest."""
+    transition: FloatArray
+    """Derivatives of the state at the end by that at the start."""
+    rate: FloatArray
+    """Derivative of the state at the end by time."""
+
+    @classmethod
+    def fire(cls, motion: SensitiveMotion, unknowns: FloatArray) -> Self | None:
+        """Return the shot; None where it does not start upward, or does not end."""
+        drive = motion.drive
+        start, period = unknowns.copy(), float(unknowns[SPEED]) / drive.angular_frequency
+        start[SPEED] = 0.0
+        motion.start(start)
+        distance = float(motion.rate[SPEED])
+        smallest = _SMALLEST_CYCLE * abs(drive.belt_speed) / drive.speed_scale
+        if distance < smallest or not 0.0 < period < longest_return(drive):
+            return None
+        motion.advance(period)
+        if motion.unbounded:
+            return None
+        residual = motion.state - start
+        miss = float(np.abs(residual).max()) / max(abs(float(start[0])), distance)
+        return cls(unknowns, residual, miss, motion.transition, motion.rate)
+
+    def newton_step(self) -> FloatArray:
+        """Return the change of the unknowns after which the linearised motion would close."""
+        jacobian = self.transition - np.eye(len(self.residual))
+        jacobian[:, SPEED] = self.rate
+        step: Any = np.linalg.lstsq(jacobian, -self.residual)[0]
+        return step
+
+    def multipliers(self) -> tuple[complex, ...]:
+        """Return the eigenvalues of the derivative of the map from one upward turn to the next."""
+        by_time_of_turn = np.outer(self.rate, self.transition[SPEED]) / self.rate[SPEED]
+        kept = np.delete(np.arange(len(self.rate)), SPEED)
+        found = np.linalg.eigvals((self.transition - by_time_of_turn)[np.ix_(kept, kept)])
+        return tuple(sorted(found.astype(complex).tolist(), key=abs, reverse=True))
+
+
+def _solve(motion: SensitiveMotion, state: FloatArray, period: float) -> LimitCycle | None:
+    """Solve for the cycle by Newton's method, each step halved until it comes nearer.
+
+    It ends where rounding lets no step come nearer. None where it misses still.
+    """
+    guess = state.copy()
+    guess[SPEED] = period * motion.drive.angular_frequency
+    shot = _Shot.fire(motion, guess)
+    if shot is None:
+        return None
+    for _ in range(_NEWTON_STEPS):
+        nearer = _nearer(motion, shot)
+        if nearer is None:
+            break
+        shot = nearer
+    if shot.miss > _TOLERANCE or any(abs(m - 1.0) < _ISOLATED for m in shot.multipliers()):
+        return None
+    return _cycle(motion, shot)
+
+
+def _nearer(motion: SensitiveMotion, shot: _Shot) -> _Shot | None:
+    step = shot.newton_step()
+    for halvings in range(_HALVINGS):
+        trial = _Shot.fire(motion, shot.unknowns + 2.0**-halvings * step)
+        if trial is not None and trial.miss < shot.miss:
+            return trial
+    return None
+
+
+def _cycle(motion: SensitiveMotion, shot: _Shot) -> LimitCycle | None:
+    """Return the cycle that a shot closes; None where it took several turns."""
+    drive = motion.drive
+    start = shot.unknowns.copy()
+    start[SPEED] = 0.0
+    period = float(shot.unknowns[SPEED]) / drive.angular_frequency
+    motion.start(start)
+    motion.advance(2.25 * period)  # the meter wants to see an upward turn from both sides
+    meter = CycleMeter(window=1)
+    meter.feed(motion.take_knots(), drive.belt_speed)
+    measures = meter.measures()
+    if measures.period is not None and not isclose(measures.period, period, rel_tol=_NEAR):
+        return None
+    return LimitCycle(
+        position=float(start[0]) * drive.length_scale,
+        filter_state=float(start[2]) * drive.length_scale if motion.order > 2 else None,
+        period=period,
+        multipliers=shot.multipliers(),
+        measures=measures,
+    )

@@ -1,0 +1,85 @@
+"""The exact motion and its derivatives by the state it started from."""
+
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.equations import WashoutGains
+from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.physics.motion import Motion
+
+SPEED = 1
+"""Where the slide's speed Y stands in the state."""
+
+
+class SensitiveMotion(Motion):
+    """A motion that carries the derivatives of its state by the state it started from.
+
+    The state is dimensionless: (X, Y), or (X, Y, W) under continuous control. Within a slip or a
+    stick heyoka integrates the variational equations along with the motion. From one to the next
+    the derivatives jump by the saltation matrix (Leine and Nijmeijer, Dynamics and Bifurcations of
+    Non-Smooth Mechanical Systems, 2004, ch. 7). Knots are recorded.
+    """
+
+    def __init__(self, drive: Drive, gains: WashoutGains | None = None) -> None:
+        """Start at rest at X = 0: without force, or with `gains` (SI) under continuous control."""
+        super().__init__(drive, 0.0, 0.0, continuous_control=gains is not None, record=True)
+        if gains is not None:
+            self.set_gains(gains.corner_frequency, gains.linear, gains.cubic)
+        self.start(np.zeros(self.order))
+
+    @property
+    def order(self) -> int:
+        """Number of the state's components."""
+        return 3 if self._continuous_control else 2
+
+    @property
+    def state(self) -> FloatArray:
+        """X, Y and, under continuous control, W."""
+        return np.array([self._x, self._y, self._w][: self.order])
+
+    @property
+    def rate(self) -> FloatArray:
+        """Derivative of the state by dimensionless time."""
+        filtered = self._gains.filtered(self._y, self._w)
+        return np.array([self._y, self._acceleration(self._sign), filtered][: self.order])
+
+    def start(self, state: FloatArray) -> None:
+        """Start again at `state`, at time zero and with no knots."""
+        self.take_knots()
+        self._time = self._knot_time = 0.0
+        self.restart(state[0] * self.drive.length_scale, state[SPEED] * self.drive.speed_scale)
+        if self._continuous_control:
+            self._w = float(state[2])
+        self.transition: FloatArray = np.eye(self.order)
+        """Derivatives of the state (rows) by that at the start (columns)."""
+
+    def _system(self, right_hand_side: Any) -> Any:
+        return hy.var_ode_sys(right_hand_side, hy.var_args.vars, order=1)
+
+    def _propagate(self, integrator: Any, now: float, end: float) -> tuple[int | None, float]:
+        # From the identity each time: heyoka's error is relative to the largest of the variables.
+        derivatives = integrator.state[self.order :].reshape(self.order, self.order)
+        derivatives[:] = np.eye(self.order)
+        found = super()._propagate(integrator, now, end)
+        self.transition = derivatives @ self.transition
+        return found
+
+    def _slip(self, now: float, end: float) -> float:
+        sign = self._sign
+        now = super()._slip(now, end)
+        if self._sign != sign:
+            # I + (f_after - f_before) n^T / (n^T f_before), n along Y, where only Y' jumps. On
+            # leaving the belt nothing jumps.
+            after = self._acceleration(self._sign)
+            self.transition[SPEED] *= after / self._acceleration(sign) if after != 0.0 else 0.0
+        return now
+
+    def _acceleration(self, sign: float) -> float:
+        """Return X'' while slipping with sgn(v_r) = `sign`, or sticking (0)."""
+        if sign == 0.0:
+            return 0.0
+        relative_speed = (self._y - self._belt_speed) * self._drive.speed_scale
+        return float(self._drive.friction.coefficient(relative_speed, sign)) - self._reaction()

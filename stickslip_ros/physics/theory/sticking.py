@@ -1,0 +1,153 @@
+"""The onset of sticking: the belt speed below which the slide sticks once a cycle."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.knots import Knots
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.theory.averaging import averaged_growth
+from stickslip_ros.physics.theory.returns import follow, release_position
+from stickslip_ros.physics.theory.roots import zero_between
+
+_AVERAGED = np.geomspace(1e-4, 1e4, 200)
+"""Dimensionless belt speeds between which averaging looks for an onset."""
+
+_FOLLOWED = np.geomspace(4.0, 0.02, 100)
+"""Belt speeds between which the motion is followed, in averaged onsets, or else in the drive's."""
+
+_ROUNDING = 1e-12
+"""Share of the belt speed below which a difference of speeds is rounding."""
+
+
+@dataclass(frozen=True)
+class StickingOnset:
+    """The highest belt speed with a cycle that sticks: m/s, above zero."""
+
+    approximate: float | None
+    """By averaging: the speed amplitude of a harmonic vibration is the speed of the belt.
+
+    For the cubic law that is sqrt(4/5) of the Hopf speed.
+    """
+    exact: float | None
+    """By the motion: a periodic orbit touches the speed of the belt; to rounding."""
+    no_approximate: str | None
+    """Where there is no approximate speed, a sentence that says why."""
+    no_exact: str | None
+    """Where there is no exact speed, a sentence that says why."""
+
+
+def sticking_onset(drive: Drive) -> StickingOnset:
+    """Return the onset of sticking for whatever belt speed; that of `drive` is not its matter.
+
+    The exact one is looked for up to four times the approximate one, or, without that, up to four
+    times the belt speed of `drive`.
+    """
+    averaged = _averaged(drive)
+    reference = averaged if isinstance(averaged, float) else abs(drive.belt_speed)
+    followed = _followed(drive, reference or drive.speed_scale)
+    return StickingOnset(
+        approximate=averaged if isinstance(averaged, float) else None,
+        exact=followed if isinstance(followed, float) else None,
+        no_approximate=averaged if isinstance(averaged, str) else None,
+        no_exact=followed if isinstance(followed, str) else None,
+    )
+
+
+def _averaged(drive: Drive) -> float | str:
+    """Return the approximate onset (m/s), or why there is none."""
+    growing = np.flatnonzero(averaged_growth(drive, _AVERAGED, _AVERAGED) > 0.0)
+    low, high = _AVERAGED[[0, -1]] * drive.speed_scale
+    if len(growing) == 0:
+        return f"By averaging it sticks at no belt speed from {low:.3g} to {high:.3g} m/s."
+    highest = int(growing[-1])
+    if highest == len(_AVERAGED) - 1:
+        return f"By averaging it still sticks at {high:.3g} m/s, the highest belt speed tried."
+    onset = zero_between(
+        lambda speed: float(averaged_growth(drive, speed, speed)), *_AVERAGED[highest : highest + 2]
+    )
+    return onset * drive.speed_scale
+
+
+def _followed(drive: Drive, reference: float) -> float | str:
+    """Return the exact onset (m/s), or why there is none."""
+    release = _Release(drive)
+    speeds = (reference * _FOLLOWED).tolist()
+    above = None
+    for speed in speeds:
+        if release.excess(speed) > 0.0:
+            break
+        above = speed
+    else:
+        return f"It sticks at no belt speed from {speeds[-1]:.3g} to {speeds[0]:.3g} m/s."
+    if above is not None:
+        return zero_between(release.excess, speed, above)
+    sticking = next((speed for speed in speeds if release.sticks_again(speed)), 0.0)
+    if sticking == speed:
+        return f"It still sticks at {speed:.3g} m/s, the highest belt speed tried."
+    return (
+        f"Above {sticking:.3g} m/s, up to {speed:.3g} m/s at least, it overtakes the belt and does "
+        "not stick: no orbit touches the belt's speed."
+    )
+
+
+class _Release:
+    """What a slide does when the belt lets go of it, which it always does in the same state."""
+
+    def __init__(self, drive: Drive) -> None:
+        self._motion = Motion(drive, 0.0, 0.0, record=True)
+
+    def excess(self, belt_speed: float) -> float:
+        """Return by what share of the belt's speed (m/s) the slide's next upward speed is above.
+
+        -1 where it does not come up again. Beyond the belt's speed friction turns round: there the
+        peak is that of the parabola which begins with the slide's acceleration and loses v0 of it
+        per unit of time, as an orbit does that touches.
+        """
+        peaks = (_highest(knots, belt_speed) for knots in self._follow(belt_speed))
+        peak = next((peak for peak in peaks if peak is not None), None)
+        if peak is None:
+            return -1.0
+        position, velocity = peak
+        excess = velocity / belt_speed - 1.0
+        if abs(excess) > _ROUNDING:
+            return excess
+        drive = self._motion.drive
+        acceleration = (release_position(drive) - position) / drive.length_scale
+        excess = (acceleration / (belt_speed / drive.speed_scale)) ** 2 / 2.0
+        return excess if excess > _ROUNDING else 0.0
+
+    def sticks_again(self, belt_speed: float) -> bool:
+        """Return whether it sticks again, be it that it overtakes the belt (m/s) before."""
+        *_, knots = self._follow(belt_speed)
+        return bool(np.any(knots.sticking & np.logical_or.accumulate(knots.velocity < 0.0)))
+
+    def _follow(self, belt_speed: float) -> Iterator[Knots]:
+        motion = self._motion
+        motion.drive = replace(motion.drive, belt_speed=belt_speed)
+        motion.restart(release_position(motion.drive), belt_speed)
+        motion.take_knots()
+        return follow(motion)
+
+
+def _highest(knots: Knots, belt_speed: float) -> tuple[float, float] | None:
+    """Return position and velocity where it is fastest, once it went back and until it does again.
+
+    If it comes to the belt's speed: there. None as long as the motion has not got so far.
+    """
+    backward = knots.velocity < 0.0
+    forward = np.flatnonzero(np.logical_or.accumulate(backward) & ~backward)
+    if len(forward) == 0:
+        return None
+    swing = knots[forward[0] :]
+    over = np.flatnonzero(swing.velocity < 0.0)
+    arrived = np.flatnonzero(swing.velocity >= belt_speed * (1.0 - _ROUNDING))
+    if len(arrived) > 0 and not np.any(over < arrived[0]):
+        row = int(arrived[0])
+    elif len(over) > 0:
+        row = int(np.argmax(swing.velocity[: over[0]]))
+    else:
+        return None
+    return float(swing.position[row]), float(swing.velocity[row])

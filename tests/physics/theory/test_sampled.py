@@ -1,0 +1,266 @@
+"""The linear sampled loop: against the loop itself, against brute force and in its limits."""
+
+from dataclasses import replace
+from math import inf, log, pi
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.equations import WashoutGains
+from stickslip_ros.physics.friction import Coulomb, Exponential
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.physics.theory.closed_forms import CubicLoop
+from stickslip_ros.physics.theory.linear import expand
+from stickslip_ros.physics.theory.sampled import (
+    LONGEST_DELAY,
+    LinearSampledLoop,
+    why_no_linear_loop,
+)
+from stickslip_ros.physics.washout import Washout, WashoutParameters
+from tests.physics.drives import FEED_DRIVE, PAPER
+
+
+def loop_of(drive: Drive, rate: float, force_delay: float = 0.0) -> LinearSampledLoop:
+    loop = LinearSampledLoop.of(drive, rate, force_delay)
+    assert loop is not None
+    return loop
+
+
+def simulated(
+    drive: Drive, rate: float, force_delay: float, gains: WashoutGains, samples: int
+) -> np.ndarray:
+    """Dimensionless deviations (X, Y) at the samples of the loop itself, beginning with 1e-7."""
+    expansion = expand(drive)
+    assert expansion is not None
+    rest = expansion.equilibrium[0] * drive.length_scale
+    motion = Motion(drive, rest + 1e-7 * drive.length_scale, 0.0)
+    loop = SampledLoop(motion, rate, LOCKSTEP_START, force_delay=force_delay)
+    law = Washout(WashoutParameters(gains.corner_frequency, gains.linear, gains.cubic))
+    rows = []
+    for _ in range(samples):
+        sample = loop.sample
+        x, y = (sample.position - rest) / drive.length_scale, sample.velocity / drive.speed_scale
+        rows.append((x, y))
+        force = law.answer(sample.stamp, sample.velocity)
+        assert force is not None
+        loop.offer(sample.stamp, force)
+        loop.advance()
+    return np.array(rows)
+
+
+LOOPS = [
+    (PAPER, 10.0, 0.0, WashoutGains(0.5, -0.5, -1.0)),
+    (PAPER, 10.0, 0.03, WashoutGains(0.5, -0.5, 0.0)),
+    (PAPER, 10.0, 0.1, WashoutGains(0.5, -0.5, 0.0)),
+    (PAPER, 10.0, 0.25, WashoutGains(0.5, -0.1, 0.0)),
+    (PAPER, 1.0, 2.3, WashoutGains(0.5, 0.1, 0.0)),
+    (FEED_DRIVE, 1000.0, 0.0035, WashoutGains(20.0, -3000.0, 0.0)),
+    (replace(FEED_DRIVE, belt_speed=-0.04), 700.0, 0.01, WashoutGains(20.0, -3000.0, 0.0)),
+    (replace(PAPER, friction=Exponential(0.4, 0.25, 0.2, 0.1)), 5.0, 0.5, WashoutGains(1, -0.4, 0)),
+    (replace(PAPER, friction=Coulomb(0.4)), 5.0, 0.7, WashoutGains(1.0, 0.1, 0.0)),
+]
+
+
+@pytest.mark.parametrize(("drive", "rate", "force_delay", "gains"), LOOPS)
+def test_it_is_the_loop_that_runs(
+    drive: Drive, rate: float, force_delay: float, gains: WashoutGains
+) -> None:
+    loop = loop_of(drive, rate, force_delay)
+    found = simulated(drive, rate, force_delay, gains, 200)
+    matrix = loop.transition_matrix(gains)
+    state = np.zeros(len(matrix))
+    state[0] = 1e-7
+    expected = []
+    for _ in found:
+        expected.append(state[:2])
+        state = matrix @ state
+    # What is nonlinear changes a deviation by its own size.
+    assert found == pytest.approx(np.array(expected), abs=2e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(("drive", "rate", "force_delay", "gains"), LOOPS)
+def test_a_small_vibration_grows_by_the_spectral_radius(
+    drive: Drive, rate: float, force_delay: float, gains: WashoutGains
+) -> None:
+    """A vibration that grows by r per sample satisfies y_(n+2) = 2 r cos(phi) y_(n+1) - r^2 y_n."""
+    loop = loop_of(drive, rate, force_delay)
+    values = np.linalg.eigvals(loop.transition_matrix(gains))
+    moduli = np.sort(np.abs(values))[::-1]
+    if moduli[2] > 0.97 * moduli[0]:
+        pytest.skip("more than one pair lasts")
+    late = simulated(drive, rate, force_delay, gains, 400)[150:, 0]
+    system = np.stack([late[1:-1], late[:-2]], axis=1)
+    _, square = np.linalg.lstsq(system, late[2:], rcond=None)[0]
+    assert np.sqrt(-square) == pytest.approx(loop.spectral_radius(gains), abs=1e-6)
+
+
+@pytest.mark.parametrize("rate_and_delay", [(100.0, 0.0), (20.0, 0.13), (5.0, 0.2), (2.0, 0.9)])
+def test_the_loop_is_stable_on_one_side_of_the_critical_gain(
+    rate_and_delay: tuple[float, float],
+) -> None:
+    rate, force_delay = rate_and_delay
+    critical = loop_of(PAPER, rate, force_delay).critical_linear_gain(0.2)
+    assert critical is not None
+    amplitudes = []
+    for factor in (1.3, 0.7):
+        gains = WashoutGains(0.2, factor * critical, 0.0)
+        distances = np.hypot(*simulated(PAPER, rate, force_delay, gains, int(150.0 * rate)).T)
+        amplitudes.append(distances[-int(7.0 * rate) :].max() / 1e-7)
+    stable, unstable = amplitudes
+    assert stable < 0.5
+    assert unstable > 2.0
+
+
+rates = st.floats(0.2, 200.0)
+speeds = st.floats(0.1, 0.7)
+corners = st.floats(0.02, 10.0)
+
+
+@given(speeds, rates, st.floats(0.0, 12.0), corners)
+@settings(max_examples=60)
+def test_the_stable_gains_are_those_with_a_spectral_radius_below_one(
+    belt_speed: float, rate: float, periods: float, corner_frequency: float
+) -> None:
+    loop = loop_of(replace(PAPER, belt_speed=belt_speed), rate, periods / rate)
+    intervals = loop.stable_linear_gains(corner_frequency)
+    gains = np.concatenate([np.linspace(-4.0, 4.0, 201), -np.geomspace(1e-3, 1e4, 100)])
+    # At an end itself it is neither, and near it rounding decides.
+    ends = np.array([end for interval in intervals for end in interval])
+    clear = np.array([np.all(np.abs(gain - ends) > 1e-6 * (1.0 + abs(gain))) for gain in gains])
+    inside = np.array([any(low < gain < high for low, high in intervals) for gain in gains])
+    rates = loop.decay_rates(np.array([corner_frequency]), gains)[0] / rate
+    decided = clear & (np.abs(rates) > 1e-9)
+    assert np.array_equal(inside[decided], (rates > 0.0)[decided])
+
+
+@given(speeds, rates, st.floats(0.0, 4.0), corners)
+@settings(max_examples=60)
+def test_at_an_end_a_multiplier_is_on_the_unit_circle(
+    belt_speed: float, rate: float, periods: float, corner_frequency: float
+) -> None:
+    loop = loop_of(replace(PAPER, belt_speed=belt_speed), rate, periods / rate)
+    for interval in loop.stable_linear_gains(corner_frequency):
+        for end in interval:
+            if end != 0.0 and abs(end) < 1e3:
+                gains = WashoutGains(corner_frequency, end, 0.0)
+                assert loop.spectral_radius(gains) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("corner_frequency", "critical"), [(2.0, -0.935), (0.2, -0.148)])
+def test_critical_gains_of_the_continuous_loop(corner_frequency: float, critical: float) -> None:
+    found = loop_of(PAPER, 1e5).critical_linear_gain(corner_frequency)
+    assert found == pytest.approx(critical, abs=5e-4)
+
+
+@given(speeds, corners)
+def test_the_critical_gain_tends_to_that_of_the_continuous_loop(
+    belt_speed: float, corner_frequency: float
+) -> None:
+    drive = replace(PAPER, belt_speed=belt_speed)
+    cubic = CubicLoop.of(drive)
+    assert cubic is not None
+    assume(abs(cubic.trace * corner_frequency - 1.0) > 0.05)
+    expected = cubic.critical_linear_gain(corner_frequency)
+    errors = []
+    for rate in (1e3, 1e4, 1e6):
+        found = loop_of(drive, rate, 0.5 / rate).critical_linear_gain(corner_frequency)
+        if expected is None:
+            # Only gains that shrink the filter to a few samples can be left.
+            assert found is None or abs(found) > 10.0
+            return
+        assert found is not None
+        errors.append(abs(found - expected) * rate)
+    assert max(errors) < 100.0 * (1.0 + corner_frequency) ** 4
+
+
+@given(st.floats(0.5, 50.0), st.floats(0.0, 3.0), corners, st.floats(-1.0, 1.0))
+def test_a_delay_of_whole_periods_hardly_differs_from_almost_as_much(
+    rate: float, periods: float, corner_frequency: float, gain: float
+) -> None:
+    gains = WashoutGains(corner_frequency, gain, 0.0)
+    whole = round(periods)
+    exact = loop_of(PAPER, rate, whole / rate)
+    assert exact.order == 3 + whole
+    for further in (-1e-7, 1e-7):
+        if whole + further > 0.0:
+            near = loop_of(PAPER, rate, (whole + further) / rate)
+            assert near.order == 3 + whole + (further > 0.0)
+            radius = exact.spectral_radius(gains)
+            assert near.spectral_radius(gains) == pytest.approx(radius, abs=1e-3)
+
+
+def test_units_do_not_matter() -> None:
+    """The feed drive is the paper's drive at 100 rad/s, with 1e4 N s/m for a gain of one."""
+    paper, feed = loop_of(PAPER, 10.0, 0.13), loop_of(FEED_DRIVE, 1000.0, 0.0013)
+    assert feed.critical_linear_gain(20.0) == pytest.approx(1e4 * paper.critical_linear_gain(0.2))
+    one, other = WashoutGains(0.2, -0.3, 0.0), WashoutGains(20.0, -3000.0, 0.0)
+    assert feed.spectral_radius(other) == pytest.approx(paper.spectral_radius(one), rel=1e-12)
+    assert feed.decay_rate(other) == pytest.approx(100.0 * paper.decay_rate(one))
+    assert feed.settling_time(other) == pytest.approx(paper.settling_time(one) / 100.0)
+
+
+def test_settling_time() -> None:
+    loop = loop_of(PAPER, 10.0)
+    gains = WashoutGains(0.2, -1.0, 0.0)
+    time = loop.settling_time(gains)
+    assert time == pytest.approx(log(100.0) / loop.decay_rate(gains))
+    assert loop.settling_time(WashoutGains(0.2, -0.1, 0.0)) is None
+
+
+def test_a_slow_washout_at_the_hopf_point_has_a_triple_root() -> None:
+    """At p = 0, (l + r)^3 = l^3 + (d - k1) l^2 + l + d for r = 1/sqrt(3), d = r^3, k1 = d - 3 r."""
+    cubic = CubicLoop.of(PAPER)
+    assert cubic is not None and cubic.hopf_speed is not None
+    loop = loop_of(replace(PAPER, belt_speed=cubic.hopf_speed), 1e4)
+    r = 3.0**-0.5
+    assert loop.decay_rate(WashoutGains(r**3, r**3 - 3.0 * r, 0.0)) == pytest.approx(r, rel=0.02)
+
+
+def test_no_gain_is_stable_where_every_sample_falls_on_the_same_phase() -> None:
+    """A free slide sampled once per period shows nothing of its vibration."""
+    drive = replace(PAPER, damping=0.0)
+    loop = loop_of(drive, 1.0 / (2.0 * pi))
+    assert loop.stable_linear_gains(0.2) == []
+    assert loop.critical_linear_gain(0.2) is None
+
+
+def test_a_map_has_the_decay_rate_of_each_pair() -> None:
+    loop = loop_of(PAPER, 10.0, 0.25)
+    corners, gains = np.array([0.1, 0.3]), np.array([-1.0, -0.4, 0.2])
+    rates = loop.decay_rates(corners, gains)
+    for row, corner in enumerate(corners):
+        for column, gain in enumerate(gains):
+            expected = loop.decay_rate(WashoutGains(corner, gain, 0.0))
+            assert rates[row, column] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("force_delay", [0.5, 1.0, 2.0])
+def test_a_coarser_loop_decays_nearly_alike(force_delay: float) -> None:
+    loop = loop_of(PAPER, 100.0, force_delay)
+    coarse = loop.coarsened()
+    assert coarse.order < 30 < loop.order
+    for linear in (-0.5, -0.2, 0.2):
+        gains = WashoutGains(0.3, linear, 0.0)
+        assert coarse.decay_rate(gains) == pytest.approx(loop.decay_rate(gains), abs=0.02)
+
+
+def test_what_it_does_not_go_into_it_says() -> None:
+    assert LinearSampledLoop.of(replace(PAPER, belt_speed=0.0), 100.0) is None
+    assert "belt rests" in (why_no_linear_loop(replace(PAPER, belt_speed=0.0), 100.0, 0.0) or "")
+    assert LinearSampledLoop.of(PAPER, 100.0, 1e4) is None
+    reason = why_no_linear_loop(PAPER, 100.0, 1e4)
+    assert reason is not None and str(LONGEST_DELAY) in reason
+    assert why_no_linear_loop(PAPER, 100.0, 3.0) is None
+
+
+def test_the_longest_delay_and_the_highest_rate() -> None:
+    assert loop_of(PAPER, 100.0, LONGEST_DELAY / 100.0).critical_linear_gain(0.1) is not None
+    critical = loop_of(PAPER, 1e9).critical_linear_gain(2.0)
+    cubic = CubicLoop.of(PAPER)
+    assert cubic is not None
+    assert critical == pytest.approx(cubic.critical_linear_gain(2.0), rel=1e-6)
+    assert critical != -inf

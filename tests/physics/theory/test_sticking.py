@@ -1,0 +1,151 @@
+"""The onset of sticking, by averaging and on the motion itself."""
+
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
+from stickslip_ros.physics.measures import Regime
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.theory.averaging import averaged_growth
+from stickslip_ros.physics.theory.limit_cycles import limit_cycles
+from stickslip_ros.physics.theory.sticking import sticking_onset
+from tests.physics.drives import FEED_DRIVE, PAPER
+
+SUDDEN = replace(PAPER, friction=Exponential(0.4, 0.25, 0.05, 0.0))
+
+
+def hopf_speed(damping: float, static: float, minimum: float, minimum_speed: float) -> float:
+    """v_b1 of the cubic law, eq. 9; `damping` is 2 beta."""
+    slope = 1.5 * (static - minimum) / minimum_speed
+    return minimum_speed * sqrt(1.0 - damping / slope)
+
+
+def sticks(drive: Drive) -> bool:
+    """Whether the plain motion, left alone from rest on the belt, still sticks at the end."""
+    motion = Motion(drive, 0.0, drive.belt_speed, record=True)
+    motion.advance(150.0 * drive.natural_period)
+    motion.take_knots()
+    motion.advance(3.0 * drive.natural_period)
+    return bool(motion.take_knots().sticking.any())
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.01, 0.02, 0.4])
+def test_averaging_of_the_cubic_law_has_a_closed_form(damping: float) -> None:
+    onset = sticking_onset(replace(PAPER, damping=damping))
+    expected = sqrt(0.8) * hopf_speed(damping, 0.4, 0.25, 0.5)
+    assert onset.approximate == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("law", [PAPER.friction, SUDDEN.friction, Linear(0.4, 0.3)])
+@pytest.mark.parametrize("amplitude", [0.05, 0.3, 0.9])
+def test_averaged_growth_is_the_work_of_friction_on_a_harmonic(
+    law: FrictionLaw, amplitude: float
+) -> None:
+    """By another quadrature, with the phases where the slide overtakes the belt split off."""
+    belt_speed = 0.3
+    overtakes = float(np.arccos(min(1.0, belt_speed / amplitude)))
+
+    def power(phase: float, sign: float) -> float:
+        relative_speed = amplitude * np.cos(phase) - belt_speed
+        return float(law.coefficient(relative_speed, sign)) * float(np.cos(phase))
+
+    work = quad(power, 0.0, overtakes, args=(1.0,), epsabs=1e-13)[0]
+    work += quad(power, overtakes, np.pi, args=(-1.0,), epsabs=1e-13)[0]
+    found = averaged_growth(replace(PAPER, friction=law), belt_speed, amplitude)
+    tolerance = 1e-12 if amplitude <= belt_speed else 5e-3
+    assert float(found) == pytest.approx(2.0 / np.pi * work - 0.02 * amplitude, abs=tolerance)
+
+
+@pytest.mark.parametrize("drive", [PAPER, SUDDEN], ids=["cubic", "exponential"])
+def test_the_cycle_sticks_just_below_the_exact_onset_and_not_just_above(drive: Drive) -> None:
+    onset = sticking_onset(drive).exact
+    assert onset is not None
+    below, above = (replace(drive, belt_speed=onset * (1.0 + part)) for part in (-1e-8, 1e-8))
+    assert sticks(below)
+    assert not sticks(above)
+    assert any(cycle.measures.regime is Regime.STICK_SLIP for cycle in limit_cycles(below))
+    assert all(cycle.measures.regime is Regime.PURE_SLIP for cycle in limit_cycles(above))
+
+
+def test_at_the_exact_onset_the_cycle_touches_the_speed_of_the_belt() -> None:
+    onset = sticking_onset(PAPER).exact
+    assert onset is not None
+    drive = replace(PAPER, belt_speed=onset * (1.0 + 1e-10))
+    (cycle,) = limit_cycles(drive)
+    motion = Motion(drive, cycle.position, 0.0, record=True)
+    motion.advance(cycle.period)
+    knots = motion.take_knots()
+    assert not knots.sticking.any()
+    assert knots.velocity.max() == pytest.approx(onset, rel=1e-8)
+
+
+def test_the_exact_onset_of_the_paper_differs_in_the_third_digit() -> None:
+    onset = sticking_onset(PAPER)
+    assert onset.exact == pytest.approx(0.4395, abs=5e-5)
+    assert onset.approximate == pytest.approx(0.4372, abs=5e-5)
+    assert onset.no_exact is None
+    assert onset.no_approximate is None
+
+
+def test_it_scales_and_does_not_depend_on_the_speed_or_direction_of_the_belt() -> None:
+    onset = sticking_onset(PAPER)
+    assert onset.exact is not None
+    for belt_speed in (-0.3, 0.0, 7.0):
+        assert sticking_onset(replace(PAPER, belt_speed=belt_speed)) == onset
+    in_si = sticking_onset(FEED_DRIVE)
+    assert in_si.exact == pytest.approx(onset.exact / 10.0, rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("law", "damping", "words"),
+    [
+        (Coulomb(0.4), 0.02, "sticks at no belt speed"),
+        (Coulomb(0.4), 0.0, "sticks at no belt speed"),
+        (PAPER.friction, 0.5, "sticks at no belt speed"),
+        (SUDDEN.friction, 0.0, "still sticks at"),
+        (Linear(0.4, 0.45), 0.02, "overtakes the belt and does not stick"),
+        (Linear(0.4, 2.5), 0.02, "sticks at no belt speed"),
+    ],
+)
+def test_where_there_is_no_onset_a_sentence_says_why(
+    law: FrictionLaw, damping: float, words: str
+) -> None:
+    onset = sticking_onset(replace(PAPER, friction=law, damping=damping))
+    assert onset.approximate is None
+    assert onset.exact is None
+    assert onset.no_approximate is not None
+    assert onset.no_exact is not None
+    assert words in onset.no_exact
+
+
+def test_the_speeds_in_a_sentence_are_si() -> None:
+    onset = sticking_onset(replace(FEED_DRIVE, friction=Coulomb(0.4)))
+    assert onset.no_exact == "It sticks at no belt speed from 0.0008 to 0.16 m/s."
+
+
+@pytest.mark.long
+@settings(max_examples=20, deadline=None)
+@given(
+    st.one_of(
+        st.builds(Stribeck, st.just(0.4), st.floats(0.1, 0.39), st.floats(0.05, 2.0)),
+        st.builds(
+            Exponential, st.just(0.4), st.floats(0.1, 0.39), st.floats(0.05, 2.0), st.just(0.0)
+        ),
+    ),
+    st.floats(0.005, 1.0),
+)
+def test_a_cycle_that_sticks_exists_up_to_the_onset(law: FrictionLaw, damping: float) -> None:
+    drive = replace(PAPER, friction=law, damping=damping)
+    onset = sticking_onset(drive).exact
+    assume(onset is not None)
+    for share in (0.5, 0.999, 1.001, 1.5):
+        cycles = limit_cycles(replace(drive, belt_speed=share * onset))
+        sticking = [cycle for cycle in cycles if cycle.measures.regime is Regime.STICK_SLIP]
+        assert len(sticking) == (share < 1.0)
