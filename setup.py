@@ -63,6 +63,7 @@ setup(
         "matplotlib",
         "mcap>=1.5",  # the first whose writer can close a chunk on demand
         "numpy",
+        "pillow",
         "pydantic>=2",  # another API than 1, which some distributions still ship
         "pyyaml",
         "rich",

@@ -8,9 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE
 
-# Okabe and Ito's palette, which the colour-blind can tell apart.
-_BLUE, _ORANGE, _GREEN, _GREY = "#0072B2", "#D55E00", "#009E73", "#999999"
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"))
 
 
@@ -47,7 +46,7 @@ def draw_control_coming_on(
     displacement.set_ylabel(f"displacement ({length_prefix}m)")
     displacement.tick_params(labelbottom=False)
     shown = (run.force_time >= start) & (run.force_time <= end)
-    force.step(run.force_time[shown], run.force[shown], where="post", color=_ORANGE, lw=0.8)
+    force.step(run.force_time[shown], run.force[shown], where="post", color=ORANGE, lw=0.8)
     force.set_ylabel("control force (N)")
     force.set_xlabel("time (s)")
     force.set_xlim(start, end)
@@ -58,10 +57,10 @@ def draw_control_coming_on(
     late = run.time >= switched_on
     settled = ~late & (run.time >= switched_on / 2.0)
     for axes, rows, colour, title in (
-        (before, settled, _BLUE, f"before: {switched_on / 2.0:g} s to {switched_on:g} s"),
-        (after, late, _GREEN, f"after: {switched_on:g} s to {run.time[-1]:g} s"),
+        (before, settled, BLUE, f"before: {switched_on / 2.0:g} s to {switched_on:g} s"),
+        (after, late, GREEN, f"after: {switched_on:g} s to {run.time[-1]:g} s"),
     ):
-        axes.axhline(belt / speed, color=_GREY, ls="--", lw=1.0, label="belt speed")
+        axes.axhline(belt / speed, color=GREY, ls="--", lw=1.0, label="belt speed")
         axes.plot(run.position[rows] / length, run.velocity[rows] / speed, color=colour, lw=0.9)
         axes.set_title(title, fontsize=10)
         axes.set_xlabel(f"displacement ({length_prefix}m)")
@@ -80,9 +79,9 @@ def _draw_displacement(
     sticking = run.velocity[shown] == run.belt_velocity[shown]
     axes.fill_between(
         run.time[shown], 0.0, 1.0, where=sticking, transform=axes.get_xaxis_transform(),
-        color=_GREY, alpha=0.4, lw=0.0, label="slide sticks to the belt",
+        color=GREY, alpha=0.4, lw=0.0, label="slide sticks to the belt",
     )  # fmt: skip
-    axes.plot(run.time[shown], run.position[shown] / length, color=_BLUE, lw=1.0)
+    axes.plot(run.time[shown], run.position[shown] / length, color=BLUE, lw=1.0)
     axes.legend(loc="upper right", fontsize=8)
 
 

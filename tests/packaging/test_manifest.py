@@ -15,6 +15,7 @@ KEYS = {
     "matplotlib": {"python3-matplotlib"},
     "mcap": set(),
     "numpy": {"python3-numpy"},
+    "pillow": {"python3-pil"},
     "pydantic": {"python3-pydantic"},
     "pytest": {"python3-pytest"},
     "pytest-timeout": {"python3-pytest-timeout"},

@@ -1,0 +1,4 @@
+"""What the pictures have in common."""
+
+BLUE, ORANGE, GREEN, SKY_BLUE, GREY = "#0072B2", "#D55E00", "#009E73", "#56B4E9", "#999999"
+"""Of Okabe and Ito's palette, which the colour-blind can tell apart, and a grey."""

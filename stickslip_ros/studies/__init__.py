@@ -1,0 +1,1 @@
+"""Many runs: sweeps, diagrams, designs and the reproduction of the paper."""
