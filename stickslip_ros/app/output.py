@@ -22,6 +22,7 @@ _LABELS: dict[str, tuple[str, str]] = {
     "frequency": ("frequency", "Hz"),
     "stick_fraction": ("stick fraction", ""),
     "cycles": ("cycles measured", ""),
+    "multipliers": ("Floquet multipliers", ""),
     "peak_force": ("peak control force", "N"),
     "resting_force": ("control force at rest", "N"),
     "samples": ("samples", ""),
@@ -60,10 +61,13 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
     Console(soft_wrap=True).print(table)
 
 
-def quantities(values: Sequence[Any], unit: str) -> list[str]:
-    """Return values to show with their unit, all with the SI prefix that suits the largest."""
-    scale, prefix = _prefix(values) if unit else (1.0, "")
-    return [_text(value, scale, f" {prefix}{unit}".rstrip()) for value in values]
+def quantities(values: Sequence[Any], unit: str, digits: int = 4) -> list[str]:
+    """Return values to show with their unit, all with the SI prefix that suits the largest.
+
+    A unit that begins with a number, such as 1/s, gets no prefix.
+    """
+    scale, prefix = _prefix(values) if unit[:1].isalpha() else (1.0, "")
+    return [_text(value, scale, f" {prefix}{unit}".rstrip(), digits) for value in values]
 
 
 @contextmanager
@@ -84,12 +88,12 @@ def _prefix(values: Iterable[Any]) -> tuple[float, str]:
     return next(((scale, p) for scale, p in _PREFIXES.items() if largest >= scale), (1.0, ""))
 
 
-def _text(value: Any, scale: float, unit: str) -> str:
+def _text(value: Any, scale: float, unit: str, digits: int) -> str:
     if value is None:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value / scale:.4g}{unit}" if isinstance(value, float) else str(value)
+    return f"{value / scale:.{digits}g}{unit}" if isinstance(value, float) else str(value)
 
 
 def _finite(value: Any) -> Any:

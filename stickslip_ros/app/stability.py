@@ -1,0 +1,293 @@
+"""`stickslip stability`: what theory says of a scenario, without running it."""
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import replace
+from math import copysign
+from typing import Any, cast
+
+from stickslip_ros.app.arguments import add_json, add_scenario, made_of, scenario_of
+from stickslip_ros.app.output import print_figures, print_json, print_table, quantities
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.equations import WashoutGains
+from stickslip_ros.physics.theory.closed_forms import CubicLoop
+from stickslip_ros.physics.theory.closed_loop import critical_gains
+from stickslip_ros.physics.theory.hopf import hopf_points
+from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycle_of_run, limit_cycles
+from stickslip_ros.physics.theory.linear import SPEED, Expansion, expand
+from stickslip_ros.physics.theory.sampled import LinearSampledLoop, why_no_linear_loop
+from stickslip_ros.physics.theory.sticking import sticking_onset
+from stickslip_ros.scenario.files import Scenario
+
+NAME = "stability"
+HELP = "equilibrium, Hopf speeds, limit cycles and critical gains of a scenario, by theory"
+
+Section = dict[str, Any]
+Notes = dict[str, str]
+"""Why a quantity does not exist, by its place in the JSON."""
+
+_NO_CONTROL = "the scenario has no controller"
+
+_LABELS: dict[str, dict[str, tuple[str, str]]] = {
+    "": {"equilibrium_position": ("equilibrium position", "m")},
+    "open_loop": {
+        "eigenvalues": ("eigenvalues", "1/s"),
+        "stable": ("stable", ""),
+        "hopf_speeds": ("Hopf speeds", "m/s"),
+        "hopf_angular_frequencies": ("angular frequency there", "rad/s"),
+        "crossing_speeds": ("crossing speed of the eigenvalues", "1/m"),
+        "first_lyapunov_coefficients": ("first Lyapunov coefficient", ""),
+    },
+    "sticking": {
+        "onset_speed_approximate": ("sticking begins below, by averaging", "m/s"),
+        "onset_speed": ("sticking begins below, exactly", "m/s"),
+    },
+    "closed_loop": {
+        "eigenvalues": ("eigenvalues", "1/s"),
+        "stable": ("stable", ""),
+        "hopf_speeds": ("Hopf speeds", "m/s"),
+        "critical_linear_gain": ("critical linear gain", "N s/m"),
+        "first_lyapunov_coefficient": ("first Lyapunov coefficient there", ""),
+        "critical_cubic_gain": ("critical cubic gain", "N s^3/m^3"),
+    },
+    "sampled_loop": {
+        "spectral_radius": ("spectral radius", ""),
+        "stable": ("stable", ""),
+        "decay_rate": ("decay rate", "1/s"),
+        "settling_time": ("settling time, to a hundredth", "s"),
+        "critical_linear_gain": ("critical linear gain", "N s/m"),
+        "stable_linear_gains": ("stable linear gains", "N s/m"),
+    },
+}
+"""What the figures of each section are called in the table, and their unit."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    add_scenario(parser)
+    add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command; return the exit status."""
+    scenario = scenario_of(arguments)
+    found, notes = stability(scenario)
+    if arguments.json:
+        print_json({**found, "notes": notes, **made_of(scenario)})
+    else:
+        _print(scenario, found, notes)
+    return 0
+
+
+def stability(scenario: Scenario) -> tuple[Section, Notes]:
+    """Return what theory says of the scenario, SI units, and why what is null does not exist."""
+    plant = scenario.plant
+    drive = plant.as_drive()
+    gains = scenario.washout_controller.as_washout().gains if plant.expects_control else None
+    notes: Notes = {}
+    expansion = expand(drive)
+    position = None if expansion is None else float(expansion.equilibrium[0]) * drive.length_scale
+    found: Section = {
+        "equilibrium_position": position,
+        "open_loop": _open_loop(drive, expansion, notes),
+        "sticking": _sticking(drive, notes),
+        "closed_loop": _closed_loop(drive, gains, notes),
+        "sampled_loop": _sampled_loop(drive, gains, plant.rate, plant.force_delay, notes),
+        "closed_forms": _closed_forms(drive, gains),
+    }
+    if expansion is None:
+        notes["equilibrium_position"] = (
+            "the belt rests, and friction holds the slide anywhere within mu_s N / k = "
+            f"{drive.friction.static * drive.length_scale:.4g} m"
+        )
+    return found, notes
+
+
+def _eigenvalues(drive: Drive, expansion: Expansion | None) -> Section:
+    if expansion is None:
+        return {"eigenvalues": None, "stable": None}
+    values = expansion.eigenvalues * drive.angular_frequency
+    return {
+        "eigenvalues": [[float(value.real), float(value.imag)] for value in values],
+        "stable": expansion.stable,
+    }
+
+
+def _open_loop(drive: Drive, expansion: Expansion | None, notes: Notes) -> Section:
+    points = hopf_points(drive)
+    if not points:
+        moving = expansion or expand(replace(drive, belt_speed=drive.speed_scale))
+        state = "stable" if moving and moving.stable else "unstable"
+        notes["open_loop.hopf_speeds"] = (
+            "the slope of the friction and the damping balance at no belt speed; the equilibrium "
+            f"is {state} at every one"
+        )
+    return {
+        **_eigenvalues(drive, expansion),
+        "hopf_speeds": [point.belt_speed for point in points],
+        "hopf_angular_frequencies": [point.angular_frequency for point in points],
+        "crossing_speeds": [point.crossing_speed for point in points],
+        "first_lyapunov_coefficients": [point.first_lyapunov_coefficient for point in points],
+        "limit_cycles": [_cycle(cycle) for cycle in limit_cycles(drive)],
+    }
+
+
+def _sticking(drive: Drive, notes: Notes) -> Section:
+    onset = sticking_onset(drive)
+    for name, reason in (
+        ("onset_speed_approximate", onset.no_approximate),
+        ("onset_speed", onset.no_exact),
+    ):
+        if reason is not None:
+            notes[f"sticking.{name}"] = reason
+    return {"onset_speed_approximate": onset.approximate, "onset_speed": onset.exact}
+
+
+def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Section:
+    names = ("critical_linear_gain", "first_lyapunov_coefficient", "critical_cubic_gain")
+    if gains is None:
+        notes["closed_loop"] = _NO_CONTROL
+        nothing = _eigenvalues(drive, None) | dict.fromkeys(names)
+        return {**nothing, "hopf_speeds": [], "limit_cycles": []}
+    expansion = expand(drive, gains)
+    critical = critical_gains(drive, gains)
+    values = (None, None, None)
+    if critical is not None:
+        values = (critical.linear, critical.first_lyapunov_coefficient, critical.cubic)
+    elif expansion is not None:
+        notes["closed_loop.critical_linear_gain"] = _why_no_gain(drive, gains)
+    return {
+        **_eigenvalues(drive, expansion),
+        **dict(zip(names, values, strict=True)),
+        "hopf_speeds": [point.belt_speed for point in hopf_points(drive, gains)],
+        "limit_cycles": [_cycle(cycle) for cycle in _closed_loop_cycles(drive, gains)],
+    }
+
+
+def _why_no_gain(drive: Drive, gains: WashoutGains) -> str:
+    expansion = expand(drive)
+    assert expansion is not None
+    product = expansion.jacobian[SPEED, SPEED] * gains.scaled(drive).corner_frequency
+    return (
+        "no linear gain stabilises the equilibrium: by Routh and Hurwitz p d must be below 1 and "
+        f"is {product:.4g} (p the slope of friction less damping, d the corner frequency, "
+        "dimensionless)"
+    )
+
+
+def _closed_loop_cycles(drive: Drive, gains: WashoutGains) -> Iterator[LimitCycle]:
+    """Yield the cycle to which rest at zero displacement leads, where it leads to one."""
+    cycle = limit_cycle_of_run(drive, 0.0, gains=gains)
+    if cycle is not None:
+        yield cycle
+
+
+def _sampled_loop(
+    drive: Drive, gains: WashoutGains | None, rate: float, force_delay: float, notes: Notes
+) -> Section:
+    loop = LinearSampledLoop.of(drive, rate, force_delay)
+    if gains is None or loop is None:
+        reason = why_no_linear_loop(drive, rate, force_delay)
+        notes["sampled_loop"] = _NO_CONTROL if gains is None else reason or ""
+        return dict.fromkeys(_LABELS["sampled_loop"])
+    radius = loop.spectral_radius(gains)
+    intervals = loop.stable_linear_gains(gains.corner_frequency)
+    if not intervals:
+        notes["sampled_loop.critical_linear_gain"] = (
+            f"no linear gain stabilises the equilibrium at this rate and delay with a corner "
+            f"frequency of {gains.corner_frequency:g} rad/s"
+        )
+    if radius >= 1.0:
+        notes["sampled_loop.settling_time"] = "a deviation from the equilibrium grows"
+    return {
+        "spectral_radius": radius,
+        "stable": radius < 1.0,
+        "decay_rate": loop.decay_rate(gains),
+        "settling_time": loop.settling_time(gains),
+        "critical_linear_gain": loop.critical_linear_gain(gains.corner_frequency),
+        "stable_linear_gains": [[interval.low, interval.high] for interval in intervals],
+    }
+
+
+def _closed_forms(drive: Drive, gains: WashoutGains | None) -> Section | None:
+    """Return what can be written down for the cubic Stribeck law, in the same units."""
+    cubic = CubicLoop.of(drive)
+    if cubic is None:
+        return None
+    speed, force = drive.speed_scale, drive.normal_force
+
+    def scaled(value: float | None, unit: float) -> float | None:
+        return None if value is None else value * unit
+
+    forms: Section = {
+        "equilibrium_position": copysign(drive.length_scale, drive.belt_speed) * cubic.equilibrium,
+        "hopf_speed": scaled(cubic.hopf_speed, speed),
+        "crossing_speed": scaled(cubic.crossing_speed, drive.angular_frequency / speed),
+        "first_lyapunov_coefficient": cubic.first_lyapunov_coefficient,
+        "onset_speed_approximate": scaled(cubic.sticking_onset, speed),
+    }
+    if gains is not None:
+        dimensionless = gains.scaled(drive)
+        corner = dimensionless.corner_frequency
+        forms["closed_loop"] = {
+            "critical_linear_gain": scaled(cubic.critical_linear_gain(corner), force / speed),
+            "first_lyapunov_coefficient": cubic.critical_lyapunov_coefficient(
+                corner, dimensionless.cubic
+            ),
+            "critical_cubic_gain": scaled(cubic.critical_cubic_gain(corner), force / speed**3),
+        }
+    return forms
+
+
+def _cycle(cycle: LimitCycle) -> Section:
+    return {
+        "position": cycle.position,
+        "stable": cycle.stable,
+        "multipliers": [[value.real, value.imag] for value in cycle.multipliers],
+        **cycle.measures.as_dict(),
+    }
+
+
+def _print(scenario: Scenario, found: Section, notes: Notes) -> None:
+    rows: list[list[str]] = []
+    for section, labels in _LABELS.items():
+        figures = found[section] if section else found
+        if section:
+            rows.append([section.replace("_", " "), ""])
+        for name, (label, unit) in labels.items():
+            rows.append([f"  {label}" if section else label, _shown(name, figures[name], unit)])
+    print_table(f"{scenario.name}, by theory", ["", ""], rows)
+    for loop in ("open_loop", "closed_loop"):
+        cycles: list[Section] = found[loop]["limit_cycles"]
+        if cycles:
+            columns = {
+                f"{number}, {'stable' if cycle['stable'] else 'unstable'}": {
+                    **cycle, "multipliers": _complex(cycle["multipliers"], ""),
+                }
+                for number, cycle in enumerate(cycles, 1)
+            }  # fmt: skip
+            print_figures(f"limit cycles, {loop.replace('_', ' ')}", columns)
+    for place, reason in notes.items():
+        print(f"{place.replace('_', ' ').replace('.', ', ')}: {reason}")
+
+
+def _shown(name: str, value: Any, unit: str) -> str:
+    """Return a figure, or a list of them, to be read."""
+    if value is None or not isinstance(value, list):
+        return quantities([value], unit, digits=8 if name == "spectral_radius" else 4)[0]
+    items = cast(list[Any], value)
+    if name == "eigenvalues":
+        return _complex(items, unit)
+    if name == "stable_linear_gains":
+        return "; ".join(" to ".join(quantities(ends, unit)) for ends in items) or "-"
+    return ", ".join(quantities(items, unit)) or "-"
+
+
+def _complex(pairs: list[list[float]], unit: str) -> str:
+    """Return complex numbers given as [real, imaginary], of a conjugate pair once."""
+    texts = [
+        f"{real:.4g} ± {imaginary:.4g}j" if imaginary else f"{real:.4g}"
+        for real, imaginary in pairs
+        if imaginary >= 0.0
+    ]
+    return f"{', '.join(texts)} {unit}".rstrip()

@@ -1,0 +1,116 @@
+"""`stickslip stability`: the paper's numbers, and what does not exist with the reason why."""
+
+import json
+from typing import Any
+
+import pytest
+
+from tests.app.conftest import Run
+
+
+def stability(stickslip: Run, *arguments: str) -> dict[str, Any]:
+    done = stickslip("stability", *arguments, "--json")
+    assert done.returncode == 0, done.stderr
+
+    def refuse(constant: str) -> None:
+        raise AssertionError(f"{constant} is not JSON")
+
+    return json.loads(done.stdout, parse_constant=refuse)
+
+
+def test_the_papers_drive(stickslip: Run) -> None:
+    speed = ("-p", "plant.belt_speed=0.49", "-p", "plant.damping=0.01")
+    found = stability(stickslip, "paper", *speed)
+    assert found["equilibrium_position"] == pytest.approx(0.4 - 0.45 * 0.49 + 0.6 * 0.49**3)
+    open_loop, closed_loop = found["open_loop"], found["closed_loop"]
+    real, imaginary = (0.44 - 1.8 * 0.49**2) / 2.0, 0.99999235
+    assert open_loop["eigenvalues"] == [
+        [pytest.approx(real), pytest.approx(imaginary)],
+        [pytest.approx(real), pytest.approx(-imaginary)],
+    ]
+    assert open_loop["stable"] is False
+    assert open_loop["hopf_speeds"] == [pytest.approx((0.44 / 1.8) ** 0.5, rel=1e-12)]
+    assert open_loop["first_lyapunov_coefficients"] == [pytest.approx(-0.225, rel=1e-12)]
+    assert closed_loop["critical_linear_gain"] == pytest.approx(-0.0396, abs=5e-5)
+    assert closed_loop["first_lyapunov_coefficient"] < 0.0
+    assert closed_loop["critical_cubic_gain"] > 10.0
+    assert closed_loop["stable"] is True
+    assert len(closed_loop["eigenvalues"]) == 3
+    (cycle,) = open_loop["limit_cycles"]
+    assert cycle["stable"] is True
+    assert cycle["regime"] == "pure_slip"
+    sampled = found["sampled_loop"]
+    assert sampled["spectral_radius"] < 1.0
+    assert sampled["critical_linear_gain"] == pytest.approx(-0.0396, abs=2e-3)
+    assert found["sticking"]["onset_speed_approximate"] == pytest.approx(0.44221664)
+    assert found["sticking"]["onset_speed"] == pytest.approx(0.44466141)
+    forms = found["closed_forms"]
+    for value, form in (
+        (found["equilibrium_position"], forms["equilibrium_position"]),
+        (open_loop["hopf_speeds"][0], forms["hopf_speed"]),
+        (open_loop["crossing_speeds"][0], forms["crossing_speed"]),
+        (open_loop["first_lyapunov_coefficients"][0], forms["first_lyapunov_coefficient"]),
+        (found["sticking"]["onset_speed_approximate"], forms["onset_speed_approximate"]),
+        *((closed_loop[name], form) for name, form in forms["closed_loop"].items()),
+    ):
+        assert value == pytest.approx(form, rel=1e-12)
+    assert found["notes"] == {}
+    assert found["scenario"]["plant"]["belt_speed"] == 0.49
+    assert found["overrides"] == ["plant.belt_speed=0.49", "plant.damping=0.01"]
+
+
+def test_the_feed_drive_is_in_si_units(stickslip: Run) -> None:
+    found = stability(stickslip, "feed_drive")
+    assert found["equilibrium_position"] == pytest.approx(0.2584e-3)
+    assert found["open_loop"]["hopf_speeds"] == [pytest.approx(0.048876261, rel=1e-8)]
+    assert found["open_loop"]["hopf_angular_frequencies"] == [pytest.approx(100.0)]
+    assert found["open_loop"]["eigenvalues"][0] == [
+        pytest.approx(7.1),
+        pytest.approx(100.0 * (1.0 - 0.071**2) ** 0.5),
+    ]
+    assert found["closed_loop"]["critical_linear_gain"] == pytest.approx(-1478.46, rel=1e-5)
+    assert found["sampled_loop"]["decay_rate"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("overrides", "nulls"),
+    [
+        (["plant.friction.law=coulomb"], ["sticking.onset_speed", "open_loop.hopf_speeds"]),
+        (["plant.belt_speed=0.2", "washout_controller.corner_frequency=3.0"],
+         ["closed_loop.critical_linear_gain", "sampled_loop.critical_linear_gain"]),
+        (["plant.belt_speed=0.0"], ["equilibrium_position", "sampled_loop.spectral_radius"]),
+        (["plant.force_delay=5000.0"], ["sampled_loop.spectral_radius"]),
+    ],
+)  # fmt: skip
+def test_what_does_not_exist_is_null_for_a_reason(
+    stickslip: Run, overrides: list[str], nulls: list[str]
+) -> None:
+    options = [text for override in overrides for text in ("-p", override)]
+    found = stability(stickslip, "paper", *options)
+    for place in nulls:
+        section, _, name = place.rpartition(".")
+        value = found[section][name] if section else found[name]
+        assert value in (None, [])
+        assert found["notes"].get(place) or found["notes"].get(section), place
+
+
+def test_the_table_says_why(stickslip: Run) -> None:
+    options = ("-p", "plant.friction.law=coulomb", "--no-control")
+    done = stickslip("stability", "paper", *options)
+    assert done.returncode == 0, done.stderr
+    assert "the equilibrium is stable at every one" in done.stdout
+    assert "the scenario has no controller" in done.stdout
+    assert "nan" not in done.stdout
+
+
+def test_coexisting_cycles_are_told_apart(stickslip: Run) -> None:
+    law = ("-p", "plant.friction.law=exponential", "-p", "plant.friction.decay_speed=0.05")
+    found = stability(stickslip, "paper", *law)
+    assert found["open_loop"]["stable"] is True
+    unstable, stable = found["open_loop"]["limit_cycles"]
+    assert (unstable["stable"], unstable["regime"]) == (False, "pure_slip")
+    assert (stable["stable"], stable["regime"]) == (True, "stick_slip")
+    assert unstable["amplitude"] < stable["amplitude"]
+    done = stickslip("stability", "paper", *law)
+    assert "1, unstable" in done.stdout
+    assert "2, stable" in done.stdout
