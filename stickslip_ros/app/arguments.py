@@ -2,10 +2,14 @@
 
 import argparse
 from math import isfinite
+from pathlib import Path
 from typing import Any
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario, load_scenario
 from stickslip_ros.versions import versions
+
+_PICTURES = (".png", ".svg", ".pdf")
 
 
 def add_scenario(parser: argparse.ArgumentParser) -> None:
@@ -31,6 +35,24 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", action="store_true", help="print one JSON object and nothing else"
     )
+
+
+def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
+    """Add --plot, which draws what is `shown`."""
+    parser.add_argument(
+        "--plot",
+        type=Path,
+        metavar="FILE",
+        help=f"draw {shown} ({', '.join(_PICTURES)}); an existing file is replaced",
+    )
+
+
+def check_picture(path: Path) -> None:
+    """Refuse what no picture can be written to, before anything is computed."""
+    if path.suffix.lower() not in _PICTURES:
+        raise InvalidInputError(f"--plot {path}: must end in one of {', '.join(_PICTURES)}")
+    if not path.absolute().parent.is_dir():
+        raise InvalidInputError(f"--plot {path}: there is no directory {path.parent}")
 
 
 def scenario_of(

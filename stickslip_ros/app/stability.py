@@ -4,18 +4,40 @@ import argparse
 from collections.abc import Iterator
 from dataclasses import replace
 from math import copysign
+from pathlib import Path
 from typing import Any, cast
 
-from stickslip_ros.app.arguments import add_json, add_scenario, made_of, scenario_of
-from stickslip_ros.app.output import print_figures, print_json, print_table, quantities
+import numpy as np
+
+from stickslip_ros.app.arguments import (
+    add_json,
+    add_plot,
+    add_scenario,
+    check_picture,
+    made_of,
+    scenario_of,
+)
+from stickslip_ros.app.output import (
+    print_figures,
+    print_json,
+    print_table,
+    progress_bar,
+    quantities,
+)
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.equations import WashoutGains
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.closed_loop import critical_gains
-from stickslip_ros.physics.theory.hopf import hopf_points
+from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import SPEED, Expansion, expand
-from stickslip_ros.physics.theory.sampled import LinearSampledLoop, why_no_linear_loop
+from stickslip_ros.physics.theory.sampled import (
+    LONGEST_DELAY,
+    LinearSampledLoop,
+    why_no_linear_loop,
+)
+from stickslip_ros.physics.theory.stability_map import CriticalGains, StabilityMap
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from stickslip_ros.scenario.files import Scenario
 
@@ -27,6 +49,10 @@ Notes = dict[str, str]
 """Why a quantity does not exist, by its place in the JSON."""
 
 _NO_CONTROL = "the scenario has no controller"
+
+_DRAWN_RATES, _DRAWN_DELAY, _DRAWN_DELAYS = (0.1, 0.3, 1.0), 0.2, 41
+"""Of the critical gain: rates, in the scenario's, the longest delay, in natural periods, and how
+many delays."""
 
 _LABELS: dict[str, dict[str, tuple[str, str]]] = {
     "": {"equilibrium_position": ("equilibrium position", "m")},
@@ -46,6 +72,8 @@ _LABELS: dict[str, dict[str, tuple[str, str]]] = {
         "eigenvalues": ("eigenvalues", "1/s"),
         "stable": ("stable", ""),
         "hopf_speeds": ("Hopf speeds", "m/s"),
+        "crossing_speeds": ("crossing speed of the eigenvalues", "1/m"),
+        "first_lyapunov_coefficients": ("first Lyapunov coefficient", ""),
         "critical_linear_gain": ("critical linear gain", "N s/m"),
         "first_lyapunov_coefficient": ("first Lyapunov coefficient there", ""),
         "critical_cubic_gain": ("critical cubic gain", "N s^3/m^3"),
@@ -65,12 +93,21 @@ _LABELS: dict[str, dict[str, tuple[str, str]]] = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     add_scenario(parser)
+    add_plot(
+        parser,
+        "where the sampled loop is stable and how fast it comes to rest, over corner frequency and "
+        "linear gain, and the critical gain over the delay of the force",
+    )
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     scenario = scenario_of(arguments)
+    if arguments.plot is not None:
+        check_picture(arguments.plot)
+        with progress_bar("drawing", None):
+            _draw(arguments.plot, scenario)
     found, notes = stability(scenario)
     if arguments.json:
         print_json({**found, "notes": notes, **made_of(scenario)})
@@ -124,11 +161,17 @@ def _open_loop(drive: Drive, expansion: Expansion | None, notes: Notes) -> Secti
         )
     return {
         **_eigenvalues(drive, expansion),
+        **_hopf_points(points),
+        "limit_cycles": [_cycle(cycle) for cycle in limit_cycles(drive)],
+    }
+
+
+def _hopf_points(points: list[HopfPoint]) -> Section:
+    return {
         "hopf_speeds": [point.belt_speed for point in points],
         "hopf_angular_frequencies": [point.angular_frequency for point in points],
         "crossing_speeds": [point.crossing_speed for point in points],
         "first_lyapunov_coefficients": [point.first_lyapunov_coefficient for point in points],
-        "limit_cycles": [_cycle(cycle) for cycle in limit_cycles(drive)],
     }
 
 
@@ -148,7 +191,7 @@ def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Sect
     if gains is None:
         notes["closed_loop"] = _NO_CONTROL
         nothing = _eigenvalues(drive, None) | dict.fromkeys(names)
-        return {**nothing, "hopf_speeds": [], "limit_cycles": []}
+        return {**nothing, **_hopf_points([]), "limit_cycles": []}
     expansion = expand(drive, gains)
     critical = critical_gains(drive, gains)
     values = (None, None, None)
@@ -159,7 +202,7 @@ def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Sect
     return {
         **_eigenvalues(drive, expansion),
         **dict(zip(names, values, strict=True)),
-        "hopf_speeds": [point.belt_speed for point in hopf_points(drive, gains)],
+        **_hopf_points(hopf_points(drive, gains)),
         "limit_cycles": [_cycle(cycle) for cycle in _closed_loop_cycles(drive, gains)],
     }
 
@@ -246,6 +289,23 @@ def _cycle(cycle: LimitCycle) -> Section:
         "multipliers": [[value.real, value.imag] for value in cycle.multipliers],
         **cycle.measures.as_dict(),
     }
+
+
+def _draw(path: Path, scenario: Scenario) -> None:
+    # Half as long again to import as everything else.
+    from stickslip_ros.plots.stability_map import draw_stability_map
+
+    plant = scenario.plant
+    drive, gains = plant.as_drive(), scenario.washout_controller.as_washout().gains
+    loop = LinearSampledLoop.of(drive, plant.rate, plant.force_delay)
+    if loop is None:
+        reason = why_no_linear_loop(drive, plant.rate, plant.force_delay)
+        raise InvalidInputError(f"--plot {path}: there is nothing to draw: {reason}")
+    rates = plant.rate * np.array(_DRAWN_RATES)
+    latest = min(_DRAWN_DELAY * drive.natural_period, LONGEST_DELAY / rates.max())
+    delays = np.linspace(0.0, latest, _DRAWN_DELAYS)
+    critical = CriticalGains.over(drive, gains.corner_frequency, rates, delays)
+    draw_stability_map(path, StabilityMap.around(loop, gains), critical)
 
 
 def _print(scenario: Scenario, found: Section, notes: Notes) -> None:

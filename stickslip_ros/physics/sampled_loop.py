@@ -77,7 +77,7 @@ class SampledLoop:
         self._start = start
         # So many samples take so many ns, exactly.
         self._nanoseconds, self._samples = (NANOSECONDS / Fraction(rate)).as_integer_ratio()
-        self._whole_delay, self._split = _whole_and_rest(force_delay / self.period)
+        self._whole_delay, self._split = whole_and_rest(force_delay / self.period)
         self._force_timeout = force_timeout
         self._hold_late = hold_late
         self._expects_control = expects_control
@@ -209,7 +209,7 @@ def _rounded(numerator: int, denominator: int) -> int:
     return whole + (excess > 0 or (excess == 0 and whole % 2))
 
 
-def _whole_and_rest(delay: float) -> tuple[int, float]:
+def whole_and_rest(delay: float) -> tuple[int, float]:
     """Split a delay in periods; what is whole but for rounding counts as whole."""
     whole = round(delay)
     if abs(delay - whole) < 1e-9:

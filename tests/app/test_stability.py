@@ -1,6 +1,7 @@
 """`stickslip stability`: the paper's numbers, and what does not exist with the reason why."""
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -114,3 +115,31 @@ def test_coexisting_cycles_are_told_apart(stickslip: Run) -> None:
     done = stickslip("stability", "paper", *law)
     assert "1, unstable" in done.stdout
     assert "2, stable" in done.stdout
+
+
+def test_the_map_is_drawn(stickslip: Run, tmp_path: Path) -> None:
+    rate = ("-p", "plant.rate=20", "-p", "plant.force_delay=0.05")
+    done = stickslip("stability", "paper", *rate, "--plot", "map.png", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["sampled_loop"]["spectral_radius"] > 0.0
+    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("--plot", "map.txt"), ("--plot map.txt", ".png")),
+        (("--plot", "nowhere/map.png"), ("nowhere",)),
+        (("--plot", "map.png", "-p", "plant.belt_speed=0.0"), ("map.png", "the belt rests")),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(
+    stickslip: Run, tmp_path: Path, arguments: tuple[str, ...], named: tuple[str, ...]
+) -> None:
+    done = stickslip("stability", "paper", *arguments)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    for text in named:
+        assert text in line
+    assert list(tmp_path.iterdir()) == []

@@ -1,7 +1,7 @@
 """The linear sampled loop: against the loop itself, against brute force and in its limits."""
 
 from dataclasses import replace
-from math import inf, log, pi
+from math import log, pi
 
 import numpy as np
 import pytest
@@ -31,24 +31,25 @@ def loop_of(drive: Drive, rate: float, force_delay: float = 0.0) -> LinearSample
 
 
 def simulated(
-    drive: Drive, rate: float, force_delay: float, gains: WashoutGains, samples: int
+    loop: LinearSampledLoop, gains: WashoutGains, samples: int, start: float = 1e-7
 ) -> np.ndarray:
-    """Dimensionless deviations (X, Y) at the samples of the loop itself, beginning with 1e-7."""
+    """Dimensionless deviations (X, Y) at the samples of the loop that runs, from (start, 0)."""
+    drive, rate, force_delay = loop.drive, loop.rate, loop.force_delay
     expansion = expand(drive)
     assert expansion is not None
     rest = expansion.equilibrium[0] * drive.length_scale
-    motion = Motion(drive, rest + 1e-7 * drive.length_scale, 0.0)
-    loop = SampledLoop(motion, rate, LOCKSTEP_START, force_delay=force_delay)
+    motion = Motion(drive, rest + start * drive.length_scale, 0.0)
+    running = SampledLoop(motion, rate, LOCKSTEP_START, force_delay=force_delay)
     law = Washout(WashoutParameters(gains.corner_frequency, gains.linear, gains.cubic))
     rows = []
     for _ in range(samples):
-        sample = loop.sample
+        sample = running.sample
         x, y = (sample.position - rest) / drive.length_scale, sample.velocity / drive.speed_scale
         rows.append((x, y))
         force = law.answer(sample.stamp, sample.velocity)
         assert force is not None
-        loop.offer(sample.stamp, force)
-        loop.advance()
+        running.offer(sample.stamp, force)
+        running.advance()
     return np.array(rows)
 
 
@@ -57,7 +58,7 @@ LOOPS = [
     (PAPER, 10.0, 0.03, WashoutGains(0.5, -0.5, 0.0)),
     (PAPER, 10.0, 0.1, WashoutGains(0.5, -0.5, 0.0)),
     (PAPER, 10.0, 0.25, WashoutGains(0.5, -0.1, 0.0)),
-    (PAPER, 1.0, 2.3, WashoutGains(0.5, 0.1, 0.0)),
+    (PAPER, 1.0, 2.3, WashoutGains(0.2, 0.4, 0.0)),
     (FEED_DRIVE, 1000.0, 0.0035, WashoutGains(20.0, -3000.0, 0.0)),
     (replace(FEED_DRIVE, belt_speed=-0.04), 700.0, 0.01, WashoutGains(20.0, -3000.0, 0.0)),
     (replace(PAPER, friction=Exponential(0.4, 0.25, 0.2, 0.1)), 5.0, 0.5, WashoutGains(1, -0.4, 0)),
@@ -70,7 +71,7 @@ def test_it_is_the_loop_that_runs(
     drive: Drive, rate: float, force_delay: float, gains: WashoutGains
 ) -> None:
     loop = loop_of(drive, rate, force_delay)
-    found = simulated(drive, rate, force_delay, gains, 200)
+    found = simulated(loop, gains, 200)
     matrix = loop.transition_matrix(gains)
     state = np.zeros(len(matrix))
     state[0] = 1e-7
@@ -86,29 +87,29 @@ def test_it_is_the_loop_that_runs(
 def test_a_small_vibration_grows_by_the_spectral_radius(
     drive: Drive, rate: float, force_delay: float, gains: WashoutGains
 ) -> None:
-    """A vibration that grows by r per sample satisfies y_(n+2) = 2 r cos(phi) y_(n+1) - r^2 y_n."""
+    """What grows by r per sample satisfies x_(n+2) = 2 r cos(phi) x_(n+1) - r^2 x_n."""
     loop = loop_of(drive, rate, force_delay)
-    values = np.linalg.eigvals(loop.transition_matrix(gains))
-    moduli = np.sort(np.abs(values))[::-1]
-    if moduli[2] > 0.97 * moduli[0]:
-        pytest.skip("more than one pair lasts")
-    late = simulated(drive, rate, force_delay, gains, 400)[150:, 0]
+    moduli = np.sort(np.abs(np.linalg.eigvals(loop.transition_matrix(gains))))[::-1]
+    alone = int(log(1e-7) / log(moduli[2] / moduli[0]))
+    start = min(1e-7 * moduli[0] ** -alone, 1e-3)
+    late = simulated(loop, gains, alone + 40, start)[alone:, 0]
     system = np.stack([late[1:-1], late[:-2]], axis=1)
     _, square = np.linalg.lstsq(system, late[2:], rcond=None)[0]
     assert np.sqrt(-square) == pytest.approx(loop.spectral_radius(gains), abs=1e-6)
 
 
-@pytest.mark.parametrize("rate_and_delay", [(100.0, 0.0), (20.0, 0.13), (5.0, 0.2), (2.0, 0.9)])
+@pytest.mark.parametrize("rate_and_delay", [(100.0, 0.0), (20.0, 0.13), (5.0, 0.2), (2.0, 0.4)])
 def test_the_loop_is_stable_on_one_side_of_the_critical_gain(
     rate_and_delay: tuple[float, float],
 ) -> None:
     rate, force_delay = rate_and_delay
-    critical = loop_of(PAPER, rate, force_delay).critical_linear_gain(0.2)
+    loop = loop_of(PAPER, rate, force_delay)
+    critical = loop.critical_linear_gain(0.2)
     assert critical is not None
     amplitudes = []
     for factor in (1.3, 0.7):
         gains = WashoutGains(0.2, factor * critical, 0.0)
-        distances = np.hypot(*simulated(PAPER, rate, force_delay, gains, int(150.0 * rate)).T)
+        distances = np.hypot(*simulated(loop, gains, int(150.0 * rate)).T)
         amplitudes.append(distances[-int(7.0 * rate) :].max() / 1e-7)
     stable, unstable = amplitudes
     assert stable < 0.5
@@ -121,7 +122,7 @@ corners = st.floats(0.02, 10.0)
 
 
 @given(speeds, rates, st.floats(0.0, 12.0), corners)
-@settings(max_examples=60)
+@settings(max_examples=40)
 def test_the_stable_gains_are_those_with_a_spectral_radius_below_one(
     belt_speed: float, rate: float, periods: float, corner_frequency: float
 ) -> None:
@@ -138,7 +139,7 @@ def test_the_stable_gains_are_those_with_a_spectral_radius_below_one(
 
 
 @given(speeds, rates, st.floats(0.0, 4.0), corners)
-@settings(max_examples=60)
+@settings(max_examples=40)
 def test_at_an_end_a_multiplier_is_on_the_unit_circle(
     belt_speed: float, rate: float, periods: float, corner_frequency: float
 ) -> None:
@@ -157,6 +158,7 @@ def test_critical_gains_of_the_continuous_loop(corner_frequency: float, critical
 
 
 @given(speeds, corners)
+@settings(max_examples=25)
 def test_the_critical_gain_tends_to_that_of_the_continuous_loop(
     belt_speed: float, corner_frequency: float
 ) -> None:
@@ -178,6 +180,7 @@ def test_the_critical_gain_tends_to_that_of_the_continuous_loop(
 
 
 @given(st.floats(0.5, 50.0), st.floats(0.0, 3.0), corners, st.floats(-1.0, 1.0))
+@settings(max_examples=30)
 def test_a_delay_of_whole_periods_hardly_differs_from_almost_as_much(
     rate: float, periods: float, corner_frequency: float, gain: float
 ) -> None:
@@ -214,8 +217,9 @@ def test_settling_time() -> None:
 def test_a_slow_washout_at_the_hopf_point_has_a_triple_root() -> None:
     """At p = 0, (l + r)^3 = l^3 + (d - k1) l^2 + l + d for r = 1/sqrt(3), d = r^3, k1 = d - 3 r."""
     cubic = CubicLoop.of(PAPER)
-    assert cubic is not None and cubic.hopf_speed is not None
-    loop = loop_of(replace(PAPER, belt_speed=cubic.hopf_speed), 1e4)
+    assert cubic is not None
+    assert cubic.hopf_speed is not None
+    loop = loop_of(replace(PAPER, belt_speed=cubic.hopf_speed), 1e6)
     r = 3.0**-0.5
     assert loop.decay_rate(WashoutGains(r**3, r**3 - 3.0 * r, 0.0)) == pytest.approx(r, rel=0.02)
 
@@ -253,7 +257,8 @@ def test_what_it_does_not_go_into_it_says() -> None:
     assert "belt rests" in (why_no_linear_loop(replace(PAPER, belt_speed=0.0), 100.0, 0.0) or "")
     assert LinearSampledLoop.of(PAPER, 100.0, 1e4) is None
     reason = why_no_linear_loop(PAPER, 100.0, 1e4)
-    assert reason is not None and str(LONGEST_DELAY) in reason
+    assert reason is not None
+    assert str(LONGEST_DELAY) in reason
     assert why_no_linear_loop(PAPER, 100.0, 3.0) is None
 
 
@@ -263,4 +268,3 @@ def test_the_longest_delay_and_the_highest_rate() -> None:
     cubic = CubicLoop.of(PAPER)
     assert cubic is not None
     assert critical == pytest.approx(cubic.critical_linear_gain(2.0), rel=1e-6)
-    assert critical != -inf

@@ -1,0 +1,175 @@
+"""`stickslip design`: gains for a drive, tried out by simulation."""
+
+import argparse
+from dataclasses import asdict
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from stickslip_ros.app.arguments import (
+    add_json,
+    add_plot,
+    add_scenario,
+    check_picture,
+    made_of,
+    scenario_of,
+)
+from stickslip_ros.app.output import print_json, print_table, progress_bar, quantities
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.theory.stability_map import StabilityMap
+from stickslip_ros.studies.design import OWN_SPEED_RANGE, Design, Task, design
+
+NAME = "design"
+HELP = "propose corner frequency and gains that damp the vibration within a force limit"
+
+_DESCRIPTION = f"""{HELP}. The drive, rate and force_delay are the scenario's, the force limit is
+washout_controller.force_limit (-p washout_controller.force_limit=100). Its gains do not matter.
+What is proposed was simulated: the vibration is caught at several belt speeds and phases."""
+
+_CONTROLLER = {
+    "corner_frequency": ("corner frequency", "rad/s"),
+    "linear_gain": ("linear gain", "N s/m"),
+    "cubic_gain": ("cubic gain", "N s^3/m^3"),
+    "force_limit": ("force limit", "N"),
+    "start_after": ("start after", "s"),
+}
+
+_MARGINS = {
+    "gain_down": ("unstable below this share of the linear gain", ""),
+    "gain_up": ("unstable above this multiple of it", ""),
+    "delay": ("unstable with this further delay", "s"),
+}
+_CHECKS = {
+    "belt_speed": ("belt speed", "m/s"),
+    "vibrates": ("vibrates", ""),
+    "predicted_settling_time": ("settles in", "s"),
+    "settling_time": ("simulated", "s"),
+    "predicted_peak_force": ("peak force", "N"),
+    "peak_force": ("simulated", "N"),
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.description = _DESCRIPTION
+    add_scenario(parser)
+    parser.add_argument(
+        "--belt-speed",
+        metavar="LOW:HIGH",
+        help="range of belt speeds to design for, m/s, both above zero; one number for a single "
+        f"speed (default: the scenario's belt speed, give or take {OWN_SPEED_RANGE:.0%})".replace(
+            "%", "%%"
+        ),
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="write the parameter file there; an existing one is left alone",
+    )
+    add_plot(parser, "the decay rate over corner frequency and linear gain")
+    add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command; return the exit status."""
+    scenario = scenario_of(arguments)
+    if not scenario.plant.expects_control:
+        raise InvalidInputError("plant.expects_control = False: without control there are no gains")
+    task = Task.of(scenario, _belt_speeds(arguments.belt_speed))
+    if arguments.out is not None:
+        _refuse_unless_new(arguments.out)
+    if arguments.plot is not None:
+        check_picture(arguments.plot)
+    with progress_bar(f"designing for {scenario.name}", 1.0) as progress:
+        found = design(task, progress)
+    if arguments.out is not None and found.parameter_file is not None:
+        arguments.out.write_text(found.parameter_file, encoding="utf-8")
+    if arguments.plot is not None:
+        _draw(arguments.plot, found)
+    if arguments.json:
+        print_json({**_as_dict(found), **made_of(scenario)})
+    else:
+        _print(scenario.name, found)
+    return 0
+
+
+def _belt_speeds(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        speeds = [float(part) for part in text.split(":")]
+    except ValueError:
+        speeds = []
+    if len(speeds) not in (1, 2):
+        raise InvalidInputError(f"--belt-speed {text!r}: must be LOW:HIGH, or one speed, in m/s")
+    return speeds[0], speeds[-1]
+
+
+def _refuse_unless_new(path: Path) -> None:
+    if path.exists():
+        raise InvalidInputError(f"--out {path}: exists already, and is left as it is")
+    if not path.absolute().parent.is_dir():
+        raise InvalidInputError(f"--out {path}: there is no directory {path.parent}")
+
+
+def _draw(path: Path, found: Design) -> None:
+    # Half as long again to import as everything else.
+    from stickslip_ros.plots.stability_map import draw_stability_map
+
+    if found.slowest is not None and found.controller is not None:
+        draw_stability_map(path, StabilityMap.around(found.slowest, found.controller.gains), None)
+
+
+def _as_dict(found: Design) -> dict[str, Any]:
+    controller, slowest, task = found.controller, found.slowest, found.task
+    values = asdict(controller) if controller else dict.fromkeys(_CONTROLLER)
+    checks = [asdict(check) for check in found.checks]
+    return {
+        "belt_speeds": list(task.belt_speeds),
+        **values,
+        "force_limit": task.force_limit,
+        "worst_belt_speed": slowest.drive.belt_speed if slowest else None,
+        "decay_rate": min((check.decay_rate for check in found.checks), default=None),
+        "settling_time": max(
+            (check.predicted_settling_time for check in found.checks), default=None
+        ),
+        "peak_force": max((check.predicted_peak_force for check in found.checks), default=None),
+        "margins": asdict(found.margins) if found.margins else dict.fromkeys(_MARGINS),
+        "checks": checks,
+        "parameter_file": found.parameter_file,
+        "remark": found.remark,
+    }
+
+
+def _print(name: str, found: Design) -> None:
+    task = f"{name}, belt speed {' to '.join(quantities(sorted({*found.task.belt_speeds}), 'm/s'))}"
+    if found.controller is not None and found.slowest is not None:
+        figures = {
+            name: value if isfinite(value) else None
+            for name, value in asdict(found.controller).items()
+        }
+        rows = [
+            [label, *quantities([figures[key]], unit)] for key, (label, unit) in _CONTROLLER.items()
+        ]
+        print_table(task, ["proposal", ""], rows)
+        if found.margins is not None:
+            figures = asdict(found.margins)
+            rows = [
+                [label, *quantities([figures[key]], unit)]
+                for key, (label, unit) in _MARGINS.items()
+            ]
+            (speed,) = quantities([found.slowest.drive.belt_speed], "m/s")
+            print_table(f"at {speed}, where it settles most slowly", ["margins", ""], rows)
+        checks = [asdict(check) for check in found.checks]
+        columns = [
+            quantities([check[key] for check in checks], unit) for key, (_, unit) in _CHECKS.items()
+        ]
+        headings = [label for label, _ in _CHECKS.values()]
+        print_table("while it catches the vibration", headings, zip(*columns, strict=True))
+    else:
+        print(f"{task}: nothing to propose")
+    if found.remark is not None:
+        print(found.remark)
+    if found.parameter_file is not None:
+        print(found.parameter_file, end="")

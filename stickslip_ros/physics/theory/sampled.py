@@ -1,0 +1,318 @@
+"""The loop as the nodes run it, linear near its equilibrium: sampled, held, washed out, delayed.
+
+It is the loop of `SampledLoop` and `Washout`, exactly: between samples the force is constant, so
+that the matrix exponential takes the slide from one sample to the next.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf, isfinite, log, pi
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from scipy.linalg import expm
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.equations import WashoutGains
+from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.physics.sampled_loop import whole_and_rest
+from stickslip_ros.physics.theory.linear import expand
+
+LONGEST_DELAY = 300
+"""Whole periods of delay up to which the loop's matrix is built; its order grows with them."""
+
+SETTLED = 0.01
+"""Share of its first size to which a deviation has fallen after the settling time."""
+
+_LARGE_ORDER = 24
+"""Order of the loop's matrix above which to look at many gains takes long."""
+
+_BISECTIONS = 60
+
+_SLIDE, _FILTER = slice(0, 2), 2
+"""Where X, Y and the filter's z = d w stand in the state; forces under way follow."""
+
+
+class GainInterval(NamedTuple):
+    """Linear gains, N s/m, between which the loop is stable; an end may be infinite."""
+
+    low: float
+    high: float
+
+    @property
+    def critical(self) -> float:
+        """The end that a gain passes on its way to zero, or above zero if zero is inside."""
+        return self.low if self.low > 0.0 else self.high
+
+
+def why_no_linear_loop(drive: Drive, rate: float, force_delay: float) -> str | None:
+    """Return in one sentence why `LinearSampledLoop.of` gives None, or None if it does not."""
+    if drive.belt_speed == 0.0:
+        return "the belt rests, so friction holds the slide and nothing is linear near it"
+    if force_delay * rate > LONGEST_DELAY:
+        return (
+            f"the force comes {force_delay * rate:g} periods late; the theory of the sampled loop "
+            f"goes up to {LONGEST_DELAY}"
+        )
+    return None
+
+
+@dataclass(frozen=True)
+class LinearSampledLoop:
+    """A drive at its equilibrium under a sampled washout controller, whatever its gains.
+
+    With the period T, v_n = y_n - z_n and q = 1 - exp(-d T) the controller is z_(n+1) = z_n + q v_n
+    and force n = k1 v_n, which acts from n T + delay to (n + 1) T + delay. The state is X, Y, z and
+    the forces under way, the newest first.
+    """
+
+    drive: Drive
+    rate: float
+    """Samples per second, Hz."""
+    force_delay: float
+    """From a sample to the start of its force, s."""
+    jacobian: FloatArray
+    """Of the open loop, dimensionless (see `theory.linear`); shape (2, 2)."""
+
+    @classmethod
+    def of(cls, drive: Drive, rate: float, force_delay: float = 0.0) -> Self | None:
+        """Return the loop at `rate` (Hz) with `force_delay` (s); None as `why_no_linear_loop`."""
+        expansion = expand(drive)
+        if expansion is None or why_no_linear_loop(drive, rate, force_delay):
+            return None
+        return cls(drive, rate, force_delay, expansion.jacobian)
+
+    def transition_matrix(self, gains: WashoutGains) -> FloatArray:
+        """Return what takes the state, dimensionless, from one sample to the next.
+
+        Of `gains`, in SI units, the cubic one does not matter. Shape (n, n), n being 3 and one more
+        for each period that the delay has or has begun.
+        """
+        scaled = gains.scaled(self.drive)
+        return self._transitions(np.float64(scaled.corner_frequency), np.float64(scaled.linear))
+
+    def spectral_radius(self, gains: WashoutGains) -> float:
+        """Return by what factor a small deviation grows per sample, in the long run."""
+        return float(_spectral_radius(self.transition_matrix(gains)))
+
+    def decay_rate(self, gains: WashoutGains) -> float:
+        """Return how fast a small deviation dies out, 1/s; below zero it grows."""
+        radius = self.spectral_radius(gains)
+        return -log(radius) * self.rate if radius > 0.0 else inf
+
+    def decay_rates(self, corner_frequencies: FloatArray, linear_gains: FloatArray) -> FloatArray:
+        """Return the decay rates, 1/s, over m corner frequencies (rad/s) and gains (N s/m).
+
+        The gains are n for all, shape (n,), or n for each corner frequency, shape (m, n). The
+        result has shape (m, n).
+        """
+        shape = (len(corner_frequencies), linear_gains.shape[-1])
+        rows = zip(corner_frequencies, np.broadcast_to(linear_gains, shape), strict=True)
+        radii = np.array([self._radii(d, row) for d, row in rows]).reshape(shape)
+        with np.errstate(divide="ignore"):
+            return -np.log(radii) * self.rate
+
+    def settling_time(self, gains: WashoutGains) -> float | None:
+        """Return the time (s) in which a small deviation falls to a hundredth; None if it grows."""
+        return settling_time(self.decay_rate(gains))
+
+    def stable_linear_gains(self, corner_frequency: float) -> list[GainInterval]:
+        """Return all linear gains for which the loop is stable with this corner frequency (rad/s).
+
+        By D-decomposition (Neimark): a multiplier e^(j theta) on the unit circle wants
+        k1 = 1/G(e^(j theta)), which is a gain where it is real. These gains bound intervals in each
+        of which as many multipliers are outside the circle; where Im(1/G) rises with theta, they
+        become more with the gain. Where least are outside there are none, or no gain is stable.
+        """
+        boundary = _Boundary(self, corner_frequency / self.drive.angular_frequency)
+        crossings = sorted(boundary.crossings())
+        unit = self.drive.normal_force / self.drive.speed_scale
+        ends = [-inf, *(gain * unit for gain, _ in crossings), inf]
+        outside = np.cumsum([0, *(number for _, number in crossings)])
+        intervals = [
+            GainInterval(ends[row], ends[row + 1])
+            for row in np.flatnonzero(outside == outside.min())
+            if ends[row] < ends[row + 1]
+        ]
+        nearest = min(intervals, key=_distance)
+        gains = WashoutGains(corner_frequency, _inside(nearest), 0.0)
+        return intervals if self.spectral_radius(gains) < 1.0 else []
+
+    def critical_linear_gain(self, corner_frequency: float) -> float | None:
+        """Return the gain (N s/m) that the loop needs to be stable, or may have while it is.
+
+        It is the critical end of the stable interval nearest to zero: at a high rate and without
+        delay k1* of the continuous loop, below which that is stable. None if no gain stabilises.
+        """
+        intervals = self.stable_linear_gains(corner_frequency)
+        return min(intervals, key=_distance).critical if intervals else None
+
+    def coarsened(self) -> Self:
+        """Return nearly the same loop at a rate at which even a long delay is few periods.
+
+        For searches. To hold the force delays it too, by half a period on average; the sum stays.
+        """
+        if self.order <= _LARGE_ORDER:
+            return self
+        rate = min(self.rate, max(20.0 / self.force_delay, 5.0 * self.drive.angular_frequency))
+        mean_delay = self.force_delay + 0.5 / self.rate
+        return replace(self, rate=rate, force_delay=mean_delay - 0.5 / rate)
+
+    @property
+    def order(self) -> int:
+        """Number n of the state's components."""
+        whole, rest = self.delay
+        return 3 + whole + (rest > 0.0)
+
+    @cached_property
+    def period(self) -> float:
+        """T, dimensionless."""
+        return self.drive.angular_frequency / self.rate
+
+    @cached_property
+    def delay(self) -> tuple[int, float]:
+        """The delay in whole periods, and what is left of it in periods, below one."""
+        return whole_and_rest(self.force_delay * self.rate)
+
+    @cached_property
+    def held(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """What one period does: the slide's transition, and the effects of two forces of one.
+
+        These are the force that starts during the period (or with it), and the one that it ends.
+        Shapes (2, 2), (2,), (2,).
+        """
+        split = self.delay[1]
+        before, ending = self._slide(split)
+        after, starting = self._slide(1.0 - split)
+        return after @ before, starting, after @ ending
+
+    def _slide(self, periods: float) -> tuple[FloatArray, FloatArray]:
+        """Return the slide's transition over so many periods and the effect of a force of one."""
+        block = np.zeros((3, 3))
+        block[:2, :2] = self.jacobian
+        block[1, 2] = 1.0
+        transition: Any = expm(block * (periods * self.period))
+        return transition[:2, :2], transition[:2, 2]
+
+    def _radii(self, corner_frequency: float, linear_gains: FloatArray) -> FloatArray:
+        scaled = WashoutGains(corner_frequency, linear_gains, 0.0).scaled(self.drive)
+        return _spectral_radius(
+            self._transitions(np.full(len(linear_gains), scaled.corner_frequency), scaled.linear)
+        )
+
+    def _transitions(self, corner_frequency: Any, linear_gain: Any) -> FloatArray:
+        """Return the transition matrices for dimensionless arrays of one shape, (..., n, n)."""
+        whole, split = self.delay
+        under_way = self.order - 3
+        slide, starting, ending = self.held
+        matrix = np.zeros((*corner_frequency.shape, 3 + under_way, 3 + under_way))
+        forces = np.zeros((*corner_frequency.shape, 1 + under_way, 3 + under_way))
+        forces[..., 0, 1] = linear_gain
+        forces[..., 0, _FILTER] = -linear_gain
+        forces[..., 1:, 3:] = np.eye(under_way)
+        matrix[..., _SLIDE, _SLIDE] = slide
+        matrix[..., _SLIDE, :] += starting[:, None] * forces[..., whole, None, :]
+        if split > 0.0:
+            matrix[..., _SLIDE, :] += ending[:, None] * forces[..., whole + 1, None, :]
+        step = -np.expm1(-corner_frequency * self.period)
+        matrix[..., _FILTER, 1] = step
+        matrix[..., _FILTER, _FILTER] = 1.0 - step
+        matrix[..., 3:, :] = forces[..., :-1, :]
+        return matrix
+
+
+def settling_time(decay_rate: float) -> float | None:
+    """Return the time (s) in which what decays at that rate (1/s) falls to a hundredth."""
+    return -log(SETTLED) / decay_rate if decay_rate > 0.0 else None
+
+
+class _Boundary:
+    """1/G(e^(j theta)), the gains that put a multiplier there; dimensionless.
+
+    From the force to v, with l = e^(j theta) and the whole periods m of the delay,
+    G = (l - 1)^2 (b l + c) / (l^(m+1) (l - e^(-d T)) (l - e^(s1 T)) (l - e^(s2 T))),
+    s1 and s2 being the eigenvalues of the open loop. One factor l - 1 is the filter's, the other
+    one says that a constant force does not move the slide for good; b and c are the force that
+    starts during a period, and the one that it ends. In this form nothing cancels at high rates.
+    """
+
+    def __init__(self, loop: LinearSampledLoop, corner_frequency: float) -> None:
+        slide, starting, ending = loop.held
+        self._whole = loop.delay[0]
+        self._period = loop.period
+        values = np.linalg.eigvals(loop.jacobian).astype(np.complex128)
+        self._poles = np.array([-corner_frequency, *values]) * loop.period
+        self._starting = float(starting[1])
+        self._ending = float(slide[0, 0] * ending[1] - slide[1, 0] * ending[0])
+
+    def gain(self, theta: Any) -> Any:
+        """Return 1/G, an array of the shape of theta."""
+        forward = np.exp(1j * theta)
+        differences = np.prod(
+            [np.exp(pole) * np.expm1(1j * theta - pole) for pole in self._poles], axis=0
+        )
+        zeros = np.expm1(1j * theta) ** 2 * (self._starting * forward + self._ending)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return forward ** (self._whole + 1) * differences / zeros
+
+    def crossings(self) -> Iterator[tuple[float, int]]:
+        """Yield the real gains, and how many multipliers leave the circle there as it rises."""
+        theta = self._angles()
+        imaginary = self.gain(theta).imag
+        rows = np.flatnonzero(np.sign(imaginary[:-1]) * np.sign(imaginary[1:]) < 0.0)
+        low, high, rising = theta[rows], theta[rows + 1], np.sign(imaginary[rows + 1])
+        for _ in range(_BISECTIONS):
+            middle = (low + high) / 2.0
+            above = self.gain(middle).imag * rising > 0.0
+            low, high = np.where(above, low, middle), np.where(above, middle, high)
+        for gain, number in zip(self.gain(low).real.tolist(), rising.tolist(), strict=True):
+            yield gain, 2 * int(number)
+        # One real multiplier at -1. By symmetry 1/G is real there; the sum is exact.
+        poles = np.exp(self._poles)
+        difference = self._ending - self._starting
+        if difference != 0.0:
+            gain = float(np.prod(-1.0 - poles).real) / (4.0 * difference)
+            if isfinite(gain):
+                yield gain * (-1.0) ** (self._whole + 1), -int(np.sign(imaginary[-1]))
+
+    def _angles(self) -> FloatArray:
+        """Return angles above 0 and below pi between which each factor turns but little.
+
+        A factor l - e^s turns near the angle of e^s, the more suddenly the nearer it is to the
+        circle.
+        """
+        steps = 16 * (self._whole + 2)
+        parts: list[Any] = [
+            np.arange(1, steps) * (pi / steps),
+            self._near(0.0, self._period),
+        ]
+        for pole in self._poles:
+            parts.append(self._near(abs(float(np.angle(np.exp(1j * pole.imag)))), abs(pole.real)))
+        if self._ending > 0.0 and self._starting > 0.0:
+            parts.append(self._near(pi, abs(log(self._ending / self._starting))))
+        theta = np.sort(np.concatenate(parts))
+        return theta[(theta > 0.0) & (theta < pi)]
+
+    @staticmethod
+    def _near(angle: float, width: float) -> FloatArray:
+        distances: Any = np.geomspace(1e-3 * max(width, 1e-12), pi, 200)
+        return np.concatenate([angle - distances, angle + distances])
+
+
+def _spectral_radius(matrices: FloatArray) -> Any:
+    return np.abs(np.linalg.eigvals(matrices)).max(axis=-1)
+
+
+def _distance(interval: GainInterval) -> float:
+    """Return how far the interval is from zero."""
+    return max(interval.low, -interval.high, 0.0)
+
+
+def _inside(interval: GainInterval) -> float:
+    """Return a gain within the interval, one at which the loop is not slow if it is stable."""
+    low, high = interval
+    if low < 0.0 < high:
+        return 0.0
+    doubled = 2.0 * interval.critical
+    return doubled if low < doubled < high else (low + high) / 2.0

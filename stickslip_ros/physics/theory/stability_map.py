@@ -1,0 +1,83 @@
+"""Where the sampled loop is stable: over its gains, and over rate and delay."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.equations import WashoutGains
+from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.physics.theory.closed_loop import critical_gains
+from stickslip_ros.physics.theory.sampled import LinearSampledLoop
+
+_DECADES = 1.0
+"""How far the corner frequencies of a map go, either way."""
+
+
+@dataclass(frozen=True)
+class StabilityMap:
+    """Decay rates of a loop over corner frequency and linear gain, around some gains; SI units."""
+
+    loop: LinearSampledLoop
+    gains: WashoutGains
+    """Those that the map is around."""
+    corner_frequencies: FloatArray
+    """rad/s, shape (m,)."""
+    linear_gains: FloatArray
+    """N s/m, shape (n,); zero is among those spanned."""
+    decay_rates: FloatArray
+    """1/s, shape (m, n); above zero where the loop is stable. For a long delay an approximation."""
+    continuous: FloatArray
+    """Critical linear gain without sampling and delay, shape (m,); NaN where there is none."""
+
+    @classmethod
+    def around(cls, loop: LinearSampledLoop, gains: WashoutGains, points: int = 81) -> Self:
+        """Return the map around `gains` (SI units) with so many points along each axis."""
+        corners = np.geomspace(
+            gains.corner_frequency * 10.0**-_DECADES,
+            gains.corner_frequency * 10.0**_DECADES,
+            points,
+        )
+        continuous = np.full(points, np.nan)
+        for row, corner_frequency in enumerate(corners):
+            critical = critical_gains(loop.drive, WashoutGains(float(corner_frequency), 0.0, 0.0))
+            if critical is not None:
+                continuous[row] = critical.linear
+        needed = loop.critical_linear_gain(gains.corner_frequency) or 0.0
+        far = 2.0 * (gains.linear or needed or -loop.drive.normal_force / loop.drive.speed_scale)
+        linear = np.linspace(far, -0.25 * far, points)
+        return cls(
+            loop,
+            gains,
+            corners,
+            np.sort(linear),
+            loop.coarsened().decay_rates(corners, np.sort(linear)),
+            continuous,
+        )
+
+
+@dataclass(frozen=True)
+class CriticalGains:
+    """Critical linear gain over rate and delay of a sampled loop; SI units."""
+
+    rates: FloatArray
+    """Hz, shape (m,)."""
+    force_delays: FloatArray
+    """s, shape (n,)."""
+    linear_gains: FloatArray
+    """See `LinearSampledLoop.critical_linear_gain`, N s/m; (m, n), NaN where there is none."""
+
+    @classmethod
+    def over(
+        cls, drive: Drive, corner_frequency: float, rates: FloatArray, force_delays: FloatArray
+    ) -> Self:
+        """Return those of a drive with this corner frequency (rad/s)."""
+        gains = np.full((len(rates), len(force_delays)), np.nan)
+        for row, rate in enumerate(rates.tolist()):
+            for column, force_delay in enumerate(force_delays.tolist()):
+                loop = LinearSampledLoop.of(drive, rate, force_delay)
+                critical = loop.critical_linear_gain(corner_frequency) if loop else None
+                if critical is not None:
+                    gains[row, column] = critical
+        return cls(rates, force_delays, gains)

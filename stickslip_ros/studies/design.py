@@ -1,0 +1,467 @@
+"""Gains for a drive: those that damp it fastest within a force limit, tried out by simulation.
+
+What is proposed comes from the linear sampled loop and from the vibration without control. It is
+then tried on the drive itself, sampled, held and delayed as between the nodes.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from math import ceil, floor, inf, isinf, log10
+from typing import Self
+
+import numpy as np
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.equations import WashoutGains
+from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.physics.measures import Regime
+from stickslip_ros.physics.simulation import Progress
+from stickslip_ros.physics.theory.roots import zero_between
+from stickslip_ros.physics.theory.sampled import (
+    LinearSampledLoop,
+    settling_time,
+    why_no_linear_loop,
+)
+from stickslip_ros.physics.washout import WashoutParameters
+from stickslip_ros.scenario.files import Scenario, parameter_file
+from stickslip_ros.studies.trial import FILTER_SETTLED, Bench, Vibration
+
+OWN_SPEED_RANGE = 0.1
+"""Share of a scenario's belt speed by which the range goes below and above it by default."""
+
+_SPEEDS, _PHASES = 5, 4
+"""Belt speeds that are designed for and tried, and phases at which control comes on."""
+
+_CORNER_FREQUENCIES = (0.02, 20.0)
+"""Between which the best is looked for, in natural angular frequencies."""
+
+_CUBIC_SHARES = (0.0, 0.125, 0.25, 0.5)
+"""Cubic gains that are considered, in the friction law's own cubic coefficient.
+
+With all of it the loop would escape to infinity from high speeds. A positive one softens the
+control where the vibration is large, so that more linear gain fits under the force limit.
+"""
+
+_WORTH_IT = 1.05
+"""Factor in decay rate for which a larger cubic gain is taken."""
+
+_THROWN = (3.0, 30.0, 300.0)
+"""Dimensionless speeds from which the slide is to come back."""
+
+_ATTEMPTS, _RESERVE, _RETREAT = 8, 0.95, 0.8
+"""How often a proposal is tried, what share of what is allowed the first one uses, and by what
+factor the next one uses less."""
+
+_COARSE, _FINE, _GRIDS, _ZOOM = (25, 41), (9, 9), 5, 0.3
+"""Corner frequencies and gains of the first grid, and of the next ones that close in on the best;
+how many grids in all, and the extent of each in that before."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What gains are wanted for; SI units."""
+
+    drive: Drive
+    rate: float
+    """Samples per second, Hz."""
+    force_delay: float
+    """From a sample to the start of its force, s."""
+    force_limit: float
+    """Largest force there may be, N."""
+    belt_speeds: tuple[float, float]
+    """Lowest and highest, m/s, above zero; the other direction mirrors them."""
+
+    @classmethod
+    def of(cls, scenario: Scenario, belt_speeds: tuple[float, float] | None = None) -> Self:
+        """Return the task that a scenario sets, by default within 10 % of its own belt speed.
+
+        Raises InvalidInputError for speeds that are no range above zero.
+        """
+        plant = scenario.plant
+        if belt_speeds is None:
+            own = abs(plant.belt_speed)
+            if own == 0.0:
+                raise InvalidInputError(
+                    "plant.belt_speed = 0: gains are for a moving belt, so its speeds must be given"
+                )
+            belt_speeds = (own * (1.0 - OWN_SPEED_RANGE), own * (1.0 + OWN_SPEED_RANGE))
+        low, high = belt_speeds
+        if not 0.0 < low <= high < inf:
+            raise InvalidInputError(
+                f"belt speeds {low:g} to {high:g} m/s: must be finite, above zero, the lower first"
+            )
+        limit = scenario.washout_controller.force_limit
+        return cls(plant.as_drive(), plant.rate, plant.force_delay, limit, (low, high))
+
+    def drives(self) -> list[Drive]:
+        """Return the drive at speeds throughout the range."""
+        low, high = self.belt_speeds
+        speeds = np.linspace(low, high, _SPEEDS if low < high else 1)
+        return [replace(self.drive, belt_speed=speed) for speed in speeds.tolist()]
+
+
+@dataclass(frozen=True)
+class Check:
+    """What a proposal does at one belt speed, predicted and simulated; SI units."""
+
+    belt_speed: float
+    vibrates: bool
+    """Whether there is a vibration without control, to be caught."""
+    decay_rate: float
+    """At which a small deviation dies out, 1/s."""
+    predicted_settling_time: float
+    """In which a small deviation falls to a hundredth, s."""
+    settling_time: float | None
+    """Simulated, until a hundredth of the vibration is left, at the worst phase; None without."""
+    predicted_peak_force: float
+    """When the control comes on at the worst phase of the vibration, N."""
+    peak_force: float | None
+    """Simulated, at the worst phase, N; None without vibration."""
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How far a stable loop is from instability."""
+
+    gain_down: float | None
+    """Factor below one of the linear gain that makes it unstable; None: there is none."""
+    gain_up: float | None
+    """Factor above one that does; None: there is none."""
+    delay: float | None
+    """Further delay of the force that does, s; None: none within half a natural period, or as far
+    as theory goes."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """Gains for a task, or why there are none."""
+
+    task: Task
+    controller: WashoutParameters | None = None
+    """What is proposed; None if nothing does what is asked."""
+    remark: str | None = None
+    """Why there is no proposal, or what must be said of it."""
+    slowest: LinearSampledLoop | None = None
+    """The loop at the belt speed at which a small deviation dies out most slowly."""
+    margins: Margins | None = None
+    """Those of that loop; None without control."""
+    checks: tuple[Check, ...] = ()
+    """In the order of the belt speeds."""
+
+    @property
+    def parameter_file(self) -> str | None:
+        """The parameter file with what is proposed."""
+        if self.controller is None:
+            return None
+        return parameter_file({"washout_controller": asdict(self.controller)})
+
+
+def design(task: Task, progress: Progress = lambda _: None) -> Design:
+    """Return the gains that damp the slowest speed of the range fastest, and what they do.
+
+    The force stays within the limit while the vibration is caught at any phase, the filter having
+    forgotten its start. What fails in simulation is not proposed: the next attempt is more
+    cautious, and after some the design says why there is none.
+    """
+    drives = task.drives()
+    reason = why_no_linear_loop(drives[0], task.rate, task.force_delay)
+    if reason is not None:
+        return Design(task, remark=reason)
+    bench = Bench(drives[0], task.rate, task.force_delay)
+    vibrations = [bench.vibration(drive) for drive in drives]
+    for drive, vibration in zip(drives, vibrations, strict=True):
+        if vibration.regime is Regime.UNBOUNDED:
+            reason = (
+                f"without control the motion runs away at a belt speed of {drive.belt_speed:.4g} "
+                "m/s, so there is no limit cycle to catch it from"
+            )
+            return Design(task, remark=reason)
+    candidates = _Candidates(task, vibrations)
+    strength, shares = _RESERVE, _CUBIC_SHARES
+    failure: str | None = None
+    for attempt in range(_ATTEMPTS):
+        gains = candidates.best(strength, shares)
+        if gains is None:
+            return Design(task, remark=failure or candidates.why_none())
+        controller = _controller(task, gains)
+
+        def done(share: float, left: float = 0.5**attempt) -> None:
+            progress(1.0 - left * (1.0 - 0.5 * share))
+
+        failure = None
+        checks: list[Check] = []
+        while failure is None and len(checks) < len(drives):
+            checks.append(_check(bench, candidates, len(checks), controller))
+            failure = _failure(task, checks[-1])
+            done(len(checks) / len(drives))
+        slowest = candidates.slowest(gains)
+        remark, found = candidates.why_zero(), None
+        if failure is None and gains.linear != 0.0:
+            found = margins(slowest, gains)
+            remark, failure = _from_high_speeds(bench, slowest.drive, controller)
+        if failure is None:
+            progress(1.0)
+            return Design(task, controller, remark, slowest, found, tuple(checks))
+        peak = max((check.peak_force or 0.0 for check in checks), default=0.0)
+        if peak > task.force_limit:
+            strength *= 0.97 * task.force_limit / peak
+        elif gains.cubic != 0.0:
+            shares = _CUBIC_SHARES[:1]
+        else:
+            strength *= _RETREAT
+    return Design(task, remark=failure)
+
+
+def margins(loop: LinearSampledLoop, gains: WashoutGains) -> Margins:
+    """Return how far a stable loop with these gains (SI units) is from instability."""
+    factors = [
+        end / gains.linear
+        for interval in loop.stable_linear_gains(gains.corner_frequency)
+        if interval.low < gains.linear < interval.high
+        for end in interval
+    ]
+    return Margins(
+        gain_down=next((factor for factor in factors if 0.0 < factor < 1.0), None),
+        gain_up=next((factor for factor in factors if 1.0 < factor < inf), None),
+        delay=_delay_margin(loop, gains),
+    )
+
+
+def _delay_margin(loop: LinearSampledLoop, gains: WashoutGains) -> float | None:
+    def decay_rate(further: float) -> float:
+        return replace(loop, force_delay=loop.force_delay + further).decay_rate(gains)
+
+    further = np.linspace(0.0, loop.drive.natural_period / 2.0, 33).tolist()
+    for shorter, longer in pairwise(further):
+        if why_no_linear_loop(loop.drive, loop.rate, loop.force_delay + longer) is not None:
+            return None
+        if decay_rate(longer) < 0.0:
+            return zero_between(decay_rate, shorter, longer)
+    return None
+
+
+class _Candidates:
+    """What theory says of gains: from the linear loops of the range, and the vibrations there."""
+
+    def __init__(self, task: Task, vibrations: Sequence[Vibration]) -> None:
+        self.vibrations = vibrations
+        self.loops = [
+            loop
+            for vibration in vibrations
+            if (loop := LinearSampledLoop.of(vibration.drive, task.rate, task.force_delay))
+        ]
+        self._task = task
+        # The loops differ in one number, the slope of the friction: those at its ends tell all.
+        slopes = [float(loop.jacobian[1, 1]) for loop in self.loops]
+        ends = sorted({int(np.argmin(slopes)), int(np.argmax(slopes))})
+        self._extremes = [self.loops[index].coarsened() for index in ends]
+        # Twice what brings the slide to rest without overshoot: beyond it nothing is won.
+        unit = task.drive.normal_force / task.drive.speed_scale
+        self._largest_gain = (4.0 + 2.0 * max(map(abs, slopes))) * unit
+        self._cubic_coefficient = _cubic_coefficient(task.drive)
+
+    def slowest(self, gains: WashoutGains) -> LinearSampledLoop:
+        """Return the loop in which a small deviation dies out most slowly."""
+        return min(self.loops, key=lambda loop: loop.decay_rate(gains))
+
+    def best(self, strength: float, cubic_shares: Sequence[float]) -> WashoutGains | None:
+        """Return the gains that damp fastest with the share `strength` of what is allowed.
+
+        They have three digits, and are zero if nothing vibrates. None if none is stable.
+        """
+        if not any(vibration.vibrates for vibration in self.vibrations):
+            none = WashoutGains(_rounded(self._task.drive.angular_frequency), 0.0, 0.0)
+            if self.slowest(none).decay_rate(none) > 0.0:
+                return none
+        best, fastest = None, 0.0
+        for share in cubic_shares:
+            cubic = share * self._cubic_coefficient
+            if share > 0.0 and (cubic == 0.0 or isinf(self._task.force_limit)):
+                break
+            gains = self._fastest(strength, cubic)
+            decay_rate = self.slowest(gains).decay_rate(gains)
+            if decay_rate > fastest * _WORTH_IT:
+                best, fastest = gains, decay_rate
+        return best
+
+    def why_zero(self) -> str:
+        """Return why zero gains may be proposed."""
+        if any(vibration.vibrates for vibration in self.vibrations):
+            return "no gains within the force limit damp faster than none"
+        return "nothing vibrates without control at these belt speeds: the gains are zero"
+
+    def why_none(self) -> str:
+        """Return why no gains are stable at all speeds within the force limit."""
+        needed = inf
+        for corner_frequency in self._corner_frequencies(17).tolist():
+            peak = self._peak(corner_frequency)
+            for gain in self._weakest_gains(corner_frequency):
+                needed = min(needed, gain * peak)
+        if isinf(needed):
+            return (
+                "no linear gain makes the equilibrium stable at all these belt speeds, at this "
+                "rate and delay"
+            )
+        return (
+            f"the force limit of {self._task.force_limit:.3g} N is too small: a linear gain that "
+            "makes the equilibrium stable at all these belt speeds asks for at least "
+            f"{needed:.3g} N while it catches the vibration"
+        )
+
+    def _weakest_gains(self, corner_frequency: float) -> list[float]:
+        """Return the smallest magnitudes of the intervals of gains stable at all speeds."""
+        sets = [loop.stable_linear_gains(corner_frequency) for loop in self._extremes]
+        overlaps = [
+            (max(one.low, other.low), min(one.high, other.high))
+            for one in sets[0]
+            for other in sets[-1]
+        ]
+        return [max(low, -high, 0.0) for low, high in overlaps if low < high]
+
+    def _fastest(self, strength: float, cubic: float) -> WashoutGains:
+        """Return the fastest gains: the best of a grid that closes in on them."""
+        # A softening cubic gain is one beside a negative linear gain.
+        limits = np.array(
+            [np.log(self._corner_frequencies(2)), [-1.0, 0.0 if cubic > 0.0 else 1.0]]
+        )
+        window, counts = limits, _COARSE
+        best = WashoutGains(0.0, 0.0, 0.0)
+        for _ in range(_GRIDS):
+            logarithms, shares = (
+                np.linspace(low, high, count)
+                for (low, high), count in zip(window, counts, strict=True)
+            )
+            corners = np.exp(logarithms)
+            largest = [self._largest(corner, strength, cubic) for corner in corners.tolist()]
+            gains = np.outer(largest, shares)
+            rates = np.min([loop.decay_rates(corners, gains) for loop in self._extremes], axis=0)
+            row, column = np.unravel_index(int(np.argmax(rates)), rates.shape)
+            best = WashoutGains(*map(_rounded, (corners[row], gains[row, column], cubic)))
+            centre = np.array([[logarithms[row]], [shares[column]]])
+            reach = _ZOOM / 2.0 * (window[:, 1:] - window[:, :1])
+            window = np.clip(centre + reach * [-1.0, 1.0], limits[:, :1], limits[:, 1:])
+            counts = _FINE
+        return best
+
+    def _corner_frequencies(self, count: int) -> FloatArray:
+        """Return corner frequencies (rad/s), up to the rate: a faster filter passes nothing on."""
+        omega = self._task.drive.angular_frequency
+        low, high = (share * omega for share in _CORNER_FREQUENCIES)
+        return np.geomspace(low, max(min(high, self._task.rate), 2.0 * low), count)
+
+    def _peak(self, corner_frequency: float) -> float:
+        """Return the largest filtered speed, m/s, of all vibrations."""
+        return max(
+            float(np.abs(vibration.filtered(corner_frequency)).max(initial=0.0))
+            for vibration in self.vibrations
+        )
+
+    def _largest(self, corner_frequency: float, strength: float, cubic: float) -> float:
+        """Return the magnitude of the linear gain that is allowed.
+
+        With a softening cubic gain the force k v - k2 v^3 may be largest short of the peak.
+        """
+        peak, limit = self._peak(corner_frequency), strength * self._task.force_limit
+        gain = limit / peak + cubic * peak**2 if peak > 0.0 else inf
+        if gain < 3.0 * cubic * peak**2:
+            gain = (6.75 * cubic * limit**2) ** (1.0 / 3.0)
+        return min(gain, strength * self._largest_gain)
+
+
+def _controller(task: Task, gains: WashoutGains) -> WashoutParameters:
+    waits = FILTER_SETTLED / gains.corner_frequency if gains.linear != 0.0 else 0.0
+    return WashoutParameters(
+        corner_frequency=gains.corner_frequency,
+        linear_gain=gains.linear,
+        cubic_gain=gains.cubic,
+        force_limit=task.force_limit,
+        start_after=_rounded(waits, digits=2, up=True),
+    )
+
+
+def _check(
+    bench: Bench, candidates: _Candidates, index: int, controller: WashoutParameters
+) -> Check:
+    """Return what the controller does at one of the speeds."""
+    loop, vibration = candidates.loops[index], candidates.vibrations[index]
+    gains = controller.gains
+    decay_rate = loop.decay_rate(gains)
+    predicted = settling_time(decay_rate)
+    assert predicted is not None
+    peak = float(np.abs(gains.force(vibration.filtered(gains.corner_frequency))).max(initial=0.0))
+    settling_times: list[float | None] = []
+    peaks: list[float] = []
+    if vibration.vibrates:
+        patience = 5.0 * predicted + 20.0 * loop.drive.natural_period
+        for outcome in bench.catch(vibration, controller, _PHASES, patience):
+            settling_times.append(outcome.settling_time)
+            peaks.append(outcome.peak_force)
+            if outcome.settling_time is None:
+                break
+    settled = [time for time in settling_times if time is not None]
+    return Check(
+        belt_speed=loop.drive.belt_speed,
+        vibrates=vibration.vibrates,
+        decay_rate=decay_rate,
+        predicted_settling_time=predicted,
+        settling_time=max(settled) if settled and len(settled) == len(settling_times) else None,
+        predicted_peak_force=peak,
+        peak_force=max(peaks, default=None),
+    )
+
+
+def _failure(task: Task, check: Check) -> str | None:
+    """Return in what the simulated control fails, if it does."""
+    speed = f"at a belt speed of {check.belt_speed:.4g} m/s"
+    if check.vibrates and check.settling_time is None:
+        return f"{speed} the vibration does not die out, though a small one would"
+    if check.peak_force is not None and check.peak_force > task.force_limit:
+        return (
+            f"{speed} the force reaches {check.peak_force:.3g} N, above the limit of "
+            f"{task.force_limit:.3g} N"
+        )
+    return None
+
+
+def _from_high_speeds(
+    bench: Bench, drive: Drive, controller: WashoutParameters
+) -> tuple[str | None, str | None]:
+    """Return what is to be said of motions that begin fast, and in what the controller fails."""
+    speeds = [speed * drive.speed_scale for speed in _THROWN]
+    patience = 20.0 * drive.natural_period
+
+    def escaping(controller: WashoutParameters) -> float | None:
+        return next(
+            (
+                speed
+                for speed in speeds
+                if any(o.grows for o in bench.throw(drive, controller, speed, patience))
+            ),
+            None,
+        )
+
+    speed = escaping(controller)
+    if speed is None:
+        return None, None
+    if controller.cubic_gain == 0.0 and escaping(replace(controller, force_limit=inf)) is None:
+        return f"thrown to {speed:.3g} m/s the slide needs more force than the limit", None
+    return None, f"thrown to {speed:.3g} m/s the slide does not come back"
+
+
+def _cubic_coefficient(drive: Drive) -> float:
+    """Return by what the friction force falls with the cube of high speeds, N s^3/m^3, or zero."""
+    law, high = drive.friction.scaled(drive.speed_scale), 1e6
+    coefficient = -float(law.coefficient(high, 1.0)) / high**3
+    return coefficient * drive.normal_force / drive.speed_scale**3 if coefficient > 1e-6 else 0.0
+
+
+def _rounded(value: float, digits: int = 3, *, up: bool = False) -> float:
+    """Return a value with so many significant digits, `up` or to the nearest."""
+    if value == 0.0:
+        return 0.0
+    if up:
+        unit = 10.0 ** (floor(log10(value)) + 1 - digits)
+        value = ceil(value / unit) * unit
+    return float(f"{value:.{digits}g}")

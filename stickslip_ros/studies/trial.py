@@ -1,0 +1,232 @@
+"""Trials of a washout controller: what becomes of a vibration when it comes on, by simulation."""
+
+from collections.abc import Iterator
+from copy import copy
+from dataclasses import dataclass, replace
+from math import ceil, hypot, inf
+
+import numpy as np
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.physics.measures import CycleMeter, Measures, Regime
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.physics.samples import NANOSECONDS
+from stickslip_ros.physics.theory.sampled import SETTLED
+from stickslip_ros.physics.washout import Washout, WashoutParameters
+
+_TRANSIENTS, _TRANSIENT_PERIODS, _STEADY = 6, 300, 1e-4
+"""How often at most a vibration is given so many natural periods until its amplitude changes no
+more than by this share in them."""
+
+_MEASURED_CYCLES, _RECORDED_CYCLES = 10, 12
+
+FILTER_SETTLED = 5.0
+"""Time after which the washout filter has forgotten its start, in 1/d."""
+
+
+@dataclass(frozen=True)
+class Vibration:
+    """What a drive does without control at one belt speed, sampled; SI units."""
+
+    drive: Drive
+    rate: float
+    """Samples per second, Hz."""
+    regime: Regime | None
+    period: float | None
+    """s; None unless it vibrates."""
+    position: FloatArray
+    """Displacement at the samples of some whole cycles; empty unless it vibrates."""
+    velocity: FloatArray
+    """Velocity at the same samples."""
+
+    @property
+    def equilibrium(self) -> float:
+        """Displacement at rest, eq. 6, m."""
+        return _equilibrium(self.drive)
+
+    @property
+    def size(self) -> float:
+        """Largest distance from the equilibrium, m/s; 0 if it does not vibrate."""
+        omega = self.drive.angular_frequency
+        distances = np.hypot(omega * (self.position - self.equilibrium), self.velocity)
+        return float(distances.max(initial=0.0))
+
+    @property
+    def vibrates(self) -> bool:
+        """Whether the drive vibrates without control."""
+        return self.period is not None
+
+    def filtered(self, corner_frequency: float) -> FloatArray:
+        """Return what a washout filter (rad/s), once it has settled, lets through of the velocity.
+
+        From the whole cycles, as a periodic sequence, by the filter's response to each harmonic.
+        """
+        count = len(self.velocity)
+        if count == 0:
+            return self.velocity
+        forward = np.exp(2j * np.pi * np.arange(count // 2 + 1) / count)
+        response = (forward - 1.0) / (forward - np.exp(-corner_frequency / self.rate))
+        return np.fft.irfft(response * np.fft.rfft(self.velocity), count)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a trial came to; SI units."""
+
+    peak_force: float
+    settling_time: float | None
+    """Until the distance from the equilibrium stays below a hundredth of its first size."""
+    grows: bool
+    """Whether the motion ran away, or ended no nearer than it began."""
+
+
+class Bench:
+    """One compiled motion on which trials of one friction law are run."""
+
+    def __init__(self, drive: Drive, rate: float, force_delay: float) -> None:
+        """Prepare trials at `rate` (Hz) with `force_delay` (s)."""
+        self._rate = rate
+        self._force_delay = force_delay
+        self._motion = Motion(drive, 0.0, 0.0)
+        self._recording = Motion(drive, 0.0, 0.0, record=True)
+
+    def vibration(self, drive: Drive) -> Vibration:
+        """Return the vibration of `drive`, the outermost if there are several.
+
+        It begins where the belt tears the slide loose: there stick-slip cycles begin too.
+        """
+        motion = self._recording
+        motion.drive = drive
+        speed = drive.belt_speed
+        torn = drive.friction.static * drive.normal_force - drive.damping * speed
+        motion.restart(torn / drive.stiffness, speed)
+        # On a slow belt a cycle is mostly the time in which the belt loads the spring.
+        loading = 2.0 * drive.friction.static * drive.length_scale / speed
+        found, before = self._measured(loading), inf
+        for _ in range(_TRANSIENTS):
+            amplitude = found.velocity_amplitude
+            if found.period is None or amplitude is None or abs(amplitude / before - 1.0) < _STEADY:
+                break
+            motion.advance(_TRANSIENT_PERIODS * drive.natural_period)
+            found, before = self._measured(loading), amplitude
+        if found.period is None:
+            return Vibration(drive, self._rate, found.regime, None, np.empty(0), np.empty(0))
+        samples = _whole_cycles(found.period * self._rate)
+        states: list[tuple[float, float]] = []
+        for _ in range(samples):
+            states.append((motion.position, motion.velocity))
+            motion.advance(1.0 / self._rate)
+        motion.take_knots()
+        position, velocity = np.array(states).T
+        return Vibration(drive, self._rate, found.regime, found.period, position, velocity)
+
+    def _measured(self, loading: float) -> Measures:
+        """Go on for some cycles, each with `loading` (s) besides its slip, and measure them."""
+        motion = self._recording
+        motion.take_knots()
+        motion.advance((_MEASURED_CYCLES + 2) * (motion.drive.natural_period + loading))
+        meter = CycleMeter(_MEASURED_CYCLES)
+        meter.feed(motion.take_knots(), motion.drive.belt_speed)
+        if motion.unbounded:
+            meter.report_run_away()
+        return meter.measures()
+
+    def catch(
+        self, vibration: Vibration, washout: WashoutParameters, phases: int, patience: float
+    ) -> Iterator[Outcome]:
+        """Let the control come on at so many phases of a vibration, its filter having settled.
+
+        And once more where the force is largest as it does. `patience` (s) is how long to wait for
+        the vibration to settle. The force is not limited.
+        """
+        count = len(vibration.velocity)
+        assert vibration.period is not None
+        law = Washout(replace(washout, force_limit=inf, start_after=0.0))
+        settled = ceil(FILTER_SETTLED / washout.corner_frequency * self._rate / count) * count
+        cycle = vibration.period * self._rate
+        force = law.parameters.gains.force(vibration.filtered(washout.corner_frequency))
+        rows = {int(phase * cycle / phases) for phase in range(phases)}
+        due = {settled + row for row in rows | {int(np.argmax(np.abs(force)))}}
+        for number in range(max(due) + 1):
+            row = number % count
+            stamp, velocity = self._stamp(number), float(vibration.velocity[row])
+            if number in due:
+                start = (float(vibration.position[row]), velocity)
+                yield self._run(vibration.drive, copy(law), stamp, start, patience, vibration.size)
+            law.answer(stamp, velocity)
+
+    def throw(
+        self, drive: Drive, washout: WashoutParameters, speed: float, patience: float
+    ) -> list[Outcome]:
+        """Throw the slide out of its equilibrium at `speed` (m/s), either way.
+
+        Each time both with a filter that was at rest and with one that begins with the throw.
+        """
+        outcomes: list[Outcome] = []
+        for velocity in (speed, -speed):
+            for resting in (True, False):
+                law = Washout(replace(washout, start_after=0.0))
+                if resting:
+                    law.answer(self._stamp(0), 0.0)
+                start = (_equilibrium(drive), velocity)
+                outcomes.append(self._run(drive, law, self._stamp(1), start, patience, speed))
+        return outcomes
+
+    def _stamp(self, number: int) -> int:
+        return LOCKSTEP_START + round(number * NANOSECONDS / self._rate)
+
+    def _run(
+        self,
+        drive: Drive,
+        law: Washout,
+        stamp: int,
+        start: tuple[float, float],
+        patience: float,
+        size: float,
+    ) -> Outcome:
+        """Run the loop until the distance has stayed small for a natural period, or `patience`."""
+        motion = self._motion
+        motion.force = 0.0
+        motion.drive = drive
+        motion.restart(*start)
+        loop = SampledLoop(motion, self._rate, stamp, force_delay=self._force_delay)
+        omega, equilibrium = drive.angular_frequency, _equilibrium(drive)
+        calm = ceil((drive.natural_period + self._force_delay) * self._rate)
+        peak, last, recent = 0.0, 0, 0.0
+        samples = max(ceil(patience * self._rate), calm)
+        while True:
+            sample = loop.sample
+            distance = hypot(omega * (sample.position - equilibrium), sample.velocity)
+            if distance > SETTLED * size:
+                last = sample.number
+            if sample.number > samples - calm:
+                recent = max(recent, distance)
+            if loop.unbounded or sample.number - last > calm or sample.number >= samples:
+                break
+            force = law.answer(sample.stamp, sample.velocity)
+            assert force is not None
+            peak = max(peak, abs(force))
+            loop.offer(sample.stamp, force)
+            loop.advance()
+        settled = loop.sample.number - last > calm and not loop.unbounded
+        return Outcome(
+            peak,
+            last / self._rate if settled else None,
+            loop.unbounded or (not settled and recent >= size),
+        )
+
+
+def _equilibrium(drive: Drive) -> float:
+    sign = -1.0 if drive.belt_speed > 0.0 else 1.0
+    friction = drive.friction.coefficient(-drive.belt_speed, sign)
+    return float(friction) * drive.length_scale
+
+
+def _whole_cycles(samples_per_cycle: float) -> int:
+    """Return the number of samples that some cycles have as nearly as possible."""
+    cycles = np.arange(1, _RECORDED_CYCLES + 1)
+    counts = np.maximum(np.rint(cycles * samples_per_cycle), 1.0)
+    misses = np.abs(counts / cycles - samples_per_cycle)
+    return int(counts[int(np.argmin(misses))])

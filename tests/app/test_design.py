@@ -1,0 +1,89 @@
+"""`stickslip design`: the proposal as a table, as JSON, as a parameter file and as a picture."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.app.conftest import Run
+
+LIMIT = ("-p", "washout_controller.force_limit=200")
+
+
+def test_the_parameter_file_quenches_the_vibration(stickslip: Run, tmp_path: Path) -> None:
+    files = ("--out", "gains.yaml", "--plot", "map.png")
+    done = stickslip("design", "feed_drive", *LIMIT, *files, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (tmp_path / "gains.yaml").read_text() == found["parameter_file"]
+    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
+    for name in ("corner_frequency", "linear_gain", "cubic_gain", "force_limit", "start_after"):
+        assert f'"{name}": {found[name]}' in found["parameter_file"]
+    assert found["belt_speeds"] == pytest.approx([0.036, 0.044])
+    assert max(check["peak_force"] for check in found["checks"]) <= found["force_limit"] == 200.0
+    assert found["scenario"]["name"] == "feed_drive"
+    gains = [
+        text
+        for name in ("corner_frequency", "linear_gain", "cubic_gain", "start_after")
+        for text in ("-p", f"washout_controller.{name}={found[name]}")
+    ]
+    done = stickslip("simulate", "feed_drive", *LIMIT, *gains, "--json")
+    assert json.loads(done.stdout)["regime"] == "equilibrium"
+
+
+def test_the_table_has_the_proposal_and_what_it_does(stickslip: Run) -> None:
+    done = stickslip("design", "feed_drive", *LIMIT, "--belt-speed", "0.03:0.04")
+    assert done.returncode == 0, done.stderr
+    for text in (
+        "belt speed 30 mm/s to 40 mm/s", "linear gain", "further delay", "peak force",
+        "ros__parameters",
+    ):  # fmt: skip
+        assert text in done.stdout
+    assert "nan" not in done.stdout
+
+
+def test_no_proposal_is_a_result_with_a_reason(stickslip: Run, tmp_path: Path) -> None:
+    limit = ("-p", "washout_controller.force_limit=5")
+    done = stickslip("design", "feed_drive", *limit, "--out", "gains.yaml", "--plot", "map.png")
+    assert done.returncode == 0, done.stderr
+    assert "force limit of 5 N is too small" in done.stdout
+    assert list(tmp_path.iterdir()) == []
+    done = stickslip("design", "feed_drive", *limit, "--json")
+    found = json.loads(done.stdout)
+    assert found["linear_gain"] is found["parameter_file"] is found["decay_rate"] is None
+    assert "too small" in found["remark"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("--belt-speed", "2:1"), ("2 to 1 m/s", "lower first")),
+        (("--belt-speed", "0:1"), ("above zero",)),
+        (("--belt-speed", "nan"), ("nan",)),
+        (("--belt-speed", "slow"), ("--belt-speed 'slow'", "LOW:HIGH")),
+        (("--belt-speed", "1:2:3"), ("--belt-speed '1:2:3'", "LOW:HIGH")),
+        (("-p", "plant.belt_speed=0"), ("plant.belt_speed = 0",)),
+        (("--no-control",), ("plant.expects_control",)),
+        (("--plot", "map.txt"), ("--plot map.txt", ".png")),
+        (("--plot", "nosuch/map.png"), ("nosuch",)),
+        (("--out", "nosuch/gains.yaml"), ("nosuch",)),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(
+    stickslip: Run, tmp_path: Path, arguments: tuple[str, ...], named: tuple[str, ...]
+) -> None:
+    done = stickslip("design", "feed_drive", *arguments)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    for text in named:
+        assert text in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_existing_file_is_left_as_it_is(stickslip: Run, tmp_path: Path) -> None:
+    (tmp_path / "gains.yaml").write_text("mine")
+    done = stickslip("design", "feed_drive", "--out", "gains.yaml")
+    assert done.returncode == 2
+    assert "exists already" in done.stderr
+    assert (tmp_path / "gains.yaml").read_text() == "mine"

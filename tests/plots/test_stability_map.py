@@ -1,0 +1,101 @@
+"""The map of decay rates, and the picture of it."""
+
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stickslip_ros.physics.equations import WashoutGains
+from stickslip_ros.physics.theory.closed_forms import CubicLoop
+from stickslip_ros.physics.theory.sampled import LinearSampledLoop
+from stickslip_ros.physics.theory.stability_map import CriticalGains, StabilityMap
+from stickslip_ros.plots.stability_map import draw_stability_map
+from tests.physics.drives import FEED_DRIVE, PAPER
+
+GAINS = WashoutGains(20.0, -3000.0, 0.0)
+
+
+def map_of(force_delay: float = 0.0025, gains: WashoutGains = GAINS) -> StabilityMap:
+    loop = LinearSampledLoop.of(FEED_DRIVE, 1000.0, force_delay)
+    assert loop is not None
+    return StabilityMap.around(loop, gains, points=21)
+
+
+def test_the_map_is_around_the_gains() -> None:
+    found = map_of()
+    assert found.corner_frequencies[[0, -1]] == pytest.approx([2.0, 200.0])
+    assert found.linear_gains[[0, -1]] == pytest.approx([-6000.0, 1500.0])
+    assert found.decay_rates.shape == (21, 21)
+    row, column = 10, 8
+    assert found.corner_frequencies[row] == pytest.approx(20.0)
+    assert found.linear_gains[column] == pytest.approx(-3000.0)
+    rate = found.loop.decay_rate(GAINS)
+    assert found.decay_rates[row, column] == pytest.approx(rate)
+
+
+def test_decay_rates_change_sign_at_the_critical_gain() -> None:
+    found = map_of()
+    for row, corner_frequency in enumerate(found.corner_frequencies):
+        (interval,) = found.loop.stable_linear_gains(float(corner_frequency))
+        inside = (found.linear_gains > interval.low) & (found.linear_gains < interval.high)
+        assert np.array_equal(found.decay_rates[row] > 0.0, inside)
+
+
+def test_the_continuous_loop_has_its_closed_form() -> None:
+    found = map_of()
+    cubic = CubicLoop.of(PAPER)
+    assert cubic is not None
+    expected = [cubic.critical_linear_gain(d / 100.0) for d in found.corner_frequencies.tolist()]
+    assert found.continuous == pytest.approx(1e4 * np.array(expected), rel=1e-9)
+
+
+def test_without_gains_it_is_around_the_critical_one() -> None:
+    found = map_of(gains=WashoutGains(20.0, 0.0, 0.0))
+    critical = found.loop.critical_linear_gain(20.0)
+    assert critical is not None
+    assert found.linear_gains[0] == pytest.approx(2.0 * critical)
+
+
+def test_critical_gains_over_rate_and_delay() -> None:
+    rates, delays = np.array([100.0, 1000.0]), np.array([0.0, 0.005, 0.015])
+    found = CriticalGains.over(FEED_DRIVE, 20.0, rates, delays)
+    for row, rate in enumerate(rates):
+        for column, delay in enumerate(delays):
+            loop = LinearSampledLoop.of(FEED_DRIVE, rate, delay)
+            assert loop is not None
+            critical = loop.critical_linear_gain(20.0)
+            assert found.linear_gains[row, column] == pytest.approx(critical or np.nan, nan_ok=True)
+    assert np.isnan(found.linear_gains[:, 2]).all()
+
+
+@pytest.mark.parametrize(("ending", "start"), [(".png", b"\x89PNG"), (".svg", b"<?xml")])
+@pytest.mark.parametrize("with_critical_gains", [False, True])
+def test_the_format_follows_the_ending(
+    tmp_path: Path, ending: str, start: bytes, with_critical_gains: bool
+) -> None:
+    path = tmp_path / f"map{ending}"
+    critical = None
+    if with_critical_gains:
+        delays = np.linspace(0.0, 0.06, 7)
+        critical = CriticalGains.over(FEED_DRIVE, 20.0, np.array([100.0, 1000.0]), delays)
+    draw_stability_map(path, map_of(), critical)
+    assert path.read_bytes().startswith(start)
+
+
+def test_axes_have_units(tmp_path: Path) -> None:
+    path = tmp_path / "map.svg"
+    draw_stability_map(path, map_of(), None)
+    picture = path.read_text(encoding="utf-8")
+    for label in ("corner frequency d (rad/s)", "linear gain k1 (N s/m)", "decay rate (1/s)"):
+        assert label in picture
+    assert "0.04 m/s, 1000 Hz, force 0.0025 s late" in picture
+
+
+def test_where_nothing_is_stable_there_is_a_picture_all_the_same(tmp_path: Path) -> None:
+    loop = LinearSampledLoop.of(replace(FEED_DRIVE, belt_speed=0.02), 1000.0, 0.015)
+    assert loop is not None
+    found = StabilityMap.around(loop, replace(GAINS, linear=0.0), points=11)
+    assert -inf < found.decay_rates.max() < 0.0
+    draw_stability_map(tmp_path / "map.png", found, None)

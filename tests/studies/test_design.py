@@ -1,0 +1,225 @@
+"""Gains for a drive, and whether they do what they are said to."""
+
+from dataclasses import replace
+from functools import lru_cache
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.friction import Coulomb, Exponential, FrictionLaw, Linear
+from stickslip_ros.physics.measures import CycleMeter, Measures, Regime
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.physics.simulation import simulate_sampled
+from stickslip_ros.physics.theory.sampled import LinearSampledLoop
+from stickslip_ros.physics.washout import Washout, WashoutParameters
+from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.studies.design import Design, Task, design, margins
+from tests.physics.drives import FEED_DRIVE
+from tests.scenario.files import scenario_file
+
+FEED = Task(FEED_DRIVE, 1000.0, 0.0, inf, (0.036, 0.044))
+
+
+designed = lru_cache(design)
+"""Several tests look at the same design."""
+
+
+class RecordingWashout(Washout):
+    """Keeps the largest force it asked for."""
+
+    peak = 0.0
+
+    def answer(self, stamp: int, velocity: float) -> float | None:
+        force = super().answer(stamp, velocity)
+        self.peak = max(self.peak, abs(force or 0.0))
+        return force
+
+
+def controlled(
+    drive: Drive, task: Task, controller: WashoutParameters, duration: float
+) -> tuple[Measures, float]:
+    """Run the drive from rest, the controller coming on as it says; return measures and peak."""
+    motion = Motion(drive, 0.0, 0.0, record=True)
+    loop = SampledLoop(motion, task.rate, LOCKSTEP_START, force_delay=task.force_delay)
+    washout = RecordingWashout(controller)
+    measures = simulate_sampled(loop, motion, washout, duration, CycleMeter(5))
+    return measures, washout.peak
+
+
+def proposal(found: Design) -> WashoutParameters:
+    assert found.controller is not None, found.remark
+    return found.controller
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        FEED,
+        replace(FEED, force_limit=100.0),
+        pytest.param(replace(FEED, force_delay=0.005, force_limit=150.0), marks=pytest.mark.long),
+        pytest.param(
+            replace(FEED, belt_speeds=(0.008, 0.04), force_limit=300.0), marks=pytest.mark.long
+        ),
+    ],
+)
+def test_a_proposal_brings_the_drive_to_rest_from_its_own_limit_cycle(task: Task) -> None:
+    found = designed(task)
+    controller = proposal(found)
+    for speed in (*task.belt_speeds, sum(task.belt_speeds) / 2.0):
+        drive = replace(task.drive, belt_speed=speed)
+        start = 2.0 + controller.start_after
+        longest = max(check.settling_time or 0.0 for check in found.checks)
+        late = replace(controller, start_after=start, force_limit=inf)
+        measures, peak = controlled(drive, task, late, start + 5.0 * longest + 1.0)
+        assert measures.regime is Regime.EQUILIBRIUM
+        assert 0.0 < peak <= task.force_limit
+    assert found.parameter_file is not None
+
+
+def test_what_is_predicted_is_what_is_simulated() -> None:
+    found = designed(replace(FEED, force_limit=100.0))
+    for check in found.checks:
+        assert check.vibrates
+        assert check.settling_time is not None
+        assert check.settling_time < 1.2 * check.predicted_settling_time
+        assert check.peak_force == pytest.approx(check.predicted_peak_force, rel=0.02)
+        assert check.predicted_peak_force <= 100.0
+    assert len({check.belt_speed for check in found.checks}) == len(found.checks) > 3
+
+
+def test_nothing_near_a_proposal_is_much_faster() -> None:
+    found = designed(FEED)
+    gains = proposal(found).gains
+    loops = [
+        LinearSampledLoop.of(replace(FEED_DRIVE, belt_speed=speed), 1000.0)
+        for speed in (0.036, 0.04, 0.044)
+    ]
+    corners = gains.corner_frequency * np.linspace(0.5, 2.0, 31)
+    linear = gains.linear * np.linspace(0.5, 2.0, 31)
+    rates = np.min([loop.decay_rates(corners, linear) for loop in loops if loop], axis=0)
+    proposed = min(loop.decay_rate(gains) for loop in loops if loop)
+    assert proposed > 0.95 * rates.max()
+
+
+def test_margins_lead_to_the_edge_of_stability() -> None:
+    loop = LinearSampledLoop.of(FEED_DRIVE, 1000.0, 0.0025)
+    assert loop is not None
+    gains = proposal(designed(replace(FEED, force_delay=0.0025))).gains
+    found = margins(loop, gains)
+    for factor in (found.gain_down, found.gain_up):
+        assert factor is not None
+        at_edge = replace(gains, linear=factor * gains.linear)
+        assert loop.spectral_radius(at_edge) == pytest.approx(1.0, abs=1e-9)
+    assert found.delay is not None
+    late = replace(loop, force_delay=0.0025 + found.delay)
+    assert late.spectral_radius(gains) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.long
+def test_a_tighter_limit_is_slower_and_in_the_end_there_is_nothing() -> None:
+    rates = []
+    for limit in (600.0, 200.0, 100.0):
+        found = designed(replace(FEED, force_limit=limit))
+        rates.append(min(check.decay_rate for check in found.checks))
+    assert rates == sorted(rates, reverse=True)
+    found = designed(replace(FEED, force_limit=30.0))
+    assert found.controller is None
+    assert found.parameter_file is None
+    assert "force limit of 30 N is too small" in (found.remark or "")
+
+
+@pytest.mark.long
+def test_the_cubic_gain_is_within_what_the_friction_law_bears() -> None:
+    """The law's own, (mu_s - mu_m) N / (2 v_m^3), is 6e5 N s^3/m^3."""
+    controller = proposal(designed(replace(FEED, force_limit=100.0)))
+    assert 0.0 <= controller.cubic_gain <= 3e5
+    # From any speed it comes back, even with a force that is not limited.
+    for speed in (0.3, -3.0, 30.0):
+        motion = Motion(FEED_DRIVE, 0.0, speed, record=True)
+        loop = SampledLoop(motion, 1000.0, LOCKSTEP_START)
+        free = replace(controller, force_limit=inf, start_after=0.0)
+        measures = simulate_sampled(loop, motion, Washout(free), 8.0, CycleMeter(5))
+        assert measures.regime is Regime.EQUILIBRIUM
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("friction", [Coulomb(0.4), Exponential(0.4, 0.25, 0.1, 0.0)])
+def test_a_law_that_does_not_grow_with_speed_gets_no_cubic_gain(friction: FrictionLaw) -> None:
+    drive = replace(FEED_DRIVE, friction=friction, damping=100.0)
+    found = designed(replace(FEED, drive=drive, force_limit=200.0))
+    assert proposal(found).cubic_gain == 0.0
+
+
+def test_on_a_slow_belt_too_the_vibration_is_seen() -> None:
+    """At 0.2 mm/s the slide sticks for dozens of natural periods in each cycle."""
+    found = designed(replace(FEED, belt_speeds=(0.0002, 0.0002)))
+    (check,) = found.checks
+    assert check.vibrates
+    assert proposal(found).linear_gain < 0.0
+
+
+def test_where_nothing_vibrates_the_gains_are_zero() -> None:
+    found = designed(replace(FEED, belt_speeds=(0.055, 0.06)))
+    controller = proposal(found)
+    assert (controller.linear_gain, controller.cubic_gain) == (0.0, 0.0)
+    assert "nothing vibrates" in (found.remark or "")
+    assert not any(check.vibrates for check in found.checks)
+    assert all(check.settling_time is None for check in found.checks)
+
+
+@pytest.mark.parametrize(
+    ("task", "reason"),
+    [
+        (replace(FEED, rate=10.0), "no linear gain"),
+        (replace(FEED, force_delay=1.0), "1000 periods late"),
+        (replace(FEED, drive=replace(FEED_DRIVE, friction=Linear(0.4, 9.0))), "runs away"),
+        (replace(FEED, force_limit=0.0), "too small"),
+    ],
+)
+def test_where_there_is_nothing_to_propose_it_says_why(task: Task, reason: str) -> None:
+    found = designed(task)
+    assert found.controller is None
+    assert reason in (found.remark or "")
+
+
+def test_what_a_limited_force_cannot_do_is_said() -> None:
+    drive = replace(FEED_DRIVE, friction=Linear(0.4, 4.5))
+    found = designed(replace(FEED, drive=drive, force_limit=600.0))
+    assert proposal(found).cubic_gain == 0.0
+    assert "needs more force than the limit" in (found.remark or "")
+
+
+@pytest.mark.long
+def test_it_is_the_same_every_time_and_progress_reaches_the_end() -> None:
+    shares: list[float] = []
+    first = design(replace(FEED, force_limit=200.0), shares.append)
+    second = designed(replace(FEED, force_limit=200.0))
+    assert (first.controller, first.checks) == (second.controller, second.checks)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+
+def test_the_parameter_file_is_one(tmp_path: Path) -> None:
+    found = designed(replace(FEED, force_limit=200.0))
+    assert found.parameter_file is not None
+    read = load_scenario(scenario_file(tmp_path, found.parameter_file))
+    assert read.washout_controller.as_washout() == found.controller
+
+
+@pytest.mark.parametrize("belt_speeds", [(2.0, 1.0), (0.0, 1.0), (-1.0, 1.0), (0.1, inf)])
+def test_no_range_of_belt_speeds(belt_speeds: tuple[float, float]) -> None:
+    with pytest.raises(InvalidInputError, match="above zero"):
+        Task.of(load_scenario("feed_drive"), belt_speeds)
+    with pytest.raises(InvalidInputError, match="must be given"):
+        Task.of(load_scenario("feed_drive", ["plant.belt_speed=0"]))
+
+
+@pytest.mark.parametrize("direction", ["", "-"])
+def test_the_range_is_about_the_belt_speed_of_the_scenario(direction: str) -> None:
+    scenario = load_scenario("feed_drive", [f"plant.belt_speed={direction}0.04"])
+    assert Task.of(scenario).belt_speeds == pytest.approx((0.036, 0.044))
