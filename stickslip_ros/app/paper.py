@@ -1,0 +1,103 @@
+"""`stickslip paper`: the paper's figures and claims again, from the equations."""
+
+import argparse
+import json
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+
+from stickslip_ros.app.arguments import add_json
+from stickslip_ros.app.output import print_json, print_table, progress_bar
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.plots.paper_figures import draw_paper_figure
+from stickslip_ros.studies.paper.claims import CLAIMS, Evidence, Finding
+from stickslip_ros.studies.paper.figures import (
+    NUMBERS,
+    BifurcationFigure,
+    PaperFigure,
+    compute_figure,
+)
+from stickslip_ros.studies.paper.marks import marks
+from stickslip_ros.studies.paper.report import as_markdown, report, verdict_counts
+from stickslip_ros.versions import versions
+
+NAME = "paper"
+HELP = "reproduce the paper: its figures 2 to 13, and a report on every number and claim"
+
+_REPORT = "reproduction"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument(
+        "--out",
+        required=True,
+        type=Path,
+        metavar="DIR",
+        help=f"directory for {_REPORT}.md, {_REPORT}.json and the pictures in {_REPORT}/; what an "
+        "earlier call left there is replaced",
+    )
+    add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command; return the exit status."""
+    out: Path = arguments.out
+    pictures = out / _REPORT
+    try:
+        pictures.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InvalidInputError(f"--out {out}: cannot be made: {error.strerror}") from None
+    figures = _draw_figures(pictures)
+    findings = _judge(figures)
+    found = report(findings, {f"{_REPORT}/{_name(n)}": figures[n] for n in NUMBERS})
+    text = json.dumps(found, indent=1, ensure_ascii=False, allow_nan=False)
+    (out / f"{_REPORT}.json").write_text(f"{text}\n", encoding="utf-8")
+    (out / f"{_REPORT}.md").write_text(as_markdown(found), encoding="utf-8")
+    if arguments.json:
+        print_json({**found, "versions": versions()})
+    else:
+        rows = [[verdict, str(count)] for verdict, count in verdict_counts(found).items()]
+        print_table(f"{len(findings)} claims of the paper", ["verdict", "claims"], rows)
+        print(f"report:   {out / _REPORT}.md, {out / _REPORT}.json\npictures: {pictures}")
+    return 0
+
+
+def _name(number: int) -> str:
+    return f"figure_{number:02}.png"
+
+
+def _draw_figures(folder: Path) -> dict[int, PaperFigure]:
+    """Compute and draw the figures, several at a time."""
+    figures: dict[int, PaperFigure] = {}
+    # Not forked: heyoka's compiler has threads, which a fork would lose.
+    with (
+        progress_bar("figures", len(NUMBERS)) as progress,
+        ProcessPoolExecutor(mp_context=get_context("spawn")) as pool,
+    ):
+        jobs = {pool.submit(_draw, number, folder / _name(number)): number for number in NUMBERS}
+        try:
+            for job in as_completed(jobs):
+                figures[jobs[job]] = job.result()
+                progress(len(figures))
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    return figures
+
+
+def _draw(number: int, path: Path) -> PaperFigure:
+    figure = compute_figure(number)
+    transitions = marks(figure) if isinstance(figure, BifurcationFigure) else {}
+    draw_paper_figure(path, figure, transitions)
+    return figure
+
+
+def _judge(figures: dict[int, PaperFigure]) -> dict[str, Finding]:
+    evidence = Evidence(figures.__getitem__)
+    findings: dict[str, Finding] = {}
+    with progress_bar("claims", len(CLAIMS)) as progress:
+        for claim in CLAIMS:
+            findings[claim.identifier] = claim.check(evidence)
+            progress(len(findings))
+    return findings
