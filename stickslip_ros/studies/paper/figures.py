@@ -206,28 +206,28 @@ _SETTLED_ON = f"What the motion from rest is after {TRANSIENT_PERIODS:g} natural
 
 _BIFURCATIONS = {
     2: _Bifurcation(
-        f"{_SETTLED_ON}, over the belt speed",
+        f"{_SETTLED_ON}, over the belt speed: β = 0.01",
         "belt speed v0",
         0.0,
         1.0,
         unit_drive,
     ),
     3: _Bifurcation(
-        f"{_SETTLED_ON}, over the damping",
+        f"{_SETTLED_ON}, over the damping: v0 = 0.477",
         "damping β (the coefficient of dX/dτ is 2β)",
         0.0,
         0.05,
         _of_damping,
     ),
     4: _Bifurcation(
-        f"{_SETTLED_ON}, over the stiffness",
+        f"{_SETTLED_ON}, over the stiffness: v0 = 0.2, β = 0.01",
         "stiffness (at fixed scales)",
         0.2,
         5.0,
         _of_stiffness,
     ),
     5: _Bifurcation(
-        f"{_SETTLED_ON}, over the ratio of friction coefficients",
+        f"{_SETTLED_ON}, over the ratio of friction coefficients: v0 = 0.4, β = 0.01, μs = 0.4",
         "static over smallest kinetic coefficient μs/μm",
         1.0,
         2.0,

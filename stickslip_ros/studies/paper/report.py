@@ -23,7 +23,8 @@ pictures, and `reproduction.json`, which has the same findings in full precision
 
 Nothing in the column *computed* comes from the paper. It is about the drive with mass, stiffness
 and normal force of one, for which SI and dimensionless numbers are the same, with mu_s = 0.4,
-mu_m = 0.25 and v_m = 0.5, unless a line says otherwise. A number holds if the computed one is it
+mu_m = 0.25, v_m = 0.5 and beta = 0.01 in eq. 5 (a damping coefficient 2 beta of 0.02), unless a
+line says otherwise. A number holds if the computed one is it
 when rounded to the last digit that is printed. A correction is another calculation, stated, that
 does give what is printed or that makes a formula right.
 """
@@ -32,8 +33,9 @@ _FIGURES = """\
 ## The figures
 
 The paper's figures 2 to 13 again, from the equations. Where the paper does not print the parameter
-values, these are ours, chosen to show what its text is about; they stand in the pictures.
-Everything is dimensionless and starts from rest at X = 0. Figure 1 is a drawing of the model.
+values, these are ours, chosen to show what its text is about: those that stand in the pictures,
+and else beta = 0.01, stiffness 1, mu_s = 0.4, mu_m = 0.25 and v_m = 0.5. Everything is
+dimensionless and starts from rest at X = 0. Figure 1 is a drawing of the model.
 """
 
 _COLUMNS = ("", "claim", "printed", "computed", "difference", "verdict")
@@ -75,15 +77,24 @@ def as_markdown(report: Report) -> str:
     """Return the report as a page."""
     counts = [(verdict, str(count)) for verdict, count in verdict_counts(report).items()]
     parts = [_HEAD, _table([("verdict", "claims"), ("---", "---:"), *counts])]
+    failing = (claim for claim in report["claims"] if claim["verdict"] == Verdict.FAILS)
+    parts.append(
+        f"What does not hold; the evidence stands below:\n\n{''.join(map(_line, failing))}"
+    )
     for title, claims in groupby(report["claims"], key=lambda claim: claim["chapter"]):
         rows = [_COLUMNS, ["---"] * len(_COLUMNS), *map(_cells, claims)]
         parts.append(f"## {title}\n\n{_table(rows)}")
     parts.append(_FIGURES)
     for figure in report["figures"]:
         number, caption = figure["number"], figure["caption"]
-        picture = f"![Figure {number}: {caption}]({figure['picture']})"
+        picture = f"![Figure {number}]({figure['picture']})"
         parts.append(f"### Figure {number}\n\n{caption}\n\n{picture}\n")
     return "\n".join(parts)
+
+
+def _line(claim: Mapping[str, Any]) -> str:
+    printed = f" (printed: {_shown(claim['printed'])})" if claim["printed"] is not None else ""
+    return f"- {claim['place']}: {claim['statement']}{printed}\n"
 
 
 def _cells(claim: Mapping[str, Any]) -> list[str]:
@@ -110,9 +121,8 @@ def _shown(value: float | str | None, digits: int = 6) -> str:
 
 
 def _caption(figure: PaperFigure) -> str:
-    if not isinstance(figure, BifurcationFigure):
-        return f"{figure.title}."
-    start, end = figure.values[[0, -1]]
-    return (
-        f"{figure.title}: {len(figure.values)} values of {figure.parameter}, {start:g} to {end:g}."
-    )
+    if isinstance(figure, BifurcationFigure):
+        start, end = figure.values[[0, -1]]
+        values = f"{len(figure.values)} values of {figure.parameter} from {start:g} to {end:g}"
+        return f"{figure.title}; {values}."
+    return f"{figure.title}."

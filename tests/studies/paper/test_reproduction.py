@@ -46,6 +46,8 @@ def check(claim: Claim, finding: Finding) -> None:
     for now, then in ((finding.computed, kept["computed"]), (finding.remark, kept["remark"])):
         if isinstance(now, str):
             assert same_text(now, then), f"{claim.identifier}: {now!r} was {then!r}"
+        elif now is None:
+            assert then is None
         else:
             assert now == pytest.approx(then, rel=1e-6, abs=1e-9)
     if finding.difference is not None:
