@@ -1,6 +1,8 @@
 """Arguments that several commands have."""
 
 import argparse
+from collections.abc import Generator
+from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -53,6 +55,15 @@ def check_picture(path: Path) -> None:
         raise InvalidInputError(f"--plot {path}: must end in one of {', '.join(_PICTURES)}")
     if not path.absolute().parent.is_dir():
         raise InvalidInputError(f"--plot {path}: there is no directory {path.parent}")
+
+
+@contextmanager
+def writing(option: str, path: Path) -> Generator[None]:
+    """Refuse `path`, given with `option`, if the system does not let it be written."""
+    try:
+        yield
+    except OSError as error:
+        raise InvalidInputError(f"{option} {path}: cannot be written: {error.strerror}") from None
 
 
 def scenario_of(

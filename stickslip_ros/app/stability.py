@@ -123,9 +123,8 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
     gains = scenario.washout_controller.as_washout().gains if plant.expects_control else None
     notes: Notes = {}
     expansion = expand(drive)
-    position = None if expansion is None else float(expansion.equilibrium[0]) * drive.length_scale
     found: Section = {
-        "equilibrium_position": position,
+        "equilibrium_position": drive.equilibrium_position if expansion else None,
         "open_loop": _open_loop(drive, expansion, notes),
         "sticking": _sticking(drive, notes),
         "closed_loop": _closed_loop(drive, gains, notes),

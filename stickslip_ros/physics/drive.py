@@ -49,6 +49,11 @@ class Drive:
         return self.angular_frequency * self.length_scale
 
     @property
+    def equilibrium_position(self) -> float:
+        """Displacement of a slide at rest, m, eq. 6; on a belt at rest it may be any other too."""
+        return float(self.friction.at_rest(self.belt_speed)) * self.length_scale
+
+    @property
     def damping_coefficient(self) -> float:
         """Dimensionless damping 2 beta = c / sqrt(k m), the coefficient of X'."""
         return self.damping / sqrt(self.stiffness * self.mass)

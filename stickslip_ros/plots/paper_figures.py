@@ -163,7 +163,7 @@ def _portrait(axes: Axes, portrait: Portrait) -> None:
         sticking = last.sticking | np.append(last.sticking[1:], False)
         stuck = np.where(sticking, last.position, np.nan)
         axes.plot(stuck, np.full(len(last), belt_speed), color=ORANGE, lw=3.0)
-    axes.plot(portrait.equilibrium, 0.0, "o", color=GREEN, ms=4.0)
+    axes.plot(portrait.drive.equilibrium_position, 0.0, "o", color=GREEN, ms=4.0)
     axes.set_title(f"{portrait.case.label}\n{_outcome(portrait)}", fontsize=8)
     axes.tick_params(labelsize=7)
 

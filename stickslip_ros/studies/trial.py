@@ -13,6 +13,7 @@ from stickslip_ros.physics.measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.samples import NANOSECONDS
+from stickslip_ros.physics.theory.returns import release_position
 from stickslip_ros.physics.theory.sampled import SETTLED
 from stickslip_ros.physics.washout import Washout, WashoutParameters
 
@@ -42,15 +43,12 @@ class Vibration:
     """Velocity at the same samples."""
 
     @property
-    def equilibrium(self) -> float:
-        """Displacement at rest, eq. 6, m."""
-        return _equilibrium(self.drive)
-
-    @property
     def size(self) -> float:
         """Largest distance from the equilibrium, m/s; 0 if it does not vibrate."""
         omega = self.drive.angular_frequency
-        distances = np.hypot(omega * (self.position - self.equilibrium), self.velocity)
+        distances = np.hypot(
+            omega * (self.position - self.drive.equilibrium_position), self.velocity
+        )
         return float(distances.max(initial=0.0))
 
     @property
@@ -100,8 +98,7 @@ class Bench:
         motion = self._recording
         motion.drive = drive
         speed = drive.belt_speed
-        torn = drive.friction.static * drive.normal_force - drive.damping * speed
-        motion.restart(torn / drive.stiffness, speed)
+        motion.restart(release_position(drive), speed)
         # On a slow belt a cycle is mostly the time in which the belt loads the spring.
         loading = 2.0 * drive.friction.static * drive.length_scale / speed
         found, before = self._measured(loading), inf
@@ -170,7 +167,7 @@ class Bench:
                 law = Washout(replace(washout, start_after=0.0))
                 if resting:
                     law.answer(self._stamp(0), 0.0)
-                start = (_equilibrium(drive), velocity)
+                start = (drive.equilibrium_position, velocity)
                 outcomes.append(self._run(drive, law, self._stamp(1), start, patience, speed))
         return outcomes
 
@@ -192,7 +189,7 @@ class Bench:
         motion.drive = drive
         motion.restart(*start)
         loop = SampledLoop(motion, self._rate, stamp, force_delay=self._force_delay)
-        omega, equilibrium = drive.angular_frequency, _equilibrium(drive)
+        omega, equilibrium = drive.angular_frequency, drive.equilibrium_position
         calm = ceil((drive.natural_period + self._force_delay) * self._rate)
         peak, last, recent = 0.0, 0, 0.0
         samples = max(ceil(patience * self._rate), calm)
@@ -216,12 +213,6 @@ class Bench:
             last / self._rate if settled else None,
             loop.unbounded or (not settled and recent >= size),
         )
-
-
-def _equilibrium(drive: Drive) -> float:
-    sign = -1.0 if drive.belt_speed > 0.0 else 1.0
-    friction = drive.friction.coefficient(-drive.belt_speed, sign)
-    return float(friction) * drive.length_scale
 
 
 def _whole_cycles(samples_per_cycle: float) -> int:

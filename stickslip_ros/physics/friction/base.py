@@ -5,6 +5,8 @@ from dataclasses import dataclass, fields, replace
 from math import inf
 from typing import Any, ClassVar, Self
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class FrictionLaw(ABC):
@@ -28,6 +30,10 @@ class FrictionLaw(ABC):
         `sign` stands apart so that the branch stays smooth, and can be followed by an
         integrator, up to and beyond v_r = 0.
         """
+
+    def at_rest(self, belt_speed: Any) -> Any:
+        """Return mu(-v_belt), eq. 6: what carries a slide at rest on a belt that is not."""
+        return self.coefficient(-belt_speed, -np.sign(belt_speed))
 
     @property
     def sudden_speed(self) -> float:

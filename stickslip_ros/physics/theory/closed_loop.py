@@ -7,6 +7,9 @@ from stickslip_ros.physics.equations import WashoutGains
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
 
+_ROUNDING = 1e-9
+"""Change of a determinant with the gain, as a share of it, below which it is taken for none."""
+
 
 @dataclass(frozen=True)
 class CriticalGains:
@@ -30,11 +33,12 @@ def critical_gains(drive: Drive, gains: WashoutGains) -> CriticalGains | None:
         return None
     critical = replace(gains, linear=linear)
     sigma = _sigma(drive, critical)
-    # sigma is affine in the cubic gain, which the third derivatives alone contain, linearly.
-    unit = drive.normal_force / drive.speed_scale**3
-    without, with_unit = (_sigma(drive, replace(critical, cubic=cubic)) for cubic in (0.0, unit))
-    slope = with_unit - without
-    cubic = 0.0 - without / slope * unit if slope != 0.0 else None
+    # sigma is affine in the cubic gain, which the third derivatives alone contain, linearly. A
+    # large one drowns the rounding of the rest.
+    large = 1e9 * drive.normal_force / drive.speed_scale**3
+    without, with_large = (_sigma(drive, replace(critical, cubic=cubic)) for cubic in (0.0, large))
+    slope = with_large - without
+    cubic = 0.0 - without / slope * large if slope != 0.0 else None
     return CriticalGains(linear, sigma, cubic)
 
 
@@ -52,7 +56,8 @@ def _critical_linear_gain(drive: Drive, gains: WashoutGains) -> float | None:
             return None
         margins.append(float(hurwitz_determinants(expansion.jacobian)[-1]))
     slope = margins[1] - margins[0]
-    return None if slope >= 0.0 else -margins[0] / slope * unit
+    least = _ROUNDING * max(1.0, *map(abs, margins))
+    return None if slope > -least else -margins[0] / slope * unit
 
 
 def _sigma(drive: Drive, gains: WashoutGains) -> float:

@@ -96,7 +96,10 @@ def hurwitz_determinants(jacobian: FloatArray) -> FloatArray:
     determinant = np.linalg.det(jacobian)
     if jacobian.shape[-1] == 2:
         return np.stack([determinant, -trace], axis=-1)
-    minors = (trace**2 - np.trace(jacobian @ jacobian, axis1=-2, axis2=-1)) / 2.0
+    minors = sum(
+        jacobian[..., i, i] * jacobian[..., j, j] - jacobian[..., i, j] * jacobian[..., j, i]
+        for i, j in ((0, 1), (0, 2), (1, 2))
+    )
     return np.stack([-determinant, -trace, determinant - trace * minors], axis=-1)
 
 
@@ -152,7 +155,7 @@ def _at_equilibrium(
     field = _smooth_field(type(drive.friction), gains is not None)
     sign = -copysign(1.0, belt_speeds[0])
     law = drive.friction.scaled(drive.speed_scale)
-    positions = law.coefficient(-belt_speeds, sign)
+    positions = law.at_rest(belt_speeds)
     states = np.zeros((field.order, len(belt_speeds)))
     states[0] = positions
     values: dict[str, float | FloatArray] = {

@@ -9,9 +9,7 @@ from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.equations import WashoutGains
 from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.physics.motion import Motion
-
-SPEED = 1
-"""Where the slide's speed Y stands in the state."""
+from stickslip_ros.physics.theory.linear import SPEED
 
 
 class SensitiveMotion(Motion):

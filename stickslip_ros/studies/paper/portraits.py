@@ -62,13 +62,6 @@ class Portrait:
         return self.measures.regime is Regime.UNBOUNDED
 
     @property
-    def equilibrium(self) -> float:
-        """Displacement of the slide at rest on the moving belt, m, eq. 6."""
-        drive = self.drive
-        coefficient = drive.friction.coefficient(-drive.belt_speed, -np.sign(drive.belt_speed))
-        return float(coefficient) * drive.length_scale
-
-    @property
     def last_cycles(self) -> Knots:
         """The end of the trajectory: `LAST_CYCLES` cycles, or natural periods where none are."""
         time = self.trajectory.time

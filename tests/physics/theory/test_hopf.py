@@ -3,6 +3,7 @@
 from dataclasses import replace
 from math import sqrt
 
+import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -15,7 +16,7 @@ from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.physics.theory.hopf import hopf_points
-from stickslip_ros.physics.theory.linear import expand
+from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants, jacobians
 from tests.physics.drives import FEED_DRIVE, PAPER
 
 cubic_drives = st.builds(
@@ -94,14 +95,16 @@ def test_the_exponential_law_is_subcritical() -> None:
     assert not point.supercritical
 
 
-def test_an_overdamped_pass_through_zero_is_no_hopf_point() -> None:
-    """Two real eigenvalues of opposite sign sum up to zero in no stable loop of this kind."""
-    gains = WashoutGains(10.0, -0.1, 0.0)
-    for point in hopf_points(replace(PAPER, belt_speed=0.3), gains):
-        expansion = expand(replace(PAPER, belt_speed=point.belt_speed), gains)
-        assert expansion is not None
-        assert abs(expansion.eigenvalues[0].real) < 1e-12
-        assert expansion.eigenvalues[0].imag > 0.1
+def test_real_eigenvalues_of_opposite_sign_are_no_hopf_point() -> None:
+    gains = WashoutGains(10.0, 15.0, 0.0)
+    speeds = np.geomspace(1e-3, 10.0, 2001)
+    margins = hurwitz_determinants(jacobians(PAPER, gains, speeds))[:, -1]
+    assert np.count_nonzero(np.diff(np.sign(margins))) == 2
+    (point,) = hopf_points(PAPER, gains)
+    expansion = expand(replace(PAPER, belt_speed=point.belt_speed), gains)
+    assert expansion is not None
+    pair = [value for value in expansion.eigenvalues if value.imag > 0.0]
+    assert [abs(value.real) < 1e-10 for value in pair] == [True]
 
 
 def speed_amplitude(drive: Drive, gains: WashoutGains | None, periods: int) -> float:

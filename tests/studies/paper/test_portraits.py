@@ -38,7 +38,7 @@ def test_trajectory_of_a_decaying_vibration() -> None:
     assert np.diff(time).max() < 0.11
     assert found.trajectory.position == pytest.approx(position, abs=1e-9)
     assert found.trajectory.velocity == pytest.approx(velocity, abs=1e-9)
-    assert found.equilibrium == pytest.approx(0.4)
+    assert found.drive.equilibrium_position == pytest.approx(0.4)
     assert found.measures.regime is Regime.EQUILIBRIUM
     assert found.least_relative_speed == pytest.approx(0.6)
 

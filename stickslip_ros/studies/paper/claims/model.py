@@ -316,8 +316,7 @@ def _(evidence: Evidence) -> Observation:
     ]
     resting = [measures.regime is Regime.EQUILIBRIUM for measures, _ in fast]
     off = max(
-        abs((measures.midpoint or 0.0) - float(drive.friction.coefficient(-drive.belt_speed, -1.0)))
-        for measures, drive in fast
+        abs((measures.midpoint or 0.0) - drive.equilibrium_position) for measures, drive in fast
     )
     return Observation(
         f"at {sum(resting)} of {len(fast)} belt speeds",

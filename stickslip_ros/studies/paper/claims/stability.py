@@ -107,7 +107,7 @@ def _() -> Formula:
 def _() -> Formula:
     speed, belt_speed = STATES[1], 1.2  # so high that no state overtakes the belt
     friction = STRIBECK.coefficient(speed - belt_speed, -1.0)
-    at_rest = STRIBECK.coefficient(-belt_speed, -1.0)
+    at_rest = STRIBECK.at_rest(belt_speed)
 
     def printed(last: float) -> FloatArray:
         return -0.45 * speed + 0.6 * (speed**3 + 3.0 * speed * belt_speed**2 - last * speed**2)
@@ -634,11 +634,12 @@ def _(_: Evidence) -> Observation:
 def _(evidence: Evidence) -> Observation:
     (portrait,) = [p for p in evidence.portraits(6).portraits if p.drive.belt_speed == 0.495]
     midpoint, amplitude = portrait.measures.midpoint or 0.0, portrait.measures.amplitude or 0.0
+    equilibrium = portrait.drive.equilibrium_position
     return Observation(
         f"X = {midpoint:.4f}",
         amplitude < 1e-4 and abs(midpoint) < 1e-4,
-        amplitude < 1e-4 and abs(midpoint - portrait.equilibrium) < 1e-4,
-        f"Its deviation does: X ends at the equilibrium {portrait.equilibrium:.4f} of eq. 6.",
+        amplitude < 1e-4 and abs(midpoint - equilibrium) < 1e-4,
+        f"Its deviation does: X ends at the equilibrium {equilibrium:.4f} of eq. 6.",
     )
 
 
