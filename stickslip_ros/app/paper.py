@@ -6,9 +6,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
 
-from stickslip_ros.app.arguments import add_json
+from stickslip_ros.app.arguments import add_json, writing
 from stickslip_ros.app.output import print_json, print_table, progress_bar
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.plots.paper_figures import draw_paper_figure
 from stickslip_ros.studies.paper.claims import CLAIMS, Evidence, Finding
 from stickslip_ros.studies.paper.figures import (
@@ -44,10 +43,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     out: Path = arguments.out
     pictures = out / _REPORT
-    try:
+    with writing("--out", out):
         pictures.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidInputError(f"--out {out}: cannot be made: {error.strerror}") from None
+        (pictures / _name(NUMBERS[0])).touch()
     figures = _draw_figures(pictures)
     findings = _judge(figures)
     found = report(findings, {f"{_REPORT}/{_name(n)}": figures[n] for n in NUMBERS})

@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Iterator
 from dataclasses import replace
-from math import copysign
+from math import copysign, isinf
 from pathlib import Path
 from typing import Any, cast
 
@@ -16,6 +16,7 @@ from stickslip_ros.app.arguments import (
     check_picture,
     made_of,
     scenario_of,
+    writing,
 )
 from stickslip_ros.app.output import (
     print_figures,
@@ -49,6 +50,9 @@ Notes = dict[str, str]
 """Why a quantity does not exist, by its place in the JSON."""
 
 _NO_CONTROL = "the scenario has no controller"
+
+_BALANCE = 1e-12
+"""Slope of the friction less the damping, dimensionless, that is rounding."""
 
 _DRAWN_RATES, _DRAWN_DELAY, _DRAWN_DELAYS = (0.1, 0.3, 1.0), 0.2, 41
 """Of the critical gain: rates, in the scenario's, the longest delay, in natural periods, and how
@@ -106,9 +110,13 @@ def run(arguments: argparse.Namespace) -> int:
     scenario = scenario_of(arguments)
     if arguments.plot is not None:
         check_picture(arguments.plot)
+        if not scenario.plant.expects_control:
+            raise InvalidInputError(f"--plot {arguments.plot}: nothing to draw: {_NO_CONTROL}")
+    with progress_bar(f"theory of {scenario.name}", None):
+        found, notes = stability(scenario)
+    if arguments.plot is not None:
         with progress_bar("drawing", None):
             _draw(arguments.plot, scenario)
-    found, notes = stability(scenario)
     if arguments.json:
         print_json({**found, "notes": notes, **made_of(scenario)})
     else:
@@ -132,11 +140,26 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
         "closed_forms": _closed_forms(drive, gains),
     }
     if expansion is None:
-        notes["equilibrium_position"] = (
+        reason = (
             "the belt rests, and friction holds the slide anywhere within mu_s N / k = "
             f"{drive.friction.static * drive.length_scale:.4g} m"
         )
+        for place, value in _places(found):
+            if value is None and not {place, place.split(".")[0]} & notes.keys():
+                notes[place] = reason
+    elif found["closed_forms"] is None:
+        notes["closed_forms"] = "there are closed forms for the cubic Stribeck law only"
     return found, notes
+
+
+def _places(found: Section) -> Iterator[tuple[str, Any]]:
+    """Yield the figures by their place, those of sections as section.name."""
+    for section, value in found.items():
+        if isinstance(value, dict):
+            figures = cast(Section, value)
+            yield from ((f"{section}.{name}", figure) for name, figure in figures.items())
+        else:
+            yield section, value
 
 
 def _eigenvalues(drive: Drive, expansion: Expansion | None) -> Section:
@@ -150,19 +173,27 @@ def _eigenvalues(drive: Drive, expansion: Expansion | None) -> Section:
 
 
 def _open_loop(drive: Drive, expansion: Expansion | None, notes: Notes) -> Section:
-    points = hopf_points(drive)
+    points, cycles = hopf_points(drive), limit_cycles(drive)
     if not points:
-        moving = expansion or expand(replace(drive, belt_speed=drive.speed_scale))
-        state = "stable" if moving and moving.stable else "unstable"
-        notes["open_loop.hopf_speeds"] = (
-            "the slope of the friction and the damping balance at no belt speed; the equilibrium "
-            f"is {state} at every one"
-        )
+        notes["open_loop.hopf_speeds"] = _why_no_hopf_speed(drive)
+    if not cycles:
+        notes["open_loop.limit_cycles"] = "no motion was found that repeats itself"
     return {
         **_eigenvalues(drive, expansion),
         **_hopf_points(points),
-        "limit_cycles": [_cycle(cycle) for cycle in limit_cycles(drive)],
+        "limit_cycles": [_cycle(cycle) for cycle in cycles],
     }
+
+
+def _why_no_hopf_speed(drive: Drive) -> str:
+    moving = expand(replace(drive, belt_speed=drive.belt_speed or drive.speed_scale))
+    assert moving is not None
+    if abs(moving.jacobian[SPEED, SPEED]) < _BALANCE:
+        return "the slope of the friction and the damping balance: the equilibrium is neutral"
+    return (
+        "the slope of the friction and the damping balance at no belt speed; the equilibrium is "
+        f"{'stable' if moving.stable else 'unstable'} at every one"
+    )
 
 
 def _hopf_points(points: list[HopfPoint]) -> Section:
@@ -197,12 +228,24 @@ def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Sect
     if critical is not None:
         values = (critical.linear, critical.first_lyapunov_coefficient, critical.cubic)
     elif expansion is not None:
-        notes["closed_loop.critical_linear_gain"] = _why_no_gain(drive, gains)
+        notes |= dict.fromkeys(
+            (f"closed_loop.{name}" for name in names), _why_no_gain(drive, gains)
+        )
+    points = hopf_points(drive, gains)
+    if not points:
+        notes["closed_loop.hopf_speeds"] = (
+            "at no belt speed does a pair of eigenvalues cross the imaginary axis with these gains"
+        )
+    cycle = limit_cycle_of_run(drive, 0.0, gains=gains)
+    if cycle is None:
+        notes["closed_loop.limit_cycles"] = (
+            "from rest at zero displacement no limit cycle is reached; others are not looked for"
+        )
     return {
         **_eigenvalues(drive, expansion),
         **dict(zip(names, values, strict=True)),
-        **_hopf_points(hopf_points(drive, gains)),
-        "limit_cycles": [_cycle(cycle) for cycle in _closed_loop_cycles(drive, gains)],
+        **_hopf_points(points),
+        "limit_cycles": [_cycle(cycle)] if cycle else [],
     }
 
 
@@ -217,13 +260,6 @@ def _why_no_gain(drive: Drive, gains: WashoutGains) -> str:
     )
 
 
-def _closed_loop_cycles(drive: Drive, gains: WashoutGains) -> Iterator[LimitCycle]:
-    """Yield the cycle to which rest at zero displacement leads, where it leads to one."""
-    cycle = limit_cycle_of_run(drive, 0.0, gains=gains)
-    if cycle is not None:
-        yield cycle
-
-
 def _sampled_loop(
     drive: Drive, gains: WashoutGains | None, rate: float, force_delay: float, notes: Notes
 ) -> Section:
@@ -235,10 +271,14 @@ def _sampled_loop(
     radius = loop.spectral_radius(gains)
     intervals = loop.stable_linear_gains(gains.corner_frequency)
     if not intervals:
-        notes["sampled_loop.critical_linear_gain"] = (
-            f"no linear gain stabilises the equilibrium at this rate and delay with a corner "
+        reason = (
+            "no linear gain stabilises the equilibrium at this rate and delay with a corner "
             f"frequency of {gains.corner_frequency:g} rad/s"
         )
+        for name in ("critical_linear_gain", "stable_linear_gains"):
+            notes[f"sampled_loop.{name}"] = reason
+    elif any(isinf(end) for interval in intervals for end in interval):
+        notes["sampled_loop.stable_linear_gains"] = "an end that is null, or infinite, is open"
     if radius >= 1.0:
         notes["sampled_loop.settling_time"] = "a deviation from the equilibrium grows"
     return {
@@ -252,33 +292,38 @@ def _sampled_loop(
 
 
 def _closed_forms(drive: Drive, gains: WashoutGains | None) -> Section | None:
-    """Return what can be written down for the cubic Stribeck law, in the same units."""
+    """Return what can be written down for the cubic Stribeck law, in the same units.
+
+    What does not exist is left out.
+    """
     cubic = CubicLoop.of(drive)
     if cubic is None:
         return None
     speed, force = drive.speed_scale, drive.normal_force
 
-    def scaled(value: float | None, unit: float) -> float | None:
-        return None if value is None else value * unit
-
     forms: Section = {
         "equilibrium_position": copysign(drive.length_scale, drive.belt_speed) * cubic.equilibrium,
-        "hopf_speed": scaled(cubic.hopf_speed, speed),
-        "crossing_speed": scaled(cubic.crossing_speed, drive.angular_frequency / speed),
         "first_lyapunov_coefficient": cubic.first_lyapunov_coefficient,
-        "onset_speed_approximate": scaled(cubic.sticking_onset, speed),
+        "hopf_speed": _scaled(cubic.hopf_speed, speed),
+        "crossing_speed": _scaled(cubic.crossing_speed, drive.angular_frequency / speed),
+        "onset_speed_approximate": _scaled(cubic.sticking_onset, speed),
     }
     if gains is not None:
         dimensionless = gains.scaled(drive)
         corner = dimensionless.corner_frequency
-        forms["closed_loop"] = {
-            "critical_linear_gain": scaled(cubic.critical_linear_gain(corner), force / speed),
-            "first_lyapunov_coefficient": cubic.critical_lyapunov_coefficient(
+        linear, cubic_gain = cubic.critical_linear_gain(corner), cubic.critical_cubic_gain(corner)
+        forms |= {
+            "critical_linear_gain": _scaled(linear, force / speed),
+            "critical_lyapunov_coefficient": cubic.critical_lyapunov_coefficient(
                 corner, dimensionless.cubic
             ),
-            "critical_cubic_gain": scaled(cubic.critical_cubic_gain(corner), force / speed**3),
+            "critical_cubic_gain": _scaled(cubic_gain, force / speed**3),
         }
-    return forms
+    return {name: form for name, form in forms.items() if form is not None}
+
+
+def _scaled(value: float | None, unit: float) -> float | None:
+    return None if value is None else value * unit
 
 
 def _cycle(cycle: LimitCycle) -> Section:
@@ -287,6 +332,8 @@ def _cycle(cycle: LimitCycle) -> Section:
         "stable": cycle.stable,
         "multipliers": [[value.real, value.imag] for value in cycle.multipliers],
         **cycle.measures.as_dict(),
+        "period": cycle.period,  # the measures have none for the smallest cycles
+        "frequency": 1.0 / cycle.period,
     }
 
 
@@ -304,7 +351,8 @@ def _draw(path: Path, scenario: Scenario) -> None:
     latest = min(_DRAWN_DELAY * drive.natural_period, LONGEST_DELAY / rates.max())
     delays = np.linspace(0.0, latest, _DRAWN_DELAYS)
     critical = CriticalGains.over(drive, gains.corner_frequency, rates, delays)
-    draw_stability_map(path, StabilityMap.around(loop, gains), critical)
+    with writing("--plot", path):
+        draw_stability_map(path, StabilityMap.around(loop, gains), critical)
 
 
 def _print(scenario: Scenario, found: Section, notes: Notes) -> None:
