@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Iterator
 from dataclasses import replace
-from math import copysign, isinf
+from math import copysign, isclose, isinf
 from pathlib import Path
 from typing import Any, cast
 
@@ -31,6 +31,7 @@ from stickslip_ros.physics.equations import WashoutGains
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
+from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import SPEED, Expansion, expand
 from stickslip_ros.physics.theory.sampled import (
@@ -236,17 +237,27 @@ def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Sect
         notes["closed_loop.hopf_speeds"] = (
             "at no belt speed does a pair of eigenvalues cross the imaginary axis with these gains"
         )
-    cycle = limit_cycle_of_run(drive, 0.0, gains=gains)
-    if cycle is None:
+    cycles = _closed_loop_cycles(drive, gains)
+    if not cycles:
         notes["closed_loop.limit_cycles"] = (
-            "from rest at zero displacement no limit cycle is reached; others are not looked for"
+            "none is reached from rest at zero displacement, and none from the Hopf point at the "
+            "critical linear gain; others are not looked for"
         )
     return {
         **_eigenvalues(drive, expansion),
         **dict(zip(names, values, strict=True)),
         **_hopf_points(points),
-        "limit_cycles": [_cycle(cycle)] if cycle else [],
+        "limit_cycles": [_cycle(cycle) for cycle in cycles],
     }
+
+
+def _closed_loop_cycles(drive: Drive, gains: WashoutGains) -> list[LimitCycle]:
+    """Return the limit cycles that can be come by, each once, the smallest first."""
+    cycles = [limit_cycle_from_hopf(drive, gains), limit_cycle_of_run(drive, 0.0, gains=gains)]
+    found = [cycle for cycle in cycles if cycle is not None]
+    if len(found) > 1 and isclose(found[0].position, found[1].position, rel_tol=1e-6):
+        found.pop()
+    return found
 
 
 def _why_no_gain(drive: Drive, gains: WashoutGains) -> str:

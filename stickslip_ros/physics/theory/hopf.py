@@ -41,6 +41,32 @@ class HopfPoint:
         return self.first_lyapunov_coefficient < 0.0
 
 
+@dataclass(frozen=True)
+class ComplexPair:
+    """The complex pair of eigenvalues; of two or three there cannot be another."""
+
+    growth: float
+    """Real part."""
+    frequency: float
+    """Imaginary part, above zero."""
+    right: npt.NDArray[np.complex128]
+    """q with A q = (growth + i frequency) q."""
+    left: npt.NDArray[np.complex128]
+    """p with A^T p = (growth - i frequency) p, and p* q = 1."""
+
+    @classmethod
+    def of(cls, expansion: Expansion) -> Self | None:
+        """Return the pair of the Jacobian; None if its eigenvalues are real."""
+        decomposed: Any = np.linalg.eig(expansion.jacobian)
+        values, right = decomposed
+        upper = int(np.argmax(values.imag))
+        if values[upper].imag <= 0.0:
+            return None
+        left = np.linalg.inv(right)[upper].conj()
+        value = complex(values[upper])
+        return cls(value.real, value.imag, right[:, upper], left)
+
+
 def hopf_points(drive: Drive, gains: WashoutGains | None = None) -> list[HopfPoint]:
     """Return the Hopf points over the belt speed, lowest first.
 
@@ -82,7 +108,7 @@ def first_lyapunov_coefficient(expansion: Expansion) -> float | None:
     amplitude along the eigenvector and is divided by the frequency.
     """
     jacobian, quadratic, cubic = expansion.jacobian, expansion.quadratic, expansion.cubic
-    pair = _Pair.of(expansion)
+    pair = ComplexPair.of(expansion)
     if pair is None:
         return None
     frequency, q, p = pair.frequency, pair.right, pair.left
@@ -101,7 +127,7 @@ def first_lyapunov_coefficient(expansion: Expansion) -> float | None:
 
 def crossing_speed(expansion: Expansion) -> float | None:
     """Return d Re(l)/d v0 of the complex pair l, eq. 11 and 22, dimensionless; None without one."""
-    pair = _Pair.of(expansion)
+    pair = ComplexPair.of(expansion)
     if pair is None:
         return None
     return float((pair.left.conj() @ expansion.jacobian_by_belt_speed @ pair.right).real)
@@ -109,24 +135,3 @@ def crossing_speed(expansion: Expansion) -> float | None:
 
 def _hopf_margins(drive: Drive, gains: WashoutGains | None, belt_speeds: FloatArray) -> FloatArray:
     return hurwitz_determinants(jacobians(drive, gains, belt_speeds))[:, -1]
-
-
-@dataclass(frozen=True)
-class _Pair:
-    """The complex pair of eigenvalues; of two or three there cannot be another."""
-
-    frequency: float
-    right: npt.NDArray[np.complex128]
-    """q with A q = i frequency q, at a Hopf point."""
-    left: npt.NDArray[np.complex128]
-    """p with A^T p = -i frequency p there, and p* q = 1."""
-
-    @classmethod
-    def of(cls, expansion: Expansion) -> Self | None:
-        decomposed: Any = np.linalg.eig(expansion.jacobian)
-        values, right = decomposed
-        upper = int(np.argmax(values.imag))
-        if values[upper].imag <= 0.0:
-            return None
-        left = np.linalg.inv(right)[upper].conj()
-        return cls(float(values[upper].imag), right[:, upper], left)

@@ -1,0 +1,87 @@
+"""The limit cycle that is born at the critical gain: stable above it, or unstable below."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip_ros.physics.equations import WashoutGains
+from stickslip_ros.physics.measures import CycleMeter, Measures, Regime
+from stickslip_ros.physics.theory.closed_loop import critical_gains
+from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
+from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run
+from stickslip_ros.physics.theory.sensitivity import SensitiveMotion
+from tests.physics.drives import FEED_DRIVE, PAPER
+
+SUBCRITICAL = WashoutGains(0.2, -0.16, 2.0)
+"""Beyond the critical gain (-0.148), with more cubic gain than the critical one (0.649)."""
+
+
+def settled(gains: WashoutGains, position: float, filter_state: float) -> Measures:
+    """What the loop does from there in the end; the slide rests at the start."""
+    motion = SensitiveMotion(PAPER, gains)
+    motion.start(np.array([position, 0.0, filter_state]))
+    motion.advance(300.0 * PAPER.natural_period)
+    motion.take_knots()
+    motion.advance(20.0 * PAPER.natural_period)
+    meter = CycleMeter(window=10)
+    meter.feed(motion.take_knots(), PAPER.belt_speed)
+    return meter.measures()
+
+
+def test_an_unstable_cycle_separates_rest_from_vibration() -> None:
+    critical = critical_gains(PAPER, SUBCRITICAL)
+    assert critical is not None
+    assert critical.first_lyapunov_coefficient > 0.0
+    cycle = limit_cycle_from_hopf(PAPER, SUBCRITICAL)
+    assert cycle is not None
+    assert cycle.filter_state is not None
+    assert cycle.multipliers[0].real > 1.0
+    assert not cycle.stable
+    distance = PAPER.equilibrium_position - cycle.position
+    for factor, regime in ((0.99, Regime.EQUILIBRIUM), (1.01, Regime.STICK_SLIP)):
+        start = PAPER.equilibrium_position - factor * distance
+        found = settled(SUBCRITICAL, start, factor * cycle.filter_state)
+        assert found.regime is regime
+    outer = limit_cycle_of_run(PAPER, 0.0, gains=SUBCRITICAL)
+    assert outer is not None
+    assert outer.stable
+    assert outer.position < cycle.position
+
+
+@pytest.mark.parametrize("corner_frequency", [0.2, 2.0])
+def test_a_stable_cycle_is_the_one_that_a_run_leads_to(corner_frequency: float) -> None:
+    critical = critical_gains(PAPER, WashoutGains(corner_frequency, 0.0, -1.0))
+    assert critical is not None
+    gains = WashoutGains(corner_frequency, 0.8 * critical.linear, -1.0)
+    cycle, by_run = (
+        limit_cycle_from_hopf(PAPER, gains),
+        limit_cycle_of_run(PAPER, 0.0, gains=gains),
+    )
+    assert cycle is not None
+    assert by_run is not None
+    assert cycle.stable
+    assert cycle.position == pytest.approx(by_run.position, rel=1e-9)
+    assert cycle.period == pytest.approx(by_run.period, rel=1e-9)
+
+
+def test_si_units() -> None:
+    force, speed = FEED_DRIVE.normal_force, FEED_DRIVE.speed_scale
+    gains = WashoutGains(
+        SUBCRITICAL.corner_frequency * FEED_DRIVE.angular_frequency,
+        SUBCRITICAL.linear * force / speed,
+        SUBCRITICAL.cubic * force / speed**3,
+    )
+    si, unit = limit_cycle_from_hopf(FEED_DRIVE, gains), limit_cycle_from_hopf(PAPER, SUBCRITICAL)
+    assert si is not None
+    assert unit is not None
+    assert si.position == pytest.approx(unit.position * FEED_DRIVE.length_scale, rel=1e-9)
+    assert si.multipliers[0] == pytest.approx(unit.multipliers[0], rel=1e-9)
+
+
+def test_none_on_the_other_side_of_the_critical_gain() -> None:
+    assert limit_cycle_from_hopf(PAPER, WashoutGains(2.0, -1.0, 0.0)) is None
+    assert limit_cycle_from_hopf(PAPER, replace(SUBCRITICAL, linear=-0.13)) is None
+    assert limit_cycle_from_hopf(PAPER, WashoutGains(10.0, -1.0, 0.0)) is None
+    resting = replace(PAPER, belt_speed=0.0)
+    assert limit_cycle_from_hopf(resting, SUBCRITICAL) is None
