@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from stickslip_ros.app.stability import stability as theory_of
+from stickslip_ros.scenario.files import load_scenario
 from tests.app.conftest import Run
 
 
@@ -86,10 +88,8 @@ def test_the_feed_drive_is_in_si_units(stickslip: Run) -> None:
         ["plant.force_delay=5000.0", "plant.damping=2.0"],
     ],
 )
-def test_what_does_not_exist_is_null_for_a_reason(stickslip: Run, overrides: list[str]) -> None:
-    options = [text for override in overrides for text in ("-p", override)]
-    found = stability(stickslip, "paper", *options)
-    notes = found["notes"]
+def test_what_does_not_exist_is_null_for_a_reason(overrides: list[str]) -> None:
+    found, notes = theory_of(load_scenario("paper", overrides))
     # What is said of a Hopf point stands in several lists, one reason for all of them.
     of_hopf = {"hopf_angular_frequencies", "crossing_speeds", "first_lyapunov_coefficients"}
     nulls: list[str] = []
