@@ -11,6 +11,7 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.parameter import parameter_value_to_python
 from rclpy.publisher import Publisher
+from rclpy.subscription import Subscription
 from rclpy.task import Future
 from std_msgs.msg import Float64
 
@@ -54,20 +55,17 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._bags_opened = 0
 
     def connect(self) -> None:
-        """Refuse a bag that cannot be; listen, and publish what is measured."""
+        """Refuse a bag that cannot be; publish what is measured."""
         if self.parameters.bag:
             check_new_bag(self._next_bag())
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
         self._pending: dict[str, list[bytes]] = {}
         self._channels: dict[str, int] = {}
-        for topic in RECORDED_TOPICS:
-            self._pending[topic.name] = []
-            self.subscribe(topic, partial(self._on_message, topic.name), DEEP)
         self._connections.append(self.every(_PROCESS_PERIOD, self._process))
         self._connections.append(self.every(self.parameters.flush_period, self._flush))
 
     def start(self) -> None:
-        """Open a bag and start to measure."""
+        """Open a bag, start to measure, and then listen: who is heard is not lost."""
         self._meter = RunMeter(self.parameters.window)
         self._cycles = self._unread = 0
         self._complaint = ""
@@ -82,6 +80,11 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             if node != "analyzer"
         }
         self._asked: list[Client] = []
+        self._listening: list[Subscription] = []
+        for topic in RECORDED_TOPICS:
+            self._pending[topic.name] = []
+            take = partial(self._on_message, topic.name)
+            self._listening.append(self.subscribe(topic, take, DEEP))
 
     def stop(self) -> None:
         """Measure what is left, close the bag with its report, and log the report."""
@@ -89,6 +92,9 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         report = self._meter.report()
         self.get_logger().info(f"report: {json.dumps(report)}")
         self.destroy_publisher(self._recorded)
+        for subscription in self._listening:
+            self._connections.remove(subscription)
+            self.destroy_subscription(subscription)
         for client in [*self._to_ask.values(), *self._asked]:
             self.destroy_client(client)
         self._keep("report", report)

@@ -13,6 +13,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSCompatibility, qos_check_compatible
+from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.timer import Timer
 
@@ -120,11 +121,13 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
 
     def subscribe(
         self, topic: Topic, callback: Callable[[bytes], None], depth: int | None = None
-    ) -> None:
+    ) -> Subscription:
         """Pass the serialized messages of a topic to `callback` until the node is cleaned up."""
-        self._connections.append(
-            self.create_subscription(topic.type, topic.name, callback, topic.qos(depth), raw=True)
+        subscription = self.create_subscription(
+            topic.type, topic.name, callback, topic.qos(depth), raw=True
         )
+        self._connections.append(subscription)
+        return subscription
 
     def wait_for_delivery(self, publisher: Publisher) -> None:
         """Wait, within bounds, until every reader has what was published."""

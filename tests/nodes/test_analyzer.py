@@ -56,6 +56,24 @@ def test_it_records_the_bytes_it_hears_and_measures_them(graph: Graph, tmp_path:
     assert json.loads(plant["belt_speed"]) == 0.2
 
 
+def test_it_listens_only_while_it_is_active(graph: Graph) -> None:
+    """A plant that waits for it must not take it for ready before it is."""
+    analyzer = graph.add(AnalyzerNode, autostart=False)
+
+    def readers() -> int:
+        return analyzer.count_subscribers(JOINT_STATES.name)
+
+    analyzer.trigger_configure()
+    plant = graph.add(PlantNode, wait_for=["analyzer"], expects_control=False)
+    assert readers() == 0
+    analyzer.trigger_activate()
+    graph.wait_until(lambda: plant.active, "plant active")
+    assert readers() == 1
+    graph.deactivate("plant")
+    graph.deactivate("analyzer")
+    graph.wait_until(lambda: readers() == 0, "it listens no more")
+
+
 def test_activated_again_it_opens_a_further_bag(graph: Graph, tmp_path: Path) -> None:
     analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
     for name in ("bag", "bag_2", "bag_3"):
