@@ -1,6 +1,8 @@
 """`stickslip design`: gains for a drive, tried out by simulation."""
 
 import argparse
+import sys
+from collections.abc import Iterable
 from dataclasses import asdict
 from math import isfinite
 from pathlib import Path
@@ -13,6 +15,7 @@ from stickslip_ros.app.arguments import (
     check_picture,
     made_of,
     scenario_of,
+    writing,
 )
 from stickslip_ros.app.output import print_json, print_table, progress_bar, quantities
 from stickslip_ros.errors import InvalidInputError
@@ -39,14 +42,13 @@ _MARGINS = {
     "gain_up": ("unstable above this multiple of it", ""),
     "delay": ("unstable with this further delay", "s"),
 }
-_CHECKS = {
-    "belt_speed": ("belt speed", "m/s"),
-    "vibrates": ("vibrates", ""),
+_WORST = {
     "predicted_settling_time": ("settles in", "s"),
     "settling_time": ("simulated", "s"),
     "predicted_peak_force": ("peak force", "N"),
     "peak_force": ("simulated", "N"),
 }
+_CHECKS = {"belt_speed": ("belt speed", "m/s"), "vibrates": ("vibrates", "")} | _WORST
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,14 +85,14 @@ def run(arguments: argparse.Namespace) -> int:
         check_picture(arguments.plot)
     with progress_bar(f"designing for {scenario.name}", 1.0) as progress:
         found = design(task, progress)
-    if arguments.out is not None and found.parameter_file is not None:
-        arguments.out.write_text(found.parameter_file, encoding="utf-8")
-    if arguments.plot is not None:
-        _draw(arguments.plot, found)
     if arguments.json:
         print_json({**_as_dict(found), **made_of(scenario)})
     else:
         _print(scenario.name, found)
+    if arguments.out is not None:
+        _write(arguments.out, found)
+    if arguments.plot is not None:
+        _draw(arguments.plot, found)
     return 0
 
 
@@ -113,12 +115,27 @@ def _refuse_unless_new(path: Path) -> None:
         raise InvalidInputError(f"--out {path}: there is no directory {path.parent}")
 
 
+def _write(path: Path, found: Design) -> None:
+    if found.parameter_file is None:
+        _leave_out(f"--out {path}: not written")
+        return
+    with writing("--out", path), path.open("x", encoding="utf-8") as file:
+        file.write(found.parameter_file)
+
+
 def _draw(path: Path, found: Design) -> None:
     # Half as long again to import as everything else.
     from stickslip_ros.plots.stability_map import draw_stability_map
 
-    if found.slowest is not None and found.controller is not None:
+    if found.slowest is None or found.controller is None:
+        _leave_out(f"--plot {path}: not drawn")
+        return
+    with writing("--plot", path):
         draw_stability_map(path, StabilityMap.around(found.slowest, found.controller.gains), None)
+
+
+def _leave_out(what: str) -> None:
+    print(f"stickslip {NAME}: {what}, for there is nothing to propose", file=sys.stderr)
 
 
 def _as_dict(found: Design) -> dict[str, Any]:
@@ -131,10 +148,7 @@ def _as_dict(found: Design) -> dict[str, Any]:
         "force_limit": task.force_limit,
         "worst_belt_speed": slowest.drive.belt_speed if slowest else None,
         "decay_rate": min((check.decay_rate for check in found.checks), default=None),
-        "settling_time": max(
-            (check.predicted_settling_time for check in found.checks), default=None
-        ),
-        "peak_force": max((check.predicted_peak_force for check in found.checks), default=None),
+        **{name: _largest(check[name] for check in checks) for name in _WORST},
         "margins": asdict(found.margins) if found.margins else dict.fromkeys(_MARGINS),
         "checks": checks,
         "parameter_file": found.parameter_file,
@@ -142,9 +156,13 @@ def _as_dict(found: Design) -> dict[str, Any]:
     }
 
 
+def _largest(values: Iterable[float | None]) -> float | None:
+    return max((value for value in values if value is not None), default=None)
+
+
 def _print(name: str, found: Design) -> None:
     task = f"{name}, belt speed {' to '.join(quantities(sorted({*found.task.belt_speeds}), 'm/s'))}"
-    if found.controller is not None and found.slowest is not None:
+    if found.controller is not None:
         figures = {
             name: value if isfinite(value) else None
             for name, value in asdict(found.controller).items()
@@ -159,8 +177,7 @@ def _print(name: str, found: Design) -> None:
                 [label, *quantities([figures[key]], unit)]
                 for key, (label, unit) in _MARGINS.items()
             ]
-            (speed,) = quantities([found.slowest.drive.belt_speed], "m/s")
-            print_table(f"at {speed}, where it settles most slowly", ["margins", ""], rows)
+            print_table("to instability at any of these belt speeds", ["margins", ""], rows)
         checks = [asdict(check) for check in found.checks]
         columns = [
             quantities([check[key] for check in checks], unit) for key, (_, unit) in _CHECKS.items()

@@ -39,7 +39,7 @@ from stickslip_ros.physics.theory.sampled import (
     LinearSampledLoop,
     why_no_linear_loop,
 )
-from stickslip_ros.physics.theory.stability_map import CriticalGains, StabilityMap
+from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from stickslip_ros.scenario.files import Scenario
 
@@ -361,7 +361,7 @@ def _draw(path: Path, scenario: Scenario) -> None:
     rates = plant.rate * np.array(_DRAWN_RATES)
     latest = min(_DRAWN_DELAY * drive.natural_period, LONGEST_DELAY / rates.max())
     delays = np.linspace(0.0, latest, _DRAWN_DELAYS)
-    critical = CriticalGains.over(drive, gains.corner_frequency, rates, delays)
+    critical = CriticalGainCurves.over(drive, gains.corner_frequency, rates, delays)
     with writing("--plot", path):
         draw_stability_map(path, StabilityMap.around(loop, gains), critical)
 

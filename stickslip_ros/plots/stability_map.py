@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from stickslip_ros.physics.theory.stability_map import CriticalGains, StabilityMap
+from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
 from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
 
 _LEVELS = 9
@@ -16,7 +16,9 @@ _UNSTABLE = "#eeeeee"
 _COLOURS = (BLUE, ORANGE, GREEN, SKY_BLUE, "black")
 
 
-def draw_stability_map(path: Path, found: StabilityMap, critical: CriticalGains | None) -> None:
+def draw_stability_map(
+    path: Path, found: StabilityMap, critical: CriticalGainCurves | None
+) -> None:
     """Write the map, and beside it the critical gain over the delay if given, to `path`.
 
     The format follows the ending.
@@ -64,7 +66,7 @@ def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> None:
     )
 
 
-def _draw_critical_gains(axes: Axes, critical: CriticalGains, found: StabilityMap) -> None:
+def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, found: StabilityMap) -> None:
     for index, (rate, gains) in enumerate(zip(critical.rates, critical.linear_gains, strict=True)):
         colour = _COLOURS[index % len(_COLOURS)]
         # Where it changes sign it jumps from one interval of gains to another.

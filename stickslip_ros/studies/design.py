@@ -18,6 +18,7 @@ from stickslip_ros.physics.equations import WashoutGains
 from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.physics.measures import Regime
 from stickslip_ros.physics.simulation import Progress
+from stickslip_ros.physics.theory.linear import SPEED
 from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.physics.theory.sampled import (
     LinearSampledLoop,
@@ -53,6 +54,9 @@ _THROWN = (3.0, 30.0, 300.0)
 _ATTEMPTS, _RESERVE, _RETREAT = 8, 0.95, 0.8
 """How often a proposal is tried, what share of what is allowed the first one uses, and by what
 factor the next one uses less."""
+
+_SHARE_OF_VIBRATIONS = 0.1
+"""Share of the work, about, that it is to find the vibrations without control."""
 
 _COARSE, _FINE, _GRIDS, _ZOOM = (25, 41), (9, 9), 5, 0.3
 """Corner frequencies and gains of the first grid, and of the next ones that close in on the best;
@@ -123,10 +127,10 @@ class Check:
 
 @dataclass(frozen=True)
 class Margins:
-    """How far a stable loop is from instability."""
+    """How far stable loops are from the instability of one of them: of all, the one next to it."""
 
     gain_down: float | None
-    """Factor below one of the linear gain that makes it unstable; None: there is none."""
+    """Factor below one of the linear gain that makes one unstable; None: there is none."""
     gain_up: float | None
     """Factor above one that does; None: there is none."""
     delay: float | None
@@ -146,7 +150,7 @@ class Design:
     slowest: LinearSampledLoop | None = None
     """The loop at the belt speed at which a small deviation dies out most slowly."""
     margins: Margins | None = None
-    """Those of that loop; None without control."""
+    """Those of the loops of all speeds; None without control."""
     checks: tuple[Check, ...] = ()
     """In the order of the belt speeds."""
 
@@ -170,9 +174,11 @@ def design(task: Task, progress: Progress = lambda _: None) -> Design:
     if reason is not None:
         return Design(task, remark=reason)
     bench = Bench(drives[0], task.rate, task.force_delay)
-    vibrations = [bench.vibration(drive) for drive in drives]
-    for drive, vibration in zip(drives, vibrations, strict=True):
-        if vibration.regime is Regime.UNBOUNDED:
+    vibrations: list[Vibration] = []
+    for number, drive in enumerate(drives, 1):
+        vibrations.append(bench.vibration(drive))
+        progress(_SHARE_OF_VIBRATIONS * number / len(drives))
+        if vibrations[-1].regime is Regime.UNBOUNDED:
             reason = (
                 f"without control the motion runs away at a belt speed of {drive.belt_speed:.4g} "
                 "m/s, so there is no limit cycle to catch it from"
@@ -187,7 +193,9 @@ def design(task: Task, progress: Progress = lambda _: None) -> Design:
             return Design(task, remark=failure or candidates.why_none())
         controller = _controller(task, gains)
 
-        def done(share: float, left: float = 0.5**attempt) -> None:
+        left = (1.0 - _SHARE_OF_VIBRATIONS) * 0.5**attempt
+
+        def done(share: float, left: float = left) -> None:
             progress(1.0 - left * (1.0 - 0.5 * share))
 
         failure = None
@@ -195,12 +203,15 @@ def design(task: Task, progress: Progress = lambda _: None) -> Design:
         while failure is None and len(checks) < len(drives):
             checks.append(_check(bench, candidates, len(checks), controller))
             failure = _failure(task, checks[-1])
-            done(len(checks) / len(drives))
+            done(0.5 * len(checks) / len(drives))
         slowest = candidates.slowest(gains)
         remark, found = candidates.why_zero(), None
         if failure is None and gains.linear != 0.0:
-            found = margins(slowest, gains)
-            remark, failure = _from_high_speeds(bench, slowest.drive, controller)
+            found = margins(candidates.loops, gains)
+            ends = [drive for drive in drives if drive in (drives[0], drives[-1], slowest.drive)]
+            remark, failure = _from_high_speeds(
+                bench, ends, controller, lambda share: done(0.5 + 0.5 * share)
+            )
         if failure is None:
             progress(1.0)
             return Design(task, controller, remark, slowest, found, tuple(checks))
@@ -214,18 +225,20 @@ def design(task: Task, progress: Progress = lambda _: None) -> Design:
     return Design(task, remark=failure)
 
 
-def margins(loop: LinearSampledLoop, gains: WashoutGains) -> Margins:
-    """Return how far a stable loop with these gains (SI units) is from instability."""
+def margins(loops: Sequence[LinearSampledLoop], gains: WashoutGains) -> Margins:
+    """Return how far loops that are stable with these gains (SI units) are from instability."""
     factors = [
         end / gains.linear
+        for loop in loops
         for interval in loop.stable_linear_gains(gains.corner_frequency)
         if interval.low < gains.linear < interval.high
         for end in interval
     ]
+    delays = [delay for loop in loops if (delay := _delay_margin(loop, gains)) is not None]
     return Margins(
-        gain_down=next((factor for factor in factors if 0.0 < factor < 1.0), None),
-        gain_up=next((factor for factor in factors if 1.0 < factor < inf), None),
-        delay=_delay_margin(loop, gains),
+        gain_down=max((factor for factor in factors if 0.0 < factor < 1.0), default=None),
+        gain_up=min((factor for factor in factors if factor > 1.0), default=None),
+        delay=min(delays, default=None),
     )
 
 
@@ -254,7 +267,7 @@ class _Candidates:
         ]
         self._task = task
         # The loops differ in one number, the slope of the friction: those at its ends tell all.
-        slopes = [float(loop.jacobian[1, 1]) for loop in self.loops]
+        slopes = [float(loop.jacobian[SPEED, SPEED]) for loop in self.loops]
         ends = sorted({int(np.argmin(slopes)), int(np.argmax(slopes))})
         self._extremes = [self.loops[index].coarsened() for index in ends]
         # Twice what brings the slide to rest without overshoot: beyond it nothing is won.
@@ -426,28 +439,25 @@ def _failure(task: Task, check: Check) -> str | None:
 
 
 def _from_high_speeds(
-    bench: Bench, drive: Drive, controller: WashoutParameters
+    bench: Bench, drives: Sequence[Drive], controller: WashoutParameters, done: Progress
 ) -> tuple[str | None, str | None]:
     """Return what is to be said of motions that begin fast, and in what the controller fails."""
-    speeds = [speed * drive.speed_scale for speed in _THROWN]
-    patience = 20.0 * drive.natural_period
 
-    def escaping(controller: WashoutParameters) -> float | None:
-        return next(
-            (
-                speed
-                for speed in speeds
-                if any(o.grows for o in bench.throw(drive, controller, speed, patience))
-            ),
-            None,
-        )
+    def escapes(drive: Drive, speed: float, controller: WashoutParameters) -> bool:
+        patience = 20.0 * drive.natural_period
+        return any(outcome.grows for outcome in bench.throw(drive, controller, speed, patience))
 
-    speed = escaping(controller)
-    if speed is None:
-        return None, None
-    if controller.cubic_gain == 0.0 and escaping(replace(controller, force_limit=inf)) is None:
-        return f"thrown to {speed:.3g} m/s the slide needs more force than the limit", None
-    return None, f"thrown to {speed:.3g} m/s the slide does not come back"
+    remark: str | None = None
+    unlimited = replace(controller, force_limit=inf)
+    throws = [(drive, share * drive.speed_scale) for drive in drives for share in _THROWN]
+    for number, (drive, speed) in enumerate(throws, 1):
+        if escapes(drive, speed, controller):
+            slide = f"thrown to {speed:.3g} m/s off a belt at {drive.belt_speed:.4g} m/s the slide"
+            if controller.cubic_gain != 0.0 or escapes(drive, speed, unlimited):
+                return None, f"{slide} does not come back"
+            remark = remark or f"{slide} needs more force than the limit"
+        done(number / len(throws))
+    return remark, None
 
 
 def _cubic_coefficient(drive: Drive) -> float:

@@ -21,7 +21,9 @@ _TRANSIENTS, _TRANSIENT_PERIODS, _STEADY = 6, 300, 1e-4
 """How often at most a vibration is given so many natural periods until its amplitude changes no
 more than by this share in them."""
 
-_MEASURED_CYCLES, _RECORDED_CYCLES = 10, 12
+_MEASURED_CYCLES, _RECORDED_CYCLES, _NEARLY = 10, 12, 1e-4
+"""How many cycles a vibration is measured over, and at most recorded over; and the share by which
+the samples recorded may differ from whole cycles."""
 
 FILTER_SETTLED = 5.0
 """Time after which the washout filter has forgotten its start, in 1/d."""
@@ -216,8 +218,9 @@ class Bench:
 
 
 def _whole_cycles(samples_per_cycle: float) -> int:
-    """Return the number of samples that some cycles have as nearly as possible."""
+    """Return the number of samples that the fewest cycles have nearly, or some most nearly."""
     cycles = np.arange(1, _RECORDED_CYCLES + 1)
     counts = np.maximum(np.rint(cycles * samples_per_cycle), 1.0)
-    misses = np.abs(counts / cycles - samples_per_cycle)
-    return int(counts[int(np.argmin(misses))])
+    misses = np.abs(counts / (cycles * samples_per_cycle) - 1.0)
+    near = misses <= max(_NEARLY, misses.min())
+    return int(counts[int(np.argmax(near))])

@@ -20,7 +20,10 @@ def test_the_parameter_file_quenches_the_vibration(stickslip: Run, tmp_path: Pat
     for name in ("corner_frequency", "linear_gain", "cubic_gain", "force_limit", "start_after"):
         assert f'"{name}": {found[name]}' in found["parameter_file"]
     assert found["belt_speeds"] == pytest.approx([0.036, 0.044])
-    assert max(check["peak_force"] for check in found["checks"]) <= found["force_limit"] == 200.0
+    for name in ("settling_time", "peak_force"):
+        for figure in (name, f"predicted_{name}"):
+            assert found[figure] == max(check[figure] for check in found["checks"])
+    assert found["peak_force"] <= found["force_limit"] == 200.0
     assert found["scenario"]["name"] == "feed_drive"
     gains = [
         text
@@ -48,9 +51,16 @@ def test_no_proposal_is_a_result_with_a_reason(stickslip: Run, tmp_path: Path) -
     assert done.returncode == 0, done.stderr
     assert "force limit of 5 N is too small" in done.stdout
     assert list(tmp_path.iterdir()) == []
+    for line, option in zip(
+        done.stderr.splitlines(), ("--out gains.yaml: not written", "--plot map.png: not drawn"),
+        strict=True,
+    ):  # fmt: skip
+        assert option in line
+        assert "nothing to propose" in line
     done = stickslip("design", "feed_drive", *limit, "--json")
     found = json.loads(done.stdout)
-    assert found["linear_gain"] is found["parameter_file"] is found["decay_rate"] is None
+    for name in ("linear_gain", "parameter_file", "decay_rate", "settling_time"):
+        assert found[name] is None
     assert "too small" in found["remark"]
 
 
@@ -79,6 +89,22 @@ def test_bad_input_is_refused_in_one_line(
     for text in named:
         assert text in line
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("option", "file"), [("--out", "x.yaml"), ("--plot", "x.png")])
+def test_what_cannot_be_written_costs_no_result(stickslip: Run, option: str, file: str) -> None:
+    done = stickslip("design", "feed_drive", "--json", option, f"/proc/{file}")
+    assert done.returncode == 2
+    assert json.loads(done.stdout)["linear_gain"] < 0.0
+    (line,) = done.stderr.splitlines()
+    assert f"{option} /proc/{file}: cannot be written" in line
+
+
+def test_without_vibration_nothing_is_simulated(stickslip: Run) -> None:
+    done = stickslip("design", "feed_drive", "--belt-speed", "0.06", "--json")
+    found = json.loads(done.stdout)
+    assert found["settling_time"] is found["peak_force"] is found["margins"]["delay"] is None
+    assert found["predicted_settling_time"] > 0.0
 
 
 def test_an_existing_file_is_left_as_it_is(stickslip: Run, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from stickslip_ros.physics.equations import WashoutGains
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.sampled import LinearSampledLoop
-from stickslip_ros.physics.theory.stability_map import CriticalGains, StabilityMap
+from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
 from stickslip_ros.plots.stability_map import draw_stability_map
 from tests.physics.drives import FEED_DRIVE, PAPER
 
@@ -60,7 +60,7 @@ def test_without_gains_it_is_around_the_critical_one() -> None:
 
 def test_critical_gains_over_rate_and_delay() -> None:
     rates, delays = np.array([100.0, 1000.0]), np.array([0.0, 0.005, 0.015])
-    found = CriticalGains.over(FEED_DRIVE, 20.0, rates, delays)
+    found = CriticalGainCurves.over(FEED_DRIVE, 20.0, rates, delays)
     for row, rate in enumerate(rates):
         for column, delay in enumerate(delays):
             loop = LinearSampledLoop.of(FEED_DRIVE, rate, delay)
@@ -79,7 +79,7 @@ def test_the_format_follows_the_ending(
     critical = None
     if with_critical_gains:
         delays = np.linspace(0.0, 0.06, 7)
-        critical = CriticalGains.over(FEED_DRIVE, 20.0, np.array([100.0, 1000.0]), delays)
+        critical = CriticalGainCurves.over(FEED_DRIVE, 20.0, np.array([100.0, 1000.0]), delays)
     draw_stability_map(path, map_of(), critical)
     assert path.read_bytes().startswith(start)
 

@@ -10,6 +10,7 @@ import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.equations import WashoutGains
 from stickslip_ros.physics.friction import Coulomb, Exponential, FrictionLaw, Linear
 from stickslip_ros.physics.measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.motion import Motion
@@ -81,14 +82,25 @@ def test_a_proposal_brings_the_drive_to_rest_from_its_own_limit_cycle(task: Task
     assert found.parameter_file is not None
 
 
-def test_what_is_predicted_is_what_is_simulated() -> None:
-    found = designed(replace(FEED, force_limit=100.0))
+@pytest.mark.parametrize(
+    ("force_limit", "shortest", "longest"),
+    [
+        # A large vibration dies out as nonlinearly as the friction is: here faster than a small one
+        (100.0, 0.3, 1.0),
+        # and here, where it is gone after one period, by a part of that later.
+        (inf, 1.2, 1.45),
+    ],
+)
+def test_what_is_predicted_is_about_what_is_simulated(
+    force_limit: float, shortest: float, longest: float
+) -> None:
+    found = designed(replace(FEED, force_limit=force_limit))
     for check in found.checks:
         assert check.vibrates
         assert check.settling_time is not None
-        assert check.settling_time < 1.2 * check.predicted_settling_time
+        assert shortest < check.settling_time / check.predicted_settling_time < longest
         assert check.peak_force == pytest.approx(check.predicted_peak_force, rel=0.02)
-        assert check.predicted_peak_force <= 100.0
+        assert check.predicted_peak_force <= force_limit
     assert len({check.belt_speed for check in found.checks}) == len(found.checks) > 3
 
 
@@ -110,7 +122,7 @@ def test_margins_lead_to_the_edge_of_stability() -> None:
     loop = LinearSampledLoop.of(FEED_DRIVE, 1000.0, 0.0025)
     assert loop is not None
     gains = proposal(designed(replace(FEED, force_delay=0.0025))).gains
-    found = margins(loop, gains)
+    found = margins([loop], gains)
     for factor in (found.gain_down, found.gain_up):
         assert factor is not None
         at_edge = replace(gains, linear=factor * gains.linear)
@@ -118,6 +130,28 @@ def test_margins_lead_to_the_edge_of_stability() -> None:
     assert found.delay is not None
     late = replace(loop, force_delay=0.0025 + found.delay)
     assert late.spectral_radius(gains) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_margins_are_the_tightest_of_the_range() -> None:
+    """The highest speed is stable without control, the lowest is the worst."""
+    task = replace(FEED, belt_speeds=(0.001, 0.06))
+    found = designed(task)
+    tightest = found.margins
+    assert tightest is not None
+    assert tightest.gain_down is not None
+    for speed in np.linspace(*task.belt_speeds, 9).tolist():
+        loop = LinearSampledLoop.of(replace(FEED_DRIVE, belt_speed=speed), FEED.rate)
+        assert loop is not None
+        one = margins([loop], proposal(found).gains)
+        assert (one.gain_down or 0.0) <= tightest.gain_down < 1.0
+        assert (one.gain_up or inf) >= (tightest.gain_up or inf) > 1.0
+        assert (one.delay or inf) >= (tightest.delay or inf) > 0.0
+
+
+def test_without_damping_no_share_of_the_gain_is_unstable() -> None:
+    loop = LinearSampledLoop.of(replace(FEED_DRIVE, friction=Coulomb(0.4), damping=0.0), 1000.0)
+    assert loop is not None
+    assert margins([loop], WashoutGains(20.0, -3000.0, 0.0)).gain_down is None
 
 
 @pytest.mark.long

@@ -9,6 +9,9 @@ from stickslip_ros.physics.knots import FloatArray
 
 _PHASES = 2.0 * np.pi * np.arange(1024) / 1024
 
+_ROUNDING = 4.0 * float(np.finfo(float).eps)
+"""Share of its terms below which a mean is rounding."""
+
 
 def averaged_growth(drive: Drive, belt_speed: Any, amplitude: Any) -> FloatArray:
     """Return twice dA/dt of the speed amplitude A, the belt speed being above zero.
@@ -16,12 +19,14 @@ def averaged_growth(drive: Drive, belt_speed: Any, amplitude: Any) -> FloatArray
     It is (1/pi) int_0^{2 pi} mu(A cos t - v0) cos t dt - 2 beta A (Guckenheimer and Holmes,
     Nonlinear Oscillations, section 4.1, of eq. 5). Dimensionless, arguments too, which may be
     arrays. The trapezoidal rule is exact but for rounding while A <= v0, where the slide does not
-    overtake the belt, and the law is not much more sudden than v0 / 10,000.
+    overtake the belt, and the law is not much more sudden than v0 / 10,000. What cannot be told
+    from rounding is zero.
     """
     law = drive.friction.scaled(drive.speed_scale)
     belt_speed, amplitude = np.asarray(belt_speed, float), np.asarray(amplitude, float)
     relative_speed = np.multiply.outer(amplitude, np.cos(_PHASES)) - belt_speed[..., np.newaxis]
     friction = law.coefficient(relative_speed, np.where(relative_speed > 0.0, 1.0, -1.0))
-    return (
-        2.0 * np.mean(friction * np.cos(_PHASES), axis=-1) - drive.damping_coefficient * amplitude
-    )
+    damping = drive.damping_coefficient * amplitude
+    growth = 2.0 * np.mean(friction * np.cos(_PHASES), axis=-1) - damping
+    rounding = _ROUNDING * (np.max(np.abs(friction), axis=-1) + damping)
+    return np.where(np.abs(growth) < rounding, 0.0, growth)

@@ -8,7 +8,7 @@ durations; arguments and results are SI.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import isclose
+from math import isclose, sqrt
 from typing import Any, Self
 
 import numpy as np
@@ -20,9 +20,15 @@ from stickslip_ros.physics.measures import EQUILIBRIUM_SPEED, CycleMeter, Measur
 from stickslip_ros.physics.motion import UNBOUNDED_SPEED
 from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.linear import SPEED
-from stickslip_ros.physics.theory.returns import follow, longest_return, release_position
+from stickslip_ros.physics.theory.returns import (
+    follow,
+    largest_cycle,
+    least_cycle,
+    longest_return,
+    release_position,
+)
 from stickslip_ros.physics.theory.roots import zero_between
-from stickslip_ros.physics.theory.sensitivity import SensitiveMotion
+from stickslip_ros.physics.theory.sensitivity import SensitiveMotion, TooStiffError
 
 _ROUNDING = 1e-13
 """Share of the displacement below which a difference is rounding."""
@@ -47,8 +53,8 @@ _INNERMOST = 1e-4
 _CORNER = 1e-6
 """Share of its distance within which the cycle that sticks is looked for."""
 
-_RATIO, _RATIO_WITHOUT_TURNS = 1.1, 2.0
-"""Of one distance to the next, while the slide comes back and before, near an overdamped rest."""
+_RATIO = 1.1
+"""Of one distance to the next."""
 
 _FRICTION_SCALES = 10.0
 """Static forces and belt speeds beyond which averaging says whether there can be a cycle."""
@@ -67,7 +73,7 @@ class LimitCycle:
     period: float
     """s"""
     multipliers: tuple[complex, ...]
-    """Floquet multipliers without the trivial one, the largest first; zero where it sticks."""
+    """Floquet multipliers without the trivial one, the largest first; the last 0 if it sticks."""
     measures: Measures
     """Of one cycle."""
 
@@ -89,13 +95,16 @@ def shoot(
 
     The guess is a displacement (m) at an upward turning point, a period (s) and, under continuous
     control (eq. 19) with `gains` (SI), the state of the filter (m). Orbits that are one of a
-    family, or take several turns to close, do not count.
+    family, or take several turns to close, do not count, nor those too stiff to follow.
     """
     if drive.belt_speed == 0.0:
         return None
     motion = SensitiveMotion(drive, gains)
     state = np.array([position, 0.0, filter_state])[: motion.order] / drive.length_scale
-    return _solve(motion, state, period)
+    try:
+        return _solve(motion, state, period)
+    except TooStiffError:
+        return None
 
 
 def limit_cycle_of_run(
@@ -109,13 +118,42 @@ def limit_cycle_of_run(
     """Return the limit cycle that the motion from `position` (m) and `velocity` (m/s) leads to.
 
     It runs until it repeats itself, for so many upward turns at most, the filter at rest at first;
-    from there a cycle is shot at. None where the motion settles or runs away, or where Newton's
-    method does not arrive.
+    from there a cycle is shot at. None where the motion settles or runs away, where Newton's method
+    does not arrive, or where the motion is too stiff to follow.
     """
-    if drive.belt_speed == 0.0:
+    if drive.belt_speed == 0.0 or least_cycle(drive, gains) is None:
         return None
     motion = SensitiveMotion(drive, gains)
     motion.restart(position, velocity)
+    try:
+        return _cycle_ahead(motion, turns)
+    except TooStiffError:
+        return None
+
+
+def limit_cycles(drive: Drive) -> list[LimitCycle]:
+    """Return all limit cycles of the open loop, stable and unstable, from the smallest on.
+
+    The motion is planar, so that a cycle surrounds the equilibrium and crosses the half-line
+    X' = 0, X < X_eq once. From one such crossing to the next the half-line is mapped to itself;
+    the cycles are where this map leaves a point alone. It is followed outwards as long as the
+    slide comes back. There are no cycles on a belt at rest, none where no
+    energy is gained, and none are given where the motion is too stiff to follow.
+    """
+    if drive.belt_speed == 0.0 or least_cycle(drive) is None:
+        return []
+    returns = _ReturnMap(drive)
+    try:
+        distances = [zero_between(returns.growth, *bracket) for bracket in returns.brackets()]
+        cycles = [returns.cycle(distance) for distance in distances]
+    except TooStiffError:
+        return []
+    return [cycle for cycle in cycles if cycle is not None]
+
+
+def _cycle_ahead(motion: SensitiveMotion, turns: int) -> LimitCycle | None:
+    """Return the cycle that the motion comes to within so many upward turns."""
+    drive = motion.drive
     state, duration = motion.state, 0.0
     for _ in range(turns):
         found = _next_turn(motion, state)
@@ -130,22 +168,6 @@ def limit_cycle_of_run(
     return _solve(motion, state, duration)
 
 
-def limit_cycles(drive: Drive) -> list[LimitCycle]:
-    """Return all limit cycles of the open loop, stable and unstable, from the smallest on.
-
-    The motion is planar, so that a cycle surrounds the equilibrium and crosses the half-line
-    X' = 0, X < X_eq once. From one such crossing to the next the half-line is mapped to itself;
-    the cycles are where this map leaves a point alone. It is followed outwards as long as the
-    slide comes back. There are no cycles on a belt at rest.
-    """
-    if drive.belt_speed == 0.0:
-        return []
-    returns = _ReturnMap(drive)
-    distances = [zero_between(returns.growth, *bracket) for bracket in returns.brackets()]
-    cycles = [returns.cycle(distance) for distance in distances]
-    return [cycle for cycle in cycles if cycle is not None]
-
-
 class _ReturnMap:
     """The map from a distance below the equilibrium, the slide turning upward, to the next one."""
 
@@ -153,7 +175,7 @@ class _ReturnMap:
         self._motion = SensitiveMotion(drive)
         self._equilibrium = float(self._motion.rate[SPEED])
         speed = min(abs(drive.belt_speed), drive.friction.sudden_speed) / drive.speed_scale
-        self._innermost = _INNERMOST * min(speed, 1.0)
+        self._innermost = max(_INNERMOST * min(speed, 1.0), least_cycle(drive) or 0.0)
         self._outermost = _outermost(drive)
 
     def growth(self, distance: float) -> float:
@@ -173,18 +195,14 @@ class _ReturnMap:
     def brackets(self) -> Iterator[tuple[float, float]]:
         """Yield pairs of distances between which the growth changes sign."""
         inner, inner_growth, inner_slope = 0.0, 0.0, 0.0
-        outer, turned = self._innermost, False
+        outer, turned, landed = self._innermost, False, False
         corners = self._corners()
-        while outer < self._outermost:
-            further = outer * (_RATIO if turned else _RATIO_WITHOUT_TURNS)
-            outer = min([further, *(corner for corner in corners if corner > outer)])
-            growth, slope = self.growth(outer), self._slope()
+        while True:
+            growth, slope, lands = self.growth(outer), self._slope(), self._motion.landed
             turns = growth != -outer
             if self._motion.unbounded or (turned and not turns):
                 return
             turned = turns
-            if growth == 0.0:
-                continue
             if growth * inner_growth < 0.0:
                 yield inner, outer
             elif inner_slope * inner_growth < 0.0 < slope * growth:
@@ -192,7 +210,33 @@ class _ReturnMap:
                 if peak is not None:
                     yield inner, peak
                     yield peak, outer
-            inner, inner_growth, inner_slope = outer, growth, slope
+            if growth != 0.0:
+                inner, inner_growth, inner_slope = outer, growth, slope
+            if outer >= self._outermost:
+                return
+            if lands and not landed:
+                landed, outer = True, self._last_landing(outer)
+            else:
+                further = [outer * _RATIO, *(corner for corner in corners if corner > outer)]
+                outer = min(further)
+
+    def _last_landing(self, first: float) -> float:
+        """Return a distance about as far out as any from which the slide sticks before it turns.
+
+        Orbits do not cross, so that it does from all distances between this one and `first`. All
+        these have the same next turn: the cycle that sticks is the only one there.
+        """
+        if self._lands(self._outermost):
+            return self._outermost
+        low, high = first, self._outermost
+        while high > _RATIO * low:
+            middle = sqrt(low * high)
+            low, high = (middle, high) if self._lands(middle) else (low, middle)
+        return low
+
+    def _lands(self, distance: float) -> bool:
+        self.growth(distance)
+        return self._motion.landed
 
     def _corners(self) -> list[float]:
         """Return two distances, just within and without that of a cycle that sticks, if any.
@@ -235,11 +279,14 @@ class _ReturnMap:
 
 
 def _outermost(drive: Drive) -> float:
-    """Return a distance beyond which there are no limit cycles.
+    """Return a distance beyond which there are no limit cycles but those that stick.
 
-    Against a distance of many N/k friction is weak, unless it damps strongly, and averaging is
-    right about whether the vibration grows.
+    Where the energy does not tell: against a distance of many N/k friction is weak, unless it damps
+    strongly, and averaging is right about whether the vibration grows.
     """
+    largest = largest_cycle(drive)
+    if largest is not None:
+        return largest
     belt_speed = abs(drive.belt_speed) / drive.speed_scale
     amplitudes = np.geomspace(belt_speed, UNBOUNDED_SPEED, 200)
     growing = amplitudes[averaged_growth(drive, belt_speed, amplitudes) > 0.0]
@@ -281,6 +328,8 @@ class _Shot:
     """Derivatives of the state at the end by that at the start."""
     rate: FloatArray
     """Derivative of the state at the end by time."""
+    landed: bool
+    """Whether it came to stick on the way."""
 
     @classmethod
     def fire(cls, motion: SensitiveMotion, unknowns: FloatArray) -> Self | None:
@@ -298,7 +347,7 @@ class _Shot:
             return None
         residual = motion.state - start
         miss = float(np.abs(residual).max()) / max(abs(float(start[0])), distance)
-        return cls(unknowns, residual, miss, motion.transition, motion.rate)
+        return cls(unknowns, residual, miss, motion.transition, motion.rate, motion.landed)
 
     def newton_step(self) -> FloatArray:
         """Return the change of the unknowns after which the linearised motion would close."""
@@ -312,7 +361,10 @@ class _Shot:
         by_time_of_turn = np.outer(self.rate, self.transition[SPEED]) / self.rate[SPEED]
         kept = np.delete(np.arange(len(self.rate)), SPEED)
         found = np.linalg.eigvals((self.transition - by_time_of_turn)[np.ix_(kept, kept)])
-        return tuple(sorted(found.astype(complex).tolist(), key=abs, reverse=True))
+        multipliers = sorted(found.astype(complex).tolist(), key=abs, reverse=True)
+        if self.landed:
+            multipliers[-1] = 0j  # in exact arithmetic too: a stick forgets its landing
+        return tuple(multipliers)
 
 
 def _solve(motion: SensitiveMotion, state: FloatArray, period: float) -> LimitCycle | None:

@@ -1,11 +1,26 @@
-"""From one cycle to the next: where the belt lets the slide go, and how long it may be gone."""
+"""From one cycle to the next: where the belt lets go, how long and how far the slide may be gone.
+
+What is said of energy is exact, but that g is looked at for so many speeds only. With x the
+distance from the equilibrium, dimensionless, x'' + x = g(x') in the open loop, where
+g(y) = mu(y - v0) - mu(-v0) - 2 beta y, and the energy (x^2 + x'^2) / 2 changes by g dx.
+"""
 
 from collections.abc import Iterator
-from math import copysign
+from math import copysign, sqrt
+from typing import Any
+
+import numpy as np
 
 from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.knots import Knots
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.equations import WashoutGains
+from stickslip_ros.physics.knots import FloatArray, Knots
+from stickslip_ros.physics.motion import UNBOUNDED_SPEED, Motion
+
+_LEAST_SPEED, _SPEEDS = 1e-6, 2048
+"""Least speed at which g is looked at, in the smallest that matters, and how many there are."""
+
+_ROUNDING = 16.0 * float(np.finfo(float).eps)
+"""Share of its terms below which g is rounding."""
 
 
 def release_position(drive: Drive) -> float:
@@ -36,3 +51,67 @@ def follow(motion: Motion) -> Iterator[Knots]:
         now += step
         knots = Knots.concatenate(knots, motion.take_knots())
         yield knots
+
+
+def least_cycle(drive: Drive, gains: WashoutGains | None = None) -> float | None:
+    """Return the least speed, dimensionless, at which energy may be gained; the belt moves.
+
+    That is in the open loop, where every cycle turns at least as far from the equilibrium, or with
+    `gains` (SI) of eq. 19. None if there is no such speed: on a cycle the gain makes up for the
+    loss, so that there is none up to `UNBOUNDED_SPEED`, but where energy is conserved.
+    """
+    speed, force = _net_force(drive)
+    if gains is not None:
+        force += _greatest_help(gains.scaled(drive), speed)
+    gaining = np.abs(speed)[speed * force > 0.0]
+    return None if len(gaining) == 0 else 0.95 * float(gaining.min())
+
+
+def _greatest_help(gains: WashoutGains, speed: FloatArray) -> FloatArray:
+    """Return forces on the speed that give a cycle at least the energy that the controller does.
+
+    With v = w' and d w the parts of y that pass the filter and do not, both periodic, int v w = 0:
+    int v y = int v^2 <= int y^2. Where k2 < 0, by Young's inequality
+    -int v^3 y = -int (v^4 + v^3 d w) <= (27/256) int (d w)^4 <= (27/256) int y^4.
+    Otherwise, by Hoelder's, int v^3 y <= 8 int y^4, since v is at most twice as large as y in L^4.
+    """
+    cubic = -27.0 / 256.0 * gains.cubic if gains.cubic < 0.0 else 8.0 * gains.cubic
+    return max(gains.linear, 0.0) * speed + cubic * speed**3
+
+
+def largest_cycle(drive: Drive) -> float | None:
+    """Return a distance below the equilibrium (dimensionless) beyond which no cycle turns upward.
+
+    That is of cycles that do not stick; the belt moves. With g >= -l and g <= p at speeds from 0
+    to v0, g <= -u above and g >= -n below, u > n >= 0, a slide that turns at -d turns next at
+    d' >= d - 2 n if it comes back to -d, and passes v0 within v0^2 / D of either turning point,
+    where D = d - 2 n - max(l, p) is at least sqrt(2) v0. The energy then changes by less than
+    2 (p + n) v0^2 / D - 2 (u - n) (D - v0^2 / D). None where there is no such u.
+    """
+    speed, force = _net_force(drive)
+    belt_speed = abs(drive.belt_speed) / drive.speed_scale
+    above, below = force[speed > belt_speed], force[speed <= 0.0]
+    between = force[(speed >= 0.0) & (speed <= belt_speed)]
+    p, low = float(between.max()), -float(between.min())
+    u, n = -float(above.max()), -float(below.min())
+    if u <= n:
+        return None
+    return 2.0 * n + max(low, p) + belt_speed * sqrt(max(2.0, (u + p) / (u - n)))
+
+
+def _net_force(drive: Drive) -> tuple[FloatArray, FloatArray]:
+    """Return speeds y on either side of rest and of the belt's speed, and g there."""
+    law = drive.friction.scaled(drive.speed_scale)
+    belt_speed = abs(drive.belt_speed) / drive.speed_scale
+    least = _LEAST_SPEED * min(belt_speed, drive.friction.sudden_speed / drive.speed_scale)
+    distances = np.geomspace(least, UNBOUNDED_SPEED, _SPEEDS)
+    relative_speed = np.concatenate(
+        [-belt_speed - distances, [-belt_speed], -distances, distances,
+        (distances - belt_speed)[distances < belt_speed]]
+    )  # fmt: skip
+    speed = relative_speed + belt_speed
+    friction: Any = law.coefficient(relative_speed, np.sign(relative_speed))
+    at_rest, damping = float(law.at_rest(belt_speed)), drive.damping_coefficient * speed
+    force = friction - at_rest - damping
+    terms = np.abs(friction) + abs(at_rest) + np.abs(damping)
+    return speed, np.where(np.abs(force) < _ROUNDING * terms, 0.0, force)

@@ -7,6 +7,7 @@ that the matrix exponential takes the slide from one sample to the next.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate, pairwise
 from math import inf, isfinite, log, pi
 from typing import Any, NamedTuple, Self
 
@@ -30,12 +31,15 @@ _LARGE_ORDER = 24
 
 _BISECTIONS = 60
 
+_ROUNDING = 1e-14
+"""Share by which a multiplier is not known better."""
+
 _SLIDE, _FILTER = slice(0, 2), 2
 """Where X, Y and the filter's z = d w stand in the state; forces under way follow."""
 
 
 class GainInterval(NamedTuple):
-    """Linear gains, N s/m, between which the loop is stable; an end may be infinite."""
+    """Linear gains, N s/m, between which the loop is stable."""
 
     low: float
     high: float
@@ -43,7 +47,7 @@ class GainInterval(NamedTuple):
     @property
     def critical(self) -> float:
         """The end that a gain passes on its way to zero, or above zero if zero is inside."""
-        return self.low if self.low > 0.0 else self.high
+        return self.low if self.low >= 0.0 else self.high
 
 
 def why_no_linear_loop(drive: Drive, rate: float, force_delay: float) -> str | None:
@@ -124,20 +128,32 @@ class LinearSampledLoop:
         k1 = 1/G(e^(j theta)), which is a gain where it is real. These gains bound intervals in each
         of which as many multipliers are outside the circle; where Im(1/G) rises with theta, they
         become more with the gain. Where least are outside there are none, or no gain is stable.
+        Beyond the last ones none is: G has more poles than zeros, so that a multiplier grows with
+        the gain.
         """
         boundary = _Boundary(self, corner_frequency / self.drive.angular_frequency)
         crossings = sorted(boundary.crossings())
         unit = self.drive.normal_force / self.drive.speed_scale
-        ends = [-inf, *(gain * unit for gain, _ in crossings), inf]
-        outside = np.cumsum([0, *(number for _, number in crossings)])
-        intervals = [
-            GainInterval(ends[row], ends[row + 1])
-            for row in np.flatnonzero(outside == outside.min())
-            if ends[row] < ends[row + 1]
+        outside = accumulate(number for _, number in crossings)
+        counted = [
+            (number, GainInterval(low * unit, high * unit))
+            for number, ((low, _), (high, _)) in zip(outside, pairwise(crossings), strict=False)
+            if low < high
         ]
+        if not counted:
+            return []
+        fewest = min(number for number, _ in counted)
+        intervals = [interval for number, interval in counted if number == fewest]
         nearest = min(intervals, key=_distance)
-        gains = WashoutGains(corner_frequency, _inside(nearest), 0.0)
-        return intervals if self.spectral_radius(gains) < 1.0 else []
+        # Next to an end the loop is slow, at a high rate also far from zero.
+        low, high = nearest
+        tried = (0.0, 2.0 * nearest.critical, (low + high) / 2.0)
+        radius = min(
+            self.spectral_radius(WashoutGains(corner_frequency, gain, 0.0))
+            for gain in tried
+            if low < gain < high
+        )
+        return intervals if radius < 1.0 - _ROUNDING else []
 
     def critical_linear_gain(self, corner_frequency: float) -> float | None:
         """Return the gain (N s/m) that the loop needs to be stable, or may have while it is.
@@ -249,8 +265,15 @@ class _Boundary:
     def gain(self, theta: Any) -> Any:
         """Return 1/G, an array of the shape of theta."""
         forward = np.exp(1j * theta)
+        # The form of l - e^s that overflows on neither side.
         differences = np.prod(
-            [np.exp(pole) * np.expm1(1j * theta - pole) for pole in self._poles], axis=0
+            [
+                np.exp(pole) * np.expm1(1j * theta - pole)
+                if pole.real > 0.0
+                else -forward * np.expm1(pole - 1j * theta)
+                for pole in self._poles
+            ],
+            axis=0,
         )
         zeros = np.expm1(1j * theta) ** 2 * (self._starting * forward + self._ending)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -260,13 +283,18 @@ class _Boundary:
         """Yield the real gains, and how many multipliers leave the circle there as it rises."""
         theta = self._angles()
         imaginary = self.gain(theta).imag
+        theta, imaginary = theta[imaginary != 0.0], imaginary[imaginary != 0.0]
         rows = np.flatnonzero(np.sign(imaginary[:-1]) * np.sign(imaginary[1:]) < 0.0)
         low, high, rising = theta[rows], theta[rows + 1], np.sign(imaginary[rows + 1])
         for _ in range(_BISECTIONS):
             middle = (low + high) / 2.0
             above = self.gain(middle).imag * rising > 0.0
             low, high = np.where(above, low, middle), np.where(above, middle, high)
-        for gain, number in zip(self.gain(low).real.tolist(), rising.tolist(), strict=True):
+        gains = self.gain(low)
+        # An undamped drive's own multipliers are on the circle, which is a gain of zero.
+        unsure = np.abs(self.gain(low + _ROUNDING * self._period) - gains)
+        gains = np.where(np.abs(gains) > unsure, gains.real, 0.0)
+        for gain, number in zip(gains.tolist(), rising.tolist(), strict=True):
             yield gain, 2 * int(number)
         # One real multiplier at -1. By symmetry 1/G is real there; the sum is exact.
         poles = np.exp(self._poles)
@@ -307,12 +335,3 @@ def _spectral_radius(matrices: FloatArray) -> Any:
 def _distance(interval: GainInterval) -> float:
     """Return how far the interval is from zero."""
     return max(interval.low, -interval.high, 0.0)
-
-
-def _inside(interval: GainInterval) -> float:
-    """Return a gain within the interval, one at which the loop is not slow if it is stable."""
-    low, high = interval
-    if low < 0.0 < high:
-        return 0.0
-    doubled = 2.0 * interval.critical
-    return doubled if low < doubled < high else (low + high) / 2.0

@@ -11,6 +11,16 @@ from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.theory.linear import SPEED
 
+_GREATEST_EFFORT = 8e6
+"""Time of slipping times how stiff it is, dimensionless, to spend on a motion: some seconds."""
+
+_STRETCH = 30.0
+"""Dimensionless time after which the effort is looked at."""
+
+
+class TooStiffError(Exception):
+    """The motion takes more steps than are worth taking; not a matter of the machine's speed."""
+
 
 class SensitiveMotion(Motion):
     """A motion that carries the derivatives of its state by the state it started from.
@@ -18,7 +28,8 @@ class SensitiveMotion(Motion):
     The state is dimensionless: (X, Y), or (X, Y, W) under continuous control. Within a slip or a
     stick heyoka integrates the variational equations along with the motion. From one to the next
     the derivatives jump by the saltation matrix (Leine and Nijmeijer, Dynamics and Bifurcations of
-    Non-Smooth Mechanical Systems, 2004, ch. 7). Knots are recorded.
+    Non-Smooth Mechanical Systems, 2004, ch. 7). Knots are recorded. Raises TooStiffError where the
+    integration becomes too costly, starts counted together.
     """
 
     def __init__(self, drive: Drive, gains: WashoutGains | None = None) -> None:
@@ -26,6 +37,7 @@ class SensitiveMotion(Motion):
         super().__init__(drive, 0.0, 0.0, continuous_control=gains is not None, record=True)
         if gains is not None:
             self.set_gains(gains.corner_frequency, gains.linear, gains.cubic)
+        self._effort = 0.0
         self.start(np.zeros(self.order))
 
     @property
@@ -53,6 +65,8 @@ class SensitiveMotion(Motion):
             self._w = float(state[2])
         self.transition: FloatArray = np.eye(self.order)
         """Derivatives of the state (rows) by that at the start (columns)."""
+        self.landed = False
+        """Whether the slide came to stick since the start."""
 
     def _system(self, right_hand_side: Any) -> Any:
         return hy.var_ode_sys(right_hand_side, hy.var_args.vars, order=1)
@@ -66,14 +80,26 @@ class SensitiveMotion(Motion):
         return found
 
     def _slip(self, now: float, end: float) -> float:
-        sign = self._sign
-        now = super()._slip(now, end)
+        sign, start = self._sign, now
+        now = super()._slip(now, min(end, now + _STRETCH))
+        self._effort += (now - start) * (1.0 + self._stiffness(sign))
+        if self._effort > _GREATEST_EFFORT:
+            raise TooStiffError
         if self._sign != sign:
             # I + (f_after - f_before) n^T / (n^T f_before), n along Y, where only Y' jumps. On
             # leaving the belt nothing jumps.
             after = self._acceleration(self._sign)
             self.transition[SPEED] *= after / self._acceleration(sign) if after != 0.0 else 0.0
+            self.landed |= self.sticking
         return now
+
+    def _stiffness(self, sign: float) -> float:
+        """Return |dX''/dX'| while slipping with sgn(v_r) = `sign`."""
+        step = 1e-30j  # along the imaginary axis nothing cancels
+        law = self._drive.friction.scaled(self._drive.speed_scale)
+        friction = law.coefficient(self._y - self._belt_speed + step, sign)
+        control = self._gains.force(self._gains.filtered(self._y, self._w) + step)
+        return abs((friction + control).imag / step.imag - self._damping)
 
     def _acceleration(self, sign: float) -> float:
         """Return X'' while slipping with sgn(v_r) = `sign`, or sticking (0)."""

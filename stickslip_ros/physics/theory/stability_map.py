@@ -58,7 +58,7 @@ class StabilityMap:
 
 
 @dataclass(frozen=True)
-class CriticalGains:
+class CriticalGainCurves:
     """Critical linear gain over rate and delay of a sampled loop; SI units."""
 
     rates: FloatArray

@@ -9,7 +9,7 @@ from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.knots import Knots
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.theory.averaging import averaged_growth
-from stickslip_ros.physics.theory.returns import follow, release_position
+from stickslip_ros.physics.theory.returns import follow, least_cycle, release_position
 from stickslip_ros.physics.theory.roots import zero_between
 
 _AVERAGED = np.geomspace(1e-4, 1e4, 200)
@@ -58,13 +58,25 @@ def sticking_onset(drive: Drive) -> StickingOnset:
 
 def _averaged(drive: Drive) -> float | str:
     """Return the approximate onset (m/s), or why there is none."""
-    growing = np.flatnonzero(averaged_growth(drive, _AVERAGED, _AVERAGED) > 0.0)
+    growth = averaged_growth(drive, _AVERAGED, _AVERAGED)
     low, high = _AVERAGED[[0, -1]] * drive.speed_scale
+    if not np.any(growth):
+        return (
+            "by averaging vibrations up to the belt's speed neither grow nor die out at any belt "
+            f"speed from {low:.3g} to {high:.3g} m/s"
+        )
+    growing = np.flatnonzero(growth > 0.0)
     if len(growing) == 0:
-        return f"By averaging it sticks at no belt speed from {low:.3g} to {high:.3g} m/s."
+        return f"by averaging it sticks at no belt speed from {low:.3g} to {high:.3g} m/s"
     highest = int(growing[-1])
     if highest == len(_AVERAGED) - 1:
-        return f"By averaging it still sticks at {high:.3g} m/s, the highest belt speed tried."
+        return f"by averaging it still sticks at {high:.3g} m/s, the highest belt speed tried"
+    if growth[highest + 1] == 0.0:
+        last = _AVERAGED[highest] * drive.speed_scale
+        return (
+            f"by averaging it still sticks at {last:.3g} m/s, and at higher belt speeds vibrations "
+            "up to the belt's speed neither grow nor die out"
+        )
     onset = zero_between(
         lambda speed: float(averaged_growth(drive, speed, speed)), *_AVERAGED[highest : highest + 2]
     )
@@ -81,15 +93,15 @@ def _followed(drive: Drive, reference: float) -> float | str:
             break
         above = speed
     else:
-        return f"It sticks at no belt speed from {speeds[-1]:.3g} to {speeds[0]:.3g} m/s."
+        return f"it sticks at no belt speed from {speeds[-1]:.3g} to {speeds[0]:.3g} m/s"
     if above is not None:
-        return zero_between(release.excess, speed, above)
+        return zero_between(lambda speed: np.tanh(release.excess(speed)), speed, above)
     sticking = next((speed for speed in speeds if release.sticks_again(speed)), 0.0)
     if sticking == speed:
-        return f"It still sticks at {speed:.3g} m/s, the highest belt speed tried."
+        return f"it still sticks at {speed:.3g} m/s, the highest belt speed tried"
     return (
-        f"Above {sticking:.3g} m/s, up to {speed:.3g} m/s at least, it overtakes the belt and does "
-        "not stick: no orbit touches the belt's speed."
+        f"above {sticking:.3g} m/s, up to {speed:.3g} m/s at least, it overtakes the belt and does "
+        "not stick: no orbit touches the belt's speed"
     )
 
 
@@ -102,10 +114,12 @@ class _Release:
     def excess(self, belt_speed: float) -> float:
         """Return by what share of the belt's speed (m/s) the slide's next upward speed is above.
 
-        -1 where it does not come up again. Beyond the belt's speed friction turns round: there the
-        peak is that of the parabola which begins with the slide's acceleration and loses v0 of it
-        per unit of time, as an orbit does that touches.
+        -1 where it does not come up again, or cannot, for it gains no energy. Beyond the belt's
+        speed friction turns round: there the peak is that of the parabola which begins with the
+        slide's acceleration and loses v0 of it per unit of time, as an orbit does that touches.
         """
+        if least_cycle(replace(self._motion.drive, belt_speed=belt_speed)) is None:
+            return -1.0
         peaks = (_highest(knots, belt_speed) for knots in self._follow(belt_speed))
         peak = next((peak for peak in peaks if peak is not None), None)
         if peak is None:

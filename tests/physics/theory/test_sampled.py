@@ -5,12 +5,12 @@ from math import log, pi
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.friction import Coulomb, Exponential
+from stickslip_ros.physics.friction import Coulomb, Exponential, Linear
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
@@ -121,17 +121,39 @@ speeds = st.floats(0.1, 0.7)
 corners = st.floats(0.02, 10.0)
 
 
-@given(speeds, rates, st.floats(0.0, 12.0), corners)
-@settings(max_examples=40)
+NEUTRAL = [
+    replace(PAPER, friction=Coulomb(0.4), damping=0.0),
+    replace(PAPER, friction=Linear(0.4, 0.02), damping=0.02),
+]
+"""Without control these vibrate for ever: zero is an end of their stable gains."""
+
+drives = st.one_of(
+    speeds.map(lambda speed: replace(PAPER, belt_speed=speed)),
+    speeds.map(lambda speed: replace(PAPER, belt_speed=speed, damping=0.0)),
+    st.floats(1e-6, 10.0).map(lambda damping: replace(NEUTRAL[0], damping=damping)),
+    st.floats(-1e-8, 1e-8).map(lambda slope: replace(PAPER, friction=Linear(0.4, 0.02 + slope))),
+    st.sampled_from(NEUTRAL),
+)
+in_step = st.fractions("1/5", 8, max_denominator=5).map(lambda share: float(share) / (2.0 * pi))
+"""Rates in a simple ratio to the natural frequency."""
+
+
+@given(drives, st.one_of(rates, in_step), st.floats(0.0, 12.0), corners)
+@settings(max_examples=70)
+@example(NEUTRAL[0], 0.2354, 0.2354 * 4.2438, 2.0)
+@example(NEUTRAL[0], 4.0 / (2.0 * pi), 0.0, 1.0)
+@example(NEUTRAL[1], 2.0 / (2.0 * pi), 2.64, 0.2)
+@example(NEUTRAL[1], 1.0 / (2.0 * pi), 0.0, 0.2)
 def test_the_stable_gains_are_those_with_a_spectral_radius_below_one(
-    belt_speed: float, rate: float, periods: float, corner_frequency: float
+    drive: Drive, rate: float, periods: float, corner_frequency: float
 ) -> None:
-    loop = loop_of(replace(PAPER, belt_speed=belt_speed), rate, periods / rate)
+    loop = loop_of(drive, rate, periods / rate)
     intervals = loop.stable_linear_gains(corner_frequency)
-    gains = np.concatenate([np.linspace(-4.0, 4.0, 201), -np.geomspace(1e-3, 1e4, 100)])
+    magnitudes = np.geomspace(1e-6, 1e4, 100)
+    gains = np.concatenate([np.linspace(-4.0, 4.0, 201), -magnitudes, magnitudes])
     # At an end itself it is neither, and near it rounding decides.
     ends = np.array([end for interval in intervals for end in interval])
-    clear = np.array([np.all(np.abs(gain - ends) > 1e-6 * (1.0 + abs(gain))) for gain in gains])
+    clear = np.array([np.all(np.abs(gain - ends) > 1e-6 * abs(gain)) for gain in gains])
     inside = np.array([any(low < gain < high for low, high in intervals) for gain in gains])
     rates = loop.decay_rates(np.array([corner_frequency]), gains)[0] / rate
     decided = clear & (np.abs(rates) > 1e-9)
@@ -149,6 +171,15 @@ def test_at_an_end_a_multiplier_is_on_the_unit_circle(
             if end != 0.0 and abs(end) < 1e3:
                 gains = WashoutGains(corner_frequency, end, 0.0)
                 assert loop.spectral_radius(gains) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("drive", NEUTRAL)
+@pytest.mark.parametrize(("rate", "force_delay"), [(100.0, 0.0), (0.2354, 4.2438), (1e6, 1e-5)])
+def test_without_any_damping_zero_is_the_critical_gain(
+    drive: Drive, rate: float, force_delay: float
+) -> None:
+    loop = loop_of(drive, rate, force_delay)
+    assert str(loop.critical_linear_gain(2.0)) == "0.0"
 
 
 @pytest.mark.parametrize(("corner_frequency", "critical"), [(2.0, -0.935), (0.2, -0.148)])

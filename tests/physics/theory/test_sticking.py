@@ -125,9 +125,28 @@ def test_where_there_is_no_onset_a_sentence_says_why(
     assert words in onset.no_exact
 
 
+@pytest.mark.parametrize(
+    ("law", "damping"), [(Coulomb(0.4), 0.0), (Linear(0.4, 0.02), 0.02), (Linear(0.4, 0.45), 0.45)]
+)
+def test_what_neither_grows_nor_dies_out_has_no_onset(law: FrictionLaw, damping: float) -> None:
+    """The forces on the slide balance up to the speed of the belt, but for the spring's."""
+    onset = sticking_onset(replace(PAPER, friction=law, damping=damping))
+    assert onset.approximate is None
+    assert onset.exact is None
+    assert onset.no_approximate is not None
+    assert "neither grow nor die out" in onset.no_approximate
+
+
+def test_sticking_ends_near_the_minimum_of_friction_where_the_law_is_stiff() -> None:
+    """The slide then creeps along the law, and only its falling branch throws it off."""
+    onset = sticking_onset(replace(PAPER, friction=Stribeck(0.4, 0.25, 1e-3)))
+    assert onset.approximate == pytest.approx(sqrt(0.8) * hopf_speed(0.02, 0.4, 0.25, 1e-3))
+    assert onset.exact == pytest.approx(hopf_speed(0.02, 0.4, 0.25, 1e-3), rel=1e-4)
+
+
 def test_the_speeds_in_a_sentence_are_si() -> None:
     onset = sticking_onset(replace(FEED_DRIVE, friction=Coulomb(0.4)))
-    assert onset.no_exact == "It sticks at no belt speed from 0.0008 to 0.16 m/s."
+    assert onset.no_exact == "it sticks at no belt speed from 0.0008 to 0.16 m/s"
 
 
 @pytest.mark.long
