@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Iterator
 from dataclasses import replace
-from math import copysign, isclose, isinf
+from math import copysign, isclose
 from pathlib import Path
 from typing import Any, cast
 
@@ -178,7 +178,9 @@ def _open_loop(drive: Drive, expansion: Expansion | None, notes: Notes) -> Secti
     if not points:
         notes["open_loop.hopf_speeds"] = _why_no_hopf_speed(drive)
     if not cycles:
-        notes["open_loop.limit_cycles"] = "no motion was found that repeats itself"
+        notes["open_loop.limit_cycles"] = (
+            "no motion was found that repeats itself, or the drive is too stiff to be followed"
+        )
     return {
         **_eigenvalues(drive, expansion),
         **_hopf_points(points),
@@ -240,8 +242,9 @@ def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Sect
     cycles = _closed_loop_cycles(drive, gains)
     if not cycles:
         notes["closed_loop.limit_cycles"] = (
-            "none is reached from rest at zero displacement, and none from the Hopf point at the "
-            "critical linear gain; others are not looked for"
+            "none was reached from rest at zero displacement, and none from the Hopf point at the "
+            "critical linear gain, or the loop is too stiff to be followed; others are not looked "
+            "for"
         )
     return {
         **_eigenvalues(drive, expansion),
@@ -288,8 +291,6 @@ def _sampled_loop(
         )
         for name in ("critical_linear_gain", "stable_linear_gains"):
             notes[f"sampled_loop.{name}"] = reason
-    elif any(isinf(end) for interval in intervals for end in interval):
-        notes["sampled_loop.stable_linear_gains"] = "an end that is null, or infinite, is open"
     if radius >= 1.0:
         notes["sampled_loop.settling_time"] = "a deviation from the equilibrium grows"
     return {
