@@ -13,7 +13,7 @@ from stickslip_ros.physics.measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.samples import NANOSECONDS
-from stickslip_ros.physics.theory.returns import release_position
+from stickslip_ros.physics.theory.returns import loading_time, release_position
 from stickslip_ros.physics.theory.sampled import SETTLED
 from stickslip_ros.physics.washout import Washout, WashoutParameters
 
@@ -102,7 +102,7 @@ class Bench:
         speed = drive.belt_speed
         motion.restart(release_position(drive), speed)
         # On a slow belt a cycle is mostly the time in which the belt loads the spring.
-        loading = 2.0 * drive.friction.static * drive.length_scale / speed
+        loading = loading_time(drive)
         found, before = self._measured(loading), inf
         for _ in range(_TRANSIENTS):
             amplitude = found.velocity_amplitude

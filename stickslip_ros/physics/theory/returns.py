@@ -37,8 +37,12 @@ def longest_return(drive: Drive) -> float:
 
     It may ride the belt, and creep at a like speed, as far as static friction can bend the spring.
     """
-    stretch = 2.0 * drive.friction.static * drive.length_scale
-    return 4.0 * drive.natural_period + 2.0 * stretch / abs(drive.belt_speed)
+    return 4.0 * drive.natural_period + 2.0 * loading_time(drive)
+
+
+def loading_time(drive: Drive) -> float:
+    """Return the time (s) in which the belt bends the spring from one limit to the other."""
+    return 2.0 * drive.friction.static * drive.length_scale / abs(drive.belt_speed)
 
 
 def follow(motion: Motion) -> Iterator[Knots]:
