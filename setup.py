@@ -12,6 +12,7 @@ EXECUTABLES = {
     "plant_node": "stickslip_ros.nodes.plant:main",
     "washout_controller_node": "stickslip_ros.nodes.washout_controller:main",
     "analyzer_node": "stickslip_ros.nodes.analyzer:main",
+    "replay_node": "stickslip_ros.nodes.replay:main",
     "stickslip": "stickslip_ros.app.main:main",
 }
 
@@ -60,6 +61,7 @@ setup(
     python_requires=">=3.11",
     install_requires=[
         "heyoka",
+        "lz4",
         "matplotlib",
         "mcap>=1.5",  # the first whose writer can close a chunk on demand
         "numpy",
@@ -68,6 +70,7 @@ setup(
         "pyyaml",
         "rich",
         "scipy",
+        "zstandard",
     ],
     extras_require={
         # ROS itself, where none is installed; the message packages come with these two.

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from stickslip_ros.app.output import print_figures
 from stickslip_ros.app.run import default_bag, record, ros_bringup
-from stickslip_ros.bags.report import read_columns, report_of_bag
+from stickslip_ros.bags import Recording
+from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.plots.run_picture import RunColumns, draw_control_coming_on
 from stickslip_ros.scenario.files import load_scenario
@@ -55,7 +56,8 @@ def _demonstrate() -> None:
 
 
 def _columns(bag: Path) -> RunColumns:
-    states, forces = read_columns(bag)
+    with Recording(bag) as recording:
+        states, forces = recording.joint_states, recording.control_forces
     first = states.stamp[0]
     return RunColumns(
         time=(states.stamp - first) * 1e-9,

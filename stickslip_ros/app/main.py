@@ -5,10 +5,10 @@ import os
 import sys
 from collections.abc import Sequence
 
-from stickslip_ros.app import design, paper, report, run, simulate, stability
+from stickslip_ros.app import design, paper, repair, replay, report, run, simulate, stability
 from stickslip_ros.errors import InvalidInputError, StickslipError
 
-_COMMANDS = (run, simulate, stability, design, report, paper)
+_COMMANDS = (run, simulate, stability, design, report, repair, replay, paper)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

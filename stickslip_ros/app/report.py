@@ -1,4 +1,4 @@
-"""`stickslip report`: the measures of a recorded run."""
+"""`stickslip report`: the measures of recorded runs."""
 
 import argparse
 from pathlib import Path
@@ -9,19 +9,26 @@ from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.versions import versions
 
 NAME = "report"
-HELP = "measure a recorded run"
+HELP = "measure a recorded run, or set several side by side"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    parser.add_argument("bag", metavar="BAG", type=Path, help="bag directory, or one .mcap file")
+    parser.add_argument(
+        "bags",
+        metavar="BAG",
+        nargs="+",
+        type=Path,
+        help="bag directory, or one .mcap file; also one that is still recorded, cut off or "
+        "damaged: what is left of it is measured, and what is missing said",
+    )
     parser.add_argument(
         "--from",
         dest="start",
         type=seconds,
         default=0.0,
         metavar="S",
-        help="leave out what is before, s from the first sample (default: 0)",
+        help="leave out what is before, s from the first sample of each bag (default: 0)",
     )
     parser.add_argument(
         "--to",
@@ -29,17 +36,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=float("inf"),
         metavar="S",
-        help="leave out what is after, s from the first sample (default: the end)",
+        help="leave out what is after, s from the first sample of each bag (default: the end)",
+    )
+    parser.add_argument(
+        "--namespace",
+        metavar="NS",
+        help="ROS namespace of the drive, where a bag holds several",
     )
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    report = report_of_bag(arguments.bag, start=arguments.start, end=arguments.end)
-    report |= {"bag": str(arguments.bag)}
+    reports = {
+        str(bag): report_of_bag(
+            bag, start=arguments.start, end=arguments.end, namespace=arguments.namespace
+        )
+        for bag in arguments.bags
+    }
     if arguments.json:
-        print_json({**report, "versions": versions()})
-    else:
-        print_figures(str(arguments.bag), {"": report})
+        results = [{**report, "bag": bag} for bag, report in reports.items()]
+        result = results[0] if len(results) == 1 else {"reports": results}
+        print_json({**result, "versions": versions()})
+        return 0
+    several = len(reports) > 1
+    print_figures(
+        "" if several else str(arguments.bags[0]),
+        {bag if several else "": report for bag, report in reports.items()},
+    )
+    for bag, report in reports.items():
+        for sentence in report["missing"]:
+            print(f"{bag}: {sentence}" if several else sentence)
     return 0

@@ -2,14 +2,16 @@
 
 CDR aligns every number to its own size, counted from behind a four-byte encapsulation header. With
 fixed joints and a fixed frame all messages have one length, so that each is packed and unpacked in
-one step, and a block of them is a table. Messages laid out otherwise, as other publishers may send
-them, are decoded field by field. Padding is never looked at: Fast DDS leaves in it, and behind the
-last field, whatever was in memory.
+one step. Messages laid out otherwise, as other publishers may send them, are decoded field by
+field; where one of them has its values, all have them that are equal but for the values, so that a
+block of messages is a table. Padding is never looked at: Fast DDS leaves in it, and behind the last
+field, whatever was in memory.
 """
 
+import itertools
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,6 +25,12 @@ SLIDE = "slide"
 BELT = "belt"
 
 _LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+_ENCAPSULATION = len(_LITTLE_ENDIAN)
+
+_JOINT_STATE_VALUES = 5
+_WRENCH_VALUES = 1
+_STRUCTURES = 8
+"""Different structures that are looked for in a block of messages."""
 
 
 class JointStateSample(NamedTuple):
@@ -62,6 +70,14 @@ class WrenchColumns:
     force: NDArray[np.float64]
 
 
+class Refused(NamedTuple):
+    """Messages that could not be read."""
+
+    number: int
+    reason: str
+    """Why the first could not; empty where there is none."""
+
+
 def _name(name: str) -> bytes:
     """Encode a CDR string: length with the closing zero, the characters, the zero."""
     return struct.pack("<I", len(name) + 1) + name.encode() + b"\x00"
@@ -80,28 +96,10 @@ _JOINT_STATE_CONSTANTS = (
     2,
     2,
 )
-_JOINT_STATE_TABLE = np.dtype(
-    {
-        "names": ["sec", "nanosec", "position", "velocity", "effort"],
-        "formats": ["<i4", "<u4", "(2,)<f8", "(2,)<f8", "(2,)<f8"],
-        "offsets": [4, 8, 52, 76, 100],
-        "itemsize": _JOINT_STATE.size,
-    }
-)
-
 # The components of the wrench other than force.x are zero when packed and skipped when unpacked.
 _WRENCH = struct.Struct("<4s iI 10s6x d40x")
 _WRENCH_FRAME = _name(SLIDE)
 _WRENCH_CONSTANTS = (_LITTLE_ENDIAN, _WRENCH_FRAME)
-_WRENCH_TABLE = np.dtype(
-    {
-        "names": ["sec", "nanosec", "force"],
-        "formats": ["<i4", "<u4", "<f8"],
-        "offsets": [4, 8, 28],
-        "itemsize": _WRENCH.size,
-    }
-)
-
 _STAMP = struct.Struct("<4s iI")
 _HEADER = struct.Struct("<4s iI 5s")
 
@@ -205,7 +203,8 @@ def unpack_joint_state(data: bytes) -> JointStateSample:
                 belt_position,
                 belt_velocity,
             )
-    return _decode_joint_state(data)
+    stamp, values = _joint_state_layout(data).read(data)
+    return JointStateSample(stamp, *values)
 
 
 def unpack_wrench(data: bytes) -> tuple[int, float]:
@@ -217,8 +216,8 @@ def unpack_wrench(data: bytes) -> tuple[int, float]:
         encapsulation, sec, nanosec, frame, force = _WRENCH.unpack(data)
         if (encapsulation, frame) == _WRENCH_CONSTANTS:
             return sec * NANOSECONDS + nanosec, force
-    message = _Decoder(data, "wrench")
-    return message.header_stamp(), message.doubles(6)[0]
+    stamp, (force,) = _wrench_layout(data).read(data)
+    return stamp, force
 
 
 def unpack_header(data: bytes) -> int:
@@ -229,75 +228,130 @@ def unpack_header(data: bytes) -> int:
     if data[:4] == _LITTLE_ENDIAN and len(data) >= _STAMP.size:
         _, sec, nanosec = _STAMP.unpack_from(data)
         return sec * NANOSECONDS + nanosec
-    return _Decoder(data, "header").header_stamp()
+    return _header_layout(data).read(data)[0]
 
 
-def joint_state_columns(messages: Sequence[bytes]) -> JointStateColumns:
-    """Decode serialized joint states, all at once where they have the layout of `pack_joint_state`.
+def joint_state_columns(messages: Sequence[bytes]) -> tuple[JointStateColumns, Refused]:
+    """Decode serialized joint states; say which `unpack_joint_state` would refuse."""
+    return joint_states_in(*joined(messages))
 
-    Raises BagError at the first message that `unpack_joint_state` refuses.
-    """
-    table = _table(messages, _JOINT_STATE_TABLE, _JOINT_STATE_MASK, _JOINT_STATE_TEMPLATE)
-    if table is None:
-        stamps, *columns = zip(*map(unpack_joint_state, messages), strict=True)
-        return JointStateColumns(
-            np.array(stamps, np.int64), *(np.array(column, np.float64) for column in columns)
+
+def joint_states_in(
+    data: bytes, begin: NDArray[np.int64], end: NDArray[np.int64]
+) -> tuple[JointStateColumns, Refused]:
+    """Decode the serialized joint states `data[begin[i] : end[i]]`, as `joint_state_columns`."""
+    stamp, values, refused = _decode(data, begin, end, _joint_state_layout, _JOINT_STATE_VALUES)
+    return JointStateColumns(stamp, *values), refused
+
+
+def wrench_columns(messages: Sequence[bytes]) -> tuple[WrenchColumns, Refused]:
+    """Decode serialized wrenches; say which `unpack_wrench` would refuse."""
+    return wrenches_in(*joined(messages))
+
+
+def wrenches_in(
+    data: bytes, begin: NDArray[np.int64], end: NDArray[np.int64]
+) -> tuple[WrenchColumns, Refused]:
+    """Decode the serialized wrenches `data[begin[i] : end[i]]`, as `wrench_columns`."""
+    stamp, values, refused = _decode(data, begin, end, _wrench_layout, _WRENCH_VALUES)
+    return WrenchColumns(stamp, *values), refused
+
+
+def rows(data: bytes, starts: NDArray[np.int64], size: int) -> NDArray[np.void]:
+    """Return the stretches of `size` bytes that begin there as items of an array, copied."""
+    stretches = np.ndarray(
+        (max(0, len(data) - size + 1),), np.dtype((np.void, size)), data, strides=(1,)
+    )
+    return stretches[starts]
+
+
+def joined(messages: Sequence[bytes]) -> tuple[bytes, NDArray[np.int64], NDArray[np.int64]]:
+    """Return messages as one, and where each of them begins and ends in it."""
+    size = np.array([len(message) for message in messages], np.int64)
+    end = np.cumsum(size)
+    return b"".join(messages), end - size, end
+
+
+class _Layout:
+    """Where the values of one message stand, and of all that have its structure."""
+
+    def __init__(self, message: "_Decoder", stamp: int, values: Sequence[int | None]) -> None:
+        """Take the places of the stamp and of the values, None for one that is not there."""
+        order = message.byte_order
+        places = {str(name): place for name, place in enumerate(values) if place is not None}
+        self._table = np.dtype(
+            {
+                "names": ["sec", "nanosec", *places],
+                "formats": [f"{order}i4", f"{order}u4", *[f"{order}f8"] * len(places)],
+                "offsets": [stamp, stamp + 4, *places.values()],
+                "itemsize": len(message.data),
+            }
         )
-    position, velocity, effort = table["position"], table["velocity"], table["effort"]
-    return JointStateColumns(
-        _stamps(table),
-        position[:, 0].copy(),
-        velocity[:, 0].copy(),
-        effort[:, 0].copy(),
-        position[:, 1].copy(),
-        velocity[:, 1].copy(),
-    )
+        self._values = [str(name) if str(name) in places else None for name in range(len(values))]
+        self._mask = np.zeros(len(message.data), np.uint8)
+        for stretch in message.structure:
+            self._mask[stretch] = 0xFF
+        self._structure = np.frombuffer(message.data, np.uint8) & self._mask
+
+    @property
+    def size(self) -> int:
+        """Of a message, in bytes."""
+        return len(self._mask)
+
+    def fits(self, messages: NDArray[np.void]) -> NDArray[np.bool_]:
+        """Return which messages of this size have this structure."""
+        content = messages.view(np.uint8).reshape(len(messages), self.size)
+        same = (content & self._mask) == self._structure
+        return np.ones(len(messages), bool) if same.all() else same.all(axis=1)
+
+    def table(self, messages: NDArray[np.void]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Return stamps (ns) of shape (messages,) and values of shape (values, messages)."""
+        table = messages.view(self._table)
+        values = np.full((len(self._values), len(table)), math.nan)
+        for row, name in zip(values, self._values, strict=True):
+            if name is not None:
+                row[:] = table[name]
+        return table["sec"].astype(np.int64) * NANOSECONDS + table["nanosec"], values
+
+    def read(self, message: bytes) -> tuple[int, list[float]]:
+        """Return stamp (ns) and values of the message that the layout was taken from."""
+        stamp, values = self.table(np.frombuffer(message, self._table))
+        return int(stamp[0]), values[:, 0].tolist()
 
 
-def wrench_columns(messages: Sequence[bytes]) -> WrenchColumns:
-    """Decode serialized wrenches, all at once where they have the layout of `pack_wrench`.
-
-    Raises BagError at the first message that `unpack_wrench` refuses.
-    """
-    table = _table(messages, _WRENCH_TABLE, _WRENCH_MASK, _WRENCH_TEMPLATE)
-    if table is None:
-        stamps, forces = zip(*map(unpack_wrench, messages), strict=True)
-        return WrenchColumns(np.array(stamps, np.int64), np.array(forces, np.float64))
-    return WrenchColumns(_stamps(table), table["force"].copy())
-
-
-def _words(data: bytes) -> NDArray[np.uint32]:
-    return np.frombuffer(data, dtype="<u4")
-
-
-# Packing ones where the layout has constants, zeros where it has values, leaves out the padding.
-_JOINT_STATE_MASK = _words(
-    _JOINT_STATE.pack(
-        b"\xff" * 4, 0, 0, b"\xff" * 5, b"\xff" * 14, b"\xff" * 9, *[0xFFFFFFFF, 0.0, 0.0] * 3
-    )
-)
-_JOINT_STATE_TEMPLATE = _words(pack_joint_state(0, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)))
-_WRENCH_MASK = _words(_WRENCH.pack(b"\xff" * 4, 0, 0, b"\xff" * 10, 0.0))
-_WRENCH_TEMPLATE = _words(pack_wrench(0, 0.0))
-
-
-def _table(
-    messages: Sequence[bytes],
-    layout: np.dtype[np.void],
-    mask: NDArray[np.uint32],
-    template: NDArray[np.uint32],
-) -> NDArray[np.void] | None:
-    """View the messages as rows of the layout, or return None if one of them has another."""
-    if not {layout.itemsize}.issuperset(map(len, messages)):
-        return None
-    data = b"".join(messages)
-    if ((_words(data).reshape(len(messages), len(mask)) & mask) != template).any():
-        return None
-    return np.frombuffer(data, dtype=layout)
-
-
-def _stamps(table: NDArray[np.void]) -> NDArray[np.int64]:
-    return table["sec"].astype(np.int64) * NANOSECONDS + table["nanosec"]
+def _decode(
+    data: bytes,
+    begin: NDArray[np.int64],
+    end: NDArray[np.int64],
+    layout_of: Callable[[bytes], _Layout],
+    value_count: int,
+) -> tuple[NDArray[np.int64], NDArray[np.float64], Refused]:
+    """Return stamps and values of the messages that can be read, in their order, and the rest."""
+    parts = [(np.empty(0, np.intp), np.empty(0, np.int64), np.empty((value_count, 0)))]
+    refused = Refused(0, "")
+    left = np.arange(len(begin))
+    for attempt in itertools.count():
+        if len(left) == 0:
+            break
+        try:
+            layout = layout_of(data[begin[left[0]] : end[left[0]]])
+        except BagError as error:
+            refused = Refused(refused.number + 1, refused.reason or str(error))
+            left = left[1:]
+            continue
+        # Where every message has a structure of its own, to compare them all would take for ever.
+        compared = left if attempt < _STRUCTURES else left[:1]
+        taken = end[compared] - begin[compared] == layout.size
+        messages = rows(data, begin[compared[taken]], layout.size)
+        fits = layout.fits(messages)
+        taken[taken] = fits
+        parts.append((compared[taken], *layout.table(messages if fits.all() else messages[fits])))
+        left = np.concatenate([compared[~taken], left[len(compared) :]])
+    if len(parts) == 2:
+        return *parts[1][1:], refused
+    places, stamps, values = zip(*parts, strict=True)
+    order = np.argsort(np.concatenate(places))
+    return np.concatenate(stamps)[order], np.concatenate(values, axis=1)[:, order], refused
 
 
 def _unpackable(kind: str, stamp: int, error: struct.error) -> BagError:
@@ -307,37 +361,51 @@ def _unpackable(kind: str, stamp: int, error: struct.error) -> BagError:
     )
 
 
-def _decode_joint_state(data: bytes) -> JointStateSample:
+def _joint_state_layout(data: bytes) -> _Layout:
     message = _Decoder(data, "joint state")
     stamp = message.header_stamp()
     names = [message.string() for _ in range(message.count())]
-    position, velocity, effort = (message.doubles(message.count()) for _ in range(3))
-
+    (position, positions), (velocity, velocities), (effort, efforts) = (
+        message.doubles(message.count()) for _ in range(3)
+    )
     missing = [joint for joint in (SLIDE, BELT) if joint not in names]
     if missing:
         raise BagError(
             f"a joint state names the joints {names}; {' and '.join(missing)} must be among them"
         )
-    lengths = len(position), len(velocity), len(effort) or len(names)
-    if lengths != (len(names),) * 3:
+    if (positions, velocities, efforts or len(names)) != (len(names),) * 3:
         raise BagError(
-            f"a joint state of the joints {names} has {len(position)} positions, "
-            f"{len(velocity)} velocities and {len(effort)} efforts; "
-            "one each is needed, of efforts one each or none"
+            f"a joint state of the joints {names} has {positions} positions, {velocities} "
+            f"velocities and {efforts} efforts; one each is needed, of efforts one each or none"
         )
-    slide, belt = names.index(SLIDE), names.index(BELT)
-    return JointStateSample(
+    slide, belt = 8 * names.index(SLIDE), 8 * names.index(BELT)
+    return _Layout(
+        message,
         stamp,
-        position[slide],
-        velocity[slide],
-        effort[slide] if effort else math.nan,
-        position[belt],
-        velocity[belt],
+        [
+            position + slide,
+            velocity + slide,
+            effort + slide if efforts else None,
+            position + belt,
+            velocity + belt,
+        ],
     )
 
 
+def _wrench_layout(data: bytes) -> _Layout:
+    message = _Decoder(data, "wrench")
+    stamp = message.header_stamp()
+    force, _ = message.doubles(6)
+    return _Layout(message, stamp, [force])
+
+
+def _header_layout(data: bytes) -> _Layout:
+    message = _Decoder(data, "header")
+    return _Layout(message, message.header_stamp(), [])
+
+
 class _Decoder:
-    """Reads one CDR message field by field; bytes behind the last field are left alone."""
+    """Finds the fields of one CDR message; bytes behind the last field are left alone."""
 
     def __init__(self, data: bytes, kind: str) -> None:
         if data[:2] not in (b"\x00\x00", b"\x00\x01"):
@@ -345,44 +413,47 @@ class _Decoder:
                 f"a {kind} message begins with the bytes '{data[:2].hex()}'; "
                 "CDR begins with 0000 (big endian) or 0001 (little endian)"
             )
-        self._body = data[4:]
-        self._byte_order = "<" if data[1] else ">"
-        self._offset = 0
+        self.data = data
+        self.byte_order = "<" if data[1] else ">"
+        self.structure = [slice(0, 2)]
+        """What is no value and no padding so far."""
+        self._place = _ENCAPSULATION
         self._kind = kind
 
-    def _advance(self, alignment: int, size: int) -> int:
-        """Step over the next field and return where it starts."""
-        start = -(-self._offset // alignment) * alignment
-        if start + size > len(self._body):
-            raise BagError(
-                f"a {self._kind} message ends after {len(self._body)} bytes, "
-                f"within a field of {size} bytes that starts at byte {start}"
-            )
-        self._offset = start + size
-        return start
-
     def header_stamp(self) -> int:
-        """Read a std_msgs/msg/Header and return its stamp in ns."""
-        sec, nanosec = struct.unpack_from(
-            f"{self._byte_order}iI", self._body, self._advance(alignment=4, size=8)
-        )
+        """Step over a std_msgs/msg/Header and return where its stamp is."""
+        stamp = self._advance(alignment=4, size=8)
         self.string()
-        return sec * NANOSECONDS + nanosec
+        return stamp
 
     def count(self) -> int:
         """Read an unsigned 32-bit number, the length of what follows."""
-        (count,) = struct.unpack_from(
-            f"{self._byte_order}I", self._body, self._advance(alignment=4, size=4)
-        )
+        start = self._advance(alignment=4, size=4)
+        self.structure.append(slice(start, start + 4))
+        (count,) = struct.unpack_from(f"{self.byte_order}I", self.data, start)
         return count
 
     def string(self) -> str:
+        """Read a string."""
         length = self.count()
         start = self._advance(alignment=1, size=length)
-        return self._body[start : start + length].rstrip(b"\x00").decode(errors="replace")
+        self.structure.append(slice(start, start + length))
+        return self.data[start : start + length].rstrip(b"\x00").decode(errors="replace")
 
-    def doubles(self, count: int) -> tuple[float, ...]:
+    def doubles(self, count: int) -> tuple[int, int]:
+        """Step over so many numbers; return where they are, and how many."""
         if count == 0:
-            return ()  # nothing follows an empty sequence, not even the padding
-        start = self._advance(alignment=8, size=8 * count)
-        return struct.unpack_from(f"{self._byte_order}{count}d", self._body, start)
+            return 0, 0  # nothing follows an empty sequence, not even the padding
+        return self._advance(alignment=8, size=8 * count), count
+
+    def _advance(self, alignment: int, size: int) -> int:
+        """Step over the next field and return where it starts."""
+        offset = -(-(self._place - _ENCAPSULATION) // alignment) * alignment
+        start = _ENCAPSULATION + offset
+        if start + size > len(self.data):
+            raise BagError(
+                f"a {self._kind} message ends after {len(self.data) - _ENCAPSULATION} bytes, "
+                f"within a field of {size} bytes that starts at byte {offset}"
+            )
+        self._place = start + size
+        return start

@@ -2,44 +2,94 @@
 
 import os
 import re
-from collections.abc import Iterator
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
-from itertools import islice
+from dataclasses import fields
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self, TypeVar
 
-from stickslip_ros.bags.mcap_file import McapFile
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from stickslip_ros.bags.compression import unpack_file
+from stickslip_ros.bags.mcap_file import McapFile, MessageBlock
+from stickslip_ros.bags.messages import (
+    JointStateColumns,
+    Refused,
+    WrenchColumns,
+    joint_states_in,
+    wrenches_in,
+)
 from stickslip_ros.bags.metadata import METADATA_FILE
 from stickslip_ros.errors import BagError
 
+_PACKED = ".mcap.zstd"
+"""Ending of the files that rosbag2 packs as a whole."""
 
-class TopicBlock(NamedTuple):
-    """Successive messages of one topic."""
+_JOINT_STATES = "joint_states"
+_CONTROL_FORCE = "control_force"
+_APPLIED_DISTURBANCE = "applied_disturbance"
+_TOPICS = {
+    _JOINT_STATES: "sensor_msgs/msg/JointState",
+    _CONTROL_FORCE: "geometry_msgs/msg/WrenchStamped",
+    _APPLIED_DISTURBANCE: "geometry_msgs/msg/WrenchStamped",
+}
+"""Types of the topics of a drive, by the last part of their names."""
 
-    stamps: list[int]
-    """Log times in ns."""
-    messages: list[bytes]
-    """The serialized messages."""
+ColumnsT = TypeVar("ColumnsT", JointStateColumns, WrenchColumns)
+_Decode = Callable[[bytes, NDArray[np.int64], NDArray[np.int64]], tuple[ColumnsT, Refused]]
+
+
+class RunBlock(NamedTuple):
+    """A stretch of a recorded run, of one chunk of its bag; either part may be empty."""
+
+    joint_states: JointStateColumns
+    control_forces: WrenchColumns
 
 
 class Recording:
-    """A bag that is open for reading; a context manager that closes it."""
+    """A bag that is open for reading; a context manager that closes it.
 
-    def __init__(self, path: Path) -> None:
+    Columns are read when they are asked for, `blocks` gives them a chunk at a time:
+
+        with Recording("bags/my_run") as recording:
+            recording.topics                       # {'/feed_drive/joint_states': …}
+            states = recording.joint_states        # all of them: numpy arrays
+            states.stamp, states.position          # ns, m
+            for block in recording.blocks():       # in the memory of one chunk
+                block.control_forces.force         # N
+            recording.missing                      # [] if nothing is
+    """
+
+    def __init__(self, path: Path | str, namespace: str | None = None) -> None:
         """Open a bag directory or one MCAP file, also such as a killed recorder leaves behind.
 
-        Raises BagError if there is no bag, or one that is not stored as MCAP.
+        The columns are those of the drive in the ROS `namespace`, such as `/feed_drive`; None will
+        do where the bag holds one drive. Raises BagError if there is no bag, or one that is not
+        stored as MCAP.
         """
-        self.path = path
-        with ExitStack() as files:
-            self._files = [
-                files.enter_context(closing(McapFile(file))) for file in _mcap_files(path)
+        self.path = Path(path)
+        self._namespace = namespace
+        self._unreadable: list[str] = []
+        self._refused: Counter[str] = Counter()
+        self._reasons: dict[str, str] = {}
+        paths = _mcap_files(self.path)
+        with ExitStack() as opened:
+            unpacked = [_unpacked(path, opened) for path in paths]
+            self.files = [
+                opened.enter_context(closing(file)) for file in self._readable_files(unpacked)
             ]
-            self._opened = files.pop_all()
+            """The MCAP files in their order; those that cannot be read are left out."""
+            self._opened = opened.pop_all()
+        self._undescribed = _undescribed(self.path, paths) if self.path.is_dir() else ""
         self.topics = {
             channel.topic: file.schemas[channel.schema_id].name
-            for file in self._files
+            for file in self.files
             for channel in file.channels.values()
             if channel.schema_id in file.schemas
         }
@@ -47,67 +97,87 @@ class Recording:
 
     @property
     def complete(self) -> bool:
-        """Whether the bag was closed properly, and nothing read of it so far was damaged."""
-        described = not self.path.is_dir() or (self.path / METADATA_FILE).is_file()
-        return described and all(file.complete for file in self._files)
+        """Whether nothing is `missing`."""
+        return not self.missing
 
-    def topic_of_type(self, type_name: str, suffix: str) -> str:
-        """Return the name of the one topic of that type whose name ends with that suffix.
+    @property
+    def missing(self) -> list[str]:
+        """What the bag lacks, in sentences; reading on may find more.
 
-        The suffix is a topic's last part or parts, as `joint_states`, or all its name. Raises
-        BagError if there is no such topic, or several.
+        That is an end that no recorder wrote, damage, and messages that could not be understood.
         """
-        found = [
-            topic
-            for topic, topic_type in self.topics.items()
-            if topic_type == type_name and f"/{topic}".endswith(f"/{suffix}")
+        return [
+            *([self._undescribed] if self._undescribed else []),
+            *self._unreadable,
+            *(sentence for file in self.files for sentence in file.damage),
+            *(
+                f"{number} messages on {topic} could not be read: {self._reasons[topic]}"
+                for topic, number in self._refused.items()
+            ),
         ]
-        if len(found) == 1:
-            return found[0]
-        topics = ", ".join(f"{name} ({kind})" for name, kind in sorted(self.topics.items()))
-        raise BagError(
-            f"the bag {self.path} has {len(found) or 'no'} topics '{suffix}' of the type "
-            f"{type_name}, one is needed; its topics are: {topics or 'none'}"
-        )
+
+    @cached_property
+    def joint_states(self) -> JointStateColumns:
+        """All joint states; BagError as for `blocks`."""
+        return self._whole(JointStateColumns, _JOINT_STATES, joint_states_in)
+
+    @cached_property
+    def control_forces(self) -> WrenchColumns:
+        """All control forces; BagError as for `blocks`."""
+        return self._whole(WrenchColumns, _CONTROL_FORCE, wrenches_in)
+
+    @cached_property
+    def applied_disturbances(self) -> WrenchColumns:
+        """All disturbance forces at the samples from which they act; BagError as for `blocks`."""
+        return self._whole(WrenchColumns, _APPLIED_DISTURBANCE, wrenches_in)
+
+    def blocks(self) -> Iterator[RunBlock]:
+        """Yield joint states and control forces, those of a chunk at a time, in the file's order.
+
+        Messages that cannot be understood are left out, and `missing` then tells of them. Raises
+        BagError where the bag holds several drives and no namespace was given, and where the
+        operating system fails to read it.
+        """
+        states, forces = self._topic(_JOINT_STATES), self._topic(_CONTROL_FORCE)
+        for block, channels in self._blocks(states, forces):
+            yield RunBlock(
+                self._decoded(states, block, channels, joint_states_in),
+                self._decoded(forces, block, channels, wrenches_in),
+            )
 
     def messages(self, *topics: str) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, log time in ns and serialized message of these topics, as recorded in turn.
 
         Raises BagError where the operating system fails to read the bag.
         """
-        for file in self._files:
-            wanted = {
-                channel_id: channel.topic
-                for channel_id, channel in file.channels.items()
-                if channel.topic in topics
-            }
-            for channel_id, stamp, data in file.messages(wanted):
-                yield wanted[channel_id], stamp, data
+        for block, channels in self._blocks(*topics):
+            names = {channel: topic for topic, ids in channels.items() for channel in ids}
+            columns = (block.channel, block.log_time, block.begin, block.end)
+            for channel, stamp, begin, end in zip(*(c.tolist() for c in columns), strict=True):
+                yield names[channel], stamp, block.data[begin:end]
 
-    def blocks(self, *topics: str, size: int = 10_000) -> Iterator[dict[str, TopicBlock]]:
-        """Yield the messages of these topics in blocks of `size` messages of all topics together.
+    def offered_qos(self, topic: str) -> str:
+        """Return what the recorded publishers of a topic offered, as rosbag2's YAML; "" if unknown.
 
-        Each block has an entry for every topic, which may be empty. Raises BagError where the
-        operating system fails to read the bag.
+        It is a list with an item for each publisher.
         """
-        messages = self.messages(*topics)
-        while batch := list(islice(messages, size)):
-            block = {topic: TopicBlock([], []) for topic in topics}
-            for topic, stamp, data in batch:
-                stamps, datas = block[topic]
-                stamps.append(stamp)
-                datas.append(data)
-            yield block
+        found = [
+            channel.metadata.get("offered_qos_profiles", "")
+            for file in self.files
+            for channel in file.channels.values()
+            if channel.topic == topic
+        ]
+        return next(filter(None, found), "")
 
     def metadata(self, name: str) -> dict[str, str] | None:
         """Return the last table of texts of that name in the bag, None if there is none."""
-        found = [file.metadata(name) for file in self._files]
+        found = [file.metadata(name) for file in self.files]
         return next((table for table in reversed(found) if table is not None), None)
 
     def attachment(self, name: str) -> bytes | None:
         """Return the last file of that name attached to the bag, None if there is none."""
-        found = [file.attachment(name) for file in self._files]
-        return next((data for data in reversed(found) if data is not None), None)
+        found = [file.attachment(name) for file in self.files]
+        return next((file.data for file in reversed(found) if file is not None), None)
 
     def close(self) -> None:
         """Close the files."""
@@ -124,6 +194,78 @@ class Recording:
     ) -> None:
         self.close()
 
+    def _readable_files(self, paths: Sequence[Path]) -> Iterator[McapFile]:
+        """Open the files; raise BagError if none can be read, otherwise note those that cannot."""
+        errors: list[BagError] = []
+        for path in paths:
+            try:
+                yield McapFile(path)
+            except BagError as error:
+                errors.append(error)
+        if len(errors) == len(paths):
+            raise errors[0]
+        self._unreadable = [str(error) for error in errors]
+
+    @cached_property
+    def _prefix(self) -> str:
+        """What the names of the drive's topics begin with; BagError if there are several drives."""
+        if self._namespace is not None:
+            return f"/{self._namespace.strip('/')}/".replace("//", "/")
+        for name, type_name in _TOPICS.items():
+            prefixes = [
+                topic.removesuffix(name)
+                for topic, topic_type in self.topics.items()
+                if topic_type == type_name and f"/{topic}".endswith(f"/{name}")
+            ]
+            if len(prefixes) > 1:
+                namespaces = ", ".join(sorted(prefix.rstrip("/") or "/" for prefix in prefixes))
+                raise BagError(
+                    f"the bag {self.path} holds {len(prefixes)} drives; name the namespace of one "
+                    f"of them: {namespaces}"
+                )
+            if prefixes:
+                return prefixes[0]
+        return "/"
+
+    def _topic(self, name: str) -> str:
+        """Return the drive's topic of that name, "" if it has none."""
+        topic = self._prefix + name
+        return topic if self.topics.get(topic) == _TOPICS[name] else ""
+
+    def _blocks(self, *topics: str) -> Iterator[tuple[MessageBlock, dict[str, list[int]]]]:
+        """Yield the messages of these topics chunk by chunk, and the channels of each topic."""
+        for file in self.files:
+            channels: dict[str, list[int]] = {}
+            for number, channel in file.channels.items():
+                if channel.topic in topics:
+                    channels.setdefault(channel.topic, []).append(number)
+            for block in file.blocks([number for ids in channels.values() for number in ids]):
+                yield block, channels
+
+    def _decoded(
+        self,
+        topic: str,
+        block: MessageBlock,
+        channels: dict[str, list[int]],
+        decode: _Decode[ColumnsT],
+    ) -> ColumnsT:
+        messages = block.on(channels.get(topic, []))
+        columns, refused = decode(messages.data, messages.begin, messages.end)
+        if refused.number > 0:
+            self._refused[topic] += refused.number
+            self._reasons.setdefault(topic, refused.reason)
+        return columns
+
+    def _whole(self, kind: type[ColumnsT], name: str, decode: _Decode[ColumnsT]) -> ColumnsT:
+        """Return all columns of a topic, dataclasses of arrays, as one."""
+        topic = self._topic(name)
+        blocks = [self._decoded(topic, block, ids, decode) for block, ids in self._blocks(topic)]
+        if not blocks:
+            nothing = np.empty(0, np.int64)
+            blocks = [decode(b"", nothing, nothing)[0]]
+        names = [field.name for field in fields(kind)]
+        return kind(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
+
 
 def _mcap_files(path: Path) -> list[Path]:
     """Return the files of a bag in the order in which they were recorded."""
@@ -133,7 +275,7 @@ def _mcap_files(path: Path) -> list[Path]:
         if path.suffix == ".db3":
             raise _not_mcap(path)
         return [path]
-    files = sorted(path.glob("*.mcap"), key=_place_in_bag)
+    files = sorted([*path.glob("*.mcap"), *path.glob(f"*{_PACKED}")], key=_place_in_bag)
     if not files:
         if next(path.glob("*.db3"), None):
             raise _not_mcap(path)
@@ -141,10 +283,40 @@ def _mcap_files(path: Path) -> list[Path]:
     return files
 
 
+def _unpacked(path: Path, opened: ExitStack) -> Path:
+    """Return a file as MCAP: what rosbag2 packed as a whole is unpacked until the bag closes."""
+    if not path.name.endswith(_PACKED):
+        return path
+    directory = opened.enter_context(tempfile.TemporaryDirectory(prefix="stickslip_ros_"))
+    unpacked = Path(directory, path.name.removesuffix(".zstd"))
+    try:
+        unpack_file(path, unpacked)
+    except OSError as error:
+        raise BagError(f"the file {path} cannot be unpacked: {error}") from error
+    return unpacked
+
+
 def _place_in_bag(file: Path) -> tuple[int, str]:
     """Sort `bag_2.mcap` before `bag_10.mcap`, as rosbag2 numbers the files of a bag it splits."""
-    number = re.search(r"_(\d+)$", file.stem)
+    number = re.search(r"_(\d+)\.mcap", file.name)
     return (int(number[1]) if number else 0), file.name
+
+
+def _undescribed(directory: Path, files: Sequence[Path]) -> str:
+    """Return in what the `metadata.yaml` of a bag fails to list its files, or nothing."""
+    try:
+        described: Any = yaml.safe_load((directory / METADATA_FILE).read_text(encoding="utf-8"))
+        listed = set(described["rosbag2_bagfile_information"]["relative_file_paths"])
+    except FileNotFoundError:
+        return f"{METADATA_FILE} is missing: the recorder is still at work or was killed"
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
+        return f"{METADATA_FILE} cannot be understood"
+    present = {file.name for file in files}
+    if gone := sorted(map(str, listed - present)):
+        return f"{', '.join(gone)} is listed in {METADATA_FILE} but not there"
+    if new := sorted(present - listed):
+        return f"{METADATA_FILE} does not list {', '.join(new)}: the recorder did not finish"
+    return ""
 
 
 def _not_mcap(path: Path) -> BagError:

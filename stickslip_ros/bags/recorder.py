@@ -1,20 +1,32 @@
-"""Writing a bag: a directory with one MCAP file and, once closed, `metadata.yaml`."""
+"""Writing a bag: a directory of MCAP files and, when one is finished, `metadata.yaml`.
+
+At each flush the chunk at hand goes to the operating system, and so outlives this process. To hand
+it on to the disk, so that it outlives the machine's power, may take a second: a thread of the
+recorder's own does that, and all else that must not hold up the one who writes.
+"""
 
 import os
 import tempfile
-from collections.abc import Generator, Mapping
+import time
+from collections import deque
+from collections.abc import Callable, Collection, Generator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, closing, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from io import BufferedWriter, FileIO
+from math import inf
 from pathlib import Path
 from types import TracebackType
-from typing import Literal, NoReturn, Self
+from typing import Any, Literal, NoReturn, Self
 
 import yaml
+from mcap.data_stream import RecordBuilder
+from mcap.records import Channel, Schema
 from mcap.writer import CompressionType, Writer
 
 from stickslip_ros.bags.definitions import message_definition, type_hash
 from stickslip_ros.bags.mcap_file import McapFile
-from stickslip_ros.bags.metadata import closing_information, opening_information, write_metadata
+from stickslip_ros.bags.metadata import BagDescription, opening_information
 from stickslip_ros.errors import BagError
 
 Compression = Literal["lz4", "zstd", "none"]
@@ -24,7 +36,13 @@ _COMPRESSION_TYPES: dict[Compression, CompressionType] = {
     "zstd": CompressionType.ZSTD,
     "none": CompressionType.NONE,
 }
-_STAMP_LIMIT = 2**63
+_LAST_STAMP = 2**63 - 1
+_DEFINITIONS_SHARE = 0.02
+"""Of a file, at most, for definitions outside the chunks: damage may be to the first of them."""
+_SYNC_PERIOD = 0.1
+"""Least time, s, from one handing to the disk to the next: what it costs slows down who writes."""
+_MOST_TASKS = 3
+"""For the disk, which may be slower than one who splits a bag all the time."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +79,47 @@ def check_new_bag(path: Path) -> None:
     if not parent.is_dir():
         raise BagError(f"the bag {path} cannot be created: {parent} is not a directory")
     try:
-        os.rmdir(tempfile.mkdtemp(dir=parent))  # what permissions alone do not tell
+        with tempfile.TemporaryFile(dir=parent) as file:  # what permissions alone do not tell
+            file.write(bytes(4096))
     except OSError as error:
         raise BagError(
             f"the bag {path} cannot be created: {parent} cannot be written to ({error.strerror})"
         ) from None
+
+
+class _RecordStream(BufferedWriter):
+    """A new file that is written whole records at a time, and can be cut behind the last one."""
+
+    def __init__(self, path: Path, on_full: Callable[[], None]) -> None:
+        super().__init__(FileIO(path, "xb"))
+        self.path = path
+        self.size = 0
+        """Bytes of the whole records that the operating system has."""
+        self.limit = inf
+        """Size from which on the file is full."""
+        self._on_full = on_full
+
+    def write(self, records: Any, /) -> int:
+        written = super().write(records)
+        self.flush()
+        self.size += written
+        if self.size >= self.limit:
+            self._on_full()
+        return written
+
+    def sync(self) -> None:
+        """Hand what was written to the disk."""
+        os.fdatasync(self.fileno())
+
+    def cut(self) -> None:
+        """Close the file, on a disk that may fail, behind its last whole record."""
+        if self.closed:
+            return
+        with suppress(OSError):
+            os.ftruncate(self.fileno(), self.size)
+            self.sync()
+        with suppress(OSError):
+            self.raw.close()  # not to try the rest of half a record again
 
 
 class Recorder:
@@ -78,39 +132,45 @@ class Recorder:
         self,
         directory: Path,
         compression: Compression = "lz4",
-        custom_data: Mapping[str, str] | None = None,
+        *,
+        max_bag_size: int = 0,
+        max_bag_duration: float = 0.0,
     ) -> None:
         """Create the bag directory, with parents if need be, and open `<its name>_0.mcap` in it.
 
-        `compression` is that of the file's chunks; `custom_data` goes into `metadata.yaml`. Raises
-        BagError if the directory exists or cannot be created, and then leaves nothing behind.
+        `compression` is that of the files' chunks. A file that has reached `max_bag_size` bytes, or
+        whose messages would span more than `max_bag_duration` seconds by their stamps, is followed
+        by another (0: no limit). Raises BagError if the directory exists or cannot be created, and
+        then leaves nothing behind.
         """
         check_new_bag(directory)
         self.directory = _absolute(directory)
-        self._custom_data = dict(custom_data or {})
-        self._path = self.directory / f"{self.directory.name}_0.mcap"
-        self._schema_ids: dict[str, int] = {}
-        self._topics: set[str] = set()
-        information = opening_information(self._path.name, self._custom_data)
+        self._compression = _COMPRESSION_TYPES[compression]
+        self._max_size = max_bag_size
+        self._max_duration = round(max_bag_duration * 1e9)
+        self._description = BagDescription()
+        self._definitions: list[Schema | Channel] = []
+        self._definition_records = b""
+        self._schemas: list[Schema] = []
+        self._topics: list[str] = []
+        self._tables: dict[str, dict[str, str]] = {}
+        self._files = 0
         missing = [parent for parent in self.directory.parents if not os.path.lexists(parent)]
+        made = [*reversed(missing), self.directory]
         try:
             with ExitStack() as undo:
-                for new in (*reversed(missing), self.directory):
+                for new in made:
                     new.mkdir()
                     undo.callback(new.rmdir)
-                self._stream = self._path.open("xb")
-                undo.callback(self._path.unlink)
-                undo.callback(self._stream.close)
-                self._writer = Writer(self._stream, compression=_COMPRESSION_TYPES[compression])
-                self._writer.start(profile="ros2")
-                self._writer.add_metadata(
-                    "rosbag2", {"serialized_metadata": yaml.safe_dump(information, sort_keys=False)}
-                )
-                self._writer.flush()
+                self._open_file()
                 undo.pop_all()
         except (OSError, ValueError) as error:
             raise BagError(f"the bag {directory} cannot be created: {error}") from error
-        self._add_message = self._writer.add_message
+        self._closed = False
+        self._background = ThreadPoolExecutor(1, f"recorder of {self.directory.name}")
+        self._tasks: deque[Future[None]] = deque()
+        self._sync: Future[None] | None = None
+        self._do_later(_sync_directories, [*(new.parent for new in made), self.directory])
 
     def add_topic(self, name: str, type_name: str, qos: QosProfile) -> int:
         """Add a topic, such as `/feed_drive/joint_states`, and return its channel for `write`.
@@ -122,38 +182,76 @@ class Recorder:
             raise BagError(f"the topic {name} is in the bag {self.directory} already")
         definition = message_definition(type_name).encode()
         metadata = {"offered_qos_profiles": qos.to_yaml(), "topic_type_hash": type_hash(type_name)}
-        with self._writing():
-            if type_name not in self._schema_ids:
-                self._schema_ids[type_name] = self._writer.register_schema(
-                    type_name, "ros2msg", definition
-                )
-            self._topics.add(name)
-            return self._writer.register_channel(name, "cdr", self._schema_ids[type_name], metadata)
+        return self.add_channel(
+            Channel(0, name, "cdr", metadata, 0), Schema(0, definition, "ros2msg", type_name)
+        )
 
-    def write(self, channel: int, data: bytes, stamp: int) -> None:
-        """Append a serialized message; the stamp in ns becomes its log and publish time.
+    def add_channel(self, channel: Channel, schema: Schema) -> int:
+        """Add a channel as another file has it, and return this bag's number of it for `write`.
 
-        Raises BagError for a stamp that is negative or beyond 63 bits, and if the bag is closed or
+        The numbers in `channel` and `schema` do not matter. Raises BagError if the bag is closed or
         fails.
         """
-        # The library would leave half a record behind if it came upon such a stamp.
-        if not 0 <= stamp < _STAMP_LIMIT:
-            raise BagError(
-                f"a message of the stamp {stamp} ns cannot be written to the bag {self.directory}; "
-                "stamps are from 0 to 2^63 - 1 ns"
-            )
+        new: list[Schema | Channel] = []
+        with self._writing():
+            schema = replace(schema, id=0)
+            if schema not in self._schemas:
+                self._schemas.append(schema)
+                new.append(replace(schema, id=len(self._schemas)))
+            schema_id = self._schemas.index(schema) + 1
+            self._topics.append(channel.topic)
+            new.append(replace(channel, id=len(self._topics), schema_id=schema_id))
+            _register(self._writer, new)
+            records = _records(new)
+            self._stream.write(records)
+            self._definitions += new
+            self._definition_records += records
+        return len(self._topics)
+
+    def write(
+        self,
+        channel: int,
+        data: bytes,
+        stamp: int,
+        publish_time: int | None = None,
+        sequence: int = 0,
+    ) -> None:
+        """Append a serialized message; the stamp in ns is its log time.
+
+        It is the publish time, too, if that is not given. Raises BagError for a time that is
+        negative or beyond 63 bits, and if the bag is closed or fails.
+        """
+        if publish_time is None:
+            publish_time = stamp
+        elif not 0 <= publish_time <= _LAST_STAMP:
+            self._refuse_stamp(publish_time)
+        if not self._earliest <= stamp <= self._latest:
+            self._make_room(stamp)
         try:
-            self._add_message(channel, stamp, data, stamp)
+            self._add_message(channel, stamp, data, publish_time, sequence)
         except OSError as error:
             self._fail(error)
 
     def flush(self) -> None:
         """Hand all that was written to the operating system, so that it outlives this process.
 
-        Raises BagError if the bag is closed or fails.
+        The disk has it soon after, or soon after the next flush if they follow each other at once.
+        Raises BagError if the bag is closed or fails; what the disk refuses is told at the next
+        flush.
         """
         with self._writing():
             self._writer.flush()
+            grown = self._stream.size - self._defined_size
+            if _DEFINITIONS_SHARE * grown > len(self._definition_records):
+                self._stream.write(self._definition_records)
+                self._defined_size = self._stream.size
+            now = time.monotonic()
+            if self._stream.size > self._synced_size and now >= self._next_sync:
+                self._synced_size = self._stream.size
+                self._next_sync = now + _SYNC_PERIOD
+                # One that has not begun yet sees to this flush, too.
+                if self._sync is None or self._sync.running() or self._sync.done():
+                    self._sync = self._do_later(self._stream.sync)
 
     def attach(self, name: str, data: bytes, media_type: str) -> None:
         """Put a whole file of a media type such as `text/yaml` into the bag.
@@ -164,27 +262,25 @@ class Recorder:
             self._writer.add_attachment(0, 0, name, media_type, data)
 
     def add_metadata(self, name: str, data: Mapping[str, str]) -> None:
-        """Put a table of texts into the bag.
+        """Put a table of texts into the bag: into the file at hand and those that follow.
 
         Raises BagError if the bag is closed or fails.
         """
         with self._writing():
-            self._writer.add_metadata(name, dict(data))
+            self._tables[name] = dict(data)
+            self._writer.add_metadata(name, self._tables[name])
 
     def close(self) -> None:
-        """Finish the file and write `metadata.yaml`; does nothing when done already.
+        """Finish the bag, all of it on the disk; does nothing when done already.
 
         Raises BagError if the bag fails.
         """
-        if self._stream.closed:
+        if self._closed:
             return
         with self._writing():
-            self._add_message = self._refuse
-            self._writer.finish()
-            self._stream.close()
-            with closing(McapFile(self._path)) as file:
-                information = closing_information(file, self._custom_data)
-            write_metadata(self.directory, information)
+            self._do_later(self._finish, self._writer, self._stream)
+            self._wait_for_tasks(at_most=0)
+        self._end()
 
     def __enter__(self) -> Self:
         return self
@@ -197,27 +293,138 @@ class Recorder:
     ) -> None:
         self.close()
 
+    def _open_file(self) -> None:
+        """Begin the next file with all that is known by now; where that fails, there is none."""
+        path = self.directory / f"{self.directory.name}_{self._files}.mcap"
+        stream = _RecordStream(path, self._begin_another)
+        try:
+            writer = Writer(stream, compression=self._compression)
+            writer.start(profile="ros2")
+            information = opening_information(path.name)
+            writer.add_metadata("rosbag2", {"serialized_metadata": information})
+            for name, table in self._tables.items():
+                writer.add_metadata(name, table)
+            _register(writer, self._definitions)
+            stream.write(self._definition_records)
+        except (OSError, ValueError):
+            stream.cut()
+            path.unlink()
+            raise
+        self._files += 1
+        self._stream, self._writer, self._add_message = stream, writer, writer.add_message
+        self._synced_size = 0
+        self._next_sync = 0.0
+        self._defined_size = stream.size
+        self._earliest = self._latest = _LAST_STAMP
+
+    def _make_room(self, stamp: int) -> None:
+        """Begin a further file if a message of that stamp is not to be in the one at hand."""
+        if not 0 <= stamp <= _LAST_STAMP:
+            self._refuse_stamp(stamp)
+        if stamp > self._latest:
+            with self._writing():
+                self._wait_for_tasks(at_most=_MOST_TASKS)
+                self._writer.flush()
+                finished = self._writer, self._stream
+                self._stream.limit = inf
+                self._open_file()
+                self._do_later(self._finish, *finished)
+                self._sync = None
+        if self._max_size and self._earliest == _LAST_STAMP:
+            # A file grows with chunks only: what a limit below its beginning lets in is one.
+            self._stream.limit = max(self._max_size, self._stream.size + 1)
+        self._earliest = min(stamp, self._earliest)
+        if self._max_duration:
+            self._latest = min(self._earliest + self._max_duration, _LAST_STAMP)
+
+    def _begin_another(self) -> None:
+        """Let no further message into the file at hand."""
+        self._latest = -1
+
+    def _finish(self, writer: Writer, stream: _RecordStream) -> None:
+        """Complete a file and describe it; when it is to be followed by another, that is there."""
+        try:
+            writer.finish()
+            stream.sync()
+            stream.close()
+        except OSError:
+            stream.cut()
+            raise
+        with closing(McapFile(stream.path)) as file:
+            self._description.add(file)
+        self._description.write(self.directory)
+        _sync_directories([self.directory])
+
+    def _do_later(self, task: Callable[..., None], *arguments: Any) -> Future[None]:
+        """Have something done in the background, behind what is to be done there already."""
+        self._tasks.append(self._background.submit(task, *arguments))
+        return self._tasks[-1]
+
+    def _wait_for_tasks(self, at_most: int) -> None:
+        """Wait until no more than that are to be done; raise what one of those done has raised."""
+        while self._tasks and (len(self._tasks) > at_most or self._tasks[0].done()):
+            self._tasks.popleft().result()
+
     @contextmanager
     def _writing(self) -> Generator[None]:
-        if self._stream.closed:
+        if self._closed:
             self._refuse()
         try:
+            self._wait_for_tasks(at_most=len(self._tasks))
             yield
-        except OSError as error:
+        except (OSError, BagError) as error:
             self._fail(error)
 
-    def _fail(self, error: OSError) -> NoReturn:
+    def _fail(self, error: Exception) -> NoReturn:
         """Close the file as it is: after half a record nothing more can be appended."""
-        self._add_message = self._refuse
-        with suppress(OSError):
-            self._stream.close()
+        self._end()
+        self._stream.cut()
         raise BagError(
             f"the bag {self.directory} cannot be written any more ({error}); "
             "what it holds so far can be read"
         ) from error
 
+    def _end(self) -> None:
+        self._closed = True
+        self._add_message = self._refuse
+        self._background.shutdown()
+
+    def _refuse_stamp(self, stamp: int) -> NoReturn:
+        """Refuse it before the library comes upon it and leaves half a record behind."""
+        raise BagError(
+            f"a message of the stamp {stamp} ns cannot be written to the bag {self.directory}; "
+            "stamps are from 0 to 2^63 - 1 ns"
+        )
+
     def _refuse(self, *_: object) -> NoReturn:
         raise BagError(f"the bag {self.directory} is closed")
+
+
+def _register(writer: Writer, definitions: Sequence[Schema | Channel]) -> None:
+    """Let a writer know of definitions: in the same order it gives them the same numbers."""
+    for new in definitions:
+        if isinstance(new, Schema):
+            writer.register_schema(new.name, new.encoding, new.data)
+        else:
+            writer.register_channel(new.topic, new.message_encoding, new.schema_id, new.metadata)
+
+
+def _records(definitions: Sequence[Schema | Channel]) -> bytes:
+    builder = RecordBuilder()
+    for definition in definitions:
+        definition.write(builder)
+    return builder.end()
+
+
+def _sync_directories(directories: Collection[Path]) -> None:
+    """Hand the names in directories to the disk, where file system and permissions allow that."""
+    for directory in directories:
+        with suppress(OSError):
+            descriptor = os.open(directory, os.O_RDONLY)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
 
 
 def _absolute(path: Path) -> Path:

@@ -1,29 +1,18 @@
-"""A recorded run from its bag: as columns, and as a report of its measures and counts."""
+"""A recorded run from its bag: a report of its measures and counts."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import fields
 from math import isinf
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-import numpy as np
-
-from stickslip_ros.bags.messages import (
-    JointStateColumns,
-    WrenchColumns,
-    joint_state_columns,
-    wrench_columns,
-)
+from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.physics.knots import BoolArray
-from stickslip_ros.physics.samples import IntArray, RunMeter
+from stickslip_ros.physics.samples import NANOSECONDS, IntArray, RunMeter
 
 _DEFAULT_WINDOW = 20
 """Cycles to average over for a bag of somebody else's."""
 _LARGEST_WINDOW = 100_000
-
-ColumnsT = TypeVar("ColumnsT", JointStateColumns, WrenchColumns)
 
 
 def report_of_bag(
@@ -32,51 +21,95 @@ def report_of_bag(
     start: float = 0.0,
     end: float = float("inf"),
     window: int | None = None,
+    namespace: str | None = None,
 ) -> dict[str, Any]:
     """Return measures, counts and completeness of the recording at `path`, ready for JSON.
 
-    Only what lies from `start` on and before `end` (s after the first joint state) is measured,
-    over the last `window` whole cycles of it (None: as many as the analyzer did). Raises BagError
-    for what is no bag or holds no joint states, and InvalidInputError for an empty part.
+    Only what lies from `start` on and before `end` (s after the first joint state or, where there
+    is none, the first force) is measured, over the last `window` whole cycles of it (None: as many
+    as the analyzer did). The drive is that in the ROS `namespace`, None where there is only one.
+    `complete` says whether `missing`, sentences on what the bag lacks, is empty.
+
+    Raises BagError for what is no bag or holds neither joint states nor control forces, and
+    InvalidInputError for an empty part.
     """
     if not start < end:
         raise InvalidInputError(f"the part from {start} s to {end} s is empty")
-    first: int | None = None
-    with Recording(path) as recording:
-        meter = RunMeter(window or _window_at_recording(recording))
-        for states, forces in _column_blocks(recording):
-            if first is None and len(states.stamp):
-                first = int(states.stamp[0])
-            if first is None:
-                continue
-            rows = _within(states.stamp, first, start, end)
-            meter.motion.feed(
+    with Recording(path, namespace) as recording:
+        run = _RunReader(RunMeter(window or _window_at_recording(recording)), start, end)
+        for block in recording.blocks():
+            run.feed(block.joint_states, block.control_forces)
+        run.finish()
+        missing = recording.missing
+        if run.first is None:
+            topics = ", ".join(
+                f"{name} ({kind})" for name, kind in sorted(recording.topics.items())
+            )
+            raise BagError(
+                f"the bag {path} holds no joint_states and no control_force"
+                + (f" in {namespace}" if namespace else "")
+                + f" that can be read; its topics are: {topics or 'none'}"
+                + "".join(f"; {sentence}" for sentence in missing)
+            )
+    if run.measured == 0:
+        raise InvalidInputError(f"the part from {start} s to {end} s of {path} holds no samples")
+    if not run.has_states:
+        missing.append("the bag holds no joint states: nothing is known of the motion")
+    return {**run.meter.report(), "complete": not missing, "missing": missing}
+
+
+class _RunReader:
+    """Feeds a meter with the part of a run that lies between two instants."""
+
+    def __init__(self, meter: RunMeter, start: float, end: float) -> None:
+        self.meter = meter
+        self.first: int | None = None
+        """Stamp from which the instants count, ns, once there is one."""
+        self.has_states = False
+        self.measured = 0
+        """Joint states and forces in the part."""
+        self._start = round(start * NANOSECONDS)
+        self._end = end if isinf(end) else round(end * NANOSECONDS)
+        self._early: list[WrenchColumns] = []
+
+    def feed(self, states: JointStateColumns, forces: WrenchColumns) -> None:
+        if len(states.stamp) > 0:
+            self.has_states = True
+            first = self._begin(int(states.stamp[0])) if self.first is None else self.first
+            rows = self._part(states.stamp, first)
+            self.measured += int(rows.sum())
+            self.meter.motion.feed(
                 states.stamp[rows],
                 states.position[rows],
                 states.velocity[rows],
                 states.belt_velocity[rows],
             )
-            rows = _within(forces.stamp, first, start, end)
-            meter.force.feed(forces.stamp[rows], forces.force[rows])
-        complete = recording.complete
-    if first is None:
-        raise BagError(f"the bag {path} holds no joint states")
-    if meter.motion.samples == 0:
-        raise InvalidInputError(f"the part from {start} s to {end} s of {path} holds no samples")
-    return {**meter.report(), "complete": complete}
+        if self.first is None:
+            self._early.append(forces)
+        else:
+            self._feed_forces(forces, self.first)
 
+    def finish(self) -> None:
+        """Measure the forces of a run without joint states."""
+        stamps = [forces.stamp[0] for forces in self._early if len(forces.stamp) > 0]
+        if stamps:
+            self._begin(int(stamps[0]))
 
-def read_columns(path: Path) -> tuple[JointStateColumns, WrenchColumns]:
-    """Return the joint states and the control forces of the recording at `path`, all at once.
+    def _begin(self, first: int) -> int:
+        self.first = first
+        for forces in self._early:
+            self._feed_forces(forces, first)
+        self._early.clear()
+        return first
 
-    Raises BagError for what is no bag or holds no joint states.
-    """
-    with Recording(path) as recording:
-        blocks = list(_column_blocks(recording))
-    if not blocks:
-        raise BagError(f"the bag {path} holds no joint states")
-    states, forces = zip(*blocks, strict=True)
-    return _joined(JointStateColumns, states), _joined(WrenchColumns, forces)
+    def _feed_forces(self, forces: WrenchColumns, first: int) -> None:
+        rows = self._part(forces.stamp, first)
+        self.measured += int(rows.sum())
+        self.meter.force.feed(forces.stamp[rows], forces.force[rows])
+
+    def _part(self, stamp: IntArray, first: int) -> BoolArray:
+        since = stamp - first
+        return (since >= self._start) & (since < self._end)
 
 
 def _window_at_recording(recording: Recording) -> int:
@@ -86,24 +119,3 @@ def _window_at_recording(recording: Recording) -> int:
     except (KeyError, ValueError):
         return _DEFAULT_WINDOW
     return window if 0 < window <= _LARGEST_WINDOW else _DEFAULT_WINDOW
-
-
-def _column_blocks(recording: Recording) -> Iterator[tuple[JointStateColumns, WrenchColumns]]:
-    states = recording.topic_of_type("sensor_msgs/msg/JointState", suffix="joint_states")
-    control = states.removesuffix("joint_states") + "control_force"
-    topics = [topic for topic in (states, control) if topic in recording.topics]
-    for block in recording.blocks(*topics):
-        messages = block[control].messages if control in block else []
-        yield joint_state_columns(block[states].messages), wrench_columns(messages)
-
-
-def _joined(kind: type[ColumnsT], blocks: Sequence[ColumnsT]) -> ColumnsT:
-    """Return blocks of columns, dataclasses of arrays, as one."""
-    names = [field.name for field in fields(kind)]
-    return kind(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
-
-
-def _within(stamp: IntArray, first: int, start: float, end: float) -> BoolArray:
-    """Return which stamps lie from `start` on and before `end`, s after `first` (ns)."""
-    since = stamp - first
-    return (since >= round(start * 1e9)) & (since < (end * 1e9 if isinf(end) else round(end * 1e9)))

@@ -2,6 +2,7 @@
 
 import json
 import sys
+import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -16,6 +17,7 @@ from rclpy.task import Future
 from std_msgs.msg import Float64
 
 from stickslip_ros.bags.messages import (
+    Refused,
     joint_state_columns,
     pack_header,
     unpack_header,
@@ -23,7 +25,7 @@ from stickslip_ros.bags.messages import (
 )
 from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
 from stickslip_ros.errors import BagError, StickslipError
-from stickslip_ros.nodes.managed import OK, WARN, Level, ManagedNode
+from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.process import run_node
 from stickslip_ros.nodes.topics import (
     AMPLITUDE,
@@ -61,15 +63,18 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
         self._pending: dict[str, list[bytes]] = {}
         self._channels: dict[str, int] = {}
-        self._connections.append(self.every(_PROCESS_PERIOD, self._process))
-        self._connections.append(self.every(self.parameters.flush_period, self._flush))
+        self._tick = min(_PROCESS_PERIOD, self.parameters.flush_period / 2.0)
+        self._connections.append(self.every(self._tick, self._on_tick))
 
     def start(self) -> None:
         """Open a bag, start to measure, and then listen: who is heard is not lost."""
         self._meter = RunMeter(self.parameters.window)
         self._cycles = self._unread = 0
-        self._complaint = ""
-        self._recorder = self._open_bag() if self.parameters.bag else None
+        self._newest = self._told = 0
+        self._complaint = self._bag_failure = ""
+        self._recorder: Recorder | None = None
+        if self.parameters.bag:
+            self._open_bag()
         # It exists while there is a recorder to wait for, and the plant sees by it that there is.
         self._recorded: Publisher = self.create_publisher(
             RECORDED.type, RECORDED.name, RECORDED.qos()
@@ -88,9 +93,10 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def stop(self) -> None:
         """Measure what is left, close the bag with its report, and log the report."""
+        for topic, subscription in zip(RECORDED_TOPICS, self._listening, strict=True):
+            self._take_what_waits(topic, subscription)
         self._process()
         report = self._meter.report()
-        self.get_logger().info(f"report: {json.dumps(report)}")
         self.destroy_publisher(self._recorded)
         for subscription in self._listening:
             self._connections.remove(subscription)
@@ -99,6 +105,10 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self.destroy_client(client)
         self._keep("report", report)
         self._close_bag()
+        if self._bag_failure:  # then it is nowhere else
+            self.get_logger().warning(f"report: {json.dumps(report)}")
+        else:
+            self.get_logger().info(f"report: {json.dumps(report)}")
 
     def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
         """Return the regime, counts of samples, and what is wrong with the bag or a message."""
@@ -106,6 +116,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             return OK, "", {}
         report = self._meter.report()
         figures = {name: report[name] for name in ("regime", "samples", "lost_samples")}
+        if self._bag_failure:
+            return ERROR, self._bag_failure, figures
         if report["lost_samples"] and not self._complaint:
             return WARN, "samples were lost", figures
         return (WARN if self._complaint else OK), self._complaint, figures
@@ -123,33 +135,49 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             return
         if self._recorder is not None:
             self._write(topic, message, stamp)
+            self._flush_if_due()
         pending = self._pending[topic]
         pending.append(message)
         if topic == JOINT_STATES.name:
+            self._newest = stamp
             if self._unread % RECORDED_EVERY == 0:
-                self._recorded.publish(pack_header(stamp))
+                self._tell_how_far()
                 self._process()
             self._unread += 1
 
+    def _take_what_waits(self, topic: Topic, subscription: Subscription) -> None:
+        """Take the messages that have arrived but were not yet passed to `_on_message`."""
+        with subscription.handle:
+            while taken := subscription.handle.take_message(
+                subscription.msg_type, subscription.raw
+            ):
+                self._on_message(topic.name, taken[0])
+
+    def _tell_how_far(self) -> None:
+        if self._newest != self._told:
+            self._told = self._newest
+            self._recorded.publish(pack_header(self._told))
+
+    def _on_tick(self) -> None:
+        if self.active:
+            self._tell_how_far()
+            self._process()
+            self._flush_if_due(within=self._tick)
+
     def _process(self) -> None:
         """Decode and measure what has come since the last time."""
-        if not self.active:
-            return
         states = self._take(JOINT_STATES, joint_state_columns)
-        if states is not None:
-            motion = self._meter.motion
-            for cycle in motion.feed(
-                states.stamp, states.position, states.velocity, states.belt_velocity
-            ):
-                figures = (cycle.amplitude, cycle.stick_fraction, cycle.frequency)
-                for publisher, figure in zip(self._limit_cycle, figures, strict=True):
-                    publisher.publish(Float64(data=figure))
-                self._cycles += 1
-                if self._cycles % self.parameters.window == 0:
-                    self._log_measures()
+        for cycle in self._meter.motion.feed(
+            states.stamp, states.position, states.velocity, states.belt_velocity
+        ):
+            figures = (cycle.amplitude, cycle.stick_fraction, cycle.frequency)
+            for publisher, figure in zip(self._limit_cycle, figures, strict=True):
+                publisher.publish(Float64(data=figure))
+            self._cycles += 1
+            if self._cycles % self.parameters.window == 0:
+                self._log_measures()
         forces = self._take(CONTROL_FORCE, wrench_columns)
-        if forces is not None:
-            self._meter.force.feed(forces.stamp, forces.force)
+        self._meter.force.feed(forces.stamp, forces.force)
         self._pending[APPLIED_DISTURBANCE.name].clear()
         self._ask_for_parameters()
 
@@ -158,31 +186,36 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         text = ", ".join(f"{name} {value}" for name, value in figures.items() if value is not None)
         self.get_logger().info(text)
 
-    def _take(self, topic: Topic, decode: Callable[[Sequence[bytes]], ColumnsT]) -> ColumnsT | None:
+    def _take(
+        self, topic: Topic, decode: Callable[[Sequence[bytes]], tuple[ColumnsT, Refused]]
+    ) -> ColumnsT:
         """Return the pending messages of a topic as columns; one that is unreadable is dropped."""
         messages, self._pending[topic.name] = self._pending[topic.name], []
-        try:
-            return decode(messages) if messages else None
-        except StickslipError as error:
-            self._complaint = str(error)
-        readable = [message for message in messages if _can_decode(decode, message)]
-        return decode(readable) if readable else None
+        columns, refused = decode(messages)
+        if refused.number > 0:
+            self._complaint = refused.reason
+        return columns
 
     def _next_bag(self) -> Path:
         suffix = f"_{self._bags_opened + 1}" if self._bags_opened else ""
         return Path(self.parameters.bag + suffix)
 
-    def _open_bag(self) -> Recorder:
-        recorder = Recorder(self._next_bag(), self.parameters.compression)
+    def _open_bag(self) -> None:
+        recorder = Recorder(
+            self._next_bag(),
+            self.parameters.compression,
+            max_bag_size=self.parameters.max_bag_size,
+            max_bag_duration=self.parameters.max_bag_duration,
+        )
         self._bags_opened += 1
         for topic in RECORDED_TOPICS:
             name = self.resolve_topic_name(topic.name)
             qos = QosProfile(depth=topic.depth)
             self._channels[topic.name] = recorder.add_topic(name, topic.type_name, qos)
         self._recorder = recorder
+        self._flushed_at = time.monotonic()
         self._keep("versions", versions())
         self._keep("analyzer", self.parameters.flat())
-        return recorder
 
     def _keep(self, name: str, values: Mapping[str, Any]) -> None:
         """Put a table into the bag that says how the recording came about, or what it gave."""
@@ -201,26 +234,32 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         except BagError as error:
             self._give_up_recording(error)
 
-    def _flush(self) -> None:
-        if self.active and self._recorder is not None:
-            try:
-                self._recorder.flush()
-            except BagError as error:
-                self._give_up_recording(error)
+    def _flush_if_due(self, within: float = 0.0) -> None:
+        """Flush if that is due `within` so many seconds; under a flood no timer sees to it."""
+        if self._recorder is None:
+            return
+        now = time.monotonic()
+        if now + within < self._flushed_at + self.parameters.flush_period:
+            return
+        self._flushed_at = now
+        try:
+            self._recorder.flush()
+        except BagError as error:
+            self._give_up_recording(error)
 
     def _give_up_recording(self, error: BagError) -> None:
         """Go on measuring without a bag."""
-        self._complaint = str(error)
-        self.get_logger().error(self._complaint)
-        self._close_bag()
+        self._recorder = None
+        self._bag_failure = str(error)
+        self.get_logger().error(self._bag_failure)
 
     def _close_bag(self) -> None:
-        recorder, self._recorder = self._recorder, None
-        if recorder is not None:
+        if self._recorder is not None:
             try:
-                recorder.close()
+                self._recorder.close()
             except BagError as error:
-                self.get_logger().error(str(error))
+                self._give_up_recording(error)
+            self._recorder = None
 
     def _ask_for_parameters(self) -> None:
         """Ask plant and controller, as soon as they are there, what they run with."""
@@ -236,14 +275,6 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if self.active and response is not None:
             values = [parameter_value_to_python(value) for value in response.values]
             self._keep(node, dict(zip(names, values, strict=False)))
-
-
-def _can_decode(decode: Callable[[Sequence[bytes]], Any], message: bytes) -> bool:
-    try:
-        decode([message])
-    except StickslipError:
-        return False
-    return True
 
 
 def main() -> None:

@@ -25,10 +25,11 @@ from std_msgs.msg import Header
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.managed import STATE, ManagedNode
-from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.plant import NEWEST_STAMP, PlantNode
 from stickslip_ros.nodes.process import PARENT_VARIABLE, spin, stop_on_signals
 from stickslip_ros.nodes.topics import DIAGNOSTICS, RECORDED
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.physics.samples import NANOSECONDS
 from stickslip_ros.scenario.files import Scenario, parameter_file
 
 _LOGGING = ["--ros-args", "--log-level", "warn"]
@@ -38,6 +39,7 @@ _RETRY_PERIOD = 0.02
 _WATCH_PERIOD = 0.1
 _EXIT_TIMEOUT = 5.0
 _LAST_WORDS_TIMEOUT = 2.0
+_CATCH_UP_TIMEOUT = 10.0
 
 _NODES: dict[str, Callable[..., ManagedNode[Any]]] = {
     "analyzer": AnalyzerNode,
@@ -131,7 +133,8 @@ class _Bringup:
         self._plant_paused = Future()
         self._last_words = Future()
         self._outcome = RunOutcome()
-        self._first_stamp: float | None = None
+        self._first_recorded: int | None = None
+        self._recorded = 0
         self._node.create_subscription(
             DIAGNOSTICS.type, DIAGNOSTICS.name, self._on_diagnostics, DIAGNOSTICS.qos()
         )
@@ -219,6 +222,8 @@ class _Bringup:
     def _bring_down(self) -> None:
         """Deactivate what is active, the analyzer last, and end the processes."""
         for node in reversed(self._active):
+            if node == "analyzer":
+                self._let_the_analyzer_catch_up()
             paused = node == "plant" and self._plant_paused.done()
             if not paused and not self._is_dead(node):
                 self._deactivate(node)
@@ -232,6 +237,19 @@ class _Bringup:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+
+    def _let_the_analyzer_catch_up(self) -> None:
+        """Wait until it holds the plant's last sample; fail if it stops short of that."""
+        last = int(self._outcome.plant.get(NEWEST_STAMP, 0))
+        seen, seen_at = self._recorded, time.monotonic()
+        while self._recorded < last and not self._is_dead("analyzer"):
+            self._spin_until(Future(), _RETRY_PERIOD, always=True)
+            if self._recorded > seen:
+                seen, seen_at = self._recorded, time.monotonic()
+            elif time.monotonic() - seen_at > _CATCH_UP_TIMEOUT:
+                missing = (last - max(self._recorded, self._first_recorded or 0)) * 1e-9
+                self._fail(f"the analyzer did not take in the last {missing:g} s of samples")
+                return
 
     def _deactivate(self, node: str) -> None:
         """Deactivate a node, unless somebody else has: rclpy leaves that request unanswered."""
@@ -301,7 +319,7 @@ class _Bringup:
             self._plant_paused.set_result(None)
 
     def _on_recorded(self, message: Header) -> None:
-        stamp = message.stamp.sec + message.stamp.nanosec * 1e-9
-        if self._first_stamp is None:
-            self._first_stamp = stamp
-        self._progress(stamp - self._first_stamp)
+        self._recorded = message.stamp.sec * NANOSECONDS + message.stamp.nanosec
+        if self._first_recorded is None:
+            self._first_recorded = self._recorded
+        self._progress((self._recorded - self._first_recorded) * 1e-9)

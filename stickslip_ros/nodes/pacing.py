@@ -1,9 +1,10 @@
-"""What lets the plant go on to its next sample: the clock, or the answer to the last one."""
+"""What lets a node go on to its next sample: the clock, an answer, or how far a recorder is."""
 
 import time
+from collections import deque
 from collections.abc import Callable
 from math import inf
-from threading import Event, Lock, Thread
+from threading import TIMEOUT_MAX, Event, Lock, Thread
 from typing import Any
 
 from stickslip_ros.nodes.managed import ManagedNode
@@ -17,6 +18,70 @@ _BATCH = 100
 """Samples that lockstep publishes in one go where nothing holds it up."""
 _LONG_WAIT = 0.05
 """Wait, s, from which on it must be possible to be interrupted."""
+
+
+class Sleeper:
+    """Sleeps until absolute times of the monotonic clock, unless it is woken before."""
+
+    def __init__(self) -> None:
+        self._woken = Event()
+
+    def sleep_until(self, deadline: float) -> None:
+        """Return at the deadline, s, or earlier because of `wake`."""
+        wait = deadline - time.monotonic()
+        if wait > _LONG_WAIT:
+            if self._woken.wait(min(wait - _LONG_WAIT, TIMEOUT_MAX)):
+                self._woken.clear()
+                return
+            wait = deadline - time.monotonic()
+        if wait > 0.0:
+            time.sleep(wait)
+
+    def wake(self) -> None:
+        """End a long sleep, the next one if there is none now; from any thread."""
+        self._woken.set()
+
+
+class FlowWindow:
+    """Bounds how many joint states may be on their way to the recorder that reads them.
+
+    A recorder that has gone or is silent for too long is not waited for until it speaks again.
+    """
+
+    def __init__(self, size: int, recorder_exists: Callable[[], bool]) -> None:
+        """Bound them to `size` samples."""
+        self._recorder_exists = recorder_exists
+        self._recorder_present = recorder_exists()
+        self._under_way: deque[int] = deque(maxlen=size)
+
+    @property
+    def under_way(self) -> int:
+        """Samples that the recorder may not hold yet; 0 if none is waited for."""
+        return len(self._under_way) if self._recorder_present else 0
+
+    @property
+    def full(self) -> bool:
+        """Whether the recorder has to come further before a further sample is sent."""
+        return self.under_way == self._under_way.maxlen
+
+    def sent(self, stamp: int) -> None:
+        """Say that the sample of that stamp (ns) was sent."""
+        self._under_way.append(stamp)
+
+    def recorded(self, stamp: int) -> None:
+        """Say that the recorder holds everything up to the last sample of that stamp (ns)."""
+        self._recorder_present = True
+        newest_first = enumerate(reversed(self._under_way))
+        left = next((number for number, sent in newest_first if sent == stamp), None)
+        while left is not None and len(self._under_way) > left:
+            self._under_way.popleft()
+
+    def give_up(self, patience_ends: bool) -> str:
+        """Wait no longer if the recorder has gone or patience ends; return what is wrong then."""
+        if self._recorder_exists() and not patience_ends:
+            return ""
+        self._recorder_present = False
+        return "the recorder is silent: not waited for any more"
 
 
 class Pacer:
@@ -76,9 +141,9 @@ class LockstepPacer(Pacer):
         super().__init__(loop, publish, end)
         self._node = node
         self._reply_timeout = node.parameters.reply_timeout
-        self._window = node.parameters.flow_window
-        self._recorded = -1
-        self._recorder_present = self._recorder_exists()
+        self._flow = FlowWindow(
+            node.parameters.flow_window, lambda: node.count_publishers(RECORDED.name) > 0
+        )
         self._scheduled = False
         self._seen = -1
         self._seen_at = 0.0
@@ -87,6 +152,7 @@ class LockstepPacer(Pacer):
     def start(self, last: int | None) -> None:
         """Publish sample 0 and go on, once the node is active, when it is answered."""
         super().start(last)
+        self._flow.sent(self._loop.sample.stamp)
         self._schedule()
 
     def stop(self) -> None:
@@ -102,22 +168,21 @@ class LockstepPacer(Pacer):
 
     def recorder_came_to(self, stamp: int) -> None:
         """Go on if the recorder has caught up."""
-        number = self._loop.number(stamp)
-        if number <= self._loop.sample.number:
-            self._recorded = max(self._recorded, number)
-        self._recorder_present = True
+        self._flow.recorded(stamp)
         self._proceed()
 
     def _proceed(self) -> None:
         loop = self._loop
         for _ in range(_BATCH):
-            if not self._running or self._awaits_force or self._awaits_recorder:
+            if not self._running or self._awaits_force or self._flow.full:
                 return
             if loop.sample.number >= self._last or loop.unbounded:
                 self.stop()
                 self._end()
                 return
-            self._publish(loop.advance())
+            sample = loop.advance()
+            self._publish(sample)
+            self._flow.sent(sample.stamp)
         self._schedule()
 
     def _schedule(self) -> None:
@@ -134,14 +199,6 @@ class LockstepPacer(Pacer):
     def _awaits_force(self) -> bool:
         return self._loop.controller_present and not self._loop.answered
 
-    @property
-    def _awaits_recorder(self) -> bool:
-        ahead = self._loop.sample.number - self._recorded
-        return self._recorder_present and ahead >= self._window
-
-    def _recorder_exists(self) -> bool:
-        return self._node.count_publishers(RECORDED.name) > 0
-
     def _watch(self) -> None:
         """Give up whoever has held up the loop for too long."""
         now = time.monotonic()
@@ -149,9 +206,8 @@ class LockstepPacer(Pacer):
             self._seen, self._seen_at = self._loop.sample.number, now
             return
         patience_ends = now - self._seen_at >= self._reply_timeout
-        if self._awaits_recorder and (patience_ends or not self._recorder_exists()):
-            self._recorder_present = False
-            self._complain("the recorder is silent: not waited for any more")
+        if self._flow.full and (silence := self._flow.give_up(patience_ends)):
+            self._complain(silence)
         elif self._awaits_force and patience_ends:
             self._loop.controller_present = False
             self._complain("no control force comes: going on without")
@@ -183,7 +239,7 @@ class RealtimePacer(Pacer):
         self._lock = lock
         self._interval = loop.period / real_time_factor
         self._call_soon = call_soon
-        self._interrupted = Event()
+        self._sleeper = Sleeper()
         self._thread = Thread(target=self._run, name="pacer", daemon=True)
 
     def start(self, last: int | None) -> None:
@@ -194,7 +250,7 @@ class RealtimePacer(Pacer):
     def stop(self) -> None:
         """Publish no further sample."""
         super().stop()
-        self._interrupted.set()
+        self._sleeper.wake()
         self._thread.join()
 
     def _run(self) -> None:
@@ -211,7 +267,7 @@ class RealtimePacer(Pacer):
                 self._call_soon(self._end)
                 return
             deadline = self._started + (loop.sample.number + 1) * self._interval
-            self._sleep_until(deadline)
+            self._sleeper.sleep_until(deadline)
             if not self._running:
                 return
             with self._lock:
@@ -219,11 +275,3 @@ class RealtimePacer(Pacer):
             self._publish(sample)
             if time.monotonic() > deadline + self._interval:
                 self.missed_deadlines += 1
-
-    def _sleep_until(self, deadline: float) -> None:
-        wait = deadline - time.monotonic()
-        if wait > _LONG_WAIT:
-            self._interrupted.wait(wait - _LONG_WAIT)
-            wait = deadline - time.monotonic()
-        if wait > 0.0:
-            time.sleep(wait)

@@ -26,6 +26,9 @@ from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, Sample, SampledLo
 from stickslip_ros.physics.samples import NANOSECONDS
 from stickslip_ros.scenario.parameters import Pace, PlantParameters
 
+NEWEST_STAMP = "newest_stamp"
+"""Key under which the diagnostics tell the stamp of the newest sample, ns."""
+
 _HISTORY_SECONDS = 8.0
 
 
@@ -100,6 +103,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         loop, pacer = self._loop, self._pacer
         figures = {
             "samples": loop.sample.number + 1,
+            NEWEST_STAMP: loop.sample.stamp,
             "late_forces": loop.late_forces,
             "missed_deadlines": pacer.missed_deadlines,
             "steps_per_second": round(pacer.steps_per_second, 1),

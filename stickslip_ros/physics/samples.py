@@ -1,6 +1,5 @@
 """Measures from samples: stamps become time and losses, samples become knots, knots cycles."""
 
-from collections import deque
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -20,7 +19,8 @@ _LONGEST_GAP = 10
 _FEW_STEPS = 10
 """Steps after which the period is taken as known."""
 
-_RESTING_SHARE = 0.1
+_RESTING_PART = 10
+"""The force at rest is that of the last tenth of the time."""
 
 
 class _Rows(NamedTuple):
@@ -200,12 +200,17 @@ class SampleMeter:
 
 
 class ForceMeter:
-    """Measures the control force, fed in blocks of columns of any length."""
+    """Measures the control force, fed in blocks of columns of any length.
+
+    What it says does not depend on how the run is cut into blocks. Of the past it keeps only the
+    magnitudes that are larger than all later ones: no other will be the largest up to the end.
+    """
 
     def __init__(self) -> None:
-        self._first: int | None = None
         self._peak = 0.0
-        self._latest: deque[tuple[IntArray, FloatArray]] = deque()
+        self._first: int | None = None
+        self._stamp = np.empty(0, dtype=np.int64)
+        self._magnitude = np.empty(0)
 
     def feed(self, stamp: IntArray, force: FloatArray) -> None:
         """Take the forces that follow: stamps in ns, forces in N, equal lengths.
@@ -213,18 +218,21 @@ class ForceMeter:
         What is not finite is left out; where time goes back, the time at rest is that from there.
         """
         finite = np.isfinite(force)
-        stamp, force = stamp[finite], force[finite]
+        stamp = np.concatenate([self._stamp, stamp[finite]])
+        magnitude = np.concatenate([self._magnitude, np.abs(force[finite])])
         if len(stamp) == 0:
             return
-        if self._first is None or stamp[-1] < self._first:
-            self._first = int(stamp.min())
-            self._latest.clear()
-        magnitude = np.abs(force)
         self._peak = max(self._peak, float(magnitude.max()))
-        self._latest.append((stamp, magnitude))
-        resting_since = self._resting_since(self._first)
-        while len(self._latest) > 1 and self._latest[0][0].max() < resting_since:
-            self._latest.popleft()
+        restarts = np.flatnonzero(np.diff(stamp) < 0) + 1
+        if len(restarts) > 0:
+            stamp, magnitude = stamp[restarts[-1] :], magnitude[restarts[-1] :]
+        if self._first is None or len(restarts) > 0:
+            self._first = int(stamp[0])
+        largest_later = np.maximum.accumulate(magnitude[:0:-1])[::-1]
+        kept = np.append(magnitude[:-1] > largest_later, True)
+        last = int(stamp[-1])
+        kept &= stamp >= last - (last - self._first) // _RESTING_PART
+        self._stamp, self._magnitude = stamp[kept], magnitude[kept]
 
     @property
     def peak_force(self) -> float | None:
@@ -234,14 +242,7 @@ class ForceMeter:
     @property
     def resting_force(self) -> float | None:
         """Largest magnitude over the last tenth of the time, N; None without forces."""
-        if self._first is None:
-            return None
-        since = self._resting_since(self._first)
-        return max(float(force[stamp >= since].max(initial=0.0)) for stamp, force in self._latest)
-
-    def _resting_since(self, first: int) -> float:
-        last = int(self._latest[-1][0].max())
-        return last - _RESTING_SHARE * (last - first)
+        return None if self._first is None else float(self._magnitude[0])
 
 
 class RunMeter:

@@ -246,9 +246,45 @@ class AnalyzerParameters(NodeParameters):
     flush_period: float = _field(
         1.0, "Wall time after which what was recorded is on disk.", "s", fixed=True, gt=0.0
     )
+    max_bag_size: int = _field(
+        0,
+        "Size from which on a bag goes on in a further file; 0: any.",
+        "bytes",
+        fixed=True,
+        ge=0,
+    )
+    max_bag_duration: float = _field(
+        0.0,
+        "Time between stamps beyond which a bag goes on in a further file; 0: any.",
+        "s",
+        fixed=True,
+        ge=0.0,
+        le=1e9,
+    )
     compression: Literal["lz4", "zstd", "none"] = _field(
         "lz4", "Compression of the bag.", fixed=True, choices=("lz4", "zstd", "none")
     )
+
+
+class ReplayParameters(NodeParameters):
+    """Parameters of the replay node, which is part of no scenario."""
+
+    bag: str = _field("", "Bag to replay: its directory, or one of its files.", fixed=True)
+    rate: float = _field(1.0, "Recorded time over wall time.", fixed=True, gt=0.0)
+    loop: bool = _field(False, "Begin anew at the end of the bag.", fixed=True)
+    start: float = _field(
+        0.0, "Recorded time, from the bag's first message on, to begin at.", "s", fixed=True, ge=0.0
+    )
+    duration: float = _field(
+        float("inf"),
+        "Recorded time to replay.",
+        "s",
+        fixed=True,
+        gt=0.0,
+        allow_inf_nan=True,
+    )
+    topics: list[str] = _field([], "Topics to replay; none: all of the bag.", fixed=True)
+    clock: bool = _field(False, "Publish recorded time on /clock.", fixed=True)
 
 
 NODE_PARAMETERS: dict[str, type[NodeParameters]] = {

@@ -8,11 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 
-from stickslip_ros.bags.messages import joint_state_columns
 from stickslip_ros.bags.reader import Recording
+from stickslip_ros.nodes.managed import STATE
+from stickslip_ros.nodes.topics import DIAGNOSTICS
 from tests.app.conftest import Run
-from tests.nodes.graph import PATIENCE, wait_for
+from tests.nodes.graph import PATIENCE, Graph, wait_for
 
 # Amplitude and stick fraction of the uncontrolled limit cycle at some belt speeds.
 REFERENCE = {
@@ -69,8 +71,7 @@ def test_the_washout_kills_the_vibration_of_the_feed_drive(stickslip: Run, tmp_p
     assert after["amplitude"] < 0.01 * before["amplitude"]
     assert 50.0 < whole["peak_force"] < 150.0
     with Recording(tmp_path / "bag") as recording:
-        messages = [m for _, _, m in recording.messages("/feed_drive/joint_states")]
-    position = joint_state_columns(messages).position
+        position = recording.joint_states.position
     assert float(position[6000:].max() - position[6000:].min()) < 0.02 * before["amplitude"]
 
 
@@ -91,13 +92,42 @@ def test_a_node_that_dies_is_named_and_the_bag_closed(
     process = start_stickslip("run", "feed_drive", "--bag", "bag")
     wait_for_samples(process, tmp_path / "bag")
     for child in children(process.pid):
-        if b"stickslip_ros.nodes.washout_controller" in Path(f"/proc/{child}/cmdline").read_bytes():
+        if b"stickslip_ros.nodes.washout_controller" in command(child):
             os.kill(child, signal.SIGKILL)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1
     assert "washout_controller died (killed by signal 9)" in errors
     with Recording(tmp_path / "bag") as recording:
         assert recording.complete
+
+
+def test_samples_that_the_analyzer_has_not_taken_in_at_the_end_are_waited_for(
+    start_stickslip: Callable[..., subprocess.Popen[str]],
+    domain: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    graph = Graph(domain)
+    health = graph.listen(DIAGNOSTICS)
+    in_real_time = ("--pace", "realtime", "--duration", "3")
+    process = start_stickslip("run", "paper", *in_real_time, "--bag", "bag", "--json")
+    graph.wait_until(lambda: "active" in states_of_plant(health), "the plant is active")
+    (analyzer,) = (child for child in children(process.pid) if b"nodes.analyzer" in command(child))
+    os.kill(analyzer, signal.SIGSTOP)
+    graph.wait_until(lambda: states_of_plant(health)[-1] == "inactive", "the plant pauses")
+    os.kill(analyzer, signal.SIGCONT)
+    graph.close()
+    output, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, errors
+    result = json.loads(output)
+    assert (result["samples"], result["report"]["complete"]) == (301, True)
+
+
+def states_of_plant(health: list[DiagnosticArray]) -> list[str]:
+    """Return in which states of its life cycle the plant has said to be, the newest last."""
+    told = [s for array in health for s in array.status if s.name == "/feed_drive/plant"]
+    return [entry.value for status in told for entry in status.values if entry.key == STATE]
 
 
 def test_no_node_outlives_a_run_that_is_killed(
@@ -112,6 +142,10 @@ def test_no_node_outlives_a_run_that_is_killed(
     wait_for(lambda: not any(is_running(node) for node in nodes), "the nodes end")
     with Recording(tmp_path / "bag") as recording:
         assert recording.complete
+
+
+def command(pid: int) -> bytes:
+    return Path(f"/proc/{pid}/cmdline").read_bytes()
 
 
 def is_running(pid: int) -> bool:

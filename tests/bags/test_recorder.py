@@ -1,13 +1,17 @@
 import os
 import resource
-import signal
-import subprocess
-import sys
+import struct
+from io import BytesIO
 from pathlib import Path
+from threading import Event
 
 import pytest
 import yaml
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
+from mcap.records import Message
+from mcap.stream_reader import StreamReader
+from mcap.writer import MCAP0_MAGIC
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
@@ -16,17 +20,25 @@ from stickslip_ros.bags.messages import pack_joint_state, pack_wrench
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
 from stickslip_ros.errors import BagError
+from tests.nodes.graph import wait_for
 
 JOINT_STATES = "/feed_drive/joint_states"
 FORCES = "/feed_drive/control_force"
 QOS = QosProfile(depth=2000)
 
+END = struct.pack("<BQ4x BQ20x", Opcode.DATA_END, 4, Opcode.FOOTER, 20) + MCAP0_MAGIC
+"""Of a file without a summary."""
+
+
+def add_topics(recorder):
+    states = recorder.add_topic(JOINT_STATES, "sensor_msgs/msg/JointState", QOS)
+    return states, recorder.add_topic(FORCES, "geometry_msgs/msg/WrenchStamped", QOS)
+
 
 def record(directory, count, **options):
     """Write `count` pairs of joint state and force, 1 ms apart from 1 s on."""
     with Recorder(directory, **options) as recorder:
-        states = recorder.add_topic(JOINT_STATES, "sensor_msgs/msg/JointState", QOS)
-        forces = recorder.add_topic(FORCES, "geometry_msgs/msg/WrenchStamped", QOS)
+        states, forces = add_topics(recorder)
         for number in range(count):
             stamp = 10**9 + number * 10**6
             recorder.write(states, pack_joint_state(stamp, (number, 0), (0, 0), (0, 0)), stamp)
@@ -88,7 +100,7 @@ def test_rosbags_finds_types_hashes_and_qos(tmp_path):
 
 def test_metadata_yaml_is_that_of_rosbag2(tmp_path):
     bag = tmp_path / "bag"
-    record(bag, 3, custom_data={"scenario": "paper"})
+    record(bag, 3)
     unlimited = {"sec": 9223372036, "nsec": 854775807}
     qos = {
         "history": "keep_last",
@@ -137,14 +149,14 @@ def test_metadata_yaml_is_that_of_rosbag2(tmp_path):
                 "message_count": 6,
             }
         ],
-        "custom_data": {"scenario": "paper"},
+        "custom_data": {},
         "ros_distro": "jazzy",
     }
     assert sorted(path.name for path in bag.iterdir()) == ["bag_0.mcap", "metadata.yaml"]
 
 
 def test_the_file_itself_is_that_of_rosbag2(tmp_path):
-    record(tmp_path / "bag", 1, custom_data={"scenario": "paper"})
+    record(tmp_path / "bag", 1)
     with (tmp_path / "bag" / "bag_0.mcap").open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
         assert reader.get_header().profile == "ros2"
@@ -161,7 +173,6 @@ def test_the_file_itself_is_that_of_rosbag2(tmp_path):
     assert serialized.keys() == information(tmp_path / "bag").keys()
     assert serialized["version"] == 9
     assert serialized["ros_distro"] == "jazzy"
-    assert serialized["custom_data"] == {"scenario": "paper"}
 
 
 def test_an_empty_bag_is_a_bag(tmp_path):
@@ -192,28 +203,198 @@ def test_a_topic_may_come_late(tmp_path):
         assert [connection.topic for connection, _, _ in reader.messages()] == ["/a", "/b"]
 
 
-KILLED = """
-import os, signal, sys
-from pathlib import Path
-from stickslip_ros.bags.recorder import QosProfile, Recorder
-recorder = Recorder(Path(sys.argv[1]))
-channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QosProfile(depth=1))
-for stamp in range(3000):
-    recorder.write(channel, bytes(12), stamp)
-recorder.flush()
-recorder.write(channel, bytes(12), 3000)
-os.kill(os.getpid(), signal.SIGKILL)
-"""
+def records(content):
+    """Return opcode and place of the records of a file that are in no chunk."""
+    found, place = [], 8
+    while place < len(content) - 8:
+        opcode, length = struct.unpack_from("<BQ", content, place)
+        found.append((opcode, place))
+        place += 9 + length
+    return found
 
 
-def test_a_killed_recorder_has_kept_what_it_flushed(tmp_path):
+def test_definitions_are_repeated_where_damage_to_the_first_chunk_cannot_reach(tmp_path):
+    with Recorder(tmp_path / "bag", compression="none") as recorder:
+        states, forces = add_topics(recorder)
+        for stamp in range(2000):
+            recorder.write(states, bytes(300), stamp)
+            recorder.write(forces, bytes(100), stamp)
+            if stamp % 100 == 99:
+                recorder.flush()
+    content = (tmp_path / "bag" / "bag_0.mcap").read_bytes()
+    opcodes = [opcode for opcode, _ in records(content)]
+    outside = opcodes[: opcodes.index(Opcode.DATA_END)]
+    assert outside.index(Opcode.CHANNEL) < outside.index(Opcode.CHUNK)
+    schemas = [place for opcode, place in records(content) if opcode == Opcode.SCHEMA]
+    start = schemas[2]  # behind the two topics' own
+    after_header = records(content)[1][1]
+    rest = StreamReader(BytesIO(content[:after_header] + content[start:])).records
+    stamps = [record.log_time for record in rest if isinstance(record, Message)]
+    assert len(stamps) > 1000
+    assert stamps == sorted(2 * list(range(2000)))[-len(stamps) :]
+
+
+def test_definitions_take_little_of_a_file_that_is_flushed_all_the_time(tmp_path):
+    sizes = {}
+    for name, flushes in (("flushed", True), ("whole", False)):
+        with Recorder(tmp_path / name, compression="none") as recorder:
+            states, _ = add_topics(recorder)
+            for stamp in range(2000):
+                recorder.write(states, bytes(1000), stamp)
+                if flushes and stamp % 10 == 9:
+                    recorder.flush()
+        sizes[name] = sum(file.stat().st_size for file in (tmp_path / name).glob("*.mcap"))
+    assert sizes["flushed"] < 1.1 * sizes["whole"]
+
+
+def contents(bag):
+    """Return what rosbags finds in a bag: topic, stamp and message, in turn."""
+    with AnyReader([bag]) as reader:
+        return [(connection.topic, *message) for connection, *message in reader.messages()]
+
+
+def test_a_bag_that_is_split_by_size_holds_the_same(tmp_path):
+    record(tmp_path / "whole", 20_000, compression="none")
+    record(tmp_path / "split", 20_000, compression="none", max_bag_size=1_500_000)
+    files = ["split_0.mcap", "split_1.mcap", "split_2.mcap"]
+    assert {file.name for file in (tmp_path / "split").iterdir()} == {*files, "metadata.yaml"}
+    for file in files[:-1]:
+        assert 1_500_000 < (tmp_path / "split" / file).stat().st_size < 3_000_000
+    assert contents(tmp_path / "split") == contents(tmp_path / "whole")
+    with Recording(tmp_path / "split") as recording:
+        assert recording.complete
+    whole, split = information(tmp_path / "whole"), information(tmp_path / "split")
+    assert split["relative_file_paths"] == files
+    assert [file["path"] for file in split["files"]] == files
+    assert sum(file["message_count"] for file in split["files"]) == 40_000
+    for name in ("duration", "starting_time", "message_count", "topics_with_message_count"):
+        assert split[name] == whole[name]
+
+
+def test_a_bag_is_split_by_the_time_between_stamps(tmp_path):
+    """As rosbag2 does: what is further from the earliest stamp of a file is in the next one."""
+    with Recorder(tmp_path / "bag", max_bag_duration=3.0) as recorder:
+        channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+        for second in (5, 4, 6, 7, 8, 9, 11, 12, 10, 13):
+            recorder.write(channel, bytes(12), second * 10**9)
+    assert [
+        (file["starting_time"]["nanoseconds_since_epoch"], file["duration"]["nanoseconds"])
+        for file in information(tmp_path / "bag")["files"]
+    ] == [(4 * 10**9, 3 * 10**9), (8 * 10**9, 3 * 10**9), (10 * 10**9, 3 * 10**9)]
+    assert [stamp for _, stamp, _ in contents(tmp_path / "bag")] == [
+        second * 10**9 for second in (4, 5, 6, 7, 8, 9, 11, 10, 12, 13)
+    ]
+
+
+def test_each_file_of_a_split_bag_is_complete_by_itself(tmp_path):
+    with Recorder(tmp_path / "bag", max_bag_size=1) as recorder:
+        channel, _ = add_topics(recorder)
+        recorder.add_metadata("early", {"a": "1"})
+        for stamp in range(3):
+            recorder.write(channel, pack_joint_state(stamp + 1, (0, 0), (0, 0), (0, 0)), stamp)
+            recorder.flush()
+        recorder.add_metadata("late", {"b": "2"})
+    files = sorted((tmp_path / "bag").glob("*.mcap"))
+    assert len(files) == 3
+    for number, file in enumerate(files):
+        with file.open("rb") as stream:
+            reader = make_reader(stream, validate_crcs=True)
+            assert [message.log_time for _, _, message in reader.iter_messages()] == [number]
+            assert {table.name for table in reader.iter_metadata()} >= {"rosbag2", "early"}
+        with Reader(file) as reader:
+            assert set(reader.topics) == {JOINT_STATES, FORCES}
+        with Recording(file) as recording:
+            assert recording.complete
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.metadata("early") == {"a": "1"}
+        assert recording.metadata("late") == {"b": "2"}
+
+
+def test_what_is_finished_is_described_while_the_recording_goes_on(tmp_path):
     bag = tmp_path / "bag"
-    repository = Path(__file__).parents[2]
-    killed = subprocess.run([sys.executable, "-c", KILLED, bag], cwd=repository, check=False)
-    assert killed.returncode == -signal.SIGKILL
+    with Recorder(bag, max_bag_size=1) as recorder:
+        channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+        recorder.write(channel, bytes(12), 1)
+        recorder.flush()
+        assert not (bag / "metadata.yaml").exists()
+        recorder.write(channel, bytes(12), 2)
+        recorder.flush()
+        wait_for((bag / "metadata.yaml").exists, "the first file is finished")
+        with Recording(bag) as recording:
+            assert not recording.complete
+            assert [stamp for _, stamp, _ in recording.messages("/a")] == [1, 2]
+        assert [stamp for _, stamp, _ in contents(bag)] == [1]
     with Recording(bag) as recording:
-        assert [stamp for _, stamp, _ in recording.messages("/a")] == list(range(3000))
+        assert recording.complete
+
+
+@pytest.fixture
+def slow_disk(monkeypatch):
+    """Let the disk take what it is handed when the event is set that is returned; list all that."""
+    ready, handed = Event(), []
+
+    def sync(descriptor):
+        handed.append(descriptor)
+        assert ready.wait(60.0)
+
+    monkeypatch.setattr(os, "fdatasync", sync)
+    yield ready, handed
+    ready.set()
+
+
+def test_a_slow_disk_does_not_hold_up_the_recording(tmp_path, slow_disk):
+    ready, handed = slow_disk
+    with Recorder(tmp_path / "bag") as recorder:
+        channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+        for stamp in range(100):
+            recorder.write(channel, bytes(12), stamp)
+            recorder.flush()
+        with Recording(tmp_path / "bag") as recording:
+            assert len(list(recording.messages("/a"))) == 100
+        wait_for(lambda: handed, "the disk is busy")
+        ready.set()
+    assert len(handed) <= 3  # at the first flush, once for all others, at the end
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.complete
+
+
+def test_a_disk_that_refuses_what_it_is_handed_ends_the_recording(tmp_path, monkeypatch):
+    recorder = Recorder(tmp_path / "bag")
+    channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+    recorder.write(channel, bytes(12), 1)
+
+    def sync(_):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(os, "fdatasync", sync)
+
+    def refused():
+        try:
+            recorder.flush()
+        except BagError as error:
+            return "Input/output error" in str(error)
+        return False
+
+    wait_for(refused, "the error is told")
+    with pytest.raises(BagError, match="is closed"):
+        recorder.write(channel, bytes(12), 2)
+    recorder.close()
+    with Recording(tmp_path / "bag") as recording:
+        assert [stamp for _, stamp, _ in recording.messages("/a")] == [1]
         assert not recording.complete
+
+
+@pytest.mark.parametrize("call", ["fdatasync", "fsync"])
+def test_closing_fails_where_the_disk_refuses(tmp_path, monkeypatch, call):
+    recorder = Recorder(tmp_path / "bag")
+
+    def sync(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, call, sync)
+    with pytest.raises(BagError, match="No space left"):
+        recorder.close()
+    assert [file.name for file in (tmp_path / "bag").iterdir()] == ["bag_0.mcap"]
 
 
 def test_the_bag_is_closed_when_an_error_passes(tmp_path):
@@ -288,6 +469,37 @@ def test_a_full_disk_ends_the_recording_and_keeps_what_was_written(tmp_path):
         assert not recording.complete
     assert len(stamps) >= 1000
     assert stamps == list(range(len(stamps)))
+
+
+@pytest.mark.usefixtures("full_disk")
+def test_on_a_full_disk_no_half_record_is_left(tmp_path):
+    recorder = Recorder(tmp_path / "bag")
+    channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+    recorder.write(channel, bytes(12), 1)
+    recorder.flush()
+    recorder.write(channel, os.urandom(200_000), 2)
+    with pytest.raises(BagError, match="cannot be written any more"):
+        recorder.flush()
+    content = (tmp_path / "bag" / "bag_0.mcap").read_bytes()
+    with_an_end = StreamReader(BytesIO(content + END)).records
+    assert [record.log_time for record in with_an_end if isinstance(record, Message)] == [1]
+
+
+@pytest.mark.usefixtures("full_disk")
+def test_a_disk_that_is_full_at_the_end_leaves_what_was_finished_before(tmp_path):
+    recorder = Recorder(tmp_path / "bag", max_bag_size=50_000)
+    channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+    for stamp in range(3):
+        recorder.write(channel, os.urandom(60_000), stamp)
+        recorder.flush()
+    recorder.write(channel, os.urandom(60_000), 3)
+    with pytest.raises(BagError, match="cannot be written any more"):
+        recorder.attach("too much", bytes(100_000), "text/plain")
+    recorder.close()
+    assert information(tmp_path / "bag")["message_count"] == 3
+    assert [stamp for _, stamp, _ in contents(tmp_path / "bag")] == [0, 1, 2]
+    with Recording(tmp_path / "bag") as recording:
+        assert not recording.complete
 
 
 def test_parents_are_made(tmp_path):

@@ -1,6 +1,8 @@
 """The analyzer node on the real middleware."""
 
 import json
+import resource
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -9,10 +11,12 @@ from stickslip_ros.bags.messages import joint_state_columns, pack_wrench
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.managed import ERROR
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.topics import (
     AMPLITUDE,
     CONTROL_FORCE,
+    DIAGNOSTICS,
     DISTURBANCE_FORCE,
     JOINT_STATES,
     STICK_FRACTION,
@@ -44,7 +48,7 @@ def test_it_records_the_bytes_it_hears_and_measures_them(graph: Graph, tmp_path:
         plant = recording.metadata("stickslip_ros/plant")
         assert recording.complete
     assert recorded == [bytes(message) for message in heard]
-    assert joint_state_columns(recorded).stamp[-1] == 61_000_000_000
+    assert joint_state_columns(recorded)[0].stamp[-1] == 61_000_000_000
     report = report_of_bag(tmp_path / "bag")
     assert report["lost_samples"] == 0
     assert report["samples"] == 6001
@@ -132,3 +136,51 @@ def test_the_closed_loop_is_answered_without_loss(graph: Graph, tmp_path: Path) 
         disturbances = list(recording.messages("/test/applied_disturbance"))
     assert states == forces == [1_000_000_000 + n * 10_000_000 for n in range(2001)]
     assert len(disturbances) == 1
+
+
+@pytest.fixture
+def file_size_limit() -> Iterator[Callable[[int], None]]:
+    """Limit the bytes of each file: a disk that is full fails in the same way."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda limit: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_on_a_full_disk_it_says_so_and_goes_on_measuring(
+    graph: Graph, tmp_path: Path, file_size_limit: Callable[[int], None]
+) -> None:
+    bag = tmp_path / "bag"
+    analyzer = graph.add(AnalyzerNode, bag=str(bag), flush_period=0.01)
+    graph.wait_until(lambda: analyzer.active, "analyzer active")
+    diagnostics, amplitudes = graph.listen(DIAGNOSTICS), graph.listen(AMPLITUDE)
+    parameters = {"expects_control": False, "duration": 60.0}
+    plant = graph.add(PlantNode, wait_for=["analyzer"], autostart=False, **parameters)
+    plant.trigger_configure()
+    file_size_limit(100_000)
+
+    def run() -> None:
+        graph.wait_until(lambda: plant.active or plant.trigger_activate(), "plant active")
+        graph.wait_until(lambda: not plant.active, "plant pauses")
+
+    run()
+    graph.wait_until(lambda: len(amplitudes) >= 7, "it goes on measuring")
+    graph.deactivate("analyzer")
+    complaints = {
+        status.message for heard in diagnostics for status in heard.status if status.level == ERROR
+    }
+    (complaint,) = complaints
+    assert str(bag) in complaint
+    assert "File too large" in complaint
+    with Recording(bag) as recording:
+        stamps = [stamp for _, stamp, _ in recording.messages("/test/joint_states")]
+        assert not recording.complete
+    assert stamps == [1_000_000_000 + n * 10_000_000 for n in range(len(stamps))]
+    assert 0 < len(stamps) < 6001
+
+    file_size_limit(10_000_000)
+    analyzer.trigger_activate()
+    run()
+    graph.deactivate("analyzer")
+    report = report_of_bag(tmp_path / "bag_2")
+    assert report["complete"]
+    assert report["samples"] == 6001

@@ -12,6 +12,7 @@ SOURCE = Path(__file__).parents[2]
 KEYS = {
     "heyoka": set(),
     "hypothesis": {"python3-hypothesis"},
+    "lz4": set(),
     "matplotlib": {"python3-matplotlib"},
     "mcap": set(),
     "numpy": {"python3-numpy"},
@@ -39,6 +40,7 @@ KEYS = {
     "rosbags": {"python3-rosbags-pip"},
     "scipy": {"python3-scipy"},
     "setuptools": {"python3-setuptools"},
+    "zstandard": set(),
 }
 
 

@@ -1,0 +1,49 @@
+"""`stickslip repair`: a sound bag from a damaged one."""
+
+import argparse
+from pathlib import Path
+
+from stickslip_ros.app.arguments import add_json
+from stickslip_ros.app.output import print_json, print_table, progress_bar
+from stickslip_ros.bags.repair import repair
+from stickslip_ros.versions import versions
+
+NAME = "repair"
+HELP = "write a sound bag from one that is cut off or damaged"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument(
+        "bag",
+        metavar="BAG",
+        type=Path,
+        help="bag directory, or one .mcap file, such as a killed recorder or a bad disk leaves; "
+        "it is only read",
+    )
+    parser.add_argument(
+        "out", metavar="OUT", type=Path, help="directory for the sound bag; must not exist"
+    )
+    add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command; return the exit status."""
+    with progress_bar(f"repairing {arguments.bag}", None) as progress:
+        repaired = repair(arguments.bag, arguments.out, progress)
+    if arguments.json:
+        print_json(
+            {
+                "bag": str(arguments.bag),
+                "out": str(arguments.out),
+                "messages": dict(repaired.messages),
+                "missing": repaired.missing,
+                "versions": versions(),
+            }
+        )
+        return 0
+    rows = [[topic, str(count)] for topic, count in sorted(repaired.messages.items())]
+    print_table(str(arguments.out), ["topic", "messages"], rows)
+    for sentence in repaired.missing or ["nothing was missing"]:
+        print(sentence)
+    return 0

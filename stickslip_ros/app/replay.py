@@ -1,0 +1,82 @@
+"""`stickslip replay`: a recorded run, published again."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from stickslip_ros.app.arguments import seconds
+from stickslip_ros.app.output import progress_bar
+from stickslip_ros.app.run import INTERRUPTED, ros_bringup
+
+NAME = "replay"
+HELP = "publish the messages of a bag again, as they were spaced"
+DESCRIPTION = (
+    "Publish the messages of a bag again, unchanged, under their recorded names and as they were "
+    "spaced. It begins when one of the topics has a reader and, for half a second, no other reader "
+    "has come; it ends with the bag, or at Ctrl-C. The stamps in the messages stay as they are."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.description = DESCRIPTION
+    parser.add_argument("bag", metavar="BAG", type=Path, help="bag directory, or one .mcap file")
+    parser.add_argument(
+        "--rate",
+        type=float,
+        default=1.0,
+        metavar="R",
+        help="recorded time over wall time (default: 1)",
+    )
+    parser.add_argument(
+        "--loop",
+        action="store_true",
+        help="begin anew at the end, until Ctrl-C; readers see the stamps go back",
+    )
+    parser.add_argument(
+        "--start",
+        type=seconds,
+        default=0.0,
+        metavar="S",
+        help="begin at S s from the first message of the bag (default: 0)",
+    )
+    parser.add_argument(
+        "--duration",
+        type=seconds,
+        default=float("inf"),
+        metavar="S",
+        help="replay S s of recorded time (default: up to the end)",
+    )
+    parser.add_argument(
+        "--topics", nargs="+", default=[], metavar="T", help="topics to replay (default: all)"
+    )
+    parser.add_argument("--clock", action="store_true", help="publish recorded time on /clock")
+    parser.add_argument(
+        "--wait-for",
+        nargs="+",
+        default=[],
+        metavar="NODE",
+        help="begin when these nodes read the topics (default: when somebody does)",
+    )
+    parser.add_argument(
+        "--network",
+        action="store_true",
+        help="let other machines see the topics (default: they are kept on this one)",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command; return the exit status."""
+    reach = ros_bringup().keep_on_this_machine(arguments.network)
+    from stickslip_ros.nodes.replay import replay_bag
+
+    def offering(topics: Sequence[str]) -> None:
+        wait = f"until {', '.join(arguments.wait_for) or 'somebody'} reads them"
+        print(f"{arguments.bag}: {', '.join(topics)}, {reach}, waiting {wait}", file=sys.stderr)
+
+    names = ("rate", "loop", "start", "duration", "topics", "clock", "wait_for")
+    parameters = {name: getattr(arguments, name) for name in names} | {"bag": str(arguments.bag)}
+    with progress_bar(f"replaying {arguments.bag}", None if arguments.loop else 1.0) as progress:
+        interrupted = replay_bag(parameters, offering, progress)
+    return INTERRUPTED if interrupted else 0

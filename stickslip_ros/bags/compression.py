@@ -1,0 +1,70 @@
+"""Unpacking what recorders pack, never into more memory than it is said to need."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from lz4.frame import LZ4FrameDecompressor
+from zstandard import ZstdDecompressor, ZstdError, frame_content_size
+
+_LARGEST = 1 << 30
+"""Recorders close their chunks at a few MB: what claims to be larger than this is damaged."""
+_PIECE = 4 << 20
+
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+"""What a zstd frame begins with, and no serialized message."""
+
+
+def unpack(compression: str, data: bytes, size: int) -> bytes | None:
+    """Return what was packed as `lz4`, `zstd` or not at all; None if that is not `size` bytes."""
+    if size > _LARGEST:
+        return None
+    match compression:
+        case "":
+            unpacked = data
+        case "lz4":
+            unpacked = _unpack_lz4(data, size)
+        case "zstd":
+            unpacked = _gathered(ZstdDecompressor().stream_reader(data).read, size)
+        case _:
+            return None
+    return unpacked if len(unpacked) == size else None
+
+
+def unpack_message(data: bytes) -> bytes:
+    """Return a message that rosbag2 packed by itself as zstd; any other as it is."""
+    try:
+        return unpack("zstd", data, frame_content_size(data)) or data
+    except ZstdError:
+        return data
+
+
+def unpack_file(packed: Path, unpacked: Path) -> None:
+    """Write what a file packed as zstd holds to another, as far as it is sound."""
+    with packed.open("rb") as source, unpacked.open("wb") as target, suppress(ZstdError):
+        ZstdDecompressor().copy_stream(source, target)
+
+
+def _unpack_lz4(data: bytes, size: int) -> bytes:
+    decompressor = LZ4FrameDecompressor()
+    rest = iter((data,))
+
+    def read(length: int) -> bytes:
+        if decompressor.eof:
+            return b""
+        return decompressor.decompress(next(rest, b""), length)
+
+    return _gathered(read, size)
+
+
+def _gathered(read: Callable[[int], bytes], size: int) -> bytes:
+    """Read in pieces, so that a false size costs nothing, until it is passed or nothing comes."""
+    pieces: list[bytes] = []
+    missing = size + 1
+    try:
+        while missing > 0 and (piece := read(min(missing, _PIECE))):
+            pieces.append(piece)
+            missing -= len(piece)
+    except (RuntimeError, ZstdError):
+        return b""
+    return b"".join(pieces)

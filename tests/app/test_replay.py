@@ -1,0 +1,82 @@
+"""`stickslip replay`: a bag through the middleware, started as a user starts it."""
+
+import signal
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
+from tests.app.conftest import Run
+from tests.nodes.conftest import graph  # noqa: F401 - a fixture used here
+from tests.nodes.graph import PATIENCE, Graph
+from tests.nodes.runs import FORCES, STATES, messages_of, record_states
+
+Start = Callable[..., subprocess.Popen[str]]
+
+
+def test_it_says_what_it_waits_for_plays_to_the_end_and_is_done(
+    start_stickslip: Start,
+    graph: Graph,  # noqa: F811
+    tmp_path: Path,
+) -> None:
+    record_states(tmp_path / "bag", 200)
+    process = start_stickslip("replay", "bag", "--rate", "20", "--start", "0.5")
+    assert process.stderr is not None
+    offered = process.stderr.readline()
+    assert f"bag: {FORCES}, {STATES}, kept on this machine" in offered
+    assert "waiting until somebody reads them" in offered
+    assert "nobody reads" in process.stderr.readline()
+    forces, states = graph.listen(CONTROL_FORCE, raw=True), graph.listen(JOINT_STATES, raw=True)
+    graph.wait_until(lambda: len(states) == len(forces) == 150, "all is heard")
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, errors
+    heard = {FORCES: forces, STATES: states}
+    for topic, messages in messages_of(tmp_path / "bag").items():
+        assert heard[topic] == [message for _, message in messages[50:]]
+
+
+def test_ctrl_c_ends_a_loop(
+    start_stickslip: Start,
+    graph: Graph,  # noqa: F811
+    tmp_path: Path,
+) -> None:
+    record_states(tmp_path / "bag", 20)
+    states = graph.listen(JOINT_STATES, raw=True)
+    process = start_stickslip("replay", "bag", "--loop", "--topics", STATES)
+    graph.wait_until(lambda: len(states) > 45, "the third pass")
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130, errors
+
+
+def test_ctrl_c_ends_the_wait_for_a_reader(start_stickslip: Start, tmp_path: Path) -> None:
+    record_states(tmp_path / "bag", 20)
+    process = start_stickslip("replay", "bag")
+    assert process.stderr is not None
+    assert "waiting" in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130, errors
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("nosuch",), ("nosuch", "does not exist")),
+        (("bag", "--rate", "0"), ("rate = 0.0", "above 0")),
+        (("bag", "--start", "9"), ("start = 9.0 s", "0.01 s long")),
+        (("bag", "--topics", "/x"), ("topics = ['/x']", STATES, FORCES)),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(
+    stickslip: Run, tmp_path: Path, arguments: tuple[str, ...], named: tuple[str, ...]
+) -> None:
+    record_states(tmp_path / "bag", 2)
+    done = stickslip("replay", *arguments)
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    for text in named:
+        assert text in line

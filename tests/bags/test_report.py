@@ -1,0 +1,135 @@
+import pytest
+from mcap.writer import CompressionType, Writer
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+
+from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.errors import BagError, InvalidInputError
+from tests.bags.runs import PERIOD, SECOND, STAMPS, STATES, motion, record, state
+
+
+def foreign_state(stamp):
+    """Return the same as another program may publish it."""
+    position, velocity = motion(stamp / SECOND)
+    message = JointState(
+        name=["gripper", "belt", "slide"],
+        position=[7.0, 0.0, position],
+        velocity=[8.0, 20.0, velocity],
+    )
+    message.header.frame_id = "machine"
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, SECOND)
+    return serialize_message(message)
+
+
+def test_a_run_is_measured_and_complete(tmp_path):
+    record(tmp_path / "bag")
+    report = report_of_bag(tmp_path / "bag")
+    assert report["amplitude"] == pytest.approx(3.0, rel=1e-6)
+    assert report["frequency"] == pytest.approx(1.0 / PERIOD, rel=1e-6)
+    assert (report["samples"], report["lost_samples"]) == (1000, 0)
+    assert (report["complete"], report["missing"]) == (True, [])
+
+
+def test_a_part_counts_from_the_first_joint_state(tmp_path):
+    record(tmp_path / "bag")
+    report = report_of_bag(tmp_path / "bag", start=2.0, end=7.5)
+    assert (report["samples"], report["duration"]) == (550, pytest.approx(5.49))
+    assert report["peak_force"] == pytest.approx(5.0 + 7.49)
+
+
+def test_forces_ahead_of_the_first_joint_state_are_measured(tmp_path):
+    record(tmp_path / "bag", states=STAMPS[500:])
+    assert report_of_bag(tmp_path / "bag")["samples"] == 500
+    resting = report_of_bag(tmp_path / "bag", end=1.0)
+    assert resting["peak_force"] == pytest.approx(5.0 + 5.99)
+
+
+def test_what_is_lost_is_counted_by_the_stamps(tmp_path):
+    record(tmp_path / "bag", states=STAMPS[:300] + STAMPS[307:])
+    report = report_of_bag(tmp_path / "bag")
+    assert (report["samples"], report["lost_samples"]) == (993, 7)
+
+
+def test_without_joint_states_the_forces_are_measured_and_it_is_said(tmp_path):
+    record(tmp_path / "bag", states=[])
+    report = report_of_bag(tmp_path / "bag")
+    assert report["peak_force"] == pytest.approx(14.99)
+    assert (report["amplitude"], report["samples"], report["complete"]) == (None, 0, False)
+    assert report["missing"] == ["the bag holds no joint states: nothing is known of the motion"]
+
+
+def test_without_forces_the_motion_is_measured(tmp_path):
+    record(tmp_path / "bag", forces=[])
+    report = report_of_bag(tmp_path / "bag")
+    assert report["amplitude"] == pytest.approx(3.0, rel=1e-6)
+    assert (report["peak_force"], report["complete"]) == (None, True)
+
+
+@pytest.mark.parametrize("part", [{"start": 20.0}, {"start": 3.0, "end": 3.0}])
+def test_an_empty_part_is_refused(tmp_path, part):
+    record(tmp_path / "bag")
+    with pytest.raises(InvalidInputError, match="the part from"):
+        report_of_bag(tmp_path / "bag", **part)
+
+
+def test_a_bag_of_nothing_of_ours_is_refused_with_its_topics(tmp_path):
+    with Recorder(tmp_path / "bag") as recorder:
+        channel = recorder.add_topic("/a/temperature", "std_msgs/msg/Float64", QosProfile(1))
+        recorder.write(channel, bytes(12), 1)
+    with pytest.raises(BagError, match=r"no joint_states and no control_force .*/a/temperature"):
+        report_of_bag(tmp_path / "bag")
+    with pytest.raises(BagError, match="in /b that can be read"):
+        report_of_bag(tmp_path / "bag", namespace="/b")
+
+
+def test_joint_states_of_a_robot_without_slide_are_refused_with_the_reason(tmp_path):
+    message = JointState(name=["elbow"], position=[1.0], velocity=[0.0])
+    with Recorder(tmp_path / "bag") as recorder:
+        channel = recorder.add_topic(STATES, "sensor_msgs/msg/JointState", QosProfile(1))
+        for stamp in range(5):
+            recorder.write(channel, serialize_message(message), stamp)
+    with pytest.raises(BagError, match=r"5 messages .*joints \['elbow'\]; slide and belt must be"):
+        report_of_bag(tmp_path / "bag")
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"compression": CompressionType.ZSTD, "chunk_size": 10_000},
+        {"compression": CompressionType.NONE},
+        {"use_chunking": False},
+    ],
+)
+def test_other_recorders_layouts_and_messages_give_the_same_report(tmp_path, options):
+    """Joints in another order and among others, no efforts, late log times, other topics."""
+    record(tmp_path / "bag", forces=[])
+    path = tmp_path / "foreign.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, **options)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
+        other = writer.register_schema("std_msgs/msg/Float64", "ros2msg", b"")
+        channel = writer.register_channel(STATES, "cdr", schema)
+        noise = writer.register_channel("/noise", "cdr", other)
+        for stamp in STAMPS:
+            late = stamp + 12_345
+            message = foreign_state(stamp) if stamp % 3 else state(stamp)
+            writer.add_message(channel, late, message, late)
+            writer.add_message(noise, late, bytes(12), late)
+        writer.finish()
+    assert report_of_bag(path) == report_of_bag(tmp_path / "bag")
+
+
+def test_a_growing_bag_is_measured_as_far_as_it_goes(tmp_path):
+    with Recorder(tmp_path / "bag") as recorder:
+        channel = recorder.add_topic(STATES, "sensor_msgs/msg/JointState", QosProfile(1))
+        for count, stamp in enumerate(STAMPS, 1):
+            recorder.write(channel, state(stamp), stamp)
+            if count in (400, 800):
+                recorder.flush()
+                report = report_of_bag(tmp_path / "bag")
+                assert report["samples"] == count
+                assert not report["complete"]
+                assert any("still at work" in sentence for sentence in report["missing"])
+    assert report_of_bag(tmp_path / "bag")["complete"]

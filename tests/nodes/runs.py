@@ -1,0 +1,55 @@
+"""Recorded runs for tests that need one."""
+
+from pathlib import Path
+
+from stickslip_ros.bags.messages import pack_joint_state, pack_wrench
+from stickslip_ros.bags.reader import Recording
+from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from tests.nodes.graph import Graph, own_domain
+
+SECOND = 1_000_000_000
+STATES = "/test/joint_states"
+FORCES = "/test/control_force"
+
+
+def record_states(bag: Path, count: int, step: int = SECOND // 100) -> str:
+    """Write as many joint states and forces, `step` ns apart, from 1 s on; return the path."""
+    with Recorder(bag) as recorder:
+        qos = QosProfile(depth=JOINT_STATES.depth)
+        states = recorder.add_topic(STATES, JOINT_STATES.type_name, qos)
+        forces = recorder.add_topic(FORCES, CONTROL_FORCE.type_name, qos)
+        for number in range(count):
+            stamp = SECOND + number * step
+            state = pack_joint_state(stamp, (number, 0.0), (0.1, 0.4), (0.0, 0.0))
+            recorder.write(states, state, stamp)
+            recorder.write(forces, pack_wrench(stamp, 0.5 * number), stamp)
+    return str(bag)
+
+
+def record_run(bag: Path, **plant_parameters: object) -> None:
+    """Record the closed loop in lockstep until the plant pauses by itself."""
+    with own_domain() as domain:
+        graph = Graph(domain)
+        analyzer = graph.add(AnalyzerNode, bag=str(bag))
+        controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
+        graph.wait_until(lambda: analyzer.active and controller.active, "both active")
+        listeners = ["analyzer", "washout_controller"]
+        plant = graph.add(PlantNode, wait_for=listeners, **plant_parameters)
+        graph.wait_until(lambda: plant.active, "plant active")
+        graph.wait_until(lambda: not plant.active, "plant pauses")
+        for node in listeners[::-1]:
+            graph.deactivate(node)
+        graph.close()
+
+
+def messages_of(bag: Path) -> dict[str, list[tuple[int, bytes]]]:
+    """Return log times (ns) and serialized messages of a bag by topic."""
+    with Recording(bag) as recording:
+        messages: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in recording.topics}
+        for topic, log_time, message in recording.messages(*recording.topics):
+            messages[topic].append((log_time, message))
+    return messages

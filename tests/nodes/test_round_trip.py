@@ -1,0 +1,62 @@
+"""Run, record, report, replay into a second analyzer, record again: nothing may be different."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.replay import ReplayNode
+from tests.nodes.graph import Graph
+from tests.nodes.runs import messages_of, record_run
+
+REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
+
+
+def test_what_is_replayed_and_recorded_again_is_the_same(graph: Graph, tmp_path: Path) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    step = {"disturbance.kind": "step", "disturbance.amplitude": 0.1, "disturbance.start": 20.0}
+    record_run(first, belt_speed=0.45, duration=30.0, **step)
+
+    graph.add(AnalyzerNode, bag=str(second))
+    replay = graph.add(ReplayNode, bag=str(first), rate=1e6, wait_for=["analyzer"])
+    graph.wait_until(lambda: replay.diagnose()[2] and not replay.active, "the bag is replayed")
+    graph.deactivate("analyzer")
+
+    messages = messages_of(first)
+    assert [len(messages[f"/test/{topic}"]) for topic in ("joint_states", "control_force")] == [
+        3001,
+        3001,
+    ]
+    assert len(messages["/test/applied_disturbance"]) > 0
+    assert messages_of(second) == messages
+    assert report_of_bag(second) == report_of_bag(first)
+
+
+def check_against_the_reference(report: dict[str, Any]) -> None:
+    expected = json.loads(REFERENCE.with_suffix(".json").read_text())
+    assert expected.pop("bag") == "bags/reference"
+    del expected["versions"]
+    assert report.keys() == expected.keys()
+    for name, value in expected.items():
+        exact = not isinstance(value, float)
+        assert report[name] == (value if exact else pytest.approx(value, rel=1e-12, abs=0.0)), name
+
+
+def test_the_reference_bag_is_reported_as_ever() -> None:
+    check_against_the_reference(report_of_bag(REFERENCE))
+
+
+def test_the_reference_bag_is_reported_as_ever_when_it_is_replayed(
+    graph: Graph, tmp_path: Path
+) -> None:
+    options = {"namespace": "/feed_drive", "overrides": {"bag": str(tmp_path / "again")}}
+    analyzer = AnalyzerNode(context=graph.context, **options)
+    graph.adopt(analyzer)
+    replay = graph.add(ReplayNode, bag=str(REFERENCE), rate=1e6, wait_for=["analyzer"])
+    graph.wait_until(lambda: replay.diagnose()[2] and not replay.active, "the bag is replayed")
+    analyzer.trigger_deactivate()
+    assert messages_of(tmp_path / "again") == messages_of(REFERENCE)
+    check_against_the_reference(report_of_bag(tmp_path / "again"))
