@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from stickslip_ros.app.output import print_figures
-from stickslip_ros.app.run import default_bag, record, ros_bringup
+from stickslip_ros.app.run import default_bag, record, ros_nodes
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import StickslipError
@@ -33,7 +33,7 @@ def _demonstrate() -> None:
     scenario = load_scenario(_SCENARIO, ["plant.pace=lockstep", f"plant.duration={_DURATION}"])
     switched_on = scenario.washout_controller.start_after
     bag = default_bag(_SCENARIO)
-    reach = ros_bringup().keep_on_this_machine(network=False)
+    reach = ros_nodes("process").keep_on_this_machine(network=False)
     print(
         f"{_DURATION:g} s of {_SCENARIO} in lockstep: plant, washout controller and analyzer as "
         f"ROS 2 nodes, {reach}; the controller acts from {switched_on:g} s on"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from stickslip_ros.app.arguments import seconds
 from stickslip_ros.app.output import progress_bar
-from stickslip_ros.app.run import INTERRUPTED, ros_bringup
+from stickslip_ros.app.run import INTERRUPTED, ros_nodes
 
 NAME = "replay"
 HELP = "publish the messages of a bag again, as they were spaced"
@@ -68,8 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    reach = ros_bringup().keep_on_this_machine(arguments.network)
-    from stickslip_ros.nodes.replay import replay_bag
+    reach = ros_nodes("process").keep_on_this_machine(arguments.network)
 
     def offering(topics: Sequence[str]) -> None:
         wait = f"until {', '.join(arguments.wait_for) or 'somebody'} reads them"
@@ -78,5 +77,5 @@ def run(arguments: argparse.Namespace) -> int:
     names = ("rate", "loop", "start", "duration", "topics", "clock", "wait_for")
     parameters = {name: getattr(arguments, name) for name in names} | {"bag": str(arguments.bag)}
     with progress_bar(f"replaying {arguments.bag}", None if arguments.loop else 1.0) as progress:
-        interrupted = replay_bag(parameters, offering, progress)
+        interrupted = ros_nodes("replay").replay_bag(parameters, offering, progress)
     return INTERRUPTED if interrupted else 0

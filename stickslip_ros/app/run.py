@@ -4,6 +4,7 @@ import argparse
 import sys
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from importlib import import_module
 from itertools import count
 from pathlib import Path
 from types import ModuleType
@@ -71,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     bag = arguments.bag or (Path(scenario.analyzer.bag) if scenario.analyzer.bag else None)
     bag = bag or default_bag(scenario.name)
     check_new_bag(bag)
-    reach = ros_bringup().keep_on_this_machine(arguments.network)
+    reach = ros_nodes("process").keep_on_this_machine(arguments.network)
     print(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}", file=sys.stderr)
     figures, interrupted = record(scenario, bag, namespace=namespace, composed=arguments.composed)
     if arguments.json:
@@ -93,7 +94,7 @@ def record(
     duration = scenario.plant.duration
     total = duration if duration < float("inf") else None
     with progress_bar(f"running {scenario.name}", total) as progress:
-        outcome = ros_bringup().run_nodes(
+        outcome = ros_nodes("bringup").run_nodes(
             scenario, namespace=namespace, bag=bag, composed=composed, progress=progress
         )
     try:
@@ -104,16 +105,15 @@ def record(
         raise
 
 
-def ros_bringup() -> ModuleType:
-    """Return the module that brings nodes up; the commands that need no ROS do without."""
+def ros_nodes(module: str) -> ModuleType:
+    """Return a module of `nodes`; the commands that need no ROS do without."""
     try:
-        from stickslip_ros.nodes import bringup
+        return import_module(f"stickslip_ros.nodes.{module}")
     except ModuleNotFoundError as error:
         raise RunError(
             f"running nodes needs ROS 2, of which {error.name} is not installed: "
             "pip install 'stickslip_ros[ros]', or source an installed ROS 2"
         ) from None
-    return bringup
 
 
 def default_bag(scenario: str) -> Path:

@@ -131,19 +131,29 @@ class Recording:
         """All disturbance forces at the samples from which they act; BagError as for `blocks`."""
         return self._whole(WrenchColumns, _APPLIED_DISTURBANCE, wrenches_in)
 
-    def blocks(self) -> Iterator[RunBlock]:
+    def blocks(self, least: int = 1) -> Iterator[RunBlock]:
         """Yield joint states and control forces, those of a chunk at a time, in the file's order.
 
+        Chunks with fewer than `least` of both are joined to ones with more, the last ones excepted.
         Messages that cannot be understood are left out, and `missing` then tells of them. Raises
         BagError where the bag holds several drives and no namespace was given, and where the
         operating system fails to read it.
         """
         states, forces = self._topic(_JOINT_STATES), self._topic(_CONTROL_FORCE)
-        for block, channels in self._blocks(states, forces):
-            yield RunBlock(
-                self._decoded(states, block, channels, joint_states_in),
-                self._decoded(forces, block, channels, wrenches_in),
+        gathered: list[RunBlock] = []
+        count = 0
+        for messages, channels in self._blocks(states, forces):
+            block = RunBlock(
+                self._decoded(states, messages, channels, joint_states_in),
+                self._decoded(forces, messages, channels, wrenches_in),
             )
+            gathered.append(block)
+            count += len(block.joint_states.stamp) + len(block.control_forces.stamp)
+            if count >= least:
+                yield _joined_blocks(gathered)
+                gathered, count = [], 0
+        if gathered:
+            yield _joined_blocks(gathered)
 
     def messages(self, *topics: str) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, log time in ns and serialized message of these topics, as recorded in turn.
@@ -263,8 +273,20 @@ class Recording:
         if not blocks:
             nothing = np.empty(0, np.int64)
             blocks = [decode(b"", nothing, nothing)[0]]
-        names = [field.name for field in fields(kind)]
-        return kind(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
+        return _joined(kind, blocks)
+
+
+def _joined_blocks(blocks: Sequence[RunBlock]) -> RunBlock:
+    states, forces = zip(*blocks, strict=True)
+    return RunBlock(_joined(JointStateColumns, states), _joined(WrenchColumns, forces))
+
+
+def _joined(kind: type[ColumnsT], blocks: Sequence[ColumnsT]) -> ColumnsT:
+    """Return columns, dataclasses of arrays, end to end."""
+    if len(blocks) == 1:
+        return blocks[0]
+    names = [field.name for field in fields(kind)]
+    return kind(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
 
 
 def _mcap_files(path: Path) -> list[Path]:

@@ -62,22 +62,6 @@ class RunOutcome:
     """The plant's last figures, as in its diagnostics."""
 
 
-def keep_on_this_machine(network: bool) -> str:
-    """Restrict ROS discovery to this machine, or open it; return in words what holds.
-
-    To be called before ROS is initialised. What the environment says holds, unless `network` asks
-    for more.
-    """
-    name = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-    if network:
-        os.environ[name] = "SUBNET"
-        return "open to the network"
-    said = os.environ.setdefault(name, "LOCALHOST")
-    if said == "LOCALHOST":
-        return "kept on this machine"
-    return f"as the environment says: {name}={said}"
-
-
 def run_nodes(
     scenario: Scenario,
     *,

@@ -49,7 +49,8 @@ def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) 
         print(f"{parser.prog}: {_first_line(error)}", file=sys.stderr)
         return 2
     try:
-        return _run_initialized(make)
+        run_until_stopped(make())
+        return 0
     except InvalidInputError as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
         return 2
@@ -60,21 +61,36 @@ def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) 
         rclpy.try_shutdown()
 
 
-def _run_initialized(make: Callable[[], ManagedNode[Any]]) -> int:
-    node = make()
+def run_until_stopped(node: ManagedNode[Any]) -> None:
+    """Run a node until SIGINT, SIGTERM or it itself ends that; raise what it was stopped with."""
     executor = EventsExecutor()
     executor.add_node(node)
     stop_on_signals(node.stopped, executor)
     spin(executor, node.stopped)
     if node.active:
         node.trigger_deactivate()
-    refusal = node.stopped.result()
+    reason = node.stopped.result()
     executor.remove_node(node)
     node.destroy_node()
     executor.shutdown()
-    if refusal is not None:
-        raise refusal
-    return 0
+    if reason is not None:
+        raise reason
+
+
+def keep_on_this_machine(network: bool) -> str:
+    """Restrict ROS discovery to this machine, or open it; return in words what holds.
+
+    To be called before ROS is initialised. What the environment says holds, unless `network` asks
+    for more.
+    """
+    name = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    if network:
+        os.environ[name] = "SUBNET"
+        return "open to the network"
+    said = os.environ.setdefault(name, "LOCALHOST")
+    if said == "LOCALHOST":
+        return "kept on this machine"
+    return f"as the environment says: {name}={said}"
 
 
 def die_with_parent() -> None:

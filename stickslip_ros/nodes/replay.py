@@ -13,7 +13,6 @@ from typing import Any
 
 import rclpy
 from rclpy.duration import Duration
-from rclpy.experimental import EventsExecutor
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
@@ -26,7 +25,7 @@ from stickslip_ros.nodes.excerpt import Excerpt
 from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.pacing import FlowWindow
 from stickslip_ros.nodes.player import Message, Player
-from stickslip_ros.nodes.process import run_node, spin, stop_on_signals
+from stickslip_ros.nodes.process import run_node, run_until_stopped
 from stickslip_ros.nodes.topics import CLOCK, JOINT_STATES, RECORDED
 from stickslip_ros.physics.samples import NANOSECONDS
 from stickslip_ros.scenario.parameters import ReplayParameters
@@ -229,18 +228,9 @@ class _OneReplay(ReplayNode):
 
     def run(self) -> bool:
         """Return whether a signal ended it."""
-        executor = EventsExecutor()
-        executor.add_node(self)
-        stop_on_signals(self.stopped, executor)
-        spin(executor, self.stopped)
-        if self.active:
-            self.trigger_deactivate()
-        executor.remove_node(self)
-        self.destroy_node()
-        executor.shutdown()
-        failure = self.stopped.result() or (self._player and self._player.failure)
-        if failure is not None:
-            raise failure
+        run_until_stopped(self)
+        if self._player is not None and self._player.failure is not None:
+            raise self._player.failure
         return not self._ended
 
     def connect(self) -> None:

@@ -93,6 +93,8 @@ def test_topics_are_remapped_and_parameters_come_from_a_file(
         ("washout_controller", ("-p", "corner_frequency:=.nan"), ("corner_frequency = nan",)),
         ("analyzer", ("-p", "window:=0"), ("window = 0", "at least 1")),
         ("analyzer", ("-p", "bag:=/proc/none/bag"), ("/proc/none/bag",)),
+        ("replay", ("-p", "rate:=0"), ("rate = 0", "above 0")),
+        ("replay", ("-p", "bag:=/nowhere"), ("the bag /nowhere does not exist",)),
     ],
 )
 def test_bad_parameters_end_the_process_with_one_line(
@@ -107,7 +109,7 @@ def test_bad_parameters_end_the_process_with_one_line(
         assert text in lines[0]
 
 
-@pytest.mark.parametrize("node", ["plant", "washout_controller", "analyzer"])
+@pytest.mark.parametrize("node", ["plant", "washout_controller", "analyzer", "replay"])
 def test_help_names_every_parameter(node: str) -> None:
     shown = subprocess.run(
         [sys.executable, "-m", f"stickslip_ros.nodes.{node}", "--help"],
