@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from rclpy.duration import Duration
 
-from stickslip_ros.bags.messages import joint_state_columns, pack_wrench
+from stickslip_ros.bags.messages import joint_state_columns, pack_joint_state, pack_wrench
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.nodes.analyzer import AnalyzerNode
@@ -22,7 +23,7 @@ from stickslip_ros.nodes.topics import (
     STICK_FRACTION,
 )
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from tests.nodes.graph import Graph
+from tests.nodes.graph import PATIENCE, Graph
 
 
 def run_to_the_end(graph: Graph, bag: Path, **plant_parameters: object) -> None:
@@ -136,6 +137,25 @@ def test_the_closed_loop_is_answered_without_loss(graph: Graph, tmp_path: Path) 
         disturbances = list(recording.messages("/test/applied_disturbance"))
     assert states == forces == [1_000_000_000 + n * 10_000_000 for n in range(2001)]
     assert len(disturbances) == 1
+
+
+def test_what_has_arrived_when_it_stops_is_recorded_although_nothing_has_run(
+    graph: Graph, tmp_path: Path
+) -> None:
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    states = graph.observer.create_publisher(
+        JOINT_STATES.type, f"/test/{JOINT_STATES.name}", JOINT_STATES.qos()
+    )
+    graph.wait_until(
+        lambda: analyzer.active and states.get_subscription_count() == 1, "analyzer listens"
+    )
+    stamps = [1_000_000_000 + n * 1_000_000 for n in range(500)]
+    for stamp in stamps:
+        states.publish(pack_joint_state(stamp, (0.0, 0.0), (0.0, 0.4), (0.0, 0.0)))
+    assert states.wait_for_all_acked(Duration(seconds=PATIENCE))
+    analyzer.trigger_deactivate()
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.joint_states.stamp.tolist() == stamps
 
 
 @pytest.fixture
