@@ -7,8 +7,10 @@ from pathlib import Path
 from lz4.frame import LZ4FrameDecompressor
 from zstandard import ZstdDecompressor, ZstdError, frame_content_size
 
-_LARGEST = 1 << 30
-"""Recorders close their chunks at a few MB: what claims to be larger than this is damaged."""
+_LARGEST = 1 << 28
+_LARGEST_RATIO = 1000
+_SMALL = 1 << 20
+"""Recorders close chunks at a few MB, which shrink a few times: what claims more is damaged."""
 _PIECE = 4 << 20
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
@@ -17,7 +19,7 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 def unpack(compression: str, data: bytes, size: int) -> bytes | None:
     """Return what was packed as `lz4`, `zstd` or not at all; None if that is not `size` bytes."""
-    if size > _LARGEST:
+    if size > min(_LARGEST, max(_SMALL, _LARGEST_RATIO * len(data))):
         return None
     match compression:
         case "":

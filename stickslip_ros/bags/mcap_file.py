@@ -9,6 +9,7 @@ the reading goes on at the next sound chunk.
 import re
 import struct
 import zlib
+from array import array
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from copy import copy
@@ -74,6 +75,9 @@ _FIELDS: dict[int, tuple[int, ...]] = {
     Opcode.SUMMARY_OFFSET: (17,),
     Opcode.DATA_END: (4,),
 }
+_OPCODES = frozenset((*_FIELDS, Opcode.MESSAGE))
+_PRIVATE = 0x80
+"""Opcodes from here on mean what a program likes."""
 _INVENTORY = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.ATTACHMENT))
 """What stands between the messages and tells what they are or how they came about."""
 _CHECKED = 1_000_000
@@ -137,10 +141,9 @@ class MessageBlock:
 
     def on(self, channels: Collection[int]) -> "MessageBlock":
         """Return those on these channels."""
-        present = self.channel
-        wanted = np.zeros(len(self), bool)
-        for channel in channels:
-            wanted |= present == channel
+        chosen = np.zeros(1 << 16, bool)
+        chosen[list(channels)] = True
+        wanted = chosen[self.channel]
         if wanted.all():
             return self
         part = copy(self)
@@ -204,11 +207,14 @@ class McapFile:
         self.statistics: Statistics | None = None
         """The file's own account of its messages, if it has one."""
         self._definitions: Counter[tuple[int, int, bytes]] = Counter()
-        self._metadata_starts: dict[str, int] = {}
-        self._attachment_starts: dict[str, int] = {}
+        self._channel_ids: set[int] = set()
+        self._tables: dict[int, str] = {}
+        self._attachments: dict[int, str] = {}
         self._chunked = False
         self._gaps: dict[int, int] = {}
         self._lost: dict[int, int] = {}
+        if path.exists() and not path.is_file():
+            raise BagError(f"the file {path} cannot be opened: it is no regular file")
         try:
             self._stream = path.open("rb")
         except OSError as error:
@@ -240,27 +246,24 @@ class McapFile:
         for channel, lost in self._lost.items():
             topic = self.channels[channel].topic
             found.append(f"{name}: {lost} messages that were recorded on {topic} are gone")
+        found += [f"{name}: of what type {topic} is, is not told" for topic in self._undefined]
         return found
 
-    @property
-    def metadata_names(self) -> list[str]:
-        """Names of the tables that `metadata` can return."""
-        return list(self._metadata_starts)
+    def tables(self, name: str | None = None) -> Iterator[Metadata]:
+        """Yield the readable metadata records, of that name or all, in file order."""
+        for start, found in sorted(self._tables.items()):
+            if name in (None, found):
+                table = self._parsed(start, Opcode.METADATA, Metadata.read)
+                if table is not None:
+                    yield table
 
-    @property
-    def attachment_names(self) -> list[str]:
-        """Names of the files that `attachment` can return."""
-        return list(self._attachment_starts)
-
-    def metadata(self, name: str) -> dict[str, str] | None:
-        """Return the last readable metadata record of that name, None if there is none."""
-        record = self._parsed(self._metadata_starts.get(name), Opcode.METADATA, Metadata.read)
-        return record and record.metadata
-
-    def attachment(self, name: str) -> Attachment | None:
-        """Return the last readable attachment of that name, None if there is none."""
-        start = self._attachment_starts.get(name)
-        return self._parsed(start, Opcode.ATTACHMENT, Attachment.read)
+    def attachments(self, name: str | None = None) -> Iterator[Attachment]:
+        """Yield the readable attachments, of that name or all, in file order."""
+        for start, found in sorted(self._attachments.items()):
+            if name in (None, found):
+                attachment = self._parsed(start, Opcode.ATTACHMENT, Attachment.read)
+                if attachment is not None:
+                    yield attachment
 
     def blocks(self, channels: Collection[int]) -> Iterator[MessageBlock]:
         """Yield the messages on those channels in file order, those of a chunk at a time.
@@ -272,7 +275,8 @@ class McapFile:
         for block in self._blocks():
             wanted = block.on(channels)
             if len(wanted) > 0:
-                counts.update(dict(enumerate(np.bincount(wanted.channel))))
+                present, numbers = np.unique(wanted.channel, return_counts=True)
+                counts.update(dict(zip(present.tolist(), numbers.tolist(), strict=True)))
                 yield wanted.unpacked()
         recorded = self.statistics.channel_message_counts if self.statistics else {}
         for channel in set(channels) & set(self.channels):
@@ -305,8 +309,8 @@ class McapFile:
         if not begins_well and self._next_chunk(0) == self._size:
             raise BagError(f"the file {self.path} is not an MCAP file: it does not begin like one")
         ends_well = self._read_summary()
-        # A summary need not repeat the channels.
-        if not (ends_well and self.channels):
+        # A summary need not repeat the definitions.
+        if not (ends_well and self.channels and not self._undefined):
             for record, chunk in self._records(data_start):
                 if chunk is not None:
                     self._chunked = True
@@ -318,6 +322,12 @@ class McapFile:
                     self._note(record.opcode, record.start, content, 1)
             self._define()
         return begins_well and ends_well
+
+    @property
+    def _undefined(self) -> list[str]:
+        """The topics of which no type is known, although they have one."""
+        known = (0, *self.schemas)
+        return [c.topic for c in self.channels.values() if c.schema_id not in known]
 
     def _read_summary(self) -> bool:
         """Note what the summary tells; return whether the file ends as its writer leaves it."""
@@ -352,20 +362,22 @@ class McapFile:
             match opcode:
                 case Opcode.SCHEMA | Opcode.CHANNEL:
                     number = int.from_bytes(content[:2], "little")
+                    if opcode == Opcode.CHANNEL:
+                        self._channel_ids.add(number)
                     self._definitions[opcode, number, content] += weight
                 case Opcode.STATISTICS:
                     self.statistics = _parse(Statistics.read, content)
                     self._chunked = self.statistics.chunk_count > 0
                 case Opcode.METADATA:
-                    self._metadata_starts[_parse(Metadata.read, content).name] = start
+                    self._tables[start] = _parse(Metadata.read, content).name
                 case Opcode.METADATA_INDEX:
                     index = _parse(MetadataIndex.read, content)
-                    self._metadata_starts[index.name] = index.offset
+                    self._tables[index.offset] = index.name
                 case Opcode.ATTACHMENT:
-                    self._attachment_starts[_parse(Attachment.read, content).name] = start
+                    self._attachments[start] = _parse(Attachment.read, content).name
                 case Opcode.ATTACHMENT_INDEX:
                     index = _parse(AttachmentIndex.read, content)
-                    self._attachment_starts[index.name] = index.offset
+                    self._attachments[index.offset] = index.name
                 case _:
                     pass
         except _DamageError:
@@ -413,18 +425,14 @@ class McapFile:
             return None
         if record.opcode == Opcode.MESSAGE:
             channel = int.from_bytes(self._read(record.content, 2), "little")
-            known = channel in self.channels or any(
-                (opcode, number) == (Opcode.CHANNEL, channel)
-                for opcode, number, _ in self._definitions
-            )
             # Where there are chunks all messages are in them; this is something else, damaged.
-            sound = known and record.length >= _MESSAGE_LENGTH and not self._chunked
-            return record if sound else None
+            sound = channel in self._channel_ids and record.length >= _MESSAGE_LENGTH
+            return record if sound and not self._chunked else None
         if record.opcode not in _FIELDS:
-            # Another program's own kind, if one that is known follows.
+            # Another program's own kind, if another record follows.
             following = self._read(record.end, 1)
-            private = record.opcode > max(_FIELDS) and following and following[0] in _FIELDS
-            return record if private else None
+            followed = bool(following) and (following[0] in _OPCODES or following[0] >= _PRIVATE)
+            return record if record.opcode >= _PRIVATE and followed else None
         place = record.content
         for field in _FIELDS[record.opcode]:
             if field < 0:
@@ -517,9 +525,13 @@ def _as_block(messages: list[bytes]) -> MessageBlock:
 
 def _walked(data: bytes) -> _OpenChunk:
     """Find the messages of a chunk by going from record to record."""
-    records = list(_records_in(data))
-    starts = [begin - _HEAD.size for opcode, begin, _ in records if opcode == Opcode.MESSAGE]
-    others = [record for record in records if record[0] != Opcode.MESSAGE]
+    starts = array("q")
+    others: list[_Place] = []
+    for place in _records_in(data):
+        if place[0] == Opcode.MESSAGE:
+            starts.append(place[1] - _HEAD.size)
+        elif place[0] in _INVENTORY:
+            others.append(place)
     return _OpenChunk(MessageBlock(data, np.array(starts, np.int64)), others)
 
 
@@ -533,7 +545,7 @@ def _records_in(data: bytes) -> Iterator[_Place]:
             raise _DamageError from error
         begin = position + _HEAD.size
         position = begin + length
-        if position > len(data):
+        if opcode == 0 or position > len(data):
             raise _DamageError
         yield opcode, begin, position
 

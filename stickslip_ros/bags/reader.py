@@ -181,13 +181,13 @@ class Recording:
 
     def metadata(self, name: str) -> dict[str, str] | None:
         """Return the last table of texts of that name in the bag, None if there is none."""
-        found = [file.metadata(name) for file in self.files]
-        return next((table for table in reversed(found) if table is not None), None)
+        found = [table for file in self.files for table in file.tables(name)]
+        return found[-1].metadata if found else None
 
     def attachment(self, name: str) -> bytes | None:
         """Return the last file of that name attached to the bag, None if there is none."""
-        found = [file.attachment(name) for file in self.files]
-        return next((file.data for file in reversed(found) if file is not None), None)
+        found = [attachment for file in self.files for attachment in file.attachments(name)]
+        return found[-1].data if found else None
 
     def close(self) -> None:
         """Close the files."""
@@ -331,7 +331,7 @@ def _undescribed(directory: Path, files: Sequence[Path]) -> str:
         listed = set(described["rosbag2_bagfile_information"]["relative_file_paths"])
     except FileNotFoundError:
         return f"{METADATA_FILE} is missing: the recorder is still at work or was killed"
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
+    except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError, RecursionError):
         return f"{METADATA_FILE} cannot be understood"
     present = {file.name for file in files}
     if gone := sorted(map(str, listed - present)):

@@ -253,13 +253,15 @@ class Recorder:
                 if self._sync is None or self._sync.running() or self._sync.done():
                     self._sync = self._do_later(self._stream.sync)
 
-    def attach(self, name: str, data: bytes, media_type: str) -> None:
-        """Put a whole file of a media type such as `text/yaml` into the bag.
+    def attach(
+        self, name: str, data: bytes, media_type: str, log_time: int = 0, create_time: int = 0
+    ) -> None:
+        """Put a whole file of a media type such as `text/yaml` into the bag; times are in ns.
 
         Raises BagError if the bag is closed or fails.
         """
         with self._writing():
-            self._writer.add_attachment(0, 0, name, media_type, data)
+            self._writer.add_attachment(create_time, log_time, name, media_type, data)
 
     def add_metadata(self, name: str, data: Mapping[str, str]) -> None:
         """Put a table of texts into the bag: into the file at hand and those that follow.

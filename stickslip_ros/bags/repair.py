@@ -1,15 +1,18 @@
 """Saving what is left of a damaged bag into a sound one."""
 
+import shutil
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from stickslip_ros.bags.mcap_file import McapFile
+from stickslip_ros.bags.metadata import METADATA_FILE
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import Recorder, check_new_bag
 from stickslip_ros.errors import BagError
 
+_Definition = tuple[object, ...]
 _ROSBAG2 = "rosbag2"
 """Name of rosbag2's own table in every file, of which the new bag has one of its own."""
 
@@ -30,64 +33,80 @@ def repair(path: Path, out: Path, progress: Callable[[int], None] = lambda _: No
     Messages of every topic come over with their times, as do tables and attached files. `progress`
     is told now and then how many messages are done. The original is only read. Raises BagError for
     what is no bag or has nothing to be saved, and if `out` exists, lies within the original or
-    cannot be written.
+    cannot be written; then there is no `out`.
     """
     check_new_bag(out)
-    if out.resolve().is_relative_to(path.resolve()):
-        raise BagError(f"the bag {out} would lie within {path}, which is only to be read")
+    original = path.parent if (path.parent / METADATA_FILE).exists() else path
+    if out.resolve().is_relative_to(original.resolve()):
+        raise BagError(f"the bag {out} would lie within {original}, which is only to be read")
     repaired = Repaired()
     with Recording(path) as recording:
         if not recording.topics:
             why = "; ".join(recording.missing) or "it holds no topics"
             raise BagError(f"nothing of the bag {path} can be saved: {why}")
-        with Recorder(out) as recorder:
-            channels: dict[tuple[str, str], int] = {}
-            for file in recording.files:
-                _copy_tables(file, recorder)
-                _copy_messages(file, recorder, channels, repaired, progress)
-        repaired.missing = recording.missing
+        try:
+            with Recorder(out) as recorder:
+                channels: dict[_Definition, int] = {}
+                for file in recording.files:
+                    _copy_tables(file, recorder)
+                    _copy_messages(file, recorder, channels, repaired, progress)
+        except BaseException:
+            shutil.rmtree(out, ignore_errors=True)  # it would look like a sound bag of everything
+            raise
+        repaired.missing[:0] = recording.missing
     return repaired
 
 
 def _copy_tables(file: McapFile, recorder: Recorder) -> None:
-    for name in file.metadata_names:
-        table = file.metadata(name)
-        if table is not None and name != _ROSBAG2:
-            recorder.add_metadata(name, table)
-    for name in file.attachment_names:
-        attachment = file.attachment(name)
-        if attachment is not None:
-            recorder.attach(name, attachment.data, attachment.media_type)
+    for table in file.tables():
+        if table.name != _ROSBAG2:
+            recorder.add_metadata(table.name, table.metadata)
+    for attachment in file.attachments():
+        recorder.attach(
+            attachment.name,
+            attachment.data,
+            attachment.media_type,
+            attachment.log_time,
+            attachment.create_time,
+        )
 
 
 def _copy_messages(
     file: McapFile,
     recorder: Recorder,
-    channels: dict[tuple[str, str], int],
+    channels: dict[_Definition, int],
     repaired: Repaired,
     progress: Callable[[int], None],
 ) -> None:
-    """Copy the messages of a file; `channels` are those of the new bag by topic and type."""
+    """Copy the messages of a file; `channels` are those of the new bag by their definition."""
     topics: dict[int, str] = {}
     targets: dict[int, int] = {}
     for number, channel in file.channels.items():
         schema = file.schemas.get(channel.schema_id)
         if schema is None:
+            name = file.path.name
+            repaired.missing.append(f"{name}: {channel.topic} is left out: it has no known type")
             continue
-        key = channel.topic, schema.name
-        if key not in channels:
-            channels[key] = recorder.add_channel(channel, schema)
-        topics[number], targets[number] = channel.topic, channels[key]
+        details = (channel.message_encoding, *sorted(channel.metadata.items()))
+        definition = (channel.topic, schema.name, schema.encoding, schema.data, details)
+        if definition not in channels:
+            channels[definition] = recorder.add_channel(channel, schema)
+        topics[number], targets[number] = channel.topic, channels[definition]
+    untimely = 0
     for block in file.blocks(targets):
-        columns = (
-            block.channel,
-            block.begin,
-            block.end,
-            block.log_time,
-            block.publish_time,
-            block.sequence,
-        )
-        for channel, begin, end, *times in zip(*(c.tolist() for c in columns), strict=True):
-            recorder.write(targets[channel], block.data[begin:end], *times)
+        times = block.log_time, block.publish_time, block.sequence
+        columns = block.channel, block.begin, block.end, *times
+        for channel, begin, end, log_time, publish_time, sequence in zip(
+            *(column.tolist() for column in columns), strict=True
+        ):
+            if log_time < 0 or publish_time < 0:  # beyond 63 bits, which rosbag2 cannot read
+                untimely += 1
+                continue
+            message = block.data[begin:end]
+            recorder.write(targets[channel], message, log_time, publish_time, sequence)
             repaired.messages[topics[channel]] += 1
         progress(repaired.messages.total())
+    if untimely:
+        repaired.missing.append(
+            f"{file.path.name}: {untimely} messages are left out: their times exceed 2^63 - 1 ns"
+        )

@@ -1,6 +1,5 @@
 """A recorded run from its bag: a report of its measures and counts."""
 
-from math import isinf
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,8 @@ from stickslip_ros.physics.samples import NANOSECONDS, IntArray, RunMeter
 _DEFAULT_WINDOW = 20
 """Cycles to average over for a bag of somebody else's."""
 _LARGEST_WINDOW = 100_000
+_LONGEST = 9e9
+"""Time, s, that stamps can tell."""
 _MEASURED_AT_ONCE = 20_000
 """Messages; to measure each chunk by itself would take twice as long."""
 
@@ -70,8 +71,9 @@ class _RunReader:
         self.has_states = False
         self.measured = 0
         """Joint states and forces in the part."""
-        self._start = round(start * NANOSECONDS)
-        self._end = end if isinf(end) else round(end * NANOSECONDS)
+        self._start, self._end = (
+            round(min(instant, _LONGEST) * NANOSECONDS) for instant in (start, end)
+        )
         self._early: list[WrenchColumns] = []
 
     def feed(self, states: JointStateColumns, forces: WrenchColumns) -> None:

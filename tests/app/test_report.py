@@ -67,6 +67,7 @@ def test_a_damaged_bag_is_repaired(command, tmp_path):
         (["report", "nothing"], "the bag nothing does not exist"),
         (["report", "bag", "--namespace", "/other"], "no joint_states and no control_force in"),
         (["report", "bag", "--from", "50"], "from 50.0 s to inf s of bag holds no samples"),
+        (["report", "bag", "--from", "1e300"], "from 1e+300 s to inf s"),
         (["report", "bag", "--from", "-1"], "'-1' is not a time in seconds"),
         (["report", "text"], "not an MCAP file"),
         (["repair", "bag"], "OUT"),

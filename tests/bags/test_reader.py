@@ -1,8 +1,12 @@
+import os
+import resource
 import shutil
+import struct
 from contextlib import suppress
 
 import pytest
 import yaml
+import zstandard
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.writer import CompressionType, IndexType, Writer
@@ -219,6 +223,47 @@ def test_files_of_other_writers_are_read(scratch, options):
         assert recording.complete
 
 
+@pytest.mark.parametrize("chunked", [True, False])
+def test_records_of_a_kind_of_its_own_are_passed_over(scratch, chunked):
+    private = struct.pack("<BQ", 0x99, 3) + b"own"
+    with scratch.open("wb") as stream:
+        writer = Writer(stream, use_chunking=chunked)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
+        channel = writer.register_channel(JOINT_STATES, "cdr", schema)
+        for number in range(COUNT):
+            if number % 100 == 50:
+                writer.flush()
+                stream.write(private * 2)
+            writer.add_message(channel, number, state(number), number)
+        writer.finish()
+    with Recording(scratch) as recording:
+        assert recording.joint_states.stamp.tolist() == list(range(COUNT))
+        assert recording.complete
+
+
+def test_a_chunk_that_unpacks_to_masses_of_nothing_costs_nothing(bag, scratch):
+    """Without a checksum it might be anything; as records it would be three million of no size."""
+    packed = zstandard.compress(bytes(32 << 20))
+    content = struct.pack("<QQQII4sQ", 0, 0, 32 << 20, 0, 4, b"zstd", len(packed)) + packed
+    bomb = struct.pack("<BQ", 6, len(content)) + content
+    sound = (bag / "bag_0.mcap").read_bytes()
+    scratch.write_bytes(sound[:8] + bomb * 20 + sound[8:])
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with Recording(scratch) as recording:
+        assert recording.joint_states.stamp.tolist() == list(range(COUNT))
+        assert not recording.complete
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000  # kB
+
+
+@pytest.mark.parametrize("text", ["a: 2001-99-99", "[" * 5000, "- 1", "\xff", ""])
+def test_a_metadata_yaml_that_makes_no_sense_is_told(bag, tmp_path, text):
+    shutil.copytree(bag, tmp_path / "bag")
+    (tmp_path / "bag" / "metadata.yaml").write_text(text, encoding="latin-1")
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.missing == ["metadata.yaml cannot be understood"]
+
+
 def test_a_split_bag_is_read_in_order(tmp_path):
     bag = tmp_path / "bag"
     bag.mkdir()
@@ -315,6 +360,7 @@ def test_what_the_publishers_offered_is_told(tmp_path):
         ("nul\0nul", "does not exist"),
         ("long" * 100, "does not exist"),
         ("directory", "cannot be opened"),
+        ("pipe", "no regular file"),
     ],
 )
 def test_what_is_no_bag_is_refused(tmp_path, name, complaint):
@@ -323,6 +369,7 @@ def test_what_is_no_bag_is_refused(tmp_path, name, complaint):
     (tmp_path / "directory" / "directory.mcap").mkdir(parents=True)
     (tmp_path / "file.txt").write_text("not a bag, but longer than a bag's beginning")
     (tmp_path / "empty.mcap").touch()
+    os.mkfifo(tmp_path / "pipe")
     (tmp_path / "truncated.mcap").write_bytes(b"\x89MCAP")
     with pytest.raises(BagError, match=complaint):
         Recording(tmp_path / name)
