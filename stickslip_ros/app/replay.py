@@ -21,7 +21,10 @@ DESCRIPTION = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.description = DESCRIPTION
-    parser.add_argument("bag", metavar="BAG", type=Path, help="bag directory, or one .mcap file")
+    parser.usage = "%(prog)s BAG [OPTION ...]"  # argparse shows BAG last, where --topics takes it
+    parser.add_argument(
+        "bag", metavar="BAG", type=Path, help="bag directory, or one .mcap file; stands first"
+    )
     parser.add_argument(
         "--rate",
         type=float,
@@ -49,12 +52,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="replay S s of recorded time (default: up to the end)",
     )
     parser.add_argument(
-        "--topics", nargs="+", default=[], metavar="T", help="topics to replay (default: all)"
+        "--topics",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="T",
+        help="topics to replay (default: all)",
     )
     parser.add_argument("--clock", action="store_true", help="publish recorded time on /clock")
     parser.add_argument(
         "--wait-for",
         nargs="+",
+        action="extend",
         default=[],
         metavar="NODE",
         help="begin when these nodes read the topics (default: when somebody does)",

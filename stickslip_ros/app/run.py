@@ -1,8 +1,10 @@
 """`stickslip run`: the closed loop as ROS 2 nodes, recorded and reported."""
 
 import argparse
+import signal
 import sys
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from importlib import import_module
 from itertools import count
@@ -108,12 +110,26 @@ def record(
 def ros_nodes(module: str) -> ModuleType:
     """Return a module of `nodes`; the commands that need no ROS do without."""
     try:
-        return import_module(f"stickslip_ros.nodes.{module}")
+        with _interrupts_kept():
+            return import_module(f"stickslip_ros.nodes.{module}")
     except ModuleNotFoundError as error:
         raise RunError(
             f"running nodes needs ROS 2, of which {error.name} is not installed: "
             "pip install 'stickslip_ros[ros]', or source an installed ROS 2"
         ) from None
+
+
+@contextmanager
+def _interrupts_kept() -> Generator[None]:
+    """Let SIGINT wait: where it meets a C extension being loaded, it becomes an ImportError."""
+    kept: list[int] = []
+    handler = signal.signal(signal.SIGINT, lambda number, _: kept.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if kept:
+            signal.raise_signal(signal.SIGINT)
 
 
 def default_bag(scenario: str) -> Path:

@@ -12,7 +12,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.nodes.offers import message_type, offered_profile
-from stickslip_ros.nodes.player import JITTER, Message
+from stickslip_ros.nodes.player import JITTER, Message, Timeline
 from stickslip_ros.nodes.topics import CLOCK, JOINT_STATES, RECORDED
 from stickslip_ros.physics.samples import NANOSECONDS
 from stickslip_ros.scenario.parameters import ReplayParameters
@@ -26,7 +26,13 @@ class Offer(NamedTuple):
 
 
 class Excerpt:
-    """The part of a bag that is to be replayed."""
+    """The part of a bag that is to be replayed.
+
+    Its start and duration count recorded time as it passes in the replay, from the bag's first
+    message on. What was logged earlier than messages before it belongs to the time of its log time,
+    at the begin of the bag to its begin; where log times go back by more than JITTER, recorded time
+    goes on behind what came before. A part without start and duration is the whole bag.
+    """
 
     def __init__(self, parameters: ReplayParameters, source: str) -> None:
         """Look into the bag.
@@ -53,7 +59,7 @@ class Excerpt:
             self._find_offers(recording)
             self._check_part(recording)
             self.length = self._known_length(recording)
-            """Recorded time from start to end, s; infinite where the bag does not tell it."""
+            """Recorded time from start to end, s; infinite where no account of the bag tells it."""
 
     def messages(self) -> Iterator[Message]:
         """Yield the messages to replay as recorded in turn; raises BagError where reading fails."""
@@ -62,14 +68,23 @@ class Excerpt:
             self.lacking = recording.missing
 
     def _part(self, recording: Recording) -> Iterator[Message]:
-        begin = self.first + round(self._parameters.start * NANOSECONDS)
+        begin = round(self._parameters.start * NANOSECONDS)
         end = begin + self._parameters.duration * NANOSECONDS
-        for topic, log_time, data in recording.messages(*self.offers):
-            if log_time >= end + JITTER:
+        for (topic, log_time, data), elapsed, newest in self._timed(recording, *self.offers):
+            if newest >= end + JITTER:
                 return
             # An empty message cannot be delivered, and Fast DDS would hold back what follows it.
-            if begin <= log_time < end and data:
+            if begin <= elapsed < end and data:
                 yield topic, log_time, data
+
+    def _timed(self, recording: Recording, *topics: str) -> Iterator[tuple[Message, int, int]]:
+        """Yield each message with its recorded time, ns, and the newest one up to there."""
+        timeline = Timeline()
+        timeline.go_to(self.first)
+        for message in recording.messages(*topics):
+            timeline.go_to(message[1])
+            elapsed = max(timeline.elapsed_at(message[1]), 0)
+            yield message, elapsed, timeline.elapsed_at(timeline.now)
 
     def _find_offers(self, recording: Recording) -> None:
         asked = self._parameters.topics
@@ -102,18 +117,23 @@ class Excerpt:
     def _check_part(self, recording: Recording) -> None:
         if next(self._part(recording), None) is not None:
             return
-        last = max(log_time for _, log_time, _ in recording.messages(*recording.topics))
+        length = max(elapsed for _, elapsed, _ in self._timed(recording, *recording.topics))
         raise self._refused(
             f"start = {self._parameters.start} s, duration = {self._parameters.duration} s",
             f"nothing was recorded then on {', '.join(self.offers)}; "
-            f"the bag {recording.path} is {(last - self.first) * 1e-9:g} s long",
+            f"the bag {recording.path} is {length * 1e-9:g} s long",
         )
 
     def _known_length(self, recording: Recording) -> float:
         accounts = [file.statistics for file in recording.files]
-        ends = [account.message_end_time for account in accounts if account is not None]
-        rest = (max(ends) - self.first) * 1e-9 - self._parameters.start if ends else inf
-        return min(rest, self._parameters.duration)
+        known = [account for account in accounts if account is not None and account.message_count]
+        rest = inf
+        if known and None not in accounts:
+            earliest = min(account.message_start_time for account in known)
+            latest = max(account.message_end_time for account in known)
+            if earliest >= self.first - JITTER:
+                rest = (latest - self.first) * 1e-9 - self._parameters.start
+        return min(rest if rest >= 0.0 else inf, self._parameters.duration)
 
     def _refused(self, what: str, why: str) -> InvalidInputError:
         return InvalidInputError(f"{self._source}: {what} is refused: {why}")

@@ -28,11 +28,11 @@ class Timeline:
     log times go back by more than JITTER a new segment begins, one interval behind the old one.
     """
 
-    def __init__(self, rate: float) -> None:
+    def __init__(self, rate: float = 1.0) -> None:
         """Let recorded time pass `rate` times as fast as wall time."""
         self._seconds = 1e-9 / rate
         self._origin = 0.0
-        self._first: int | None = None
+        self._zero: int | None = None
         self.now = 0
         """The newest log time of the segment, ns."""
         self._interval = NANOSECONDS
@@ -42,21 +42,25 @@ class Timeline:
     @property
     def deadline(self) -> float:
         """When what `go_to` went to is due, s of the clock that its `now` was read from."""
-        return self._origin + (self.now - (self._first or 0)) * self._seconds
+        return self._origin + self.elapsed_at(self.now) * self._seconds
 
     @property
     def paused(self) -> bool:
         """Whether time stands still."""
         return self._paused_at is not None
 
-    def go_to(self, log_time: int, now: float) -> None:
+    def elapsed_at(self, log_time: int) -> int:
+        """Return the recorded time, ns, from what was first of all to a log time of the segment."""
+        return log_time - (self._zero or 0)
+
+    def go_to(self, log_time: int, now: float = 0.0) -> None:
         """Go on to what was logged at that time (ns); what is first of all is due `now` (s)."""
-        if self._first is None:
+        if self._zero is None:
             self._origin = now
-            self._first = self.now = log_time
+            self._zero = self.now = log_time
         elif self._begins_anew or log_time < self.now - JITTER:
-            self._origin = self.deadline + self._interval * self._seconds
-            self._first = self.now = log_time
+            self._zero = log_time - self.elapsed_at(self.now) - self._interval
+            self.now = log_time
         elif log_time > self.now:
             self._interval = log_time - self.now
             self.now = log_time

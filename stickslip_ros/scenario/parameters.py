@@ -4,6 +4,7 @@ ROS declarations, scenario files, overrides, messages and the documentation deri
 models. A nested field `friction.static` is the ROS parameter of that name.
 """
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -39,6 +40,10 @@ def _field(
     """Describe a parameter; `fixed` ones cannot be changed while the node is active."""
     extra: Any = {"unit": unit, "fixed": fixed, "choices": tuple(choices)}
     return Field(default, description=meaning, json_schema_extra=extra, **bounds)
+
+
+_NAME = "[A-Za-z_][A-Za-z0-9_]*"
+_NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
 
 
 def _known_law(name: str) -> str:
@@ -118,6 +123,17 @@ class NodeParameters(_Model):
         fixed=True,
     )
     use_sim_time: bool = _field(False, "Let ROS time follow /clock.")
+
+    @model_validator(mode="after")
+    def _names_are_possible(self) -> Self:
+        """Refuse to wait for a node of a name that none can have."""
+        if not all(_NODE_NAME.fullmatch(name) for name in self.wait_for):
+            message = (
+                f"wait_for = {self.wait_for} is refused: must be names of nodes, "
+                "of letters, digits and _, not beginning with a digit"
+            )
+            raise ValueError(message)
+        return self
 
     @classmethod
     def validated(cls, values: Mapping[str, Any], source: str) -> Self:
@@ -273,7 +289,12 @@ class ReplayParameters(NodeParameters):
     rate: float = _field(1.0, "Recorded time over wall time.", fixed=True, gt=0.0)
     loop: bool = _field(False, "Begin anew at the end of the bag.", fixed=True)
     start: float = _field(
-        0.0, "Recorded time, from the bag's first message on, to begin at.", "s", fixed=True, ge=0.0
+        0.0,
+        "Recorded time, from the bag's first message on, to begin at.",
+        "s",
+        fixed=True,
+        ge=0.0,
+        le=1e10,
     )
     duration: float = _field(
         float("inf"),

@@ -61,13 +61,23 @@ def test_ctrl_c_ends_the_wait_for_a_reader(start_stickslip: Start, tmp_path: Pat
     assert process.returncode == 130, errors
 
 
+def test_a_call_whose_bag_is_taken_for_a_topic_says_where_it_stands(stickslip: Run) -> None:
+    done = stickslip("replay", "--topics", "/x", "bag")
+    assert done.returncode == 2
+    assert "usage: stickslip replay BAG [OPTION ...]" in done.stderr
+    assert "BAG" in done.stderr.splitlines()[-1]
+
+
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
         (("nosuch",), ("nosuch", "does not exist")),
         (("bag", "--rate", "0"), ("rate = 0.0", "above 0")),
         (("bag", "--start", "9"), ("start = 9.0 s", "0.01 s long")),
-        (("bag", "--topics", "/x"), ("topics = ['/x']", STATES, FORCES)),
+        (("bag", "--start", "1e300"), ("start = 1e+300", "at most 1e+10 s")),
+        (("bag", "--wait-for", "1bad"), ("wait_for = ['1bad']", "names of nodes")),
+        (("bag", "--topics", "/x", "/y"), ("topics = ['/x', '/y']", STATES, FORCES)),
+        (("--topics", "/x", "--topics", "/y", "--", "bag"), ("topics = ['/x', '/y']",)),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(

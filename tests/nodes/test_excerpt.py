@@ -1,5 +1,6 @@
 """What of a bag is to be replayed, and what is refused."""
 
+from math import inf
 from pathlib import Path
 
 import pytest
@@ -54,6 +55,7 @@ def test_a_part_begins_and_ends_at_recorded_times(tmp_path: Path) -> None:
     assert heard(bag) == run
     assert heard(bag, start=2.0, duration=3.0) == run[4:10]
     assert heard(bag, start=2.5, duration=1.0, topics=[FORCES]) == [(FORCES, 8.0)]
+    assert heard(bag, start=2.0, duration=1e300) == run[4:]
     assert excerpt(bag).length == 9.0
     assert excerpt(bag, start=2.0).length == 7.0
     assert excerpt(bag, start=2.0, duration=3.0).length == 3.0
@@ -64,6 +66,27 @@ def test_what_comes_late_still_belongs_to_the_part(tmp_path: Path) -> None:
     run = [(STATES, 5.0), (STATES, 7.5), (FORCES, 6.9), (STATES, end), (FORCES, 6.8)]
     bag = record(tmp_path / "bag", *run)
     assert heard(bag, duration=2.0) == [(STATES, 5.0), (FORCES, 6.9)]
+
+
+def test_the_first_message_need_not_be_the_earliest(tmp_path: Path) -> None:
+    run = [(STATES, 5.0), (FORCES, 4.9), (STATES, 6.0), (FORCES, 5.9), (STATES, 7.0)]
+    bag = record(tmp_path / "bag", *run)
+    assert heard(bag) == run
+    assert heard(bag, duration=1.0) == [*run[:2], run[3]]
+    assert heard(bag, start=0.5) == run[2:]
+    assert excerpt(bag).length == 2.0
+
+
+def test_a_segment_of_earlier_log_times_follows_the_one_before(tmp_path: Path) -> None:
+    times = (11.0, 12.0, 13.0, 1.0, 2.0, 3.0)
+    run = [(STATES, time) for time in times]
+    bag = record(tmp_path / "bag", *run)
+    assert heard(bag) == run
+    assert heard(bag, start=1.0, duration=3.0) == run[1:4]
+    assert heard(bag, start=4.0) == run[4:]
+    assert excerpt(bag).length == inf
+    with pytest.raises(InvalidInputError, match="is 5 s long"):
+        excerpt(bag, start=6.0)
 
 
 def test_what_only_the_living_say_is_left_out_unless_asked_for(tmp_path: Path) -> None:
@@ -112,6 +135,7 @@ def test_what_the_bag_lacks_is_known_when_it_was_read(tmp_path: Path) -> None:
         ({"bag": ""}, ("/replay: bag = ''", "path of a bag")),
         ({"bag": "nosuch"}, ("nosuch", "does not exist")),
         ({"start": 5.0}, ("/replay: start = 5.0 s", "nothing was recorded", "4 s long")),
+        ({"start": 1e300}, ("/replay: start = 1e+300", "at most 1e+10 s")),
         ({"start": 1.5, "duration": 1.0}, ("duration = 1.0 s", "nothing was recorded")),
         ({"topics": [RECORDED]}, ("nothing was recorded then on /drive/recorded",)),
         ({"topics": ["/nosuch"]}, ("/replay: topics = ['/nosuch']", STATES, FORCES)),

@@ -7,6 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.friction import LAWS
 from stickslip_ros.scenario.parameters import (
     NODE_PARAMETERS,
@@ -146,6 +147,12 @@ def test_the_last_sample_of_a_plant(duration: float, rate: float, last: int | No
     assert plant.last_sample == last
 
 
+@pytest.mark.parametrize("name", ["1bad", "", "a-b", "/", "a//b", "a/", "a/1b", "ä", "a\n"])
+def test_no_node_is_waited_for_that_cannot_be(name: str) -> None:
+    with pytest.raises(InvalidInputError, match=r"test: wait_for = .* must be names of nodes"):
+        PlantParameters.validated({"wait_for": ["plant", name]}, "test")
+
+
 def test_parameters_cannot_be_assigned() -> None:
     with pytest.raises(ValidationError):
         PlantParameters().mass = 2.0
@@ -160,7 +167,7 @@ def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
         int: st.integers(200, 5_000),
         float: numbers | st.integers(1, 1000),
         str: st.text(),
-        list: st.lists(st.text()),
+        list: st.lists(st.from_regex("/?([A-Z]+/)?[a-z_][a-z0-9_]*", fullmatch=True)),
     }
     parameters = {parameter.name: parameter for parameter in parameters_of(model)}
     values: dict[str, Any] = {}
