@@ -22,7 +22,6 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.theory.stability_map import StabilityMap
 from stickslip_ros.studies.design import OWN_SPEED_RANGE, Design, Task, design
 
-NAME = "design"
 HELP = "propose corner frequency and gains that damp the vibration within a force limit"
 
 _DESCRIPTION = f"""{HELP}. The drive, rate and force_delay are the scenario's, the force limit is
@@ -135,7 +134,7 @@ def _draw(path: Path, found: Design) -> None:
 
 
 def _leave_out(what: str) -> None:
-    print(f"stickslip {NAME}: {what}, for there is nothing to propose", file=sys.stderr)
+    print(f"stickslip design: {what}, for there is nothing to propose", file=sys.stderr)
 
 
 def _as_dict(found: Design) -> dict[str, Any]:

@@ -4,11 +4,13 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 
-from stickslip_ros.app import design, paper, repair, replay, report, run, simulate, stability
+from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.errors import InvalidInputError, StickslipError
 
-_COMMANDS = (run, simulate, stability, design, report, repair, replay, paper)
+_COMMANDS = ("run", "simulate", "stability", "design", "report", "repair", "replay", "paper")
+"""Each is a module here, imported when it is asked for: some import what takes seconds."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -16,32 +18,40 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     0 done; 1 the run failed; 2 what came in is refused; 130 interrupted.
     """
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    command = " ".join(given[:1])
+    try:
+        chosen = _parser(given).parse_args(given)
+        status: int = chosen.run(chosen)
+        sys.stdout.flush()
+    except InvalidInputError as error:
+        print(f"stickslip {command}: {error}", file=sys.stderr)
+        status = 2
+    except StickslipError as error:
+        print(f"stickslip {command}: {error}", file=sys.stderr)
+        status = 1
+    except KeyboardInterrupt:
+        print(f"stickslip {command}: interrupted", file=sys.stderr)
+        status = INTERRUPTED
+    except BrokenPipeError:  # whoever read our output has seen enough
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - the interpreter flushes it at exit
+        status = 0
+    sys.exit(status)
+
+
+def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
+    """Return the parser of the command that was given, or of all if none was."""
     parser = argparse.ArgumentParser(
         prog="stickslip",
         description="Stick-slip vibration of a feed drive: run, simulate and measure it.",
     )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in _COMMANDS:
-        subparser = commands.add_parser(command.NAME, help=command.HELP, description=command.HELP)
+    for name in [name for name in _COMMANDS if name in given[:1]] or _COMMANDS:
+        command = import_module(f"stickslip_ros.app.{name}")
+        subparser = commands.add_parser(name, help=command.HELP, description=command.HELP)
         command.add_arguments(subparser)
         subparser.set_defaults(run=command.run)
-    chosen = parser.parse_args(arguments)
-    try:
-        status: int = chosen.run(chosen)
-        sys.stdout.flush()
-    except InvalidInputError as error:
-        print(f"stickslip {chosen.command}: {error}", file=sys.stderr)
-        status = 2
-    except StickslipError as error:
-        print(f"stickslip {chosen.command}: {error}", file=sys.stderr)
-        status = 1
-    except KeyboardInterrupt:
-        print(f"stickslip {chosen.command}: interrupted", file=sys.stderr)
-        status = run.INTERRUPTED
-    except BrokenPipeError:  # whoever read our output has seen enough
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - the interpreter flushes it at exit
-        status = 0
-    sys.exit(status)
+    return parser
 
 
 if __name__ == "__main__":

@@ -20,7 +20,6 @@ from stickslip_ros.studies.paper.marks import marks
 from stickslip_ros.studies.paper.report import as_markdown, report, verdict_counts
 from stickslip_ros.versions import versions
 
-NAME = "paper"
 HELP = "reproduce the paper: its figures 2 to 13, and a report on every number and claim"
 
 _REPORT = "reproduction"

@@ -8,7 +8,6 @@ from stickslip_ros.app.output import print_json, print_table, progress_bar
 from stickslip_ros.bags.repair import repair
 from stickslip_ros.versions import versions
 
-NAME = "repair"
 HELP = "write a sound bag from one that is cut off or damaged"
 
 

@@ -5,11 +5,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.arguments import seconds
 from stickslip_ros.app.output import progress_bar
-from stickslip_ros.app.run import INTERRUPTED, ros_nodes
+from stickslip_ros.app.run import ros_nodes
 
-NAME = "replay"
 HELP = "publish the messages of a bag again, as they were spaced"
 DESCRIPTION = (
     "Publish the messages of a bag again, unchanged, under their recorded names and as they were "

@@ -8,7 +8,6 @@ from stickslip_ros.app.output import print_figures, print_json
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.versions import versions
 
-NAME = "report"
 HELP = "measure a recorded run, or set several side by side"
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.arguments import add_json, add_scenario, made_of, scenario_of, seconds
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.bags.recorder import check_new_bag
@@ -20,10 +21,7 @@ from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario
 from stickslip_ros.scenario.parameters import Pace
 
-NAME = "run"
 HELP = "run a scenario as ROS 2 nodes, record it and report"
-
-INTERRUPTED = 130
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

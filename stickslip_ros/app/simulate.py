@@ -13,7 +13,6 @@ from stickslip_ros.physics.simulation import Progress, simulate_continuous, simu
 from stickslip_ros.physics.washout import Washout
 from stickslip_ros.scenario.files import Scenario
 
-NAME = "simulate"
 HELP = "run a scenario without ROS and measure its motion"
 
 _DEFAULT_PERIODS = 200.0

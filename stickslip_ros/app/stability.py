@@ -43,7 +43,6 @@ from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, Stabi
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from stickslip_ros.scenario.files import Scenario
 
-NAME = "stability"
 HELP = "equilibrium, Hopf speeds, limit cycles and critical gains of a scenario, by theory"
 
 Section = dict[str, Any]
