@@ -346,7 +346,7 @@ def _decode(
         fits = layout.fits(messages)
         taken[taken] = fits
         parts.append((compared[taken], *layout.table(messages if fits.all() else messages[fits])))
-        left = np.concatenate([compared[~taken], left[len(compared) :]])
+        left = compared[~taken] if attempt < _STRUCTURES else left[1:]
     if len(parts) == 2:
         return *parts[1][1:], refused
     places, stamps, values = zip(*parts, strict=True)

@@ -54,19 +54,25 @@ class Knots:
 
 
 def knots_from_samples(
-    time: FloatArray, position: FloatArray, velocity: FloatArray, belt_velocity: FloatArray
+    time: FloatArray,
+    position: FloatArray,
+    velocity: FloatArray,
+    belt_velocity: FloatArray,
+    *,
+    exact_times: bool = True,
 ) -> Knots:
     """Return samples of a motion with stick edges, turning points and peaks put in between.
 
     A sample sticks when its velocity is that of the belt. Between two samples the displacement is
     taken for the cubic that has both positions and both velocities. Arrays of equal length n, SI
-    units; the result has the n samples and what was inserted.
+    units; the result has the n samples and what was inserted. Without `exact_times` that is no
+    peaks: they follow from the distance over the time, and might be far too high.
     """
     stuck = velocity == belt_velocity
     knots = Knots(time, position, velocity, np.concatenate([[False], stuck[1:] & stuck[:-1]]))
     knots = _with_stick_edges(knots, stuck, belt_velocity)
     knots = _with_interior_points(knots, _Cubics.turning_points, velocity=0.0)
-    return _with_interior_points(knots, _Cubics.velocity_peaks)
+    return _with_interior_points(knots, _Cubics.velocity_peaks) if exact_times else knots
 
 
 def _insert(knots: Knots, at: npt.NDArray[np.intp], new: Knots) -> Knots:
@@ -149,7 +155,8 @@ def _with_interior_points(
     """Insert the points that `find` finds while slipping, with `velocity` where it is known."""
     cubics = _Cubics.through(knots)
     u = np.where(knots.sticking[1:], np.nan, find(cubics))
-    at = np.flatnonzero(np.isfinite(u))
+    # A leap onto the belt takes no time: there is nothing within it.
+    at = np.flatnonzero(np.isfinite(u) & (np.diff(knots.time) > 0.0))
     if len(at) == 0:
         return knots
     u, step = u[at], np.diff(knots.time)[at]

@@ -1,11 +1,12 @@
 """Measures from samples: stamps become time and losses, samples become knots, knots cycles."""
 
+from statistics import median
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from stickslip_ros.physics.knots import BoolArray, FloatArray, Knots, knots_from_samples
+from stickslip_ros.physics.knots import BoolArray, FloatArray, knots_from_samples
 from stickslip_ros.physics.measures import UNBOUNDED_BELT_SPEEDS, Cycle, CycleMeter, Measures
 
 IntArray = npt.NDArray[np.int64]
@@ -18,6 +19,27 @@ _LONGEST_GAP = 10
 
 _FEW_STEPS = 10
 """Steps after which the period is taken as known."""
+
+_LONGEST_STEP = 86_400 * NANOSECONDS
+"""A longer step is neither a period nor a loss: one of the two stamps is not of this run."""
+
+_LONGEST_LOSS = 10**7
+"""Periods up to which a gap on the grid may be a loss."""
+
+_LEAST_AHEAD = 64
+"""Steps looked at together, where as many came."""
+
+_STEADY_STEPS = 1000
+"""Steps on a grid after which one that leaves it is no sign of jitter."""
+
+_SHORT_GAP = 5
+"""By this factor at most a jittered step is longer or shorter than a period."""
+
+_FEW_GAPS = 3
+"""So many short gaps off the grid, none of them behind steady steps, are jitter."""
+
+_LARGEST = 1e100
+"""Magnitude up to which positions (m) and speeds (m/s) are believed, and nothing overflows."""
 
 _RESTING_PART = 10
 """The force at rest is that of the last tenth of the time."""
@@ -43,15 +65,58 @@ class _Rows(NamedTuple):
         )
 
 
+class _Segment(NamedTuple):
+    """What of a block belongs together: all from `start` up to the next one's."""
+
+    start: int
+    jittered: bool
+
+
+class _JitteredSteps:
+    """Steps that vary about a period, as those between readings of a clock do."""
+
+    def __init__(self, period: float) -> None:
+        self._period = period
+        self._count = 0
+        self._missing = 0
+        self._single_count = 0
+        self._single_time = 0
+        self._next_estimate = _FEW_STEPS
+
+    @property
+    def lost(self) -> int:
+        """How many samples are missing; a late one and one in time behind it make up a loss."""
+        return max(self._missing, 0)
+
+    def follow(self, steps: IntArray) -> int:
+        """Follow some of the steps (ns) up to the next gap; return how many, none at a gap."""
+        steps = steps[: self._next_estimate - self._count]
+        steps = steps[: _first((steps <= 0) | (steps > _LONGEST_GAP * self._period))]
+        periods = np.rint(steps / self._period)
+        single = steps[periods == 1.0]
+        self._count += len(steps)
+        self._missing += int(periods.sum()) - len(steps)
+        self._single_count += len(single)
+        self._single_time += int(single.sum())
+        if self._count == self._next_estimate:
+            self._next_estimate *= 2
+            if self._single_count > 0:
+                self._period = self._single_time / self._single_count
+        return len(steps)
+
+
 class _Grid:
     """The grid of instants that samples are on, found from their stamps, and what it misses.
 
     Stamps are rounded to the nanosecond. The period is known all the better the more of it were
     seen, so that a long gap of a whole number of periods can be told from one between segments.
+    Stamps that soon leave the grid again and again are on none: their steps are jittered.
     """
 
     def __init__(self) -> None:
         self._lost_before = 0
+        self._jittered: _JitteredSteps | None = None
+        self._off_grid: list[float] = []
         self._begin()
 
     def _begin(self) -> None:
@@ -59,54 +124,61 @@ class _Grid:
         self._covered = 0
         self._periods = 0
         self._intervals = 0
+        self._since_gap = 0
 
     @property
     def lost(self) -> int:
         """How many instants of the grid had no sample."""
-        return self._lost_before + self._periods - self._intervals
+        lost = self._lost_before + self._periods - self._intervals
+        return lost if self._jittered is None else lost + self._jittered.lost
 
-    def breaks(self, stamp: IntArray) -> list[int]:
-        """Follow the stamps (ns), the first of them known; return where the motion is cut.
+    def segments(self, stamp: IntArray) -> list[_Segment]:
+        """Follow the stamps (ns), the first of them known; return what the motion is cut into.
 
-        That is where a new segment begins, which is no loss, and behind a gap that is too long to
-        interpolate over.
+        It is cut where a new segment begins, which is no loss, and behind a gap that is too long
+        to interpolate over. The first of them goes on from before.
         """
-        breaks: list[int] = []
-        start = 0
-        while start < len(stamp):
-            steps = np.diff(stamp[start:])
-            if self._step == 0 and len(steps) > 0:
-                self._step = int(steps[0])
-            odd = self._odd(steps)
-            end = int(np.argmax(odd)) if odd.any() else len(steps)
-            self._follow(steps[:end])
-            if end < len(steps) and self._reconsider(int(steps[end])):
-                start += end
+        steps = np.diff(stamp)
+        segments = [_Segment(0, self._jittered is not None)]
+        done = 0
+        while done < len(steps):
+            followed = self._follow(steps[done:])
+            done += followed
+            if followed > 0 or self._reconsider(int(steps[done])):
                 continue
-            start += end + 1
-            if end < len(steps):
-                breaks.append(start)
-                self._jump(int(steps[end]))
-        return breaks
+            self._jump(int(steps[done]))
+            done += 1
+            segments.append(_Segment(done, self._jittered is not None))
+        return segments
+
+    def _follow(self, steps: IntArray) -> int:
+        """Follow some of the steps up to the next that is odd; return how many."""
+        if self._jittered is not None:
+            return self._jittered.follow(steps)
+        if self._step == 0:
+            self._step = int(steps[0])
+        # To look further ahead than came since the last gap could take quadratic time.
+        steps = steps[: max(_LEAST_AHEAD, self._since_gap)]
+        steps = steps[: _first(self._odd(steps))]
+        if len(steps) > 0:
+            self._covered += int(steps.sum())
+            self._periods += int(np.rint(steps / self._step).sum())
+            self._intervals += len(steps)
+            self._since_gap += len(steps)
+        return len(steps)
 
     def _odd(self, steps: IntArray) -> BoolArray:
         """Return which steps are not a few whole periods."""
-        if self._step <= 0:
+        if not 0 < self._step <= _LONGEST_STEP:
             return np.ones(len(steps), dtype=bool)
         periods = np.rint(steps / self._step)
         off_grid = np.abs(steps - periods * self._step) > periods + 1.0
         return off_grid | (periods < 1.0) | (periods > _LONGEST_GAP)
 
-    def _follow(self, steps: IntArray) -> None:
-        if len(steps) > 0:
-            self._covered += int(steps.sum())
-            self._periods += int(np.rint(steps / self._step).sum())
-            self._intervals += len(steps)
-
     def _reconsider(self, step: int) -> bool:
         """Take the first few steps for several periods each if a shorter one fits into them."""
         times = round(self._step / step) if step > 0 else 0
-        fits = times > 1 and abs(self._step - times * step) <= times + 1
+        fits = 1 < times <= _LONGEST_LOSS and abs(self._step - times * step) <= times + 1
         if not fits or self._intervals > _FEW_STEPS:
             return False
         self._periods *= times
@@ -115,23 +187,48 @@ class _Grid:
 
     def _jump(self, gap: int) -> None:
         """Count a long gap as loss if it is on the grid, otherwise begin a new one."""
-        if gap > 0 and self._periods > 0:
+        self._since_gap = 0
+        if 0 < gap <= _LONGEST_STEP and self._periods > 0:
             period = self._covered / self._periods
             periods = round(gap / period)
-            if abs(gap - periods * period) <= 1.0 + periods / self._periods:
+            on_grid = abs(gap - periods * period) <= 1.0 + periods / self._periods
+            if on_grid and periods <= _LONGEST_LOSS:
                 self._covered += gap
                 self._periods += periods
                 self._intervals += 1
                 return
         self._lost_before = self.lost
+        self._jittered = self._jitter(gap)
         self._begin()
+
+    def _jitter(self, gap: int) -> _JitteredSteps | None:
+        """Return what comes behind a gap off the grid if that was left too often."""
+        if self._intervals > _STEADY_STEPS:
+            self._off_grid.clear()
+        period = self._covered / self._periods if self._periods > 0 else 0.0
+        if not 0.0 < period / _SHORT_GAP <= gap <= _SHORT_GAP * period:
+            self._off_grid.clear()
+            return None
+        self._off_grid += [period, gap]
+        if len(self._off_grid) < 2 * _FEW_GAPS:
+            return None
+        steps = _JitteredSteps(median(self._off_grid))
+        self._off_grid.clear()
+        return steps
+
+
+def _first(found: BoolArray) -> int:
+    """Return the first row that is true, or their number if none is."""
+    return int(np.argmax(found)) if found.any() else len(found)
 
 
 class SampleMeter:
     """Measures a motion from its samples, fed in blocks of columns of any length.
 
-    A gap of a whole number of sample periods is loss; any other, and a stamp that goes back, is
-    the start of a new segment and not lost.
+    A gap of a whole number of sample periods is loss, up to ten million of them; any other, and a
+    stamp that goes back, is the start of a new segment and not lost. Stamps that are on no grid,
+    as those read from a clock, are measured too: then what is missing between two samples is loss
+    up to ten periods, and beyond that a new segment starts.
     """
 
     def __init__(self, window: int) -> None:
@@ -152,22 +249,30 @@ class SampleMeter:
     ) -> list[Cycle]:
         """Take the samples that follow: stamps in ns, slide and belt in SI units, equal lengths.
 
-        Rows that are not finite count as lost. Return the cycles completed by them.
+        Rows that are not finite, or of more than 1e100 m or m/s, count as lost. Return the cycles
+        completed by them.
         """
-        finite = np.isfinite(position) & np.isfinite(velocity) & np.isfinite(belt_velocity)
-        rows = _Rows(stamp, position, velocity, belt_velocity).select(finite)
+        believed = np.ones(len(stamp), dtype=bool)
+        for column in (position, velocity, belt_velocity):
+            believed &= np.abs(column) <= _LARGEST
+        rows = _Rows(stamp, position, velocity, belt_velocity).select(believed)
         self.samples += len(rows.stamp)
         if self._last is not None:
             rows = self._last.followed_by(rows)
         if len(rows.stamp) == 0:
             return []
         cycles: list[Cycle] = []
-        starts = self._grid.breaks(rows.stamp)
-        for start, end in zip([0, *starts], [*starts, len(rows.stamp)], strict=True):
+        segments = self._grid.segments(rows.stamp)
+        ends = [*(segment.start for segment in segments[1:]), len(rows.stamp)]
+        for (start, jittered), end in zip(segments, ends, strict=True):
+            segment = rows.select(slice(start, end))
+            self._look_for_run_away(segment)
+            if len(segment.stamp) == 1 and end < len(rows.stamp):
+                continue  # a lone sample is no motion, and there may be very many of them
             if start > 0:
                 self._meter.interrupt()
                 self._last = None
-            cycles += self._feed_segment(rows.select(slice(start, end)))
+            cycles += self._feed_segment(segment, jittered)
         self._last = rows.select(slice(-1, None))
         return cycles
 
@@ -185,18 +290,22 @@ class SampleMeter:
         """Return the means over the last whole cycles."""
         return self._meter.measures()
 
-    def _feed_segment(self, rows: _Rows) -> list[Cycle]:
+    def _feed_segment(self, rows: _Rows, jittered: bool) -> list[Cycle]:
         stamp, position, velocity, belt_velocity = rows
-        time = (self._elapsed + stamp - stamp[0]) * 1e-9
+        time = (stamp - stamp[0] + float(self._elapsed)) * 1e-9
         self._elapsed += int(stamp[-1] - stamp[0])
-        knots: Knots = knots_from_samples(time, position, velocity, belt_velocity)
+        with np.errstate(over="ignore", invalid="ignore"):
+            knots = knots_from_samples(
+                time, position, velocity, belt_velocity, exact_times=not jittered
+            )
         if self._last is not None:
             knots = knots[1:]  # the sample carried over was fed with its own block
-        if np.any(np.abs(velocity) > UNBOUNDED_BELT_SPEEDS * np.abs(belt_velocity)) and np.all(
-            belt_velocity != 0.0
-        ):
-            self._meter.report_run_away()
         return self._meter.feed(knots, float(belt_velocity[-1]))
+
+    def _look_for_run_away(self, rows: _Rows) -> None:
+        belt_speed = np.abs(rows.belt_velocity)
+        if np.any(np.abs(rows.velocity) > UNBOUNDED_BELT_SPEEDS * belt_speed) and belt_speed.all():
+            self._meter.report_run_away()
 
 
 class ForceMeter:

@@ -213,3 +213,150 @@ def test_no_speed_is_running_away_over_a_belt_at_rest() -> None:
     meter = SampleMeter(window=20)
     meter.feed(*samples)
     assert meter.measures().regime is None
+
+
+def read_late(samples: Samples, latest: float, seed: int = 1) -> Samples:
+    """With stamps of a clock that is read late, by the share `latest` of a period at most."""
+    period = int(samples.stamp[1] - samples.stamp[0])
+    late = np.random.default_rng(seed).random(len(samples.stamp)) * latest * period
+    return samples._replace(stamp=samples.stamp + late.astype(np.int64))
+
+
+@given(
+    st.sampled_from([2e-6, 1e-3, 0.2, 0.7]),
+    st.integers(0, 100),
+    st.lists(st.integers(1, 7000), max_size=5).map(sorted),
+)
+def test_jittered_stamps_are_measured(latest: float, seed: int, starts: list[int]) -> None:
+    """However they are cut into blocks."""
+    samples = read_late(limit_cycle(), latest, seed)
+    whole, in_blocks, exact = (SampleMeter(window=20) for _ in range(3))
+    cycles = whole.feed(*samples)
+    exact.feed(*limit_cycle())
+    measures, expected = whole.measures(), exact.measures()
+    assert measures.cycles == expected.cycles
+    assert measures.amplitude == pytest.approx(expected.amplitude, rel=1e-4)
+    assert measures.velocity_amplitude == pytest.approx(expected.velocity_amplitude, rel=1e-4)
+    assert measures.period == pytest.approx(expected.period, rel=1e-3)
+    assert measures.stick_fraction == pytest.approx(expected.stick_fraction, abs=2e-3)
+    same = []
+    for start, end in zip([0, *starts], [*starts, 7001], strict=True):
+        same += in_blocks.feed(*samples.rows(slice(start, end)))
+    assert len(same) == len(cycles)
+    for cycle, expected_cycle in zip(same, cycles, strict=True):
+        assert cycle == pytest.approx(expected_cycle, rel=1e-9)
+    assert in_blocks.lost_samples == whole.lost_samples
+    assert in_blocks.duration == whole.duration
+
+
+def test_states_that_were_really_taken_at_jittered_stamps_are_measured() -> None:
+    samples = read_late(still(stamps(100, 7001)), 0.5)
+    time = samples.stamp * 1e-9
+    samples = samples._replace(position=np.sin(time), velocity=np.cos(time))
+    meter = SampleMeter(window=20)
+    meter.feed(*samples)
+    measures = meter.measures()
+    assert meter.lost_samples == 0
+    assert measures.cycles == 10
+    assert measures.amplitude == pytest.approx(1.0, rel=1e-4)
+    assert measures.velocity_amplitude == pytest.approx(1.0, rel=1e-4)
+    assert measures.period == pytest.approx(2.0 * np.pi, rel=1e-6)
+
+
+@given(st.sets(st.integers(50, 198)), st.integers(0, 100))
+def test_what_is_lost_of_jittered_samples_is_counted(lost: set[int], seed: int) -> None:
+    lost = {number for number in lost if number % 10}  # never over the longest gap
+    kept = np.array([number for number in range(200) if number not in lost])
+    meter = SampleMeter(window=20)
+    meter.feed(*read_late(still(stamps(1000, 200)), 0.2, seed).rows(kept))
+    assert meter.samples == len(kept)
+    assert meter.lost_samples == len(lost)
+
+
+def test_a_stamp_now_and_then_off_the_grid_does_not_cut_the_motion() -> None:
+    samples = limit_cycle()
+    off_grid = np.where(np.arange(7001) % 50 == 7, 200_000, 0)
+    meter = SampleMeter(window=20)
+    meter.feed(*samples._replace(stamp=samples.stamp + off_grid))
+    assert meter.lost_samples == 0
+    assert meter.measures().cycles == 9
+
+
+def test_a_long_gap_between_jittered_samples_starts_a_new_segment() -> None:
+    samples = read_late(limit_cycle(), 0.2)
+    meter = SampleMeter(window=20)
+    meter.feed(*samples.rows(slice(0, 3000)))
+    cycles = meter.feed(*samples.rows(slice(3300, 7001)))
+    assert meter.lost_samples == 0
+    assert meter.duration == pytest.approx(67.0, abs=0.1)
+    assert [cycle.period for cycle in cycles] == pytest.approx([7.06772953] * len(cycles), rel=1e-3)
+
+
+def test_many_samples_off_every_grid_take_no_longer_than_on_one() -> None:
+    """With time that grew as the square of their number this would take minutes."""
+    time = 1e-3 * np.arange(200_000)
+    samples = Samples(stamps(1000, len(time)), np.sin(time), np.cos(time), np.full(len(time), 2.0))
+    meter = SampleMeter(window=20)
+    meter.feed(*read_late(samples, 0.2))
+    assert meter.lost_samples == 0
+    assert meter.measures().cycles == 20
+
+
+def test_many_segments_in_one_block_take_time_in_proportion() -> None:
+    """Each looks only a little ahead: seen from every one to the end it would be 4e8 steps."""
+    meter = SampleMeter(window=20)
+    meter.feed(*still(np.full(20_000, SECOND)))
+    assert meter.samples == 20_000
+    assert meter.lost_samples == 0
+    assert meter.duration == 0.0
+
+
+@pytest.mark.parametrize("number", [0, 1, 3000, 7000])
+@pytest.mark.parametrize("wild", [0, (2**31 - 1) * SECOND])
+def test_a_stamp_of_another_time_is_no_loss(number: int, wild: int) -> None:
+    samples = limit_cycle().later(1_700_000_000 * SECOND)
+    samples.stamp[number] = wild
+    meter = SampleMeter(window=20)
+    meter.feed(*samples)
+    assert meter.samples == 7001
+    assert meter.lost_samples == 0
+    assert meter.duration == pytest.approx(70.0, abs=0.03)
+    assert meter.measures().cycles >= 8
+
+
+def test_time_that_adds_up_beyond_all_stamps_is_no_error() -> None:
+    days = still(np.arange(0, 2**31, 86_400 // 2) * SECOND)
+    meter = SampleMeter(window=20)
+    for _ in range(6):
+        meter.feed(*days)
+    assert meter.duration > 2**63 / SECOND
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("column", ["position", "velocity", "belt_velocity"])
+@pytest.mark.parametrize("value", [1e308, -1e308, 1e101, -1e100, 5e-324])
+@pytest.mark.parametrize("latest", [0.0, 0.2])
+def test_no_value_overflows(column: str, value: float, latest: float) -> None:
+    samples = read_late(limit_cycle(), latest)
+    values = getattr(samples, column).copy()
+    values[100:7000:3] = value
+    meter = SampleMeter(window=20)
+    meter.feed(*samples._replace(**{column: values}))
+    measured = meter.measures().as_dict().values()
+    assert np.isfinite([figure for figure in measured if isinstance(figure, float)]).all()
+    too_large = abs(value) > 1e100
+    assert meter.samples == 7001 - too_large * len(values[100:7000:3])
+    assert meter.lost_samples == 7001 - meter.samples
+
+
+def test_a_leap_onto_the_belt_hides_no_extremes() -> None:
+    samples = still(stamps(10, 4))._replace(
+        position=np.array([0.0, -0.1, 0.2, 0.22]),
+        velocity=np.array([-1.0, -1.0, 0.2, 0.2]),
+        belt_velocity=np.full(4, 0.2),
+    )
+    meter = SampleMeter(window=20)
+    cycles = []
+    for part in (samples, samples.later(400_000_000)):
+        cycles += meter.feed(*part)
+    assert [cycle.amplitude for cycle in cycles] == pytest.approx([0.16], rel=1e-3)
