@@ -35,6 +35,8 @@ from stickslip_ros.scenario.files import Scenario, parameter_file
 _LOGGING = ["--ros-args", "--log-level", "warn"]
 _READY_TIMEOUT = 30.0
 _ANSWER_TIMEOUT = 15.0
+_MATCH_TIMEOUT = 5.0
+"""Time, s, after which a client that finds no service is replaced: some never do."""
 _RETRY_PERIOD = 0.02
 _WATCH_PERIOD = 0.1
 _EXIT_TIMEOUT = 5.0
@@ -188,8 +190,13 @@ class _Bringup:
         """Take a node through a transition, again and again while it is not ready for it."""
         deadline = time.monotonic() + _READY_TIMEOUT
         client = self._node.create_client(ChangeState, f"{node}/change_state")
+        made_at = time.monotonic()
         request = ChangeState.Request(transition=Transition(id=transition))
         while not self._ended:
+            if not client.service_is_ready() and time.monotonic() - made_at > _MATCH_TIMEOUT:
+                self._node.destroy_client(client)
+                client = self._node.create_client(ChangeState, f"{node}/change_state")
+                made_at = time.monotonic()
             if client.service_is_ready():
                 answer = client.call_async(request)
                 self._spin_until(answer, _ANSWER_TIMEOUT)

@@ -106,11 +106,12 @@ class Graph:
     ) -> Any:
         """Call a service and return its answer, None if it is `enough` that a condition holds.
 
-        On a busy machine the middleware may lose an answer: where none comes it is asked again.
+        On a busy machine the middleware may lose an answer, or never find the service for a client:
+        then another one asks again.
         """
         for _ in range(_ATTEMPTS):
             client = self.observer.create_client(kind, name)
-            self.wait_until(client.service_is_ready, f"service {name}")
+            self._run_until(client.service_is_ready, PATIENCE / _ATTEMPTS)
             answer = client.call_async(request)
             self._run_until(lambda a=answer: a.done() or enough(), PATIENCE / _ATTEMPTS)
             self.observer.destroy_client(client)

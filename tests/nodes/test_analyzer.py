@@ -182,13 +182,15 @@ def test_on_a_full_disk_it_says_so_and_goes_on_measuring(
         graph.wait_until(lambda: plant.active or plant.trigger_activate(), "plant active")
         graph.wait_until(lambda: not plant.active, "plant pauses")
 
+    def complaints() -> set[str]:
+        return {s.message for heard in diagnostics for s in heard.status if s.level == ERROR}
+
     run()
     graph.wait_until(lambda: len(amplitudes) >= 7, "it goes on measuring")
+    graph.wait_until(complaints, "it says so")
+    file_size_limit(10_000_000)  # the middleware, too, needs files, in memory
     graph.deactivate("analyzer")
-    complaints = {
-        status.message for heard in diagnostics for status in heard.status if status.level == ERROR
-    }
-    (complaint,) = complaints
+    (complaint,) = complaints()
     assert str(bag) in complaint
     assert "File too large" in complaint
     with Recording(bag) as recording:
@@ -197,7 +199,6 @@ def test_on_a_full_disk_it_says_so_and_goes_on_measuring(
     assert stamps == [1_000_000_000 + n * 10_000_000 for n in range(len(stamps))]
     assert 0 < len(stamps) < 6001
 
-    file_size_limit(10_000_000)
     analyzer.trigger_activate()
     run()
     graph.deactivate("analyzer")
