@@ -275,8 +275,8 @@ class McapFile:
         for block in self._blocks():
             wanted = block.on(channels)
             if len(wanted) > 0:
-                present, numbers = np.unique(wanted.channel, return_counts=True)
-                counts.update(dict(zip(present.tolist(), numbers.tolist(), strict=True)))
+                numbers = np.bincount(wanted.channel)
+                counts.update({int(c): int(numbers[c]) for c in np.flatnonzero(numbers)})
                 yield wanted.unpacked()
         recorded = self.statistics.channel_message_counts if self.statistics else {}
         for channel in set(channels) & set(self.channels):
