@@ -28,6 +28,7 @@ from stickslip_ros.bags.definitions import message_definition, type_hash
 from stickslip_ros.bags.mcap_file import McapFile
 from stickslip_ros.bags.metadata import BagDescription, opening_information
 from stickslip_ros.errors import BagError
+from stickslip_ros.physics.samples import NANOSECONDS
 
 Compression = Literal["lz4", "zstd", "none"]
 
@@ -147,7 +148,7 @@ class Recorder:
         self.directory = _absolute(directory)
         self._compression = _COMPRESSION_TYPES[compression]
         self._max_size = max_bag_size
-        self._max_duration = round(max_bag_duration * 1e9)
+        self._max_duration = round(max_bag_duration * NANOSECONDS)
         self._description = BagDescription()
         self._definitions: list[Schema | Channel] = []
         self._definition_records = b""

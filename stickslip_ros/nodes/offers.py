@@ -18,6 +18,7 @@ from rclpy.qos import (
 from stickslip_ros.bags.definitions import message_definition
 from stickslip_ros.errors import BagError
 from stickslip_ros.nodes.topics import DEEP
+from stickslip_ros.physics.samples import NANOSECONDS
 
 PolicyT = TypeVar("PolicyT", bound=QoSPolicyEnum)
 
@@ -86,5 +87,5 @@ def _policy(default: PolicyT, recorded: str | int | None) -> PolicyT:
 
 def _duration(recorded: Mapping[str, int] | None) -> Duration:
     values = recorded or {}
-    nanoseconds = values.get("sec", 0) * 1_000_000_000 + values.get("nsec", 0)
+    nanoseconds = values.get("sec", 0) * NANOSECONDS + values.get("nsec", 0)
     return Duration(nanoseconds=min(nanoseconds, _LONGEST))

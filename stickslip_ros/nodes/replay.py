@@ -28,9 +28,9 @@ from stickslip_ros.nodes.player import Message, Player
 from stickslip_ros.nodes.process import run_node, run_until_stopped
 from stickslip_ros.nodes.topics import CLOCK, JOINT_STATES, RECORDED
 from stickslip_ros.physics.samples import NANOSECONDS
-from stickslip_ros.scenario.parameters import ReplayParameters
+from stickslip_ros.scenario.parameters import PlantParameters, ReplayParameters
 
-_FLOW_WINDOW = 1000
+_FLOW_WINDOW = PlantParameters().flow_window
 """Joint states that may be on their way to a recorder."""
 _LOOK_PERIOD = 0.05
 _SETTLED = 0.5
