@@ -1,18 +1,19 @@
 """Analyzer node: records the topics and reports limit-cycle amplitude and stick fraction."""
 
+import heapq
 import json
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from rcl_interfaces.srv import GetParameters
 from rclpy.client import Client
 from rclpy.parameter import parameter_value_to_python
 from rclpy.publisher import Publisher
-from rclpy.subscription import Subscription
 from rclpy.task import Future
 from std_msgs.msg import Float64
 
@@ -25,17 +26,15 @@ from stickslip_ros.bags.messages import (
 )
 from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
 from stickslip_ros.errors import BagError, StickslipError
-from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
+from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode, take_waiting
 from stickslip_ros.nodes.process import run_node
 from stickslip_ros.nodes.topics import (
     AMPLITUDE,
-    APPLIED_DISTURBANCE,
     CONTROL_FORCE,
     DEEP,
     FREQUENCY,
     JOINT_STATES,
     RECORDED,
-    RECORDED_EVERY,
     RECORDED_TOPICS,
     STICK_FRACTION,
     Topic,
@@ -46,7 +45,17 @@ from stickslip_ros.versions import versions
 
 ColumnsT = TypeVar("ColumnsT")
 
-_PROCESS_PERIOD = 0.1
+_TAKE_PERIOD = 0.02
+"""Time, s, for which messages gather: one by one each would wake a thread and find cold caches."""
+_MEASURE_PERIOD = 0.1
+
+
+class _Heard(NamedTuple):
+    """A message that was taken."""
+
+    topic: Topic
+    stamp: int
+    data: bytes
 
 
 class AnalyzerNode(ManagedNode[AnalyzerParameters]):
@@ -61,16 +70,15 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if self.parameters.bag:
             check_new_bag(self._next_bag())
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
-        self._pending: dict[str, list[bytes]] = {}
         self._channels: dict[str, int] = {}
-        self._tick = min(_PROCESS_PERIOD, self.parameters.flush_period / 2.0)
+        self._tick = min(_TAKE_PERIOD, self.parameters.flush_period / 2.0)
         self._connections.append(self.every(self._tick, self._on_tick))
 
     def start(self) -> None:
         """Open a bag, start to measure, and then listen: who is heard is not lost."""
         self._meter = RunMeter(self.parameters.window)
-        self._cycles = self._unread = 0
-        self._newest = self._told = 0
+        self._cycles = self._told = 0
+        self._measured_at = time.monotonic()
         self._complaint = self._bag_failure = ""
         self._recorder: Recorder | None = None
         if self.parameters.bag:
@@ -85,20 +93,16 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             if node != "analyzer"
         }
         self._asked: list[Client] = []
-        self._listening: list[Subscription] = []
-        for topic in RECORDED_TOPICS:
-            self._pending[topic.name] = []
-            take = partial(self._on_message, topic.name)
-            self._listening.append(self.subscribe(topic, take, DEEP))
+        self._to_measure: dict[Topic, list[bytes]] = {JOINT_STATES: [], CONTROL_FORCE: []}
+        self._listening = {topic: self.collect(topic, DEEP) for topic in RECORDED_TOPICS}
 
     def stop(self) -> None:
         """Measure what is left, close the bag with its report, and log the report."""
-        for topic, subscription in zip(RECORDED_TOPICS, self._listening, strict=True):
-            self._take_what_waits(topic, subscription)
-        self._process()
+        self._take_in()
+        self._measure()
         report = self._meter.report()
         self.destroy_publisher(self._recorded)
-        for subscription in self._listening:
+        for subscription in self._listening.values():
             self._connections.remove(subscription)
             self.destroy_subscription(subscription)
         for client in [*self._to_ask.values(), *self._asked]:
@@ -122,51 +126,45 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             return WARN, "samples were lost", figures
         return (WARN if self._complaint else OK), self._complaint, figures
 
-    def _on_message(self, topic: str, message: bytes) -> None:
+    def _on_tick(self) -> None:
         if not self.active:
             return
-        try:
-            stamp = unpack_header(message)
-        except StickslipError as error:
-            self._complaint = str(error)
-            return
-        if stamp <= 0:
-            self._complaint = f"a message on {topic} with the stamp {stamp} ns was dropped"
-            return
-        if self._recorder is not None:
-            self._write(topic, message, stamp)
-            self._flush_if_due()
-        pending = self._pending[topic]
-        pending.append(message)
-        if topic == JOINT_STATES.name:
-            self._newest = stamp
-            if self._unread % RECORDED_EVERY == 0:
-                self._tell_how_far()
-                self._process()
-            self._unread += 1
+        self._take_in()
+        if time.monotonic() >= self._measured_at + _MEASURE_PERIOD:
+            self._measure()
 
-    def _take_what_waits(self, topic: Topic, subscription: Subscription) -> None:
-        """Take the messages that have arrived but were not yet passed to `_on_message`."""
-        with subscription.handle:
-            while taken := subscription.handle.take_message(
-                subscription.msg_type, subscription.raw
-            ):
-                self._on_message(topic.name, taken[0])
-
-    def _tell_how_far(self) -> None:
-        if self._newest != self._told:
-            self._told = self._newest
+    def _take_in(self) -> None:
+        """Record what has come since the last time, and keep it to be measured."""
+        heard = [self._take(topic) for topic in RECORDED_TOPICS]
+        states = heard[RECORDED_TOPICS.index(JOINT_STATES)]
+        if states and states[-1].stamp != self._told:
+            self._told = states[-1].stamp
             self._recorded.publish(pack_header(self._told))
+        for message in heapq.merge(*heard, key=attrgetter("stamp")):
+            self._write(message)
+        self._flush_if_due()
 
-    def _on_tick(self) -> None:
-        if self.active:
-            self._tell_how_far()
-            self._process()
-            self._flush_if_due(within=self._tick)
+    def _take(self, topic: Topic) -> list[_Heard]:
+        """Take the messages of a topic that wait; one without a proper stamp is dropped."""
+        heard: list[_Heard] = []
+        for data in take_waiting(self._listening[topic]):
+            try:
+                stamp = unpack_header(data)
+            except StickslipError as error:
+                self._complaint = str(error)
+                continue
+            if stamp <= 0:
+                self._complaint = f"a message on {topic.name} with the stamp {stamp} ns was dropped"
+                continue
+            heard.append(_Heard(topic, stamp, data))
+        if topic in self._to_measure:
+            self._to_measure[topic] += [message.data for message in heard]
+        return heard
 
-    def _process(self) -> None:
-        """Decode and measure what has come since the last time."""
-        states = self._take(JOINT_STATES, joint_state_columns)
+    def _measure(self) -> None:
+        """Decode and measure what was taken in since the last time."""
+        self._measured_at = time.monotonic()
+        states = self._columns(JOINT_STATES, joint_state_columns)
         for cycle in self._meter.motion.feed(
             states.stamp, states.position, states.velocity, states.belt_velocity
         ):
@@ -176,9 +174,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._cycles += 1
             if self._cycles % self.parameters.window == 0:
                 self._log_measures()
-        forces = self._take(CONTROL_FORCE, wrench_columns)
+        forces = self._columns(CONTROL_FORCE, wrench_columns)
         self._meter.force.feed(forces.stamp, forces.force)
-        self._pending[APPLIED_DISTURBANCE.name].clear()
         self._ask_for_parameters()
 
     def _log_measures(self) -> None:
@@ -186,11 +183,11 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         text = ", ".join(f"{name} {value}" for name, value in figures.items() if value is not None)
         self.get_logger().info(text)
 
-    def _take(
+    def _columns(
         self, topic: Topic, decode: Callable[[Sequence[bytes]], tuple[ColumnsT, Refused]]
     ) -> ColumnsT:
-        """Return the pending messages of a topic as columns; one that is unreadable is dropped."""
-        messages, self._pending[topic.name] = self._pending[topic.name], []
+        """Return what is to be measured of a topic; a message that is unreadable is dropped."""
+        messages, self._to_measure[topic] = self._to_measure[topic], []
         columns, refused = decode(messages)
         if refused.number > 0:
             self._complaint = refused.reason
@@ -227,19 +224,20 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         except BagError as error:
             self._give_up_recording(error)
 
-    def _write(self, topic: str, message: bytes, stamp: int) -> None:
-        assert self._recorder is not None
+    def _write(self, message: _Heard) -> None:
+        if self._recorder is None:
+            return
         try:
-            self._recorder.write(self._channels[topic], message, stamp)
+            self._recorder.write(self._channels[message.topic.name], message.data, message.stamp)
         except BagError as error:
             self._give_up_recording(error)
 
-    def _flush_if_due(self, within: float = 0.0) -> None:
-        """Flush if that is due `within` so many seconds; under a flood no timer sees to it."""
+    def _flush_if_due(self) -> None:
+        """Flush if that would be too late at the next tick."""
         if self._recorder is None:
             return
         now = time.monotonic()
-        if now + within < self._flushed_at + self.parameters.flush_period:
+        if now + self._tick < self._flushed_at + self.parameters.flush_period:
             return
         self._flushed_at = now
         try:

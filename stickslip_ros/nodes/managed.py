@@ -1,7 +1,7 @@
 """What every node of this package has: life cycle, parameters from one model, diagnostics."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Generic, TypeVar, cast
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -128,6 +128,18 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
         )
         self._connections.append(subscription)
         return subscription
+
+    def collect(self, topic: Topic, depth: int) -> Subscription:
+        """Let the serialized messages of a topic wait until they are taken, at most `depth`.
+
+        No thread is woken for each of them, as it is where they are passed to a callback.
+        """
+        return self.subscribe(topic, _left_waiting, depth)
+
+    @property
+    def subscriptions(self) -> Iterator[Subscription]:
+        """The subscriptions whose messages an executor is to pass on as they come."""
+        return (s for s in super().subscriptions if s.callback is not _left_waiting)
 
     def wait_for_delivery(self, publisher: Publisher) -> None:
         """Wait, within bounds, until every reader has what was published."""
@@ -302,6 +314,17 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
     def _take_change(self, changes: list[Parameter]) -> None:
         self.parameters = self._changed(changes)
         self.apply_parameters()
+
+
+def take_waiting(subscription: Subscription) -> Iterator[bytes]:
+    """Yield the serialized messages that wait for being taken, in order."""
+    with subscription.handle:
+        while taken := subscription.handle.take_message(subscription.msg_type, True):
+            yield taken[0]
+
+
+def _left_waiting(_: bytes) -> None:
+    """Stand for a callback where there is none."""
 
 
 def _with_floats(changes: list[Parameter], floats: set[str]) -> list[Parameter]:

@@ -47,6 +47,3 @@ CLOCK = Topic("/clock", Clock, "rosgraph_msgs/msg/Clock", 10)
 
 RECORDED_TOPICS = (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE)
 """What the analyzer writes to its bag."""
-
-RECORDED_EVERY = 100
-"""Samples after which, at the latest, the analyzer says how far it has come."""
