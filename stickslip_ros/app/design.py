@@ -3,7 +3,7 @@
 import argparse
 import sys
 from collections.abc import Iterable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,8 @@ HELP = "propose corner frequency and gains that damp the vibration within a forc
 _DESCRIPTION = f"""{HELP}. The drive, rate and force_delay are the scenario's, the force limit is
 washout_controller.force_limit (-p washout_controller.force_limit=100). Its gains do not matter.
 What is proposed was simulated: the vibration is caught at several belt speeds and phases."""
+
+_NO_JITTER = "force_jitter is left out: the delay of the force is constant here"
 
 _CONTROLLER = {
     "corner_frequency": ("corner frequency", "rad/s"),
@@ -84,6 +86,8 @@ def run(arguments: argparse.Namespace) -> int:
         check_picture(arguments.plot)
     with progress_bar(f"designing for {scenario.name}", 1.0) as progress:
         found = design(task, progress)
+    if scenario.plant.force_jitter > 0.0:
+        found = replace(found, remark="; ".join(filter(None, (found.remark, _NO_JITTER))))
     if arguments.json:
         print_json({**_as_dict(found), **made_of(scenario)})
     else:

@@ -79,6 +79,8 @@ def simulate(
             plant.rate,
             LOCKSTEP_START,
             force_delay=plant.force_delay,
+            force_jitter=plant.force_jitter,
+            force_jitter_seed=plant.force_jitter_seed,
             expects_control=plant.expects_control,
             disturbance=plant.as_disturbance(),
         )
@@ -87,6 +89,7 @@ def simulate(
     for name, value, needed in (
         ("washout_controller.force_limit", washout.force_limit, float("inf")),
         ("plant.force_delay", plant.force_delay, 0.0),
+        ("plant.force_jitter", plant.force_jitter, 0.0),
         ("plant.disturbance.kind", str(plant.disturbance.kind), "none"),
     ):
         if value != needed:

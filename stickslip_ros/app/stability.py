@@ -47,7 +47,7 @@ HELP = "equilibrium, Hopf speeds, limit cycles and critical gains of a scenario,
 
 Section = dict[str, Any]
 Notes = dict[str, str]
-"""Why a quantity does not exist, by its place in the JSON."""
+"""Why a quantity does not exist, or what it leaves out, by its place in the JSON."""
 
 _NO_CONTROL = "the scenario has no controller"
 
@@ -125,7 +125,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def stability(scenario: Scenario) -> tuple[Section, Notes]:
-    """Return what theory says of the scenario, SI units, and why what is null does not exist."""
+    """Return what theory says of the scenario, SI units, and notes on it."""
     plant = scenario.plant
     drive = plant.as_drive()
     gains = scenario.washout_controller.as_washout().gains if plant.expects_control else None
@@ -139,6 +139,8 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
         "sampled_loop": _sampled_loop(drive, gains, plant.rate, plant.force_delay, notes),
         "closed_forms": _closed_forms(drive, gains),
     }
+    if plant.force_jitter > 0.0 and "sampled_loop" not in notes:
+        notes["sampled_loop"] = "force_jitter is left out: the delay of the force is constant here"
     if expansion is None:
         reason = (
             "the belt rests, and friction holds the slide anywhere within mu_s N / k = "

@@ -63,6 +63,8 @@ class PlantNode(ManagedNode[PlantParameters]):
             parameters.rate,
             time.time_ns() if realtime else self._next_start,
             force_delay=parameters.force_delay,
+            force_jitter=parameters.force_jitter,
+            force_jitter_seed=parameters.force_jitter_seed,
             force_timeout=parameters.force_timeout,
             hold_late=realtime,
             expects_control=parameters.expects_control,

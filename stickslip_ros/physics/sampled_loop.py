@@ -8,6 +8,7 @@ from collections import Counter, deque
 from enum import StrEnum
 from fractions import Fraction
 from math import floor, isfinite
+from random import Random
 from typing import NamedTuple
 
 from stickslip_ros.physics.disturbance import Disturbance
@@ -47,9 +48,16 @@ class Verdict(StrEnum):
 class SampledLoop:
     """A motion that is sampled at a fixed rate and driven by forces that answer the samples.
 
-    Force n, the answer to sample n, acts from n T + delay to (n + 1) T + delay, T = 1/rate.
-    Where it is missing when the loop advances, the newest one is held on if `hold_late` is set
-    (as in real time) and not older than `force_timeout`; otherwise there is no force.
+    Force n, the answer to sample n, arrives at n T + delay, T = 1/rate, and acts until the next
+    one arrives. Where it is missing when the loop advances, the newest one is held on if
+    `hold_late` is set (as in real time) and not older than `force_timeout`; otherwise there is no
+    force. What stands in for force n in this way arrives when force n would have.
+
+    The delay of force n is `force_delay` and a share of `force_jitter`, uniformly distributed and
+    independent from sample to sample; it depends on n and `force_jitter_seed`, and on nothing else.
+    So jittered forces arrive at uneven intervals, and may overtake one another: then the newer one
+    acts, and the older one, arriving after it, is lost. A jitter of zero is a constant delay: force
+    n acts from n T + delay to (n + 1) T + delay.
     """
 
     def __init__(
@@ -59,6 +67,8 @@ class SampledLoop:
         start: int,
         *,
         force_delay: float = 0.0,
+        force_jitter: float = 0.0,
+        force_jitter_seed: int = 0,
         force_timeout: float = float("inf"),
         hold_late: bool = False,
         expects_control: bool = True,
@@ -77,11 +87,18 @@ class SampledLoop:
         self._start = start
         # So many samples take so many ns, exactly.
         self._nanoseconds, self._samples = (NANOSECONDS / Fraction(rate)).as_integer_ratio()
-        self._whole_delay, self._split = whole_and_rest(force_delay / self.period)
+        # In periods.
+        self._delay, self._jitter = force_delay / self.period, force_jitter / self.period
+        self._shortest_delay = whole, rest = whole_and_rest(self._delay)
+        # Of all generators, the one whose numbers are promised to stay the same.
+        self._random = Random(force_jitter_seed)
         self._force_timeout = force_timeout
         self._hold_late = hold_late
         self._expects_control = expects_control
-        self._slots = deque([0.0] * (self._whole_delay + 2), maxlen=self._whole_delay + 2)
+        # In the order of arrival: number of the period, the share of it that is over, and force;
+        # before force 0, none in each period.
+        self._under_way = deque((number, rest, 0.0) for number in range(whole))
+        self._acting = 0.0
         self._newest: tuple[int, float] = (-1, 0.0)
         self.scenario_disturbance = disturbance or Disturbance()
         """Disturbance of the scenario; a new one acts from the next sample on."""
@@ -134,16 +151,33 @@ class SampledLoop:
 
     def advance(self) -> Sample:
         """Move on to the next sample with the forces that have come, and return it."""
-        self._slots.append(self._force_of_present_sample())
-        motion = self._motion
-        if self._split > 0.0:
-            motion.force = self._slots[0] + self.disturbance
-            motion.advance(self._split * self.period)
-        motion.force = self._slots[1] + self.disturbance
-        motion.advance((1.0 - self._split) * self.period)
-        belt_position = self.sample.belt_position + motion.drive.belt_speed * self.period
-        self.sample = self._take_sample(self.sample.number + 1, belt_position)
+        self._send(self._force_of_present_sample())
+        motion, period, under_way = self._motion, self.period, self._under_way
+        present, acting, disturbance = self.sample, self._acting, self.disturbance
+        now = 0.0
+        while under_way and under_way[0][0] == present.number:
+            _, instant, force = under_way.popleft()
+            if instant > now:
+                motion.force = acting + disturbance
+                motion.advance((instant - now) * period)
+                now = instant
+            acting = force
+        self._acting = acting
+        motion.force = acting + disturbance
+        motion.advance((1.0 - now) * period)
+        belt_position = present.belt_position + motion.drive.belt_speed * period
+        self.sample = self._take_sample(present.number + 1, belt_position)
         return self.sample
+
+    def _send(self, force: float) -> None:
+        """Let the force for the present sample set out; what it overtakes is lost."""
+        whole, rest = self._shortest_delay
+        number = self.sample.number
+        if self._jitter > 0.0:
+            whole, rest = whole_and_rest(self._delay + self._jitter * self._random.random())
+            while self._under_way and self._under_way[-1][:2] >= (number + whole, rest):
+                self._under_way.pop()
+        self._under_way.append((number + whole, rest, force))
 
     def _take_sample(self, number: int, belt_position: float) -> Sample:
         motion = self._motion
@@ -187,11 +221,14 @@ class SampledLoop:
             return Verdict.NOT_FINITE
         if stamp == 0:
             return Verdict.NO_STAMP
-        if not 0 <= number <= self.sample.number or self.stamp(number) != stamp:
+        present = self.sample
+        if stamp != present.stamp and (
+            not 0 <= number < present.number or self.stamp(number) != stamp
+        ):
             return Verdict.UNKNOWN_STAMP
         if number <= self._newest[0]:
             return Verdict.ANSWERED
-        if number < self.sample.number and not self._hold_late:
+        if number < present.number and not self._hold_late:
             return Verdict.TOO_LATE
         return Verdict.ACCEPTED
 

@@ -108,9 +108,9 @@ class DisturbanceParameters(_Model):
         strict=False,
     )
     amplitude: float = _field(0.0, "Amplitude of the disturbance.", "N")
-    start: float = _field(0.0, "Simulated time at which it starts.", "s", ge=0.0)
+    start: float = _field(0.0, "Simulated time at which it starts.", "s", ge=0.0, le=1e9)
     duration: float = _field(float("inf"), "How long it lasts.", "s", ge=0.0, allow_inf_nan=True)
-    frequency: float = _field(1.0, "Frequency of the sine.", "Hz", gt=0.0)
+    frequency: float = _field(1.0, "Frequency of the sine.", "Hz", gt=0.0, le=1e9)
 
 
 class NodeParameters(_Model):
@@ -182,6 +182,12 @@ class PlantParameters(NodeParameters):
     force_delay: float = _field(
         0.0, "Delay from a sample to the start of its force.", "s", fixed=True, ge=0.0
     )
+    force_jitter: float = _field(
+        0.0, "Largest random addition to the delay of each force.", "s", fixed=True, ge=0.0
+    )
+    force_jitter_seed: int = _field(
+        0, "What the random additions follow from.", fixed=True, ge=0, le=1_000_000_000
+    )
     force_timeout: float = _field(
         0.1, "Age up to which a force is held on in pace realtime.", "s", fixed=True, ge=0.0
     )
@@ -207,15 +213,19 @@ class PlantParameters(NodeParameters):
     @model_validator(mode="after")
     def _delay_is_bounded(self) -> Self:
         """Refuse a delay that would keep more than a million forces waiting."""
-        if self.force_delay * self.rate > 1e6:
-            message = f"force_delay = {self.force_delay} s must not exceed 1e6 periods of rate"
+        if (self.force_delay + self.force_jitter) * self.rate > 1e6:
+            message = (
+                f"force_delay = {self.force_delay} s and force_jitter = {self.force_jitter} s "
+                "must not exceed 1e6 periods of rate together"
+            )
             raise ValueError(message)
         return self
 
     @property
     def last_sample(self) -> int | None:
         """Number of the sample with which the plant pauses by itself, if it does."""
-        return None if isinf(self.duration) else round(self.duration * self.rate)
+        samples = self.duration * self.rate
+        return None if isinf(samples) else round(samples)
 
     def as_drive(self) -> Drive:
         """Return the drive."""

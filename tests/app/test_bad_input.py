@@ -27,6 +27,10 @@ from tests.app.conftest import Run
             ("simulate", "paper", "--continuous-control", "-p", "plant.force_delay=0.1"),
             ("--continuous-control", "plant.force_delay", "0.1"),
         ),
+        (
+            ("simulate", "paper", "--continuous-control", "-p", "plant.force_jitter=0.1"),
+            ("--continuous-control", "plant.force_jitter", "0.1"),
+        ),
     ],
 )
 def test_one_line_and_status_2(

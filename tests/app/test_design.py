@@ -101,8 +101,11 @@ def test_what_cannot_be_written_costs_no_result(stickslip: Run, option: str, fil
 
 
 def test_without_vibration_nothing_is_simulated(stickslip: Run) -> None:
-    done = stickslip("design", "feed_drive", "--belt-speed", "0.06", "--json")
+    jitter = ("-p", "plant.force_jitter=0.01")
+    done = stickslip("design", "feed_drive", "--belt-speed", "0.06", *jitter, "--json")
     found = json.loads(done.stdout)
+    assert "nothing vibrates" in found["remark"]
+    assert "force_jitter is left out" in found["remark"]
     assert found["settling_time"] is found["peak_force"] is found["margins"]["delay"] is None
     assert found["predicted_settling_time"] > 0.0
 

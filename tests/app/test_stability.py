@@ -105,6 +105,16 @@ def test_what_does_not_exist_is_null_for_a_reason(overrides: list[str]) -> None:
     assert None not in (found["closed_forms"] or {}).values()
 
 
+def test_that_jitter_is_left_out_is_said_where_it_matters() -> None:
+    jitter = "plant.force_jitter=0.1"
+    with_it, notes = theory_of(load_scenario("paper", [jitter]))
+    without, _ = theory_of(load_scenario("paper", []))
+    assert with_it == without
+    assert "force_jitter is left out" in notes["sampled_loop"]
+    _, notes = theory_of(load_scenario("paper", [jitter, "plant.expects_control=false"]))
+    assert notes["sampled_loop"] == "the scenario has no controller"
+
+
 def test_the_table_says_why(stickslip: Run) -> None:
     options = ("-p", "plant.friction.law=coulomb", "--no-control")
     done = stickslip("stability", "paper", *options)

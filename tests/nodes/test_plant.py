@@ -27,7 +27,8 @@ from stickslip_ros.nodes.topics import (
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.sampled_loop import SampledLoop
-from stickslip_ros.scenario.parameters import PlantParameters
+from stickslip_ros.physics.washout import Washout
+from stickslip_ros.scenario.parameters import PlantParameters, WashoutControllerParameters
 from tests.nodes.graph import Graph
 
 SECOND = 1_000_000_000
@@ -56,6 +57,25 @@ def test_without_control_the_samples_are_those_of_the_loop(graph: Graph) -> None
     assert columns.velocity.tolist() == [sample.velocity for sample in samples]
     assert columns.effort.tolist() == [sample.friction_force for sample in samples]
     assert columns.belt_velocity.tolist() == [0.4] * 301
+
+
+def test_jittered_forces_act_as_they_do_without_ros(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    network = {"force_delay": 0.013, "force_jitter": 0.035, "force_jitter_seed": 7}
+    graph.add(WashoutControllerNode)
+    listeners = ["observer", "washout_controller"]
+    plant = graph.add(PlantNode, duration=3.0, wait_for=listeners, **network)
+    graph.wait_until(lambda: len(heard) == 301 and not plant.active, "301 samples")
+
+    motion = Motion(PlantParameters().as_drive(), 0.0, 0.0)
+    loop = SampledLoop(motion, 100.0, SECOND, **network)
+    law = Washout(WashoutControllerParameters().as_washout())
+    positions = [loop.sample.position]
+    for _ in range(300):
+        loop.offer(loop.sample.stamp, law.answer(loop.sample.stamp, loop.sample.velocity) or 0.0)
+        positions.append(loop.advance().position)
+    columns, _ = joint_state_columns(heard)
+    assert columns.position.tolist() == positions
 
 
 def test_lockstep_waits_for_the_answer_to_each_sample(graph: Graph) -> None:

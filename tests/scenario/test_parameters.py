@@ -39,6 +39,8 @@ UNITS: dict[str, dict[str, str | None]] = {
         "pace": None,
         "real_time_factor": None,
         "force_delay": "s",
+        "force_jitter": "s",
+        "force_jitter_seed": None,
         "force_timeout": "s",
         "reply_timeout": "s",
         "expects_control": None,
@@ -64,6 +66,7 @@ DEFAULTS: dict[str, dict[str, Any]] = {
     "plant": {
         "real_time_factor": 1.0,
         "force_delay": 0.0,
+        "force_jitter": 0.0,
         "force_timeout": 0.1,
         "reply_timeout": 10.0,
         "expects_control": True,
@@ -140,7 +143,8 @@ def test_the_disturbance_of_a_plant() -> None:
 
 
 @pytest.mark.parametrize(
-    ("duration", "rate", "last"), [(2.0, 100.0, 200), (0.1, 3.0, 0), (float("inf"), 100.0, None)]
+    ("duration", "rate", "last"),
+    [(2.0, 100.0, 200), (0.1, 3.0, 0), (float("inf"), 100.0, None), (1e308, 100.0, None)],
 )
 def test_the_last_sample_of_a_plant(duration: float, rate: float, last: int | None) -> None:
     plant = PlantParameters.validated({"duration": duration, "rate": rate}, "test")
@@ -184,7 +188,8 @@ def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
 def test_flat_values_give_the_parameters_again(node: str, data: st.DataObject) -> None:
     model = NODE_PARAMETERS[node]
     values = data.draw(values_of(model))
-    assume(values.get("force_delay", 0.0) * values.get("rate", 100.0) <= 1e6)
+    delay = values.get("force_delay", 0.0) + values.get("force_jitter", 0.0)
+    assume(delay * values.get("rate", 100.0) <= 1e6)
     parameters = model.validated(values, "test")
     flat = parameters.flat()
     assert {name: flat[name] for name in values} == values

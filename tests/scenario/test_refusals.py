@@ -80,11 +80,13 @@ WHOLE = "must be a whole number"
         ("plant", "rate", "1.1e9", "1100000000.0", f"{FINITE} above 0 and at most 1e+09 Hz"),
         ("plant", "real_time_factor", "0", "0", f"{FINITE} above 0"),
         ("plant", "force_delay", "-0.1", "-0.1", f"{FINITE} at least 0 s"),
+        ("plant", "force_jitter", "-0.1", "-0.1", f"{FINITE} at least 0 s"),
+        ("plant", "force_jitter_seed", "-1", "-1", f"{WHOLE} at least 0"),
         ("plant", "reply_timeout", "0", "0", f"{FINITE} above 0 s"),
         ("plant", "flow_window", "199", "199", f"{WHOLE} at least 200 and at most 5000 samples"),
         ("plant", "flow_window", "100001", "100001", f"{WHOLE} at least 200"),
-        ("plant", "disturbance.frequency", "0", "0", f"{FINITE} above 0 Hz"),
-        ("plant", "disturbance.start", "-1", "-1", f"{FINITE} at least 0 s"),
+        ("plant", "disturbance.frequency", "0", "0", f"{FINITE} above 0 and at most 1e+09 Hz"),
+        ("plant", "disturbance.start", "-1", "-1", f"{FINITE} at least 0 and at most 1e+09 s"),
         ("washout_controller", "corner_frequency", "0", "0", f"{FINITE} above 0 rad/s"),
         ("washout_controller", "force_limit", "-1", "-1", "at least 0 N"),
         ("washout_controller", "start_after", "-1", "-1", f"{FINITE} at least 0 s"),
@@ -143,6 +145,7 @@ def test_every_bad_value_is_named(tmp_path: Path) -> None:
         ("{friction.minimum: 0.5}", ["minimum = 0.5", "static = 0.4"]),
         ("{friction: {law: exponential, kinetic: 0.5}}", ["kinetic = 0.5", "static = 0.4"]),
         ("{force_delay: 1e5, rate: 11}", ["force_delay = 100000.0 s", "1e6 periods of rate"]),
+        ("{force_delay: 5e3, force_jitter: 6e3}", ["force_jitter = 6000.0 s", "1e6 periods"]),
     ],
 )
 def test_values_that_do_not_go_together(
