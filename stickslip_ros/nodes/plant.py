@@ -3,7 +3,7 @@
 import sys
 import threading
 import time
-from math import isfinite
+from math import isfinite, nan
 from typing import Any
 
 from rosgraph_msgs.msg import Clock
@@ -11,7 +11,7 @@ from std_srvs.srv import Trigger
 
 from stickslip_ros.bags.messages import pack_joint_state, pack_wrench, unpack_header, unpack_wrench
 from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
-from stickslip_ros.nodes.pacing import LockstepPacer, RealtimePacer
+from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer
 from stickslip_ros.nodes.process import run_node
 from stickslip_ros.nodes.topics import (
     APPLIED_DISTURBANCE,
@@ -56,6 +56,8 @@ class PlantNode(ManagedNode[PlantParameters]):
 
     def start(self) -> None:
         """Begin a segment: sample 0 now, further ones as the pacer lets them come."""
+        if self._disturbance:  # whoever records the new segment has not heard of it
+            self._disturbance = nan
         parameters = self.parameters
         realtime = parameters.pace is Pace.REALTIME
         self._loop = SampledLoop(
@@ -88,6 +90,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._pacer.stop()
         self._next_start = self._loop.stamp(self._loop.sample.number + 1)
         self.wait_for_delivery(self._state)
+        self.wait_for_delivery(self._applied)
 
     def apply_parameters(self) -> None:
         """Go on with the new drive and disturbance from the next sample on."""
@@ -108,13 +111,19 @@ class PlantNode(ManagedNode[PlantParameters]):
             NEWEST_STAMP: loop.sample.stamp,
             "late_forces": loop.late_forces,
             "missed_deadlines": pacer.missed_deadlines,
+            "largest_lateness": round(pacer.largest_lateness, 6),
             "steps_per_second": round(pacer.steps_per_second, 1),
             **{f"dropped: {reason}": count for reason, count in loop.dropped.items()},
         }
         if loop.unbounded:
             return ERROR, "the motion runs away (regime unbounded)", figures
-        if pacer.complaint or loop.dropped:
-            return WARN, pacer.complaint or "forces were dropped", figures
+        complaints = [pacer.complaint]
+        if self.parameters.expects_control and not loop.controller_present:
+            complaints.append(NO_FORCE)
+        if loop.dropped:
+            complaints.append("forces were dropped")
+        if any(complaints):
+            return WARN, "; ".join(filter(None, complaints)), figures
         return OK, "", figures
 
     def _publish(self, sample: Sample) -> None:

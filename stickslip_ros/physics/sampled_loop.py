@@ -213,8 +213,10 @@ class SampledLoop:
         if not self._hold_late:
             self.controller_present = False
             return 0.0
-        age = (present - number) * self.period
-        return force if number >= 0 and age <= self._force_timeout else 0.0
+        if (present - number) * self.period <= self._force_timeout:
+            return force
+        self.controller_present = False
+        return 0.0
 
     def _judge(self, number: int, stamp: int, force: float) -> Verdict:
         if not isfinite(force):

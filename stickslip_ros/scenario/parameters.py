@@ -278,6 +278,7 @@ class AnalyzerParameters(NodeParameters):
         "bytes",
         fixed=True,
         ge=0,
+        le=2**62,
     )
     max_bag_duration: float = _field(
         0.0,
