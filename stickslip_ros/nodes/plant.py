@@ -17,6 +17,7 @@ from stickslip_ros.nodes.topics import (
     APPLIED_DISTURBANCE,
     CLOCK,
     CONTROL_FORCE,
+    DEEP,
     DISTURBANCE_FORCE,
     JOINT_STATES,
     RECORDED,
@@ -28,8 +29,6 @@ from stickslip_ros.scenario.parameters import Pace, PlantParameters
 
 NEWEST_STAMP = "newest_stamp"
 """Key under which the diagnostics tell the stamp of the newest sample, ns."""
-
-_HISTORY_SECONDS = 8.0
 
 
 class PlantNode(ManagedNode[PlantParameters]):
@@ -45,8 +44,8 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._next_start = LOCKSTEP_START
         self._disturbance = 0.0
         self._lock = threading.Lock()
-        depth = max(2 * self.parameters.flow_window, round(_HISTORY_SECONDS * self.parameters.rate))
-        self._state = self.advertise(JOINT_STATES, min(depth, 100_000))
+        depth = max(2 * self.parameters.flow_window, DEEP)
+        self._state = self.advertise(JOINT_STATES, depth)
         self._applied = self.advertise(APPLIED_DISTURBANCE)
         self._clock_time = self.advertise(CLOCK) if self.parameters.publish_clock else None
         self.subscribe(CONTROL_FORCE, self._on_force)
