@@ -12,7 +12,7 @@ from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSCompatibility, qos_check_compatible
+from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.timer import Timer
@@ -248,18 +248,27 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
         waiting_for = {name.rsplit("/", 1)[-1] for name in self.parameters.wait_for}
         if not waiting_for:
             return ""
-        publishers = [p for p in self._connections if isinstance(p, Publisher)]
         found: set[str] = set()
-        for publisher in publishers:
-            readers = [
-                reader
-                for reader in self.get_subscriptions_info_by_topic(publisher.topic_name)
-                if qos_check_compatible(publisher.qos_profile, reader.qos_profile)[0]
-                is not QoSCompatibility.ERROR
-            ]
-            found |= {reader.node_name for reader in readers}
-            if publisher.get_subscription_count() < len(readers):
-                return f"{publisher.topic_name} is not yet matched"
+        for end in self._connections:
+            if isinstance(end, Publisher):
+                readers = [
+                    reader
+                    for reader in self.get_subscriptions_info_by_topic(end.topic_name)
+                    if _fit(end.qos_profile, reader.qos_profile)
+                ]
+                found |= {reader.node_name for reader in readers}
+                matched = end.get_subscription_count() >= len(readers)
+            elif isinstance(end, Subscription):
+                writers = [
+                    writer
+                    for writer in self.get_publishers_info_by_topic(end.topic_name)
+                    if _fit(writer.qos_profile, end.qos_profile)
+                ]
+                matched = end.get_publisher_count() >= len(writers)
+            else:
+                continue
+            if not matched:
+                return f"{end.topic_name} is not yet matched"
         absent = waiting_for - found
         return f"no reader in {', '.join(sorted(absent))}" if absent else ""
 
@@ -314,6 +323,10 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
     def _take_change(self, changes: list[Parameter]) -> None:
         self.parameters = self._changed(changes)
         self.apply_parameters()
+
+
+def _fit(writer: QoSProfile, reader: QoSProfile) -> bool:
+    return qos_check_compatible(writer, reader)[0] is not QoSCompatibility.ERROR
 
 
 def take_waiting(subscription: Subscription) -> Iterator[bytes]:
