@@ -14,7 +14,7 @@ PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 # A test that hangs fails by itself, with its name.
 PYTEST := $(BIN)/python -m pytest --timeout=300
 
-.PHONY: setup demo test test-long test-all lint clean
+.PHONY: setup demo test test-long test-all lint bench clean
 
 setup: $(READY)
 
@@ -59,6 +59,11 @@ lint: setup
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/pyright --pythonpath $(BIN)/python
+
+# A table, and the same as JSON; needs a quiet machine.
+bench: setup
+	@mkdir -p build
+	$(BIN)/python -m benchmarks --out build/benchmarks.json
 
 clean:
 	rm -rf .venv .venv-* build install log dist *.egg-info .pytest_cache .ruff_cache .hypothesis

@@ -33,10 +33,10 @@ from stickslip_ros.bags.definitions import message_definition
 from stickslip_ros.bags.messages import pack_joint_state, pack_wrench
 from stickslip_ros.bags.recorder import QosProfile, Recorder
 
-ROUNDS = 100
+ROUNDS = 60
 SAMPLES = 2000
 FLUSHED_MESSAGES = 1000
-READING_ROUNDS = 7
+READING_ROUNDS = 5
 READ_SAMPLES = 60_000
 WRITING_REQUIRED = 0.9
 READING_REQUIRED = 10.0
@@ -111,32 +111,34 @@ def peer(path: Path, resources: ExitStack, *, flushes: bool) -> Run:
 
 def writing() -> list[Row]:
     rows: list[Row] = []
-    for what, flushes in (("without flushes", False), ("a flush each 1000", True)):
+    for flushed, flushes in (("without flushes", False), ("a flush each 1000", True)):
         with tempfile.TemporaryDirectory() as directory, ExitStack() as resources:
             run = ours(Path(directory, "bag"), resources, flushes=flushes)
             peers = peer(Path(directory, "peer.mcap"), resources, flushes=flushes)
-            rates = by_turns(ROUNDS, run.slice, peers.slice)
-        rows.append(compare_rates(f"writing, {what}", *rates, required=WRITING_REQUIRED))
+            our_rates, peer_rates = by_turns(ROUNDS, run.slice, peers.slice)
+        what = f"writing, {flushed}"
+        rows.append(compare_rates(what, our_rates, "mcap", peer_rates, required=WRITING_REQUIRED))
     return rows
 
 
 def reading() -> list[Row]:
     rows: list[Row] = []
-    for what, flush_every in (("chunks of 1 s", 1000), ("full chunks", READ_SAMPLES)):
+    for chunks, flush_every in (("chunks of 1 s", 1000), ("full chunks", READ_SAMPLES)):
         with tempfile.TemporaryDirectory() as directory:
             bag = Path(directory, "bag")
             record(bag, flush_every)
-            ours, *peers = by_turns(
+            ours, decoded, undecoded, mcap = by_turns(
                 READING_ROUNDS,
                 *(
                     partial(reading_rate, read, bag)
                     for read in (read_columns, read_decoded, read_undecoded, read_with_mcap)
                 ),
             )
+        what = f"reading, {chunks}"
         rows += [
-            compare_rates(f"reading, {what}, rosbags", ours, peers[0], required=READING_REQUIRED),
-            compare_rates(f"reading, {what}, rosbags undecoded", ours, peers[1]),
-            compare_rates(f"reading, {what}, mcap undecoded", ours, peers[2]),
+            compare_rates(what, ours, "rosbags", decoded, required=READING_REQUIRED),
+            compare_rates(what, ours, "rosbags, undecoded", undecoded),
+            compare_rates(what, ours, "mcap, undecoded", mcap),
         ]
     return rows
 

@@ -1,8 +1,8 @@
 """How late does a replayed message leave, at its recorded pace?
 
-Ours: a minute of joint states and control forces at 1 kHz, replayed at rate 1 to an analyzer in a
-process of its own. Lateness is counted from the deadline that the time of the first message and the
-recorded spacing give; it does not add up.
+Ours: half a minute of joint states and control forces at 1 kHz, replayed at rate 1 to an analyzer
+in a process of its own. Lateness is counted from the deadline that the time of the first message
+and the recorded spacing give; it does not add up.
 
 Peer: a loop in another process that does nothing but sleep until the same deadlines, at the same
 time, so that both suffer from whatever else this machine does.
@@ -10,31 +10,32 @@ time, so that both suffer from whatever else this machine does.
 
 import multiprocessing
 import os
-import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
-import rclpy
-from numpy.typing import NDArray
 from rclpy.experimental import EventsExecutor
-from rclpy.signals import SignalHandlerOptions
 
+from benchmarks.lateness import SLEEP_LOOP, lateness, lateness_rows, sleep_loop
+from benchmarks.parties import ROS_ARGUMENTS, ros
 from benchmarks.slices import Row, show
 from stickslip_ros.bags.messages import pack_joint_state, pack_wrench
 from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.nodes.lifeline import start
 from stickslip_ros.nodes.player import Message
 from stickslip_ros.nodes.process import spin
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.topics import CONTROL_FORCE, DEEP, JOINT_STATES
 from stickslip_ros.physics.samples import NANOSECONDS
+from stickslip_ros.scenario.files import DEFAULT_NAMESPACE
+from stickslip_ros.testing.domain import domain_variables, own_domain
 
-SAMPLES = 60_000
+SAMPLES = 30_000
 PERIOD = 0.001
-NAMESPACE = "/feed_drive"
 ALLOWED = 0.002
 """What the last message may be later than that of the bare loop, s."""
 
@@ -63,15 +64,8 @@ class TimedReplay(ReplayNode):
 
 def bare_loop(connection: Connection) -> None:
     """Sleep until the deadlines, once started, and send the times back."""
-    times: list[float] = []
     connection.recv()
-    origin = time.monotonic()
-    for number in range(SAMPLES):
-        wait = origin + number * PERIOD - time.monotonic()
-        if wait > 0.0:
-            time.sleep(wait)
-        times.append(time.monotonic())
-    connection.send(times)
+    connection.send(sleep_loop(SAMPLES, PERIOD))
 
 
 def record(bag: Path) -> None:
@@ -79,7 +73,9 @@ def record(bag: Path) -> None:
     step = round(PERIOD * NANOSECONDS)
     with Recorder(bag) as recorder:
         states, forces = (
-            recorder.add_topic(f"{NAMESPACE}/{topic.name}", topic.type_name, QosProfile(DEEP))
+            recorder.add_topic(
+                f"{DEFAULT_NAMESPACE}/{topic.name}", topic.type_name, QosProfile(DEEP)
+            )
             for topic in (JOINT_STATES, CONTROL_FORCE)
         )
         for number in range(SAMPLES):
@@ -92,58 +88,51 @@ def record(bag: Path) -> None:
                 recorder.flush()
 
 
-def replay(bag: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def replay(bag: Path) -> tuple[Sequence[float], Sequence[float]]:
     """Return when each joint state left, and when the bare loop woke up."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     loop = context.Process(target=bare_loop, args=(theirs,))
     loop.start()
-    arguments = ["--ros-args", "--log-level", "error", "-r", f"__ns:={NAMESPACE}"]
-    analyzer = subprocess.Popen([sys.executable, "-m", "stickslip_ros.nodes.analyzer", *arguments])
-    rclpy.init(
-        args=["--ros-args", "--log-level", "error"], signal_handler_options=SignalHandlerOptions.NO
-    )
+    analyzer = start([sys.executable, "-m", "stickslip_ros.nodes.analyzer", *ROS_ARGUMENTS])
     try:
-        node = TimedReplay(bag, ours)
-        executor = EventsExecutor()
-        executor.add_node(node)
-        spin(executor, node.stopped)
-        refusal = node.stopped.result()
+        with ros():
+            node = TimedReplay(bag, ours)
+            executor = EventsExecutor()
+            executor.add_node(node)
+            spin(executor, node.stopped)
+            refusal = node.stopped.result()
         if refusal is not None:
             raise refusal
-        return np.array(node.times), np.array(ours.recv())
+        return node.times, ours.recv()
     finally:
-        rclpy.try_shutdown()
         analyzer.terminate()
         analyzer.wait()
         loop.terminate()
 
 
-def lateness(times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how long after its deadline each came."""
-    if len(times) != SAMPLES:
-        raise SystemExit(f"{len(times)} joint states left, not {SAMPLES}")
-    return times - times[0] - PERIOD * np.arange(SAMPLES)
-
-
 def measure() -> list[Row]:
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
-    with tempfile.TemporaryDirectory() as directory:
+    with own_domain() as domain, tempfile.TemporaryDirectory() as directory:
+        os.environ.update(domain_variables(domain))
         bag = Path(directory) / "bag"
         record(bag)
-        ours, bare = map(lateness, replay(bag))
-    rows = [
-        Row(f"lateness, {name}", "s", figure(ours), figure(bare), figure(bare) / figure(ours))
-        for name, figure in (
-            ("median", np.median),
-            ("99 %", lambda late: np.quantile(late, 0.99)),
-            ("largest", np.max),
-        )
+        our_times, bare_times = replay(bag)
+    if len(our_times) != SAMPLES:
+        raise SystemExit(f"{len(our_times)} joint states left, not {SAMPLES}")
+    late, bare = (lateness(times, PERIOD) for times in (our_times, bare_times))
+    last, last_bare = float(late[-1]), float(bare[-1])
+    return [
+        *lateness_rows("messages", late, SLEEP_LOOP, bare),
+        Row(
+            "last message, lateness (ratio: to peer + 2 ms)",
+            "s",
+            last,
+            SLEEP_LOOP,
+            last_bare,
+            (last_bare + ALLOWED) / last,
+            required=1.0,
+        ),
     ]
-    last, last_bare = float(ours[-1]), float(bare[-1])
-    limit = (last_bare + ALLOWED) / last
-    return [*rows, Row("of the last (ratio: to peer + 2 ms)", "s", last, last_bare, limit, 1.0)]
 
 
 if __name__ == "__main__":

@@ -1,34 +1,41 @@
-"""Ours against a peer: slices of both by turns in one run, medians, one small table."""
+"""Ours against peers: slices of all by turns in one run, medians, one small table."""
 
 import argparse
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from statistics import median
+from typing import TypeVar
 
 from stickslip_ros.versions import versions
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table."""
+    """One line of the table: a figure of ours, and whose it is compared with."""
 
     what: str
     unit: str
     ours: float
-    peer: float
-    ratio: float
+    against: str = ""
+    """Whom the other figure belongs to; empty where there is nobody to compare with."""
+    peer: float | None = None
+    ratio: float | None = None
     """How many times better ours is; below 1 it is the peer that is better."""
     required: float | None = None
     """What the ratio has to be at least."""
+    aim: float | None = None
+    """What the ratio should be at least."""
 
 
-def by_turns(rounds: int, *slices: Callable[[], float]) -> list[list[float]]:
+def by_turns(rounds: int, *slices: Callable[[], T]) -> list[list[T]]:
     """Run the slices by turns, every other round backwards; return what each gave, by slice.
 
     Noise that lasts longer than a slice thus falls on all of them alike.
     """
-    results: list[list[float]] = [[] for _ in slices]
+    results: list[list[T]] = [[] for _ in slices]
     order = list(zip(slices, results, strict=True))
     for _ in range(rounds):
         for run, values in order:
@@ -38,19 +45,30 @@ def by_turns(rounds: int, *slices: Callable[[], float]) -> list[list[float]]:
 
 
 def compare_rates(
-    what: str, ours: Sequence[float], peer: Sequence[float], required: float | None = None
+    what: str,
+    ours: Sequence[float],
+    against: str,
+    peer: Sequence[float],
+    *,
+    required: float | None = None,
+    aim: float | None = None,
 ) -> Row:
     """Compare rates, 1/s, taken by turns: medians, and the median of the ratios of neighbours."""
     ratio = median(a / b for a, b in zip(ours, peer, strict=True))
-    return Row(what, "1/s", median(ours), median(peer), ratio, required)
+    return Row(what, "1/s", median(ours), against, median(peer), ratio, required, aim)
 
 
 def compare_times(
-    what: str, ours: Sequence[float], peer: Sequence[float], required: float | None = None
+    what: str,
+    ours: Sequence[float],
+    against: str,
+    peer: Sequence[float],
+    *,
+    required: float | None = None,
 ) -> Row:
     """Compare durations, s, taken by turns: medians, and the median of the ratios of neighbours."""
     ratio = median(b / a for a, b in zip(ours, peer, strict=True))
-    return Row(what, "s", median(ours), median(peer), ratio, required)
+    return Row(what, "s", median(ours), against, median(peer), ratio, required)
 
 
 def show(question: str | None, make_rows: Callable[[], list[Row]]) -> None:
@@ -65,12 +83,43 @@ def show(question: str | None, make_rows: Callable[[], list[Row]]) -> None:
     rows = make_rows()
     if as_json:
         print(json.dumps({"rows": [asdict(row) for row in rows], "versions": versions()}, indent=2))
-        return
-    width = max(len(f"{row.what}, {row.unit}") for row in rows)
-    print(f"{'':{width}}  {'ours':>10}  {'peer':>10}  {'ratio':>8}  required")
-    for row in rows:
-        required = "" if row.required is None else f"{row.required:8g}"
-        print(
-            f"{f'{row.what}, {row.unit}':{width}}  {row.ours:10.4g}  {row.peer:10.4g}"
-            f"  {row.ratio:8.3g}  {required}".rstrip()
-        )
+    else:
+        print(table({"": rows}))
+
+
+def table(sections: dict[str, list[Row]]) -> str:
+    """Return rows as text, each section below its title; what falls short is marked."""
+    lines = [("", "ours", "peer", "", "ratio", "at least")]
+    for title, rows in sections.items():
+        if title:
+            lines += [("", "", "", "", "", ""), (title.upper(), "", "", "", "", "")]
+        lines += [_cells(row) for row in rows]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return "\n".join(_line(cells, widths) for cells in lines)
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    goal = row.aim if row.required is None else row.required
+    at_least = ""
+    if row.ratio is not None and goal is not None:
+        kind = " (aim)" if row.required is None else ""
+        at_least = f"{goal:.3g}{kind}{'  SHORT' if row.ratio < goal else ''}"
+    return (
+        f"{row.what}, {row.unit}" if row.unit else row.what,
+        _number(row.ours),
+        _number(row.peer),
+        row.against,
+        _number(row.ratio, 3),
+        at_least,
+    )
+
+
+def _number(value: float | None, digits: int = 4) -> str:
+    if value is None:
+        return ""
+    return f"{value:,.0f}" if abs(value) >= 1000.0 else f"{value:.{digits}g}"
+
+
+def _line(cells: Iterable[str], widths: Iterable[int]) -> str:
+    columns = zip(cells, "<>><><", widths, strict=True)
+    return "  ".join(f"{text:{align}{width}}" for text, align, width in columns).rstrip()

@@ -1,0 +1,86 @@
+"""Every benchmark, each in a process of its own, as one table: ours, the peer's, and the ratio."""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from benchmarks.slices import Row, table
+from stickslip_ros.versions import versions
+
+NAMES = ("motion", "bifurcation", "bags", "lockstep", "replay", "realtime")
+TIMEOUT = 600.0
+
+
+def main() -> int:
+    """Run the benchmarks named, print their table or JSON; return the exit status."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks",
+        description=__doc__,
+        epilog="`python -m benchmarks.NAME --help` says what is compared, and with what.",
+    )
+    parser.add_argument(
+        "names", nargs="*", metavar="NAME", help=f"which (default: all of {', '.join(NAMES)})"
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="write the JSON to this file, too")
+    arguments = parser.parse_args()
+    unknown = sorted(set(arguments.names) - set(NAMES))
+    if unknown:
+        parser.error(f"no benchmark {', '.join(unknown)}; there are {', '.join(NAMES)}")
+    if arguments.out is not None and not arguments.out.parent.is_dir():
+        parser.error(f"--out {arguments.out}: there is no directory {arguments.out.parent}")
+    report: dict[str, Any] = {
+        "benchmarks": {},
+        "failed": {},
+        "processors": os.cpu_count(),
+        "load_average": os.getloadavg()[0],
+        "versions": versions(),
+    }
+    for name in dict.fromkeys(arguments.names or NAMES):
+        run(name, report)
+    text = json.dumps(report, indent=2)
+    if arguments.out is not None:
+        arguments.out.write_text(text + "\n", encoding="utf-8")
+    if arguments.json:
+        print(text)
+    elif report["benchmarks"]:
+        sections = {
+            name: [Row(**row) for row in done["rows"]]
+            for name, done in report["benchmarks"].items()
+        }
+        print(table(sections))
+    for name, why in report["failed"].items():
+        print(f"benchmarks.{name} failed: {why}", file=sys.stderr)
+    return 1 if report["failed"] else 0
+
+
+def run(name: str, report: dict[str, Any]) -> None:
+    """Run one benchmark and enter its rows, or that it failed, in the report."""
+    print(f"{name} ...", end=" ", flush=True, file=sys.stderr)
+    started = time.monotonic()
+    command = [sys.executable, "-m", f"benchmarks.{name}", "--json"]
+    try:
+        done = subprocess.run(command, stdout=subprocess.PIPE, timeout=TIMEOUT, check=True)
+    except subprocess.CalledProcessError as error:
+        report["failed"][name] = f"exit status {error.returncode}"
+    except subprocess.TimeoutExpired:
+        report["failed"][name] = f"not done within {TIMEOUT:g} s"
+    else:
+        seconds = round(time.monotonic() - started, 1)
+        rows = json.loads(done.stdout)["rows"]
+        report["benchmarks"][name] = {"seconds": seconds, "rows": rows}
+        print(f"{seconds:.0f} s", file=sys.stderr)
+        return
+    print("failed", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit(130)
