@@ -39,7 +39,8 @@ $(READY): setup.py setup.cfg pyproject.toml package.xml Makefile
 	@ln -s '$(CURDIR)/config' '$(CURDIR)/package.xml' $(VENV)/share/stickslip_ros
 	@ln -sf '$(CURDIR)/resource/stickslip_ros' $(VENV)/share/ament_index/resource_index/packages
 	@cd $(VENV)/lib/stickslip_ros && ../../bin/python -c 'from importlib import metadata; \
-		print(*metadata.distribution("stickslip_ros").entry_points.names, sep="\n")' | \
+		scripts = metadata.distribution("stickslip_ros").entry_points.select(group="console_scripts"); \
+		print(*scripts.names, sep="\n")' | \
 		xargs -I{} ln -s ../../bin/{} {}
 	@touch $@
 

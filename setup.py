@@ -47,14 +47,15 @@ setup(
     maintainer_email=MANIFEST.find("maintainer").get("email"),
     license=MANIFEST.findtext("license"),
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed"]},
+    package_data={NAME: ["py.typed", "nodes/*.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", sorted(glob("config/*.yaml"))),
     ],
     entry_points={
-        "console_scripts": [f"{name} = {function}" for name, function in EXECUTABLES.items()]
+        "console_scripts": [f"{name} = {function}" for name, function in EXECUTABLES.items()],
+        "pytest11": [f"{NAME} = {NAME}.pytest_plugin"],
     },
     cmdclass={"install_scripts": InstallScripts},
     zip_safe=False,

@@ -14,8 +14,8 @@ from stickslip_ros.versions import versions
 _PICTURES = (".png", ".svg", ".pdf")
 
 
-def add_scenario(parser: argparse.ArgumentParser) -> None:
-    """Add SCENARIO and what modifies it."""
+def add_scenario(parser: argparse.ArgumentParser) -> Any:
+    """Add SCENARIO and what modifies it; return the (exclusive) group of who controls."""
     parser.add_argument(
         "scenario",
         metavar="SCENARIO",
@@ -29,7 +29,9 @@ def add_scenario(parser: argparse.ArgumentParser) -> None:
         metavar="NODE.PARAMETER=VALUE",
         help="override a parameter, as in -p plant.belt_speed=0.2 (SI units; repeatable)",
     )
-    parser.add_argument("--no-control", action="store_true", help="leave the controller out")
+    control = parser.add_mutually_exclusive_group()
+    control.add_argument("--no-control", action="store_true", help="leave the controller out")
+    return control
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
@@ -67,12 +69,15 @@ def writing(option: str, path: Path) -> Generator[None]:
 
 
 def scenario_of(
-    arguments: argparse.Namespace, *overrides: str, namespace: str = DEFAULT_NAMESPACE
+    arguments: argparse.Namespace,
+    *overrides: str,
+    namespace: str = DEFAULT_NAMESPACE,
+    other_nodes: bool = False,
 ) -> Scenario:
     """Return the scenario that was asked for, `overrides` applied after those given."""
     control = ["plant.expects_control=false"] if arguments.no_control else []
     asked = [*arguments.overrides, *control, *overrides]
-    return load_scenario(arguments.scenario, asked, namespace)
+    return load_scenario(arguments.scenario, asked, namespace, other_nodes=other_nodes)
 
 
 def made_of(scenario: Scenario) -> dict[str, Any]:

@@ -12,6 +12,9 @@ from stickslip_ros.errors import InvalidInputError, StickslipError
 _COMMANDS = ("run", "simulate", "stability", "design", "report", "repair", "replay", "paper")
 """Each is a module here, imported when it is asked for: some import what takes seconds."""
 
+_PASSING_ON = ("run",)
+"""Those that pass on to others what follows `--`, in the attribute `further`."""
+
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit with its status.
@@ -20,8 +23,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
     command = " ".join(given[:1])
+    further: list[str] = []
+    if command in _PASSING_ON and "--" in given:
+        end = given.index("--")
+        given, further = given[:end], given[end + 1 :]
     try:
-        chosen = _parser(given).parse_args(given)
+        chosen = _parser(given).parse_args(given, argparse.Namespace(further=further))
         status: int = chosen.run(chosen)
         sys.stdout.flush()
     except InvalidInputError as error:

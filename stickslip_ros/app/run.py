@@ -1,11 +1,13 @@
 """`stickslip run`: the closed loop as ROS 2 nodes, recorded and reported."""
 
 import argparse
+import shlex
 import signal
 import sys
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from importlib import import_module
 from itertools import count
 from pathlib import Path
@@ -18,6 +20,7 @@ from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
+from stickslip_ros.installed import find_executable
 from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario
 from stickslip_ros.scenario.parameters import Pace
 
@@ -26,7 +29,18 @@ HELP = "run a scenario as ROS 2 nodes, record it and report"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    add_scenario(parser)
+    control = add_scenario(parser)
+    control.add_argument(
+        "--controller",
+        metavar="PACKAGE/EXECUTABLE",
+        help="start this controller, found as by `ros2 run`, in place of the washout controller; "
+        "what follows -- are arguments for it, as in -- --ros-args -p gain:=3.0",
+    )
+    control.add_argument(
+        "--external-controller",
+        action="store_true",
+        help="start no controller, and wait for one that somebody else starts",
+    )
     parser.add_argument(
         "--duration", type=seconds, metavar="S", help="simulated time, s (default: until Ctrl-C)"
     )
@@ -68,15 +82,25 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.duration is not None:
         overrides.append(f"plant.duration={arguments.duration!r}")
     namespace = _namespace(arguments.namespace)
-    scenario = scenario_of(arguments, *overrides, namespace=namespace)
+    controller = _other_controller(arguments)
+    scenario = scenario_of(
+        arguments, *overrides, namespace=namespace, other_nodes=controller is not None
+    )
+    if controller is not None and not scenario.plant.expects_control:
+        raise InvalidInputError(
+            "plant.expects_control = False is refused with --controller and --external-controller"
+        )
     bag = arguments.bag or (Path(scenario.analyzer.bag) if scenario.analyzer.bag else None)
     bag = bag or default_bag(scenario.name)
     check_new_bag(bag)
     reach = ros_nodes("process").keep_on_this_machine(arguments.network)
     print(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}", file=sys.stderr)
-    figures, interrupted = record(scenario, bag, namespace=namespace, composed=arguments.composed)
+    figures, interrupted = record(
+        scenario, bag, namespace=namespace, composed=arguments.composed, controller=controller
+    )
     if arguments.json:
-        print_json({**figures, **made_of(scenario)})
+        command = shlex.join([arguments.controller, *arguments.further]) if controller else None
+        print_json({**figures, "controller_command": command, **made_of(scenario)})
     else:
         print_figures(scenario.name, {"": {**figures["report"], **figures}})
     if not figures["report"]["complete"]:
@@ -85,20 +109,32 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def record(
-    scenario: Scenario, bag: Path, *, namespace: str = DEFAULT_NAMESPACE, composed: bool
+    scenario: Scenario,
+    bag: Path,
+    *,
+    namespace: str = DEFAULT_NAMESPACE,
+    composed: bool,
+    controller: Sequence[str] | None = None,
 ) -> tuple[dict[str, Any], bool]:
     """Run the nodes into `bag`; return the figures of the run, and whether it was interrupted.
 
+    `controller` is the command of one in place of ours, empty for one that others start.
     Raises KeyboardInterrupt where nothing was recorded before that.
     """
     duration = scenario.plant.duration
     total = duration if duration < float("inf") else None
     with progress_bar(f"running {scenario.name}", total) as progress:
         outcome = ros_nodes("bringup").run_nodes(
-            scenario, namespace=namespace, bag=bag, composed=composed, progress=progress
+            scenario,
+            namespace=namespace,
+            bag=bag,
+            composed=composed,
+            controller=controller,
+            progress=progress,
+            tell=partial(print, file=sys.stderr),
         )
     try:
-        return _figures(bag, outcome.plant), outcome.interrupted
+        return _figures(bag, outcome), outcome.interrupted
     except BagError:
         if outcome.interrupted:  # before the first sample
             raise KeyboardInterrupt from None
@@ -137,10 +173,23 @@ def default_bag(scenario: str) -> Path:
     return next(path for path in candidates if not path.exists())
 
 
-def _figures(bag: Path, plant: Mapping[str, str]) -> dict[str, Any]:
-    report = report_of_bag(bag)
+def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
+    """Return the command of the controller in place of ours, empty if somebody else starts it."""
+    if arguments.controller is not None:
+        return [str(find_executable(arguments.controller, "--controller")), *arguments.further]
+    if arguments.further:
+        raise InvalidInputError(
+            f"-- {shlex.join(arguments.further)}: what follows -- is for --controller, "
+            "which is not given"
+        )
+    return [] if arguments.external_controller else None
+
+
+def _figures(bag: Path, outcome: Any) -> dict[str, Any]:
+    report, plant = report_of_bag(bag), outcome.plant
     return {
         "bag": str(bag),
+        "controller": outcome.controller,
         "report": report,
         "samples": report["samples"],
         "lost_samples": report["lost_samples"],

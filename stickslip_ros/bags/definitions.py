@@ -1,12 +1,10 @@
 """Definitions and type hashes of installed ROS message types, as rosbag2 stores them in a bag."""
 
 import json
-import os
 import re
-import sys
-from pathlib import Path
 
 from stickslip_ros.errors import BagError
+from stickslip_ros.installed import prefixes
 
 _TYPE_NAME = re.compile(r"(\w+)/msg/(\w+)", re.ASCII)
 _FIELD_TYPE = re.compile(r"\s*([A-Za-z][\w/]*)", re.ASCII)
@@ -63,17 +61,12 @@ def _read(type_name: str, suffix: str) -> str:
             f"'{type_name}' does not name a message type; sensor_msgs/msg/JointState does"
         )
     package, name = parts.groups()
-    # The environment's own prefix comes last: ROS wheels install there without any set-up script.
-    prefixes = [
-        *filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)),
-        sys.prefix,
-    ]
-    for prefix in prefixes:
-        path = Path(prefix, "share", package, "msg", name + suffix)
+    for prefix in prefixes():
+        path = prefix / "share" / package / "msg" / (name + suffix)
         if path.is_file():
             return path.read_text(encoding="utf-8")
     raise BagError(
         f"the message type '{type_name}' is not installed: there is no "
-        f"share/{package}/msg/{name}{suffix} in {' or '.join(prefixes)} "
+        f"share/{package}/msg/{name}{suffix} in {' or '.join(map(str, prefixes()))} "
         "(AMENT_PREFIX_PATH and the Python environment)"
     )

@@ -114,6 +114,14 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         else:
             self.get_logger().info(f"report: {json.dumps(report)}")
 
+    def heard(self) -> set[str]:
+        """Return who writes what will be recorded."""
+        return {
+            writer.node_name
+            for topic in RECORDED_TOPICS
+            for writer in self.get_publishers_info_by_topic(topic.name)
+        }
+
     def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
         """Return the regime, counts of samples, and what is wrong with the bag or a message."""
         if not self.active:

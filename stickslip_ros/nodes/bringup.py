@@ -1,12 +1,11 @@
 """Bringing the nodes up and down: as processes or composed in one, activated in order."""
 
-import os
 import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,22 +14,26 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import State, Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.srv import SetParameters
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from std_msgs.msg import Header
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.controllers import find_controllers, find_managed, near_misses
+from stickslip_ros.nodes.lifeline import GUARD_PATIENCE, start
 from stickslip_ros.nodes.managed import STATE, ManagedNode
 from stickslip_ros.nodes.plant import NEWEST_STAMP, PlantNode
-from stickslip_ros.nodes.process import PARENT_VARIABLE, spin, stop_on_signals
-from stickslip_ros.nodes.topics import DIAGNOSTICS, RECORDED
+from stickslip_ros.nodes.process import spin, stop_on_signals
+from stickslip_ros.nodes.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.physics.samples import NANOSECONDS
-from stickslip_ros.scenario.files import Scenario, parameter_file
+from stickslip_ros.scenario.files import Scenario, parameter_file, section_matches
 
 _LOGGING = ["--ros-args", "--log-level", "warn"]
 _READY_TIMEOUT = 30.0
@@ -39,9 +42,21 @@ _MATCH_TIMEOUT = 5.0
 """Time, s, after which a client that finds no service is replaced: some never do."""
 _RETRY_PERIOD = 0.02
 _WATCH_PERIOD = 0.1
-_EXIT_TIMEOUT = 5.0
+_LOOK_PERIOD = 0.1
+_DISCOVERY_TIME = 3.0
+"""Time, s, for which something must stand before it is no longer a matter of discovery."""
+_SETTLING_TIME = 0.3
+"""Time, s, given to a controller to match our readers: on our side nothing tells that it has."""
+_EXIT_TIMEOUT = 2.0 * GUARD_PATIENCE + 2.0
 _LAST_WORDS_TIMEOUT = 2.0
 _CATCH_UP_TIMEOUT = 10.0
+
+_ACTIVE = "active"
+_NEXT_TRANSITION = {
+    "unconfigured": Transition.TRANSITION_CONFIGURE,
+    "inactive": Transition.TRANSITION_ACTIVATE,
+}
+"""The way from a state of a managed node's life cycle to the active one."""
 
 _NODES: dict[str, Callable[..., ManagedNode[Any]]] = {
     "analyzer": AnalyzerNode,
@@ -53,6 +68,9 @@ _NODES: dict[str, Callable[..., ManagedNode[Any]]] = {
 Progress = Callable[[float], None]
 """Told now and then how much time has been simulated, s."""
 
+Tell = Callable[[str], None]
+"""Told what a person should know meanwhile, in a sentence."""
+
 
 @dataclass
 class RunOutcome:
@@ -62,6 +80,8 @@ class RunOutcome:
     """Whether SIGINT or SIGTERM ended it."""
     plant: dict[str, str] = field(default_factory=dict)
     """The plant's last figures, as in its diagnostics."""
+    controller: str | None = None
+    """Full name of the node that was the controller."""
 
 
 def run_nodes(
@@ -70,16 +90,21 @@ def run_nodes(
     namespace: str,
     bag: Path,
     composed: bool = False,
+    controller: Sequence[str] | None = None,
     progress: Progress = lambda _: None,
+    tell: Tell = lambda _: None,
 ) -> RunOutcome:
     """Run the scenario's nodes until the plant pauses by itself or a signal comes.
 
+    `controller` is the command, executable and arguments, of one in place of ours, which is
+    configured and activated if it is a managed (lifecycle) node. If the command is empty, somebody
+    else starts one, and the plant waits for it.
     Every node is deactivated, and the bag closed, before this returns or raises RunError (a node
     died, or did not become ready).
     """
     rclpy.init(args=_LOGGING, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        bringup = _Bringup(namespace, progress)
+        bringup = _Bringup(scenario, namespace, controller, progress, tell)
         try:
             return bringup.run(_parameters(scenario, bag), composed)
         finally:
@@ -104,9 +129,21 @@ def _parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
 class _Bringup:
     """A node that manages the others, and the executor that runs it."""
 
-    def __init__(self, namespace: str, progress: Progress) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        namespace: str,
+        other: Sequence[str] | None,
+        progress: Progress,
+        tell: Tell,
+    ) -> None:
+        self._scenario = scenario
         self._namespace = namespace
+        self._other = other
         self._progress = progress
+        self._tell = tell
+        self._told: set[str] = set()
+        self._ours = {f"{namespace.rstrip('/')}/{node}" for node in ("analyzer", "plant")}
         self._node = Node("bringup", namespace=namespace)
         self._executor: Executor = EventsExecutor()
         self._executor.add_node(self._node)
@@ -133,19 +170,21 @@ class _Bringup:
         self._node.create_timer(_WATCH_PERIOD, self._watch_processes)
 
     def run(self, parameters: Mapping[str, Mapping[str, Any]], composed: bool) -> RunOutcome:
+        nodes = list(parameters)
+        if "washout_controller" in nodes:
+            self._outcome.controller = f"{self._namespace.rstrip('/')}/washout_controller"
+        if self._other is not None:
+            nodes.remove("washout_controller")
         with tempfile.TemporaryDirectory(prefix="stickslip_ros_") as directory:
+            file = Path(directory, "parameters.yaml")
+            file.write_text(parameter_file(parameters), encoding="utf-8")
             if composed:
-                self._compose(parameters)
+                self._compose({node: parameters[node] for node in nodes})
             else:
-                self._spawn(parameters, Path(directory))
+                self._spawn(nodes, file)
             try:
-                for transition in (
-                    Transition.TRANSITION_CONFIGURE,
-                    Transition.TRANSITION_ACTIVATE,
-                ):
-                    for node in parameters:
-                        if not self._ended:
-                            self._change_state(node, transition)
+                self._start_other(file)
+                self._bring_up(nodes)
                 self._spin_until(self._plant_paused, None)
             finally:
                 self._bring_down()
@@ -172,19 +211,112 @@ class _Bringup:
             self._composed.append(node)
             self._executor.add_node(node)
 
-    def _spawn(self, parameters: Mapping[str, Mapping[str, Any]], directory: Path) -> None:
-        file = directory / "parameters.yaml"
-        file.write_text(parameter_file(parameters), encoding="utf-8")
-        ros_arguments = [*_LOGGING, "--params-file", str(file), "-r", f"__ns:={self._namespace}"]
-        for name in parameters:
+    def _spawn(self, nodes: Iterable[str], file: Path) -> None:
+        arguments = [*_LOGGING, "--params-file", str(file), "-r", f"__ns:={self._namespace}"]
+        for name in nodes:
             module = _NODES[name].__module__
-            self._processes[name] = subprocess.Popen(
-                [sys.executable, "-m", module, *ros_arguments],
-                env=os.environ | {PARENT_VARIABLE: str(os.getpid())},
-                stdin=subprocess.DEVNULL,
-                stdout=sys.stderr,
-                start_new_session=True,  # Ctrl-C is for this process, which closes the bag first
-            )
+            self._processes[name] = start([sys.executable, "-m", module, *arguments])
+
+    def _start_other(self, file: Path) -> None:
+        """Start the other controller, if that is for us to do, with the scenario's parameters."""
+        if self._other:
+            in_namespace = ["--ros-args", "-r", f"__ns:={self._namespace}"]
+            # Its own parameters may stand in the scenario; overrides are in the other file.
+            files = ["--params-file", str(self._scenario.path), "--params-file", str(file)]
+            command = [*self._other, *in_namespace, *files]
+            self._processes[self._other[0]] = start(command, guarded=True)
+
+    def _bring_up(self, nodes: Iterable[str]) -> None:
+        for node in nodes:
+            self._change_state(node, Transition.TRANSITION_CONFIGURE)
+        if self._other is not None:
+            self._meet_the_other()
+        for node in nodes:
+            if node == "plant" and self._other is not None:
+                self._await_controller(active=True)
+                self._spin_for(_SETTLING_TIME)
+            self._change_state(node, Transition.TRANSITION_ACTIVATE)
+
+    def _meet_the_other(self) -> None:
+        """Wait for the other controller, and have ours activated only when connected with it.
+
+        Nothing is recorded yet: it may take long, and end with Ctrl-C.
+        """
+        if not self._other:
+            self._tell(f"waiting for a controller: a node that {self._part}")
+        controller = self._await_controller(active=False)
+        if controller is None:
+            return
+        if self._other:
+            self._processes[controller] = self._processes.pop(self._other[0])
+        name = controller.rpartition("/")[2]
+        self._set_wait_for("analyzer", [name])
+        self._set_wait_for("plant", ["analyzer", name])
+        nodes = self._node.get_node_names_and_namespaces()
+        for section in self._scenario.other_sections:
+            if not any(section_matches(section, f"{ns.rstrip('/')}/{name}") for name, ns in nodes):
+                self._tell(f"{self._scenario.path}: section {section} matches no node")
+
+    @property
+    def _part(self) -> str:
+        """What the controller does, in words."""
+        topics = (JOINT_STATES.name, CONTROL_FORCE.name)
+        return "reads {} and publishes {}".format(*map(self._node.resolve_topic_name, topics))
+
+    def _await_controller(self, *, active: bool) -> str | None:
+        """Return the controller when it is there, or at work; None if the run ends before.
+
+        What is amiss for long is told. One that was started here must not take for ever.
+        """
+        started = time.monotonic()
+        amiss_since: dict[str, float] = {}
+        while not self._ended:
+            self._outcome.controller, amiss = self._look_for_controller(active)
+            if self._outcome.controller is not None:
+                return self._outcome.controller
+            now = time.monotonic()
+            amiss_since = {what: amiss_since.get(what, now) for what in amiss}
+            for what, since in amiss_since.items():
+                if now - since > _DISCOVERY_TIME and what not in self._told:
+                    self._told.add(what)
+                    self._tell(what)
+            if self._other and now - started > _READY_TIMEOUT:
+                why = "; ".join([f"there is no active node that {self._part}", *amiss])
+                self._fail(f"{self._other[0]} was not ready within {_READY_TIMEOUT:g} s: {why}")
+            self._spin_for(_LOOK_PERIOD)
+        return None
+
+    def _look_for_controller(self, active: bool) -> tuple[str | None, list[str]]:
+        """Return the controller, and in a sentence each what is amiss.
+
+        A managed one that was started here is taken a step on towards its being active.
+        """
+        found, managed = find_controllers(self._node), find_managed(self._node)
+        here = self._namespace.rstrip("/")
+        # Before it is configured, it may have nothing to be found by but its namespace.
+        perhaps = [node for node in managed if node.rpartition("/")[0] == here]
+        amiss = near_misses(self._node, self._ours)
+        for node in dict.fromkeys([*found, *perhaps]):
+            if node in found and not (active and node in managed):
+                return node, []
+            if node in self._ours:
+                continue
+            state = self._state_of(node)
+            if state == _ACTIVE:
+                if node in found:
+                    return node, []
+                continue
+            amiss.append(f"the managed node {node} is {state or 'silent'}")
+            if self._other and state in _NEXT_TRANSITION:
+                self._ask_for_transition(node, _NEXT_TRANSITION[state])
+        return None, amiss
+
+    def _set_wait_for(self, node: str, others: list[str]) -> None:
+        parameter = Parameter("wait_for", value=others).to_parameter_msg()
+        request = SetParameters.Request(parameters=[parameter])
+        while not self._ended:
+            if self._ask(SetParameters, f"{node}/set_parameters", request) is not None:
+                break
 
     def _change_state(self, node: str, transition: int) -> None:
         """Take a node through a transition, again and again while it is not ready for it."""
@@ -244,19 +376,32 @@ class _Bringup:
 
     def _deactivate(self, node: str) -> None:
         """Deactivate a node, unless somebody else has: rclpy leaves that request unanswered."""
-        state = self._ask(GetState, f"{node}/get_state", GetState.Request())
-        if state is not None and state.current_state.id == State.PRIMARY_STATE_ACTIVE:
-            deactivate = Transition(id=Transition.TRANSITION_DEACTIVATE)
-            request = ChangeState.Request(transition=deactivate)
-            self._ask(ChangeState, f"{node}/change_state", request)
+        if self._state_of(node, always=True) == _ACTIVE:
+            self._ask_for_transition(node, Transition.TRANSITION_DEACTIVATE, always=True)
 
-    def _ask(self, kind: Any, name: str, request: Any) -> Any:
+    def _state_of(self, node: str, *, always: bool = False) -> str:
+        """Return the state of a managed node's life cycle, nothing if it does not say."""
+        answer = self._ask(GetState, f"{node}/get_state", GetState.Request(), always=always)
+        return answer.current_state.label if answer is not None else ""
+
+    def _ask_for_transition(self, node: str, transition: int, *, always: bool = False) -> None:
+        request = ChangeState.Request(transition=Transition(id=transition))
+        answer = self._ask(ChangeState, f"{node}/change_state", request, always=always)
+        if transition == Transition.TRANSITION_ACTIVATE and answer is not None and answer.success:
+            self._active.append(node)
+
+    def _ask(self, kind: Any, name: str, request: Any, *, always: bool = False) -> Any:
         """Call a service and return its answer, None if none comes."""
         client = self._node.create_client(kind, name)
+        deadline = time.monotonic() + _ANSWER_TIMEOUT
+        while not client.service_is_ready() and time.monotonic() < deadline:
+            if self._ended and not always:
+                break
+            self._spin_until(Future(), _RETRY_PERIOD, always=always)
         answer = None
-        if client.wait_for_service(_ANSWER_TIMEOUT):
+        if client.service_is_ready():
             future = client.call_async(request)
-            self._spin_until(future, _ANSWER_TIMEOUT, always=True)
+            self._spin_until(future, _ANSWER_TIMEOUT, always=always)
             answer = future.result() if future.done() else None
         self._node.destroy_client(client)
         return answer

@@ -104,6 +104,10 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
         """Return the node's health, a sentence on it, and figures."""
         return OK, "", {}
 
+    def heard(self) -> set[str]:
+        """Return the names of the nodes that are there for it, besides those that read from it."""
+        return set()
+
     def every(self, period: float, callback: Callable[[], None]) -> Timer:
         """Call back every `period` seconds of wall time."""
         return self.create_timer(period, callback, clock=self.steady_clock)
@@ -248,7 +252,7 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
         waiting_for = {name.rsplit("/", 1)[-1] for name in self.parameters.wait_for}
         if not waiting_for:
             return ""
-        found: set[str] = set()
+        found = self.heard()
         for end in self._connections:
             if isinstance(end, Publisher):
                 readers = [
@@ -326,7 +330,7 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
 
 
 def _fit(writer: QoSProfile, reader: QoSProfile) -> bool:
-    return qos_check_compatible(writer, reader)[0] is not QoSCompatibility.ERROR
+    return qos_check_compatible(writer, reader)[0] != QoSCompatibility.ERROR
 
 
 def take_waiting(subscription: Subscription) -> Iterator[bytes]:

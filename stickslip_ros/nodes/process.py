@@ -1,11 +1,11 @@
 """Running nodes: one as a process, and the spinning that every executor here needs."""
 
 import argparse
-import ctypes
 import os
 import signal
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import rclpy
@@ -17,12 +17,12 @@ from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
 from stickslip_ros.errors import InvalidInputError, StickslipError
+from stickslip_ros.nodes.lifeline import die_with_parent
 from stickslip_ros.nodes.managed import ManagedNode
 from stickslip_ros.scenario.parameters import NodeParameters, parameters_of
 
-PARENT_VARIABLE = "STICKSLIP_ROS_PARENT"
-
-_PR_SET_PDEATHSIG = 1
+_DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 _SPIN_TIMEOUT = 0.2
 
 
@@ -42,6 +42,7 @@ def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) 
         help="ROS arguments: -p NAME:=VALUE, --params-file FILE, -r __ns:=/NAMESPACE, -r FROM:=TO",
     )
     die_with_parent()
+    prefer_prompt_middleware()
     try:
         parser.parse_args(remove_ros_args(sys.argv)[1:])
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
@@ -78,33 +79,45 @@ def run_until_stopped(node: ManagedNode[Any]) -> None:
 
 
 def keep_on_this_machine(network: bool) -> str:
-    """Restrict ROS discovery to this machine, or open it; return in words what holds.
+    """Restrict ROS to this machine, or open it; return in words what holds.
 
     To be called before ROS is initialised. What the environment says holds, unless `network` asks
     for more.
     """
-    name = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+    names = (_DISCOVERY_RANGE, *_PROFILES)
+    said = {name: os.environ[name] for name in names if name in os.environ}
+    if said or network:
+        prefer_prompt_middleware()
     if network:
-        os.environ[name] = "SUBNET"
+        os.environ[_DISCOVERY_RANGE] = "SUBNET"
         return "open to the network"
-    said = os.environ.setdefault(name, "LOCALHOST")
-    if said == "LOCALHOST":
-        return "kept on this machine"
-    return f"as the environment says: {name}={said}"
+    if said and said != {_DISCOVERY_RANGE: "LOCALHOST"}:
+        return "as the environment says: " + " ".join(f"{n}={value}" for n, value in said.items())
+    if not said:
+        os.environ.update(this_machine_only())
+    return "kept on this machine"
 
 
-def die_with_parent() -> None:
-    """Be sent SIGTERM when the process named in the environment as the parent is no more.
+def this_machine_only() -> dict[str, str]:
+    """Return the environment variables that restrict ROS to this machine."""
+    if "fastrtps" not in rclpy.get_rmw_implementation_identifier():
+        return {_DISCOVERY_RANGE: "LOCALHOST"}
+    # LOCALHOST would overrule the profile, and takes shared memory.
+    return {_DISCOVERY_RANGE: "SYSTEM_DEFAULT", _PROFILES[0]: _profile("loopback")}
 
-    Whoever starts nodes as processes sets PARENT_VARIABLE to its own process id, so that none is
-    left running when it is killed. Linux only; elsewhere it does nothing.
+
+def prefer_prompt_middleware() -> None:
+    """Let Fast DDS do without shared memory and send soon again, if the environment says nothing.
+
+    In shared memory a reader that is stopped or killed delays everybody who publishes to it, by
+    half a millisecond each time and by seconds now and then.
     """
-    parent = os.environ.pop(PARENT_VARIABLE, "")
-    if not parent or sys.platform != "linux":
-        return
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-    if os.getppid() != int(parent):
-        sys.exit(1)
+    if not any(name in os.environ for name in (*_PROFILES, "FASTDDS_BUILTIN_TRANSPORTS")):
+        os.environ[_PROFILES[0]] = _profile("network")
+
+
+def _profile(name: str) -> str:
+    return str(Path(__file__).with_name(f"{name}.xml"))
 
 
 def stop_on_signals(stopped: Future, executor: Executor) -> dict[signal.Signals, Any]:

@@ -1,16 +1,15 @@
 """Scenarios: ROS parameter files, found by name or path, with overrides."""
 
 import re
-import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from os import environ, pathsep
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, cast
 
 import yaml
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.installed import prefixes
 from stickslip_ros.scenario.parameters import (
     NODE_PARAMETERS,
     AnalyzerParameters,
@@ -34,6 +33,10 @@ class Scenario:
     plant: PlantParameters
     washout_controller: WashoutControllerParameters
     analyzer: AnalyzerParameters
+    path: Path = field(compare=False)
+    """The scenario file."""
+    other_sections: tuple[str, ...] = ()
+    """Sections of the file that match none of these nodes: parameters of a user's own node."""
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
         """Return every node's parameters by node and flat name."""
@@ -59,18 +62,26 @@ def parameter_file(values: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def load_scenario(
-    name_or_path: str, overrides: Sequence[str] = (), namespace: str = DEFAULT_NAMESPACE
+    name_or_path: str,
+    overrides: Sequence[str] = (),
+    namespace: str = DEFAULT_NAMESPACE,
+    *,
+    other_nodes: bool = False,
 ) -> Scenario:
     """Load the scenario of that name in config/, or of that path.
 
     `overrides` are texts NODE.PARAMETER=VALUE, the value written as in the file. Sections apply to
     the nodes in `namespace` as ROS applies them. Raises InvalidInputError for anything unknown,
-    ill-typed or out of bounds.
+    ill-typed or out of bounds; with `other_nodes`, sections of unknown nodes are left alone.
     """
     path = _find(name_or_path)
     values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
+    other_sections: list[str] = []
     for pattern, parameters in _sections(path):
-        _apply(values, path, pattern, parameters, namespace)
+        if other_nodes and not _matching(pattern, namespace):
+            other_sections.append(pattern)
+        else:
+            _apply(values, path, pattern, parameters, namespace)
     for node, parameters in values.items():
         NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
     given = dict.fromkeys(NODE_PARAMETERS, "")
@@ -84,15 +95,25 @@ def load_scenario(
         )
         for node, parameters in values.items()
     }
-    return Scenario(name=path.stem, overrides=tuple(overrides), **models)
+    return Scenario(
+        name=path.stem,
+        overrides=tuple(overrides),
+        path=path,
+        other_sections=tuple(other_sections),
+        **models,
+    )
+
+
+def section_matches(pattern: str, node: str) -> bool:
+    """Return whether a section applies to the node of that full name, as ROS has it."""
+    tokens = {"**": r"(/\w+)*", "*": r"/\w+"}
+    expression = "".join(tokens.get(t, "/" + re.escape(t)) for t in pattern.split("/")[1:])
+    return re.fullmatch(expression, node) is not None
 
 
 def config_directories() -> list[Path]:
     """Return the existing directories in which scenarios are found by name."""
-    prefixes = [
-        Path(entry) for entry in environ.get("AMENT_PREFIX_PATH", "").split(pathsep) if entry
-    ]
-    installed = [prefix / "share/stickslip_ros/config" for prefix in [*prefixes, Path(sys.prefix)]]
+    installed = [prefix / "share/stickslip_ros/config" for prefix in prefixes()]
     source_tree = Path(__file__).parents[2] / "config"
     return [directory for directory in [source_tree, *installed] if directory.is_dir()]
 
@@ -206,13 +227,7 @@ def _apply(
     namespace: str,
 ) -> None:
     """Give the parameters of a section to every node that it matches."""
-    tokens = {"**": r"(/\w+)*", "*": r"/\w+"}
-    expression = "".join(tokens.get(t, "/" + re.escape(t)) for t in pattern.split("/")[1:])
-    nodes = [
-        node
-        for node in NODE_PARAMETERS
-        if re.fullmatch(expression, f"{namespace.rstrip('/')}/{node}")
-    ]
+    nodes = _matching(pattern, namespace)
     if not nodes:
         raise InvalidInputError(
             f"{path}: section {pattern} matches no node; in namespace {namespace} there are "
@@ -225,6 +240,11 @@ def _apply(
             raise InvalidInputError(f"{path}: section {pattern}: no node has a parameter {name}")
         for node in takers:
             values[node][name] = value
+
+
+def _matching(pattern: str, namespace: str) -> list[str]:
+    """Return the nodes in `namespace` to which a section applies."""
+    return [n for n in NODE_PARAMETERS if section_matches(pattern, f"{namespace.rstrip('/')}/{n}")]
 
 
 def _names(node: str) -> set[str]:

@@ -21,6 +21,24 @@ from tests.app.conftest import Run
         (("run", "paper", "--namespace", "a b"), ("--namespace 'a b'",)),
         (("run", "paper", "--bag", "/proc/none/bag"), ("/proc/none/bag",)),
         (("run", "paper", "--bag", "."), ("exists already",)),
+        (("run", "paper", "--controller", "damper"), ("--controller damper", "PACKAGE/EXECUTABLE")),
+        (
+            ("run", "paper", "--controller", "stickslip/x"),
+            ("no package stickslip", "mean stickslip_ros?"),
+        ),
+        (
+            ("run", "paper", "--controller", "nosuch/x"),
+            ("no package nosuch in", "AMENT_PREFIX_PATH"),
+        ),
+        (
+            ("run", "paper", "--controller", "stickslip_ros/damper"),
+            ("no executable damper", "plant_node, replay_node"),
+        ),
+        (
+            ("run", "paper", "--external-controller", "-p", "plant.expects_control=false"),
+            ("plant.expects_control = False", "--external-controller"),
+        ),
+        (("run", "paper", "--", "-p", "gain:=3"), ("-- -p gain:=3", "--controller")),
         (("report", "nosuch"), ("nosuch",)),
         (("report", "."), (".mcap",)),
         (
@@ -54,6 +72,8 @@ def test_one_line_and_status_2(
         ("simulate", "paper", "--duration", "-1"),
         ("simulate", "paper", "--duration", "nan"),
         ("run", "paper", "--pace", "slow"),
+        ("run", "paper", "--no-control", "--external-controller"),
+        ("run", "paper", "--controller", "a/b", "--external-controller"),
         ("report", "bag", "--from", "x"),
     ],
 )

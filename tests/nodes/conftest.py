@@ -3,12 +3,16 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.nodes.graph import Graph, own_domain
+from stickslip_ros.nodes.process import this_machine_only
+from stickslip_ros.testing import own_domain
+from tests.nodes.graph import Graph
+from tests.nodes.processes import Processes
 
 
 @pytest.fixture(autouse=True)
 def _this_machine_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    for name, value in this_machine_only().items():
+        monkeypatch.setenv(name, value)
 
 
 @pytest.fixture
@@ -28,3 +32,10 @@ def graph(domain: int) -> Iterator[Graph]:
 def process_environment(domain: int) -> dict[str, str]:
     """Environment of a process that is in the test's domain."""
     return {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+
+
+@pytest.fixture
+def processes(process_environment: dict[str, str]) -> Iterator[Processes]:
+    processes = Processes(process_environment)
+    yield processes
+    processes.end()

@@ -1,11 +1,7 @@
-"""Nodes of a test, composed in this process, in a ROS domain that no other test uses."""
+"""Nodes of a test, composed in this process."""
 
-import fcntl
-import tempfile
 import time
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable
 from threading import Event
 from typing import Any
 
@@ -27,23 +23,6 @@ PATIENCE = 60.0
 
 _ATTEMPTS = 6
 """To get an answer from a service within that time."""
-
-_DOMAINS = range(1, 102)
-
-
-@contextmanager
-def own_domain() -> Generator[int]:
-    """Hold a ROS domain that no other test on this machine has, whichever process it is in."""
-    for domain in _DOMAINS:
-        lock = Path(tempfile.gettempdir()) / f"stickslip_ros_test_domain_{domain}"
-        with lock.open("w") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                continue
-            yield domain
-            return
-    raise RuntimeError("every ROS domain is taken by a test")
 
 
 def wait_for(condition: Callable[[], object], what: str) -> None:

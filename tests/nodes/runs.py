@@ -9,7 +9,8 @@ from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from tests.nodes.graph import Graph, own_domain
+from stickslip_ros.testing import own_domain
+from tests.nodes.graph import Graph
 
 SECOND = 1_000_000_000
 STATES = "/test/joint_states"

@@ -41,7 +41,8 @@ def checkout(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def executables():
-    return {script.name for script in metadata.distribution(PACKAGE).entry_points}
+    scripts = metadata.distribution(PACKAGE).entry_points.select(group="console_scripts")
+    return {script.name for script in scripts}
 
 
 @pytest.fixture

@@ -8,7 +8,8 @@ import pytest
 IMPORT_ALL = """
 import importlib, pkgutil, stickslip_ros
 for module in pkgutil.walk_packages(stickslip_ros.__path__, "stickslip_ros."):
-    importlib.import_module(module.name)
+    if module.name != "stickslip_ros.pytest_plugin":
+        importlib.import_module(module.name)
 """
 
 

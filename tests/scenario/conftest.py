@@ -14,9 +14,11 @@ def read_by_ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[ReadByRos]:
     """What ROS itself gives to a node `plant` from a parameter file."""
     context_module = pytest.importorskip("rclpy.context")
     node_module = pytest.importorskip("rclpy.node")
-    from tests.nodes.graph import own_domain
+    from stickslip_ros.nodes.process import this_machine_only
+    from stickslip_ros.testing import own_domain
 
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    for name, value in this_machine_only().items():
+        monkeypatch.setenv(name, value)
 
     def read(path: str, namespace: str = "/feed_drive") -> dict[str, Any]:
         context = context_module.Context()

@@ -48,6 +48,13 @@ def test_a_section_that_matches_no_node_is_refused(
     assert f"in namespace {namespace} there are plant, washout_controller, analyzer" in message
 
 
+def test_sections_of_other_nodes_are_left_alone_where_there_may_be_some(tmp_path: Path) -> None:
+    text = section("/**/plant", "{mass: 7.0}") + section("/**/damper", "{gain: 0.5}")
+    scenario = load_scenario(scenario_file(tmp_path, text), other_nodes=True)
+    assert (scenario.plant.mass, scenario.other_sections) == (7.0, ("/**/damper",))
+    assert str(scenario.path) == str(tmp_path / "scenario.yaml")
+
+
 def test_ros_agrees(tmp_path: Path, read_by_ros: ReadByRos) -> None:
     for namespace, pattern in matching + not_matching:
         path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))

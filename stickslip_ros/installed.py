@@ -1,0 +1,57 @@
+"""What is installed beside this package: prefixes, ROS packages and their executables."""
+
+import os
+import sys
+from collections.abc import Iterator
+from difflib import get_close_matches
+from pathlib import Path
+
+from stickslip_ros.errors import InvalidInputError
+
+_MARKERS = "share/ament_index/resource_index/packages"
+
+
+def prefixes() -> list[Path]:
+    """Return the prefixes in which ROS packages are installed, the first to look in first.
+
+    The environment's own comes last: ROS wheels install there without any set-up script.
+    """
+    given = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    return [Path(prefix) for prefix in [*filter(None, given), sys.prefix]]
+
+
+def find_executable(name: str, source: str) -> Path:
+    """Return the file of the executable PACKAGE/EXECUTABLE, found as `ros2 run` finds it.
+
+    Raises InvalidInputError, naming `source`, for one that is not installed.
+    """
+    package, _, executable = name.partition("/")
+    if not package or not executable or "/" in executable:
+        raise InvalidInputError(
+            f"{source} {name}: must be PACKAGE/EXECUTABLE, "
+            "such as stickslip_ros/washout_controller_node"
+        )
+    prefix = next((p for p in prefixes() if (p / _MARKERS / package).is_file()), None)
+    if prefix is None:
+        known = {marker.name for p in prefixes() for marker in (p / _MARKERS).glob("*")}
+        close = " or ".join(get_close_matches(package, known))
+        raise InvalidInputError(
+            f"{source} {name}: no package {package} in {', '.join(map(str, prefixes()))} "
+            "(AMENT_PREFIX_PATH and the Python environment)"
+            + (f"; did you mean {close}?" if close else "")
+        )
+    files = {file.name: file for file in _executables(prefix / "lib" / package)}
+    if executable not in files:
+        raise InvalidInputError(
+            f"{source} {name}: the package {package} in {prefix} has no executable {executable}; "
+            f"it has {', '.join(sorted(files)) or 'none'}"
+        )
+    return files[executable]
+
+
+def _executables(folder: Path) -> Iterator[Path]:
+    for parent, folders, files in os.walk(folder):
+        folders[:] = sorted(folder for folder in folders if not folder.startswith("."))
+        yield from (
+            Path(parent, file) for file in sorted(files) if os.access(Path(parent, file), os.X_OK)
+        )

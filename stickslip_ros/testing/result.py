@@ -1,0 +1,76 @@
+"""What a run of the closed loop gave: columns, measures, diagnostics."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from stickslip_ros.bags import Recording
+from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
+from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.physics.measures import Measures
+from stickslip_ros.physics.samples import RunMeter
+
+
+class Diagnostics(NamedTuple):
+    """What a node said of itself at the end of a run."""
+
+    level: bytes
+    """As in diagnostic_msgs/DiagnosticStatus: OK, WARN or ERROR."""
+    message: str
+    """What is wrong, in words; empty: nothing."""
+    figures: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class RunResult:
+    """One run: what was recorded in it, and what that comes to; SI units, stamps in ns."""
+
+    states: JointStateColumns
+    """Every sample."""
+    forces: WrenchColumns
+    """Every control force that was published; its stamp is that of the sample it answers."""
+    disturbances: WrenchColumns
+    """The disturbance force at each sample at which it changed."""
+    measures: Measures
+    """Of the last whole cycles of this run, `analyzer.window` at most."""
+    peak_force: float | None
+    """Largest magnitude of the control force, N; None without forces."""
+    resting_force: float | None
+    """The same over the last tenth of the run."""
+    late_forces: int
+    """Samples whose force had not come when it was due."""
+    lost_samples: int
+    """Samples that are missing in `states`; in lockstep none ever is."""
+    diagnostics: dict[str, Diagnostics]
+    """By the name of the node: plant and, if it ran, washout_controller."""
+
+    @property
+    def time(self) -> FloatArray:
+        """Time of each sample from the first one of this run, s."""
+        return (self.states.stamp - self.states.stamp[0]) * 1e-9
+
+    @property
+    def force_time(self) -> FloatArray:
+        """Time of the sample that each force answers, from the first sample of this run, s."""
+        return (self.forces.stamp - self.states.stamp[0]) * 1e-9
+
+
+def result_of(bag: Path, window: int, diagnostics: dict[str, Diagnostics]) -> RunResult:
+    """Read and measure a run, over the last `window` cycles; raises BagError if it cannot."""
+    with Recording(bag) as recording:
+        states, forces = recording.joint_states, recording.control_forces
+        disturbances = recording.applied_disturbances
+    meter = RunMeter(window)
+    meter.motion.feed(states.stamp, states.position, states.velocity, states.belt_velocity)
+    meter.force.feed(forces.stamp, forces.force)
+    return RunResult(
+        states=states,
+        forces=forces,
+        disturbances=disturbances,
+        measures=meter.motion.measures(),
+        peak_force=meter.force.peak_force,
+        resting_force=meter.force.resting_force,
+        late_forces=diagnostics["plant"].figures["late_forces"],
+        lost_samples=meter.motion.lost_samples,
+        diagnostics=diagnostics,
+    )

@@ -1,0 +1,367 @@
+"""`stickslip run` with a controller of the user's: a node that knows nothing of this package."""
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+
+from stickslip_ros.bags.reader import Recording
+from stickslip_ros.nodes.topics import DIAGNOSTICS
+from tests.app.conftest import Run
+from tests.app.test_run import children, command, is_running, wait_for_samples
+from tests.nodes.graph import PATIENCE, Graph, wait_for
+
+Install = Callable[..., str]
+Start = Callable[..., subprocess.Popen[str]]
+
+DAMPER = """
+import signal
+import sys
+
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+
+class Answering:
+    def connect(self):
+        self.gain = self.declare_parameter("gain", 0.1).value
+        self.force = self.create_publisher(WrenchStamped, "control_force", 10)
+        self.create_subscription(JointState, "joint_states", self.answer, 10)
+
+    def answer(self, state):
+        force = WrenchStamped(header=state.header)
+        force.wrench.force.x = -self.gain * state.velocity[0]
+        self.force.publish(force)
+
+
+class Damper(Answering, Node):
+    def __init__(self):
+        super().__init__("damper")
+        self.connect()
+
+
+class ManagedDamper(Answering, LifecycleNode):
+    def __init__(self):
+        super().__init__("damper")
+        self.active = False
+
+    def on_configure(self, state):
+        self.connect()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state):
+        self.active = True
+        return TransitionCallbackReturn.SUCCESS
+
+    def answer(self, state):
+        if self.active:
+            super().answer(state)
+
+
+class Mute(Damper):
+    def answer(self, state):
+        pass
+
+
+class Mortal(Damper):
+    def answer(self, state):
+        if state.header.stamp.sec == 2:
+            sys.exit(3)
+        super().answer(state)
+
+
+class ForceOnly(Node):
+    def __init__(self):
+        super().__init__("damper")
+        self.force = self.create_publisher(WrenchStamped, "control_force", 10)
+
+
+class Deaf(Damper):
+    def __init__(self):
+        super().__init__()
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def run(node):
+    rclpy.init()
+    try:
+        rclpy.spin(node())
+    except KeyboardInterrupt:
+        print("ended as it should")
+"""
+
+
+@pytest.fixture
+def install(
+    process_environment: dict[str, str], tmp_path_factory: pytest.TempPathFactory
+) -> Install:
+    """Install a script into a package of a user's; return how the controller is named."""
+    prefix = tmp_path_factory.mktemp("prefix")
+    process_environment["AMENT_PREFIX_PATH"] = str(prefix)
+    marker = prefix / "share/ament_index/resource_index/packages/my_controllers"
+    marker.parent.mkdir(parents=True)
+    marker.touch()
+    folder = prefix / "lib/my_controllers"
+    folder.mkdir(parents=True)
+
+    def install(script: str, name: str = "damper", interpreter: str = sys.executable) -> str:
+        executable = folder / name
+        executable.write_text(f"#!{interpreter}\n{script}", encoding="utf-8")
+        executable.chmod(0o755)
+        return f"my_controllers/{name}"
+
+    return install
+
+
+def damper(node: str) -> str:
+    return f"{DAMPER}\n\nrun({node})\n"
+
+
+def read_until(process: subprocess.Popen[str], text: str) -> str:
+    """Return the first line on standard error, from now on, that has the text."""
+    assert process.stderr is not None
+    return next((line for line in process.stderr if text in line), "")
+
+
+def payloads(bag: Path) -> dict[str, list[bytes]]:
+    with Recording(bag) as recording:
+        return {
+            topic: [payload for _, _, payload in recording.messages(f"/feed_drive/{topic}")]
+            for topic in ("joint_states", "control_force")
+        }
+
+
+@pytest.mark.long
+def test_ours_started_as_that_of_others_gives_the_same_bytes(
+    stickslip: Run, tmp_path: Path
+) -> None:
+    ours = ("--controller", "stickslip_ros/washout_controller_node")
+    arguments = ("paper", "-p", "washout_controller.linear_gain=-0.5", "--duration", "5")
+    for bag, how in {"plain": (), "processes": ours, "composed": (*ours, "--composed")}.items():
+        done = stickslip("run", *arguments, "--bag", bag, *how)
+        assert done.returncode == 0, done.stderr
+    plain = payloads(tmp_path / "plain")
+    assert [len(messages) for messages in plain.values()] == [501, 501]
+    assert payloads(tmp_path / "processes") == plain
+    assert payloads(tmp_path / "composed") == plain
+
+
+SCENARIO = """
+/**/plant:
+  ros__parameters: {reply_timeout: 1.0}
+/**/damper:
+  ros__parameters: {gain: 0.5}
+/**/dumper:
+  ros__parameters: {gain: 0.5}
+"""
+
+
+@pytest.mark.parametrize(("node", "flags"), [("Damper", ()), ("ManagedDamper", ("--composed",))])
+def test_a_controller_of_a_user(
+    stickslip: Run, install: Install, tmp_path: Path, node: str, flags: tuple[str, ...]
+) -> None:
+    name = install(damper(node))
+    (tmp_path / "my.yaml").write_text(SCENARIO, encoding="utf-8")
+    arguments = ("my.yaml", "--duration", "2", "--bag", "bag", "--json", *flags)
+    done = stickslip("run", *arguments, "--controller", name)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert (result["samples"], result["late_forces"], result["lost_samples"]) == (201, 0, 0)
+    assert (result["controller"], result["controller_command"]) == ("/feed_drive/damper", name)
+    assert "my.yaml: section /**/dumper matches no node" in done.stderr
+    assert "/**/damper" not in done.stderr
+    assert "ended as it should" in done.stderr
+    with Recording(tmp_path / "bag") as recording:
+        states, forces = recording.joint_states, recording.control_forces
+    assert forces.stamp.tolist() == states.stamp.tolist()
+    assert forces.force.tolist() == (-0.5 * states.velocity).tolist()
+
+
+@pytest.mark.long
+def test_arguments_for_the_controller(stickslip: Run, install: Install, tmp_path: Path) -> None:
+    name = install(damper("Damper"))
+    further = ("--", "--ros-args", "-p", "gain:=2.0")
+    arguments = ("paper", "--duration", "1", "--bag", "bag", "--json")
+    done = stickslip("run", *arguments, "--controller", name, *further)
+    assert done.returncode == 0, done.stderr
+    made_by = json.loads(done.stdout)["controller_command"]
+    assert made_by == "my_controllers/damper --ros-args -p gain:=2.0"
+    with Recording(tmp_path / "bag") as recording:
+        states, forces = recording.joint_states, recording.control_forces
+    assert forces.force.tolist() == (-2.0 * states.velocity).tolist()
+
+
+def test_a_controller_that_dies_ends_the_run(
+    stickslip: Run, install: Install, tmp_path: Path
+) -> None:
+    name = install(damper("Mortal"))
+    done = stickslip("run", "paper", "--composed", "--bag", "bag", "--controller", name)
+    assert done.returncode == 1
+    assert "the node /feed_drive/damper died (exit status 3)" in done.stderr
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.complete
+
+
+@pytest.mark.parametrize(
+    ("script", "interpreter", "named"),
+    [
+        ("raise SystemExit(3)", sys.executable, "my_controllers/damper died (exit status 3)"),
+        ("", "/nowhere/python", "cannot be started: No such file"),
+    ],
+)
+def test_a_controller_that_does_not_start(
+    stickslip: Run, install: Install, tmp_path: Path, script: str, interpreter: str, named: str
+) -> None:
+    name = install(script, interpreter=interpreter)
+    done = stickslip("run", "paper", "--composed", "--controller", name)
+    assert done.returncode == 1
+    assert named in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.long
+def test_a_controller_that_never_closes_the_loop(stickslip: Run, install: Install) -> None:
+    done = stickslip("run", "paper", "--controller", install(damper("ForceOnly")))
+    assert done.returncode == 1
+    assert "my_controllers/damper was not ready within 30 s" in done.stderr
+    lacking = "publishes /feed_drive/control_force but does not read /feed_drive/joint_states"
+    assert f"/feed_drive/damper {lacking}" in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.long
+def test_a_controller_that_never_answers(stickslip: Run, install: Install) -> None:
+    impatient = ("-p", "plant.reply_timeout=0.5", "--duration", "3", "--json")
+    done = stickslip("run", "paper", *impatient, "--controller", install(damper("Mute")))
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("no control force comes") == 1
+    result = json.loads(done.stdout)
+    assert (result["samples"], result["late_forces"]) == (301, 300)
+
+
+@pytest.mark.long
+def test_no_controller_outlives_the_run(
+    start_stickslip: Start, install: Install, tmp_path: Path
+) -> None:
+    """Not even behind a shell that is deaf to what asks it to end, and when the run is killed."""
+    script = tmp_path / "damper.py"
+    script.write_text(damper("Damper"), encoding="utf-8")
+    shell = f"trap '' INT TERM\n{sys.executable} {script} \"$@\" &\nwhile :; do wait; done\n"
+    name = install(shell, interpreter="/bin/sh")
+    process = start_stickslip("run", "paper", "--bag", "bag", "--composed", "--controller", name)
+    wait_for_samples(process, tmp_path / "bag")
+    (guard,) = children(process.pid)
+    (shell_process,) = children(guard)
+    (node,) = children(shell_process)
+    assert str(script).encode() in command(node)
+    process.kill()
+    process.wait()
+    wait_for(lambda: not any(map(is_running, (guard, shell_process, node))), "they end")
+
+
+@pytest.mark.long
+def test_a_deaf_controller_is_killed_at_the_end(stickslip: Run, install: Install) -> None:
+    done = stickslip("run", "paper", "--duration", "1", "--controller", install(damper("Deaf")))
+    assert done.returncode == 0, done.stderr
+    assert "my_controllers/damper ends neither on SIGINT nor on SIGTERM: killed" in done.stderr
+
+
+@pytest.fixture
+def start_damper(
+    process_environment: dict[str, str], tmp_path: Path
+) -> Iterator[Callable[..., subprocess.Popen[bytes]]]:
+    """Start a controller that no run knows of."""
+    script = tmp_path / "damper.py"
+    script.write_text(damper("Damper"), encoding="utf-8")
+    environment = process_environment | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    started: list[subprocess.Popen[bytes]] = []
+
+    def start(namespace: str = "/feed_drive") -> subprocess.Popen[bytes]:
+        arguments = ["--ros-args", "-r", f"__ns:={namespace}"]
+        started.append(subprocess.Popen([sys.executable, script, *arguments], env=environment))
+        return started[-1]
+
+    yield start
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.parametrize("late", [False, pytest.param(True, marks=pytest.mark.long)])
+def test_an_external_controller_is_waited_for(
+    start_stickslip: Start, start_damper: Callable[..., subprocess.Popen[bytes]], late: bool
+) -> None:
+    arguments = ("paper", "--composed", "--external-controller", "--duration", "2", "--json")
+    if not late:
+        start_damper()
+    process = start_stickslip("run", *arguments)
+    waits = read_until(process, "waiting for a controller")
+    assert waits.endswith(
+        "a node that reads /feed_drive/joint_states and publishes /feed_drive/control_force\n"
+    )
+    if late:
+        start_damper()
+    output, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, errors
+    result = json.loads(output)
+    assert (result["samples"], result["late_forces"]) == (201, 0)
+    assert (result["controller"], result["controller_command"]) == ("/feed_drive/damper", None)
+
+
+@pytest.mark.long
+def test_nobody_else_is_taken_for_the_controller_and_ctrl_c_ends_waiting(
+    start_stickslip: Start,
+    start_damper: Callable[..., subprocess.Popen[bytes]],
+    tmp_path: Path,
+) -> None:
+    start_damper(namespace="/other")
+    process = start_stickslip("run", "paper", "--external-controller", "--bag", "bag")
+    hint = read_until(process, "/other/damper reads")
+    assert hint.endswith(
+        "reads /other/joint_states, the plant publishes /feed_drive/joint_states\n"
+    )
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert not (tmp_path / "bag").exists()
+
+
+@pytest.mark.long
+def test_an_external_controller_may_die_and_return(
+    start_stickslip: Start,
+    start_damper: Callable[..., subprocess.Popen[bytes]],
+    domain: int,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    graph = Graph(domain)
+    health = graph.listen(DIAGNOSTICS)
+    impatient = ("-p", "plant.reply_timeout=0.5", "-p", "analyzer.flush_period=0.2")
+    first = start_damper()
+    process = start_stickslip("run", "paper", "--external-controller", "--bag", "bag", *impatient)
+    wait_for_samples(process, tmp_path / "bag")
+    first.kill()
+    assert "going on without" in read_until(process, "no control force comes")
+    graph.wait_until(lambda: "no control" in words_of_plant(health), "it is diagnosed")
+    start_damper()
+    graph.wait_until(lambda: "no control" not in words_of_plant(health), "it is taken back")
+    graph.close()
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert "no control force comes" not in errors
+
+
+def words_of_plant(health: list[DiagnosticArray]) -> str:
+    """Return what the plant has last said of itself."""
+    told = [s.message for array in health for s in array.status if s.name == "/feed_drive/plant"]
+    return told[-1] if told else ""

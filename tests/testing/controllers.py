@@ -1,0 +1,104 @@
+"""Controllers as a user writes them: plain rclpy nodes that know nothing of this package."""
+
+import sys
+from contextlib import suppress
+from threading import Event
+from typing import Any
+
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from rclpy.executors import ExternalShutdownException
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+GAIN = 0.7
+
+
+class VelocityFeedback(Node):
+    """Answers every state with a force against the slide's velocity."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("velocity_feedback", **options)
+        self.answered = 0
+        self.force = self.create_publisher(WrenchStamped, "control_force", 10)
+        self.create_subscription(JointState, "joint_states", self.answer, 10)
+
+    def answer(self, state: JointState) -> None:
+        force = WrenchStamped(header=state.header)
+        force.wrench.force.x = -GAIN * state.velocity[state.name.index("slide")]
+        self.force.publish(force)
+        self.answered += 1
+
+
+class WithoutArguments(VelocityFeedback):
+    def __init__(self) -> None:
+        super().__init__()
+
+
+class Informed(VelocityFeedback):
+    """Has a callback of a kind that not every executor runs."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.received = 0
+        self.create_subscription(JointState, "joint_states", self.look, 10)
+
+    def look(self, state: JointState, info: Any) -> None:
+        self.received = info["received_timestamp"]
+
+
+class Raising(WithoutArguments):
+    def answer(self, state: JointState) -> None:
+        super().answer(state)
+        if self.answered == 20:
+            raise ValueError("twenty are enough")
+
+
+class RaisingByItself(WithoutArguments):
+    def __init__(self) -> None:
+        super().__init__()
+        self.about_to_raise = Event()
+        self.create_timer(0.01, self.fail)
+
+    def fail(self) -> None:
+        self.about_to_raise.set()
+        raise ValueError("by itself")
+
+
+class Silent(WithoutArguments):
+    def answer(self, state: JointState) -> None:
+        self.answered += 1
+
+
+class Managed(LifecycleNode):
+    """Has publisher and subscription from when it is configured on, and publishes when active."""
+
+    def __init__(self) -> None:
+        super().__init__("managed_feedback")
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        self.force = self.create_lifecycle_publisher(WrenchStamped, "control_force", 10)
+        self.create_subscription(JointState, "joint_states", self.answer, 10)
+        return TransitionCallbackReturn.SUCCESS
+
+    def answer(self, state: JointState) -> None:
+        self.force.publish(WrenchStamped(header=state.header))
+
+
+class Refusing(LifecycleNode):
+    def __init__(self) -> None:
+        super().__init__("refusing")
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        return TransitionCallbackReturn.FAILURE
+
+
+def main() -> None:
+    rclpy.init()
+    with suppress(KeyboardInterrupt, ExternalShutdownException):
+        rclpy.spin(globals()[sys.argv[1]]())
+
+
+if __name__ == "__main__":
+    main()

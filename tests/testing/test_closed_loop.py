@@ -1,0 +1,343 @@
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from select import select
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import JointState
+
+from stickslip_ros.bags import Recording
+from stickslip_ros.errors import BagError, InvalidInputError, RunError
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.testing import ClosedLoop
+from tests.testing import controllers
+from tests.testing.controllers import GAIN, VelocityFeedback, WithoutArguments
+
+SECOND = 1_000_000_000
+
+
+def process(controller: type[Node]) -> list[str]:
+    return [sys.executable, str(controllers.__file__), controller.__name__]
+
+
+def test_a_controller_of_ones_own_acts_as_it_does_without_ros() -> None:
+    plant = load_scenario("paper").plant
+    expected = SampledLoop(Motion(plant.as_drive(), 0.0, 0.0), plant.rate, LOCKSTEP_START)
+    samples = [expected.sample]
+    for _ in range(300):
+        expected.offer(samples[-1].stamp, -GAIN * samples[-1].velocity)
+        samples.append(expected.advance())
+    with ClosedLoop("paper", controller=WithoutArguments) as loop:
+        result = loop.run(3.0)
+        assert isinstance(loop.controller, WithoutArguments)
+        assert loop.controller.answered == 301
+    assert result.states.stamp.tolist() == [sample.stamp for sample in samples]
+    assert result.states.position.tolist() == [sample.position for sample in samples]
+    assert result.forces.stamp.tolist() == result.states.stamp.tolist()
+    assert result.forces.force.tolist() == [-GAIN * sample.velocity for sample in samples]
+    assert result.time[[0, -1]].tolist() == [0.0, 3.0]
+    assert result.late_forces == result.lost_samples == 0
+
+
+@pytest.mark.parametrize(
+    "controller",
+    [
+        VelocityFeedback,
+        lambda: VelocityFeedback(),
+        controllers.Informed,
+        controllers.Managed,
+        WashoutControllerNode,
+        "washout",
+    ],
+)
+def test_every_kind_of_controller_answers_every_sample(controller: Any) -> None:
+    with ClosedLoop("paper", controller=controller) as loop:
+        result = loop.run(0.5)
+    assert result.late_forces == 0
+    assert result.forces.stamp.tolist() == result.states.stamp.tolist()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "command",
+    [
+        process(WithoutArguments),
+        process(controllers.Managed),
+        [sys.executable, "-m", WashoutControllerNode.__module__],
+        ["sh", "-c", '"$0" "$@"; exit', *process(WithoutArguments)],
+    ],
+)
+def test_a_controller_in_a_process_of_its_own_answers_every_sample(command: list[str]) -> None:
+    with ClosedLoop("paper", controller=command) as loop:
+        results = [loop.run(0.5), loop.run(0.5)]
+    for result in results:
+        assert result.late_forces == 0
+        assert result.forces.stamp.tolist() == result.states.stamp.tolist()
+
+
+@pytest.mark.long
+def test_the_test_may_start_a_controller_by_itself() -> None:
+    with ClosedLoop("paper", controller="external") as loop:
+        command = [*process(WithoutArguments), *loop.ros_arguments]
+        with subprocess.Popen(command, env=loop.environment) as controller:
+            result = loop.run(0.5)
+            controller.terminate()
+    assert result.late_forces == 0
+    assert result.forces.stamp.tolist() == result.states.stamp.tolist()
+
+
+def test_the_motion_goes_on_in_a_further_run(tmp_path: Path) -> None:
+    with ClosedLoop("paper", bag=tmp_path / "bag") as loop:
+        first, second = loop.run(1.0), loop.run(2.0)
+    assert len(first.states.stamp), len(second.states.stamp) == (101, 201)
+    assert second.states.stamp[0] == first.states.stamp[-1] + SECOND // 100
+    assert second.states.position[0] == first.states.position[-1]
+    for name, result in (("bag", first), ("bag_2", second)):
+        with Recording(tmp_path / name) as recording:
+            assert recording.complete
+            np.testing.assert_array_equal(recording.joint_states.stamp, result.states.stamp)
+
+
+def test_measures_are_those_of_the_run() -> None:
+    with ClosedLoop("paper", "plant.belt_speed=0.3", controller=None) as loop:
+        vibrating = loop.run(40.0)
+    assert vibrating.measures.regime == "stick_slip"
+    assert vibrating.peak_force is None
+    assert vibrating.late_forces == 0
+    settling = ("washout_controller.corner_frequency=0.5", "washout_controller.linear_gain=-2.0")
+    with ClosedLoop("paper", *settling) as loop:
+        loop.run(60.0)
+        resting = loop.run(20.0)
+    assert resting.measures.regime == "equilibrium"
+    assert resting.resting_force == pytest.approx(0.0, abs=1e-3)
+    assert resting.diagnostics["washout_controller"].figures["answered"] == 8002
+
+
+def test_parameters_and_disturbance_are_changed_between_runs() -> None:
+    with ClosedLoop("paper") as loop:
+        before = loop.run(0.5)
+        loop.set("plant.belt_speed=0.2", "washout_controller.linear_gain=-2.0")
+        loop.disturb(0.25)
+        after = loop.run(0.5)
+        assert loop.scenario.washout_controller.linear_gain == -2.0
+    assert set(before.states.belt_velocity) == {0.4}
+    assert set(after.states.belt_velocity) == {0.2}
+    assert before.disturbances.force.tolist() == []
+    assert after.disturbances.force.tolist() == [0.25]
+    assert after.disturbances.stamp[0] == after.states.stamp[0]
+
+
+def test_a_bad_change_changes_nothing() -> None:
+    with ClosedLoop("paper", controller=WithoutArguments) as loop:
+        for change in ("plant.mass=-1.0", "plant.mas=1.0", "mass", "washout_controller.d=1.0"):
+            with pytest.raises(InvalidInputError, match=change.partition("=")[0].split(".")[-1]):
+                loop.set("plant.belt_speed=0.2", change)
+        with pytest.raises(InvalidInputError, match="washout_controller is not part of this loop"):
+            loop.set("plant.belt_speed=0.2", "washout_controller.linear_gain=-2.0")
+        assert set(loop.run(0.1).states.belt_velocity) == {0.4}
+
+
+def test_what_a_controller_raises_ends_the_run() -> None:
+    with ClosedLoop("paper", controller=controllers.Raising) as loop:
+        for _ in range(2):
+            with pytest.raises(RunError, match="velocity_feedback raised ValueError: twenty") as it:
+                loop.run(1.0)
+            assert isinstance(it.value.__cause__, ValueError)
+            assert it.value.__cause__.__traceback__ is not None
+
+
+def test_what_a_controller_raises_after_its_last_answer_ends_the_run() -> None:
+    with (
+        ClosedLoop("paper", "plant.rate=19.0", controller=controllers.Raising) as loop,
+        pytest.raises(RunError, match="twenty"),
+    ):
+        loop.run(1.0)
+
+
+def test_what_a_controller_raises_between_runs_is_not_lost() -> None:
+    def open_and_close() -> None:
+        with ClosedLoop("paper", controller=controllers.RaisingByItself) as loop:
+            assert isinstance(loop.controller, controllers.RaisingByItself)
+            loop.controller.about_to_raise.wait()
+
+    with pytest.raises(RunError, match="raised ValueError: by itself"):
+        open_and_close()
+
+
+def test_without_an_answer_the_run_goes_on() -> None:
+    options: dict[str, Any] = {"controller": controllers.Silent}
+    with ClosedLoop("paper", "plant.reply_timeout=0.2", **options) as loop:
+        result = loop.run(1.0)
+    assert (len(result.states.stamp), len(result.forces.stamp)) == (101, 0)
+    assert result.late_forces == 100
+    assert "no control force comes" in result.diagnostics["plant"].message
+
+
+def test_a_run_that_takes_too_long_is_ended() -> None:
+    with ClosedLoop("paper", controller=controllers.Silent) as loop:
+        with pytest.raises(RunError, match=r"took more than 0.1 s: 1 samples so far"):
+            loop.run(1.0, timeout=0.1)
+        with pytest.raises(RunError, match=r"took more than 0.2 s"):
+            loop.run(1.0, timeout=0.2)
+
+
+class _Elsewhere(Node):
+    def __init__(self) -> None:
+        super().__init__("elsewhere")
+        self.create_publisher(WrenchStamped, "/control_force", 10)
+        self.create_subscription(JointState, "/joint_states", lambda _: None, 10)
+
+
+class _BestEffort(Node):
+    def __init__(self) -> None:
+        super().__init__("best_effort")
+        self.create_publisher(WrenchStamped, "control_force", qos_profile_sensor_data)
+        self.create_subscription(JointState, "joint_states", lambda _: None, 10)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("controller", "sentences"),
+    [
+        (
+            _Elsewhere,
+            [
+                "nobody reads /feed_drive/joint_states and publishes /feed_drive/control_force",
+                "elsewhere reads /joint_states, the plant publishes /feed_drive/joint_states",
+            ],
+        ),
+        (_BestEffort, ["/feed_drive/best_effort", "Best effort publisher"]),
+    ],
+)
+def test_a_controller_that_cannot_be_heard_is_told_why(
+    controller: type[Node], sentences: list[str]
+) -> None:
+    with (
+        pytest.raises(RunError) as told,
+        ClosedLoop("paper", controller=controller) as loop,
+    ):
+        loop.run(1.0)
+    for sentence in sentences:
+        assert sentence in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"controller": "python my.py"}, "controller = 'python my.py' is refused: must be a class"),
+        ({"controller": []}, r"controller = \[\] is refused"),
+        ({"controller": ["no_such_command"]}, "no command 'no_such_command'"),
+        ({"controller": lambda: 5}, "made 5, not an rclpy node"),
+        ({"controller": controllers.Refusing}, "refusing could not be configured: failure"),
+        ({"namespace": "a b"}, "namespace = 'a b' is refused"),
+    ],
+)
+def test_what_cannot_be_is_refused(options: dict[str, Any], sentence: str) -> None:
+    with pytest.raises((InvalidInputError, RunError), match=sentence):
+        ClosedLoop("paper", **options).__enter__()
+
+
+def test_a_loop_has_to_be_open_and_to_run_for_some_time(tmp_path: Path) -> None:
+    loop = ClosedLoop("paper")
+    with pytest.raises(RunError, match="not open"):
+        loop.run(1.0)
+    with loop:
+        for duration in (0.0, -1.0, float("inf"), float("nan")):
+            with pytest.raises(InvalidInputError, match=f"duration = {duration} s is refused"):
+                loop.run(duration)
+    with pytest.raises(BagError, match="exists already"):
+        ClosedLoop("paper", bag=tmp_path)
+
+
+@pytest.mark.long
+def test_a_controller_process_that_ends_is_told() -> None:
+    command = [sys.executable, "-c", "raise SystemExit(3)"]
+    with (
+        pytest.raises(RunError, match=r"SystemExit\(3\).* has ended \(exit status 3\)"),
+        ClosedLoop("paper", controller=command) as loop,
+    ):
+        loop.run(1.0)
+
+
+def test_where_the_default_context_is_in_use_the_loop_has_its_own() -> None:
+    rclpy.init(args=["--ros-args", "--disable-external-lib-logs"], domain_id=0)
+    try:
+        with (
+            pytest.raises(InvalidInputError, match="does not take `context`"),
+            ClosedLoop("paper", controller=WithoutArguments),
+        ):
+            pass
+        with ClosedLoop("paper", controller=VelocityFeedback) as loop:
+            assert loop.run(0.1).late_forces == 0
+        assert rclpy.ok()
+    finally:
+        rclpy.shutdown()
+
+
+def test_two_loops_do_not_meet() -> None:
+    with (
+        ClosedLoop("paper", controller=WithoutArguments) as first,
+        ClosedLoop("paper", controller=VelocityFeedback) as second,
+    ):
+        results = [loop.run(0.2) for loop in (first, second, first, second)]
+    for result in results:
+        assert result.forces.stamp.tolist() == result.states.stamp.tolist()
+
+
+def _in_use() -> dict[str, Any]:
+    maps = Path("/proc/self/maps").read_text(encoding="utf-8")
+    return {
+        "environment": dict(os.environ),
+        "tasks": len(os.listdir("/proc/self/task")),
+        "files": len(os.listdir("/proc/self/fd")),
+        "shared memory": sum("/dev/shm/" in line for line in maps.splitlines()),
+        "threads": threading.active_count(),
+        "default context": rclpy.ok(),
+    }
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+@pytest.mark.parametrize("controller", [WithoutArguments, "washout"])
+def test_nothing_is_left_behind(
+    controller: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+
+    def use() -> None:
+        with ClosedLoop("paper", controller=controller) as loop:
+            loop.run(0.1)
+
+    use()  # what the middleware keeps for all of the process
+    before = _in_use()
+    use()
+    with pytest.raises(ZeroDivisionError), ClosedLoop("paper", controller=controller):
+        1 / 0  # noqa: B018
+    assert _in_use() == before
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_no_process_is_left_behind(tmp_path: Path) -> None:
+    """Not even where it was started by a shell, and does not care for SIGINT."""
+    ignoring = "import signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); "
+    ignoring += "pipe = open(sys.argv[1], 'w'); print(1, file=pipe, flush=True); signal.pause()"
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    shell = ["sh", "-c", f'{sys.executable} -c "{ignoring}" {pipe} & wait']
+    with ClosedLoop("paper", controller=shell):
+        written = pipe.open()
+        assert written.readline() == "1\n"
+    with written:
+        ended, _, _ = select([written], [], [], 60.0)
+        assert ended
+        assert written.read() == ""
