@@ -40,7 +40,7 @@ from benchmarks.parties import (
 from benchmarks.slices import Row, by_turns, compare_rates, show
 from stickslip_ros.nodes.process import spin
 
-ROUNDS = 3
+ROUNDS = 11
 SLICE_TIME = 0.7
 """About what a slice takes, s."""
 FIRST_SLICE = 2000

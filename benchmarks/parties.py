@@ -28,7 +28,7 @@ from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.lifeline import start
 from stickslip_ros.nodes.managed import ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.process import spin
+from stickslip_ros.nodes.process import spin, this_machine_only
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, load_scenario, parameter_file
 from stickslip_ros.testing.domain import domain_variables, own_domain
@@ -187,6 +187,7 @@ def closed_loop(
 
     A slice is one activation of the plant, everything else being active all the time.
     """
+    os.environ.update(this_machine_only())
     with tempfile.TemporaryDirectory() as directory, ros():
         loop = OurLoop(make_plant, scenario, Path(directory) / "bag", composed=composed)
         yield loop

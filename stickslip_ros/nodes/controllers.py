@@ -3,10 +3,10 @@
 from collections.abc import Callable, Iterable, Iterator
 
 from rclpy.node import Node, NodeNameNonExistentError
-from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
+from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES, Topic
+from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES, Topic, mismatch
 
 _CHANGE_STATE = "lifecycle_msgs/srv/ChangeState"
 
@@ -108,5 +108,4 @@ def _misfit(info: TopicEndpointInfo, topic: Topic, writer: QoSProfile, reader: Q
     """Return why an endpoint and the plant's do not match, or nothing."""
     if info.topic_type != topic.type_name:
         return f"its type is {info.topic_type}, not {topic.type_name}"
-    compatibility, reason = qos_check_compatible(writer, reader)
-    return reason if compatibility == QoSCompatibility.ERROR else ""
+    return mismatch(writer, reader)

@@ -12,13 +12,12 @@ from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.timer import Timer
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.nodes.topics import DIAGNOSTICS, Topic
+from stickslip_ros.nodes.topics import DIAGNOSTICS, Topic, mismatch
 from stickslip_ros.scenario import parameters
 from stickslip_ros.scenario.parameters import NodeParameters
 
@@ -258,7 +257,7 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
                 readers = [
                     reader
                     for reader in self.get_subscriptions_info_by_topic(end.topic_name)
-                    if _fit(end.qos_profile, reader.qos_profile)
+                    if not mismatch(end.qos_profile, reader.qos_profile)
                 ]
                 found |= {reader.node_name for reader in readers}
                 matched = end.get_subscription_count() >= len(readers)
@@ -266,7 +265,7 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
                 writers = [
                     writer
                     for writer in self.get_publishers_info_by_topic(end.topic_name)
-                    if _fit(writer.qos_profile, end.qos_profile)
+                    if not mismatch(writer.qos_profile, end.qos_profile)
                 ]
                 matched = end.get_publisher_count() >= len(writers)
             else:
@@ -327,10 +326,6 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
     def _take_change(self, changes: list[Parameter]) -> None:
         self.parameters = self._changed(changes)
         self.apply_parameters()
-
-
-def _fit(writer: QoSProfile, reader: QoSProfile) -> bool:
-    return qos_check_compatible(writer, reader)[0] != QoSCompatibility.ERROR
 
 
 def take_waiting(subscription: Subscription) -> Iterator[bytes]:

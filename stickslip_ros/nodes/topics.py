@@ -5,7 +5,13 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
-from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import (
+    HistoryPolicy,
+    QoSCompatibility,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_check_compatible,
+)
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Header
@@ -47,3 +53,16 @@ CLOCK = Topic("/clock", Clock, "rosgraph_msgs/msg/Clock", 10)
 
 RECORDED_TOPICS = (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE)
 """What the analyzer writes to its bag."""
+
+
+def mismatch(writer: QoSProfile, reader: QoSProfile) -> str:
+    """Return why a reader cannot hear a writer, or nothing, by reliability and durability.
+
+    What the graph tells of the other policies does not compare with what a node has asked for.
+    """
+    both = [
+        QoSProfile(depth=1, reliability=profile.reliability, durability=profile.durability)
+        for profile in (writer, reader)
+    ]
+    compatibility, reason = qos_check_compatible(*both)
+    return reason if compatibility == QoSCompatibility.ERROR else ""
