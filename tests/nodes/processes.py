@@ -1,0 +1,64 @@
+"""Processes of a test: nodes of ours, a stranger that listens, and a load on the machine."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+
+_LISTENER = """
+import sys
+import rclpy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+rclpy.init()
+node = rclpy.create_node("stranger", namespace="/test")
+reliability = ReliabilityPolicy[sys.argv[1]]
+qos = QoSProfile(depth=10, reliability=reliability)
+node.create_subscription(JointState, "joint_states", lambda _: None, qos)
+rclpy.spin(node)
+"""
+
+
+class Processes:
+    """Starts processes in the domain of a test, and ends them all."""
+
+    def __init__(self, environment: Mapping[str, str]) -> None:
+        self._environment = environment
+        self._started: list[subprocess.Popen[bytes]] = []
+
+    def node(self, name: str, **parameters: object) -> subprocess.Popen[bytes]:
+        """Start one of our nodes in the namespace /test, or in the `namespace` given."""
+        namespace = parameters.pop("namespace", "/test")
+        arguments = ["-m", f"stickslip_ros.nodes.{name}", "--ros-args"]
+        arguments += ["-r", f"__ns:={namespace}"]
+        for key, value in parameters.items():
+            arguments += ["-p", f"{key.replace('__', '.')}:={value}"]
+        return self._start(arguments)
+
+    def stranger(self, reliability: str = "RELIABLE") -> subprocess.Popen[bytes]:
+        """Start a node that only listens to the joint states, as `ros2 topic echo` does."""
+        return self._start(["-c", _LISTENER, reliability])
+
+    def end(self) -> None:
+        for process in self._started:
+            process.kill()
+            process.wait()
+
+    def _start(self, arguments: list[str]) -> subprocess.Popen[bytes]:
+        process = subprocess.Popen([sys.executable, *arguments], env=self._environment)
+        self._started.append(process)
+        return process
+
+
+@contextmanager
+def busy_machine(count: int = 2) -> Generator[None]:
+    """Let so many processes do nothing but take processor time."""
+    burners = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for burner in burners:
+            burner.send_signal(signal.SIGKILL)
+            burner.wait()

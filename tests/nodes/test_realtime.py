@@ -1,0 +1,143 @@
+"""Real time when the plant, or who listens to it, is stopped or dies."""
+
+import os
+import signal
+import time
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+from threading import Lock
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+
+from stickslip_ros.bags.messages import unpack_header
+from stickslip_ros.nodes.pacing import RealtimePacer
+from stickslip_ros.nodes.topics import DIAGNOSTICS, JOINT_STATES
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.sampled_loop import SampledLoop
+from stickslip_ros.scenario.parameters import PlantParameters
+from tests.nodes.graph import Graph
+from tests.nodes.processes import Processes
+
+
+class Samples:
+    """Stamps of the joint states that the observer hears, and when it heard them."""
+
+    def __init__(self, graph: Graph) -> None:
+        self.stamps: list[int] = []
+        self.arrivals: list[float] = []
+        self._graph = graph
+        graph.observer.create_subscription(
+            JOINT_STATES.type, JOINT_STATES.name, self._take, JOINT_STATES.qos(10_000), raw=True
+        )
+
+    def _take(self, message: bytes) -> None:
+        self.arrivals.append(time.monotonic())
+        self.stamps.append(unpack_header(message))
+
+    def wait_for(self, count: int) -> None:
+        """Wait until as many further samples have come."""
+        enough = len(self.stamps) + count
+        self._graph.wait_until(lambda: len(self.stamps) >= enough, f"{count} further samples")
+
+    def least_delay(self, first: int, last: int | None) -> float:
+        """Return by how much, s, the least late of these samples came after its stamp's time."""
+        return min(
+            arrival - (stamp - self.stamps[0]) * 1e-9
+            for arrival, stamp in zip(
+                self.arrivals[first:last], self.stamps[first:last], strict=True
+            )
+        )
+
+
+def figure(health: list[DiagnosticArray], name: str) -> int:
+    """Return a figure of the plant's last diagnostics, 0 before it has told."""
+    figures = {
+        entry.key: entry.value
+        for array in health
+        for status in array.status
+        if status.name == "/test/plant"
+        for entry in status.values
+    }
+    return int(figures.get(name, 0))
+
+
+def test_after_a_stall_every_sample_follows_at_once_and_the_schedule_stands(
+    graph: Graph, processes: Processes
+) -> None:
+    rate, duration = 300.0, 3.0
+    samples = Samples(graph)
+    health = graph.listen(DIAGNOSTICS)
+    parameters = {"expects_control": False, "wait_for": "[observer]", "duration": duration}
+    plant = processes.node("plant", pace="realtime", rate=rate, **parameters)
+    samples.wait_for(200)
+    before = len(samples.stamps)
+    plant.send_signal(signal.SIGSTOP)
+    stopped = time.monotonic()
+    graph.wait_until(lambda: time.monotonic() >= stopped + 1.0, "time passes")
+    stall = time.monotonic() - stopped
+    plant.send_signal(signal.SIGCONT)
+
+    count = round(duration * rate) + 1
+    graph.wait_until(lambda: len(samples.stamps) == count, "every sample comes")
+    graph.wait_until(lambda: figure(health, "samples") == count, "the plant tells its figures")
+    nanoseconds = 1_000_000_000 / rate
+    assert [stamp - samples.stamps[0] for stamp in samples.stamps] == [
+        round(number * nanoseconds) for number in range(count)
+    ]
+    assert count > figure(health, "missed_deadlines") >= stall * rate - 5
+    # The second half of the rest: by then the plant has caught up.
+    after = (before + round(stall * rate) + count) // 2
+    delayed = samples.least_delay(after, None) - samples.least_delay(0, before)
+    assert abs(delayed) < 0.5 * stall
+
+
+@pytest.mark.parametrize("rate", [3.0, 1000.0 / 3.0, 1000.0, 44_100.0])
+@pytest.mark.parametrize("factor", [1.0, 0.1, 7.0])
+def test_after_millions_of_samples_the_deadline_is_exact(rate: float, factor: float) -> None:
+    motion = Motion(PlantParameters().as_drive(), 0.0, 0.0)
+    loop = SampledLoop(motion, rate, 1_000_000_000)
+    pacer = RealtimePacer(loop, lambda _: None, lambda: None, Lock(), factor, lambda _: None)
+    for number in (1, 1_000_003, 3_600_000, 86_400_000):
+        exact = number / (Fraction(rate) * Fraction(factor))
+        assert abs(Fraction(pacer.deadline(number)) - Fraction(pacer.deadline(0)) - exact) < 1e-6
+
+
+def processor_time(pid: int) -> float:
+    """Return the processor time, s, that a process has taken."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("reliability", ["RELIABLE", "BEST_EFFORT"])
+@pytest.mark.parametrize("end", [signal.SIGSTOP, signal.SIGKILL])
+def test_a_reader_that_is_stopped_or_killed_costs_the_plant_nothing(
+    graph: Graph, processes: Processes, end: signal.Signals, reliability: str
+) -> None:
+    """The shared memory of Fast DDS would cost 0.4 ms for each sample, or stand still for 1 s.
+
+    A second plant, to which the reader does not listen, tells what a sample costs meanwhile.
+    """
+    samples = Samples(graph)
+    stranger = processes.stranger(reliability)
+    common = {"pace": "realtime", "rate": 500.0, "expects_control": False}
+    plant = processes.node("plant", **common, wait_for="[stranger]")
+    other = processes.node("plant", **common, namespace="/other")
+
+    def relative_cost(count: int) -> float:
+        """Return the plant's processor time in that of the other, for so many samples."""
+        began = [processor_time(process.pid) for process in (plant, other)]
+        samples.wait_for(count)
+        taken = [processor_time(process.pid) for process in (plant, other)]
+        return (taken[0] - began[0]) / (taken[1] - began[1])
+
+    samples.wait_for(1000)
+    usual = relative_cost(1500)
+    first = len(samples.stamps)
+    stranger.send_signal(end)
+    samples.wait_for(2000)  # some effects take seconds to show
+    assert relative_cost(1500) < 1.6 * usual
+    assert max(b - a for a, b in pairwise(samples.arrivals[first:])) < 0.9
+    assert samples.stamps == [samples.stamps[0] + n * 2_000_000 for n in range(len(samples.stamps))]
