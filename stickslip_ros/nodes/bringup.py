@@ -220,10 +220,12 @@ class _Bringup:
     def _start_other(self, file: Path) -> None:
         """Start the other controller, if that is for us to do, with the scenario's parameters."""
         if self._other:
+            executable, *further = self._other
             in_namespace = ["--ros-args", "-r", f"__ns:={self._namespace}"]
-            # Its own parameters may stand in the scenario; overrides are in the other file.
+            # Its own parameters may stand in the scenario; overrides are in the other file. What
+            # was given with the command comes last, and so has the last word.
             files = ["--params-file", str(self._scenario.path), "--params-file", str(file)]
-            command = [*self._other, *in_namespace, *files]
+            command = [executable, *in_namespace, *files, "--", *further]
             self._processes[self._other[0]] = start(command, guarded=True)
 
     def _bring_up(self, nodes: Iterable[str]) -> None:

@@ -16,8 +16,8 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Header
 
-DEEP = 6_000
-"""Messages that wait for a reader that falls behind; with yet more, Fast DDS delays the writer."""
+DEEP = 4_900
+"""Messages that wait for a reader that falls behind; above 5,000, Fast DDS delays the writer."""
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -32,7 +33,7 @@ def draw_courses(path: Path, courses: Sequence[Course], shown: float = 0.6) -> N
     """
     speeds = sorted({course.belt_speed for course in courses})
     controllers = list(dict.fromkeys(course.controller for course in courses))
-    colours = dict(zip(controllers, _COLOURS, strict=True))
+    colours = dict(zip(controllers, cycle(_COLOURS), strict=False))
     figure = Figure(figsize=(11.0, 5.6), layout="constrained")
     axes = figure.subplots(2, len(speeds), sharex=True, sharey="row", squeeze=False)
     for course in courses:

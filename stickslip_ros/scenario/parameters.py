@@ -197,7 +197,7 @@ class PlantParameters(NodeParameters):
     expects_control: bool = _field(True, "Whether a controller is to answer.", fixed=True)
     flow_window: int = _field(
         1000, "Samples by which lockstep may run ahead of the recorder.", "samples", fixed=True,
-        ge=200, le=5_000,
+        ge=200, le=4_000,
     )  # fmt: skip
     duration: float = _field(
         float("inf"),

@@ -189,8 +189,9 @@ def test_a_controller_of_a_user(
 @pytest.mark.long
 def test_arguments_for_the_controller(stickslip: Run, install: Install, tmp_path: Path) -> None:
     name = install(damper("Damper"))
-    further = ("--", "--ros-args", "-p", "gain:=2.0")
-    arguments = ("paper", "--duration", "1", "--bag", "bag", "--json")
+    (tmp_path / "my.yaml").write_text(SCENARIO, encoding="utf-8")
+    further = ("--", "--ros-args", "-p", "gain:=2.0")  # the scenario says otherwise
+    arguments = ("my.yaml", "--duration", "1", "--bag", "bag", "--json")
     done = stickslip("run", *arguments, "--controller", name, *further)
     assert done.returncode == 0, done.stderr
     made_by = json.loads(done.stdout)["controller_command"]

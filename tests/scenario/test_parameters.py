@@ -168,7 +168,7 @@ def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
     numbers = st.floats(1e-6, 1e6)
     strategies: dict[type, st.SearchStrategy[Any]] = {
         bool: st.booleans(),
-        int: st.integers(200, 5_000),
+        int: st.integers(200, 4_000),
         float: numbers | st.integers(1, 1000),
         str: st.text(),
         list: st.lists(st.from_regex("/?([A-Z]+/)?[a-z_][a-z0-9_]*", fullmatch=True)),

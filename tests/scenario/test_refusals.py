@@ -83,7 +83,7 @@ WHOLE = "must be a whole number"
         ("plant", "force_jitter", "-0.1", "-0.1", f"{FINITE} at least 0 s"),
         ("plant", "force_jitter_seed", "-1", "-1", f"{WHOLE} at least 0"),
         ("plant", "reply_timeout", "0", "0", f"{FINITE} above 0 s"),
-        ("plant", "flow_window", "199", "199", f"{WHOLE} at least 200 and at most 5000 samples"),
+        ("plant", "flow_window", "199", "199", f"{WHOLE} at least 200 and at most 4000 samples"),
         ("plant", "flow_window", "100001", "100001", f"{WHOLE} at least 200"),
         ("plant", "disturbance.frequency", "0", "0", f"{FINITE} above 0 and at most 1e+09 Hz"),
         ("plant", "disturbance.start", "-1", "-1", f"{FINITE} at least 0 and at most 1e+09 s"),
