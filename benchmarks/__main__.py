@@ -34,6 +34,8 @@ def main() -> int:
         parser.error(f"no benchmark {', '.join(unknown)}; there are {', '.join(NAMES)}")
     if arguments.out is not None and not arguments.out.parent.is_dir():
         parser.error(f"--out {arguments.out}: there is no directory {arguments.out.parent}")
+    if arguments.out is not None and arguments.out.is_dir():
+        parser.error(f"--out {arguments.out}: is a directory")
     report: dict[str, Any] = {
         "benchmarks": {},
         "failed": {},
@@ -44,8 +46,6 @@ def main() -> int:
     for name in dict.fromkeys(arguments.names or NAMES):
         run(name, report)
     text = json.dumps(report, indent=2)
-    if arguments.out is not None:
-        arguments.out.write_text(text + "\n", encoding="utf-8")
     if arguments.json:
         print(text)
     elif report["benchmarks"]:
@@ -56,6 +56,8 @@ def main() -> int:
         print(table(sections))
     for name, why in report["failed"].items():
         print(f"benchmarks.{name} failed: {why}", file=sys.stderr)
+    if arguments.out is not None:
+        arguments.out.write_text(text + "\n", encoding="utf-8")
     return 1 if report["failed"] else 0
 
 

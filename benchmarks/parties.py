@@ -1,6 +1,8 @@
 """Parties of a benchmark: processes of their own that run a slice when they are asked to.
 
-While one runs, the others wait and take no processor time. Our closed loop is such a party.
+While one runs, the others wait; all of them talk by the same transport, that of `stickslip run`.
+Our closed loop is such a party. What its analyzer has not written at the end of a slice, at most
+20 ms of messages, is not counted.
 """
 
 import multiprocessing
@@ -28,7 +30,7 @@ from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.lifeline import start
 from stickslip_ros.nodes.managed import ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.process import spin, this_machine_only
+from stickslip_ros.nodes.process import spin
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, load_scenario, parameter_file
 from stickslip_ros.testing.domain import domain_variables, own_domain
@@ -37,6 +39,7 @@ T = TypeVar("T")
 
 ROS_ARGUMENTS = ["--ros-args", "--log-level", "error", "-r", f"__ns:={DEFAULT_NAMESPACE}"]
 READY_TIMEOUT = 30.0
+EXIT_TIMEOUT = 30.0
 
 Slice = Callable[[int], T]
 """Runs so many samples or round trips and returns what was measured."""
@@ -69,6 +72,8 @@ def party(
             yield run
         finally:
             connection.close()
+            process.join(EXIT_TIMEOUT)
+            process.kill()
             process.join()
         if process.exitcode:
             raise SystemExit("a party ended badly, as told above")
@@ -187,7 +192,6 @@ def closed_loop(
 
     A slice is one activation of the plant, everything else being active all the time.
     """
-    os.environ.update(this_machine_only())
     with tempfile.TemporaryDirectory() as directory, ros():
         loop = OurLoop(make_plant, scenario, Path(directory) / "bag", composed=composed)
         yield loop

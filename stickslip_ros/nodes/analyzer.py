@@ -31,7 +31,6 @@ from stickslip_ros.nodes.process import run_node
 from stickslip_ros.nodes.topics import (
     AMPLITUDE,
     CONTROL_FORCE,
-    DEEP,
     FREQUENCY,
     JOINT_STATES,
     RECORDED,
@@ -94,7 +93,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         }
         self._asked: list[Client] = []
         self._to_measure: dict[Topic, list[bytes]] = {JOINT_STATES: [], CONTROL_FORCE: []}
-        self._listening = {topic: self.collect(topic, DEEP) for topic in RECORDED_TOPICS}
+        self._listening = {topic: self.collect(topic) for topic in RECORDED_TOPICS}
 
     def stop(self) -> None:
         """Measure what is left, close the bag with its report, and log the report."""

@@ -17,7 +17,7 @@ from rclpy.task import Future
 from rclpy.timer import Timer
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.nodes.topics import DIAGNOSTICS, Topic, mismatch
+from stickslip_ros.nodes.topics import DIAGNOSTICS, Topic, mismatch, type_name
 from stickslip_ros.scenario import parameters
 from stickslip_ros.scenario.parameters import NodeParameters
 
@@ -132,12 +132,12 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
         self._connections.append(subscription)
         return subscription
 
-    def collect(self, topic: Topic, depth: int) -> Subscription:
-        """Let the serialized messages of a topic wait until they are taken, at most `depth`.
+    def collect(self, topic: Topic) -> Subscription:
+        """Let the serialized messages of a topic wait until they are taken.
 
         No thread is woken for each of them, as it is where they are passed to a callback.
         """
-        return self.subscribe(topic, _left_waiting, depth)
+        return self.subscribe(topic, _left_waiting)
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
@@ -175,7 +175,7 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start, if those waited for are there."""
-        missing = self._unmatched()
+        missing = self.unmatched()
         if missing:
             self.get_logger().debug(f"not activated: {missing}")
             return TransitionCallbackReturn.FAILURE
@@ -234,7 +234,7 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
         state = self._state_machine.current_state[1]
         if state == "unconfigured":
             self.trigger_configure()
-        elif state == "inactive" and self._unmatched():
+        elif state == "inactive" and self.unmatched():
             return
         elif state == "inactive":
             self.trigger_activate()
@@ -246,7 +246,7 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
             self._autostart_timer.cancel()
             self._autostart_timer = None
 
-    def _unmatched(self) -> str:
+    def unmatched(self) -> str:
         """Return what is missing of the nodes waited for, or nothing."""
         waiting_for = {name.rsplit("/", 1)[-1] for name in self.parameters.wait_for}
         if not waiting_for:
@@ -257,7 +257,8 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
                 readers = [
                     reader
                     for reader in self.get_subscriptions_info_by_topic(end.topic_name)
-                    if not mismatch(end.qos_profile, reader.qos_profile)
+                    if reader.topic_type == type_name(end.msg_type)
+                    and not mismatch(end.qos_profile, reader.qos_profile)
                 ]
                 found |= {reader.node_name for reader in readers}
                 matched = end.get_subscription_count() >= len(readers)
@@ -265,7 +266,8 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
                 writers = [
                     writer
                     for writer in self.get_publishers_info_by_topic(end.topic_name)
-                    if not mismatch(writer.qos_profile, end.qos_profile)
+                    if writer.topic_type == type_name(end.msg_type)
+                    and not mismatch(writer.qos_profile, end.qos_profile)
                 ]
                 matched = end.get_publisher_count() >= len(writers)
             else:
@@ -273,7 +275,7 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
             if not matched:
                 return f"{end.topic_name} is not yet matched"
         absent = waiting_for - found
-        return f"no reader in {', '.join(sorted(absent))}" if absent else ""
+        return f"not there: {', '.join(sorted(absent))}" if absent else ""
 
     def _declare(self, model: type[ParametersT]) -> ParametersT:
         given = {

@@ -5,8 +5,7 @@ import gc
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from collections.abc import Callable
 from math import inf
 from threading import TIMEOUT_MAX, Event, Lock, Thread
 from typing import Any
@@ -91,7 +90,7 @@ class FlowWindow:
         if self._recorder_exists() and not patience_ends:
             return ""
         self._recorder_present = False
-        return "the recorder is silent: not waited for any more"
+        return "the recorder has gone or is silent: not waited for any more"
 
 
 class Pacer:
@@ -271,8 +270,8 @@ class RealtimePacer(Pacer):
 
     def _run(self) -> None:
         try:
-            with _prompt_thread():
-                self._keep_deadlines()
+            _be_prompt()
+            self._keep_deadlines()
         except Exception as error:  # it would end the thread without a word
             self.complaint = f"{type(error).__name__}: {error}"
             self._call_soon(self._end)
@@ -296,16 +295,9 @@ class RealtimePacer(Pacer):
                 self.missed_deadlines += 1
 
 
-@contextmanager
-def _prompt_thread() -> Generator[None]:
-    """Let this thread go on soon after it could: the defaults favour throughput."""
+def _be_prompt() -> None:
+    """Let this thread go on soon after it could; the defaults favour throughput."""
     if sys.platform == "linux":  # otherwise it sleeps up to 50 us longer than asked
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1)
-    switch_interval = sys.getswitchinterval()
     sys.setswitchinterval(_SWITCH_INTERVAL)
     gc.freeze()  # what the imports have made takes tens of ms to go through
-    try:
-        yield
-    finally:
-        gc.unfreeze()
-        sys.setswitchinterval(switch_interval)

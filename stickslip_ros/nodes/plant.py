@@ -17,7 +17,6 @@ from stickslip_ros.nodes.topics import (
     APPLIED_DISTURBANCE,
     CLOCK,
     CONTROL_FORCE,
-    DEEP,
     DISTURBANCE_FORCE,
     JOINT_STATES,
     RECORDED,
@@ -44,8 +43,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._next_start = LOCKSTEP_START
         self._disturbance = 0.0
         self._lock = threading.Lock()
-        depth = max(2 * self.parameters.flow_window, DEEP)
-        self._state = self.advertise(JOINT_STATES, depth)
+        self._state = self.advertise(JOINT_STATES)
         self._applied = self.advertise(APPLIED_DISTURBANCE)
         self._clock_time = self.advertise(CLOCK) if self.parameters.publish_clock else None
         self.subscribe(CONTROL_FORCE, self._on_force)

@@ -85,24 +85,24 @@ def keep_on_this_machine(network: bool) -> str:
     for more.
     """
     names = (_DISCOVERY_RANGE, *_PROFILES)
-    said = {name: os.environ[name] for name in names if name in os.environ}
-    if said or network:
-        prefer_prompt_middleware()
+    said = [f"{name}={os.environ[name]}" for name in names if name in os.environ]
     if network:
         os.environ[_DISCOVERY_RANGE] = "SUBNET"
-        return "open to the network"
-    if said and said != {_DISCOVERY_RANGE: "LOCALHOST"}:
-        return "as the environment says: " + " ".join(f"{n}={value}" for n, value in said.items())
-    if not said:
+    elif not said:
         os.environ.update(this_machine_only())
-    return "kept on this machine"
+    prefer_prompt_middleware()
+    if network:
+        return "open to the network"
+    if this_machine_only().items() <= os.environ.items():
+        return "kept on this machine"
+    return f"as the environment says: {' '.join(said)}"
 
 
 def this_machine_only() -> dict[str, str]:
     """Return the environment variables that restrict ROS to this machine."""
     if "fastrtps" not in rclpy.get_rmw_implementation_identifier():
         return {_DISCOVERY_RANGE: "LOCALHOST"}
-    # LOCALHOST would overrule the profile, and takes shared memory.
+    # LOCALHOST would overrule the profile, and take shared memory.
     return {_DISCOVERY_RANGE: "SYSTEM_DEFAULT", _PROFILES[0]: _profile("loopback")}
 
 
@@ -112,7 +112,11 @@ def prefer_prompt_middleware() -> None:
     In shared memory a reader that is stopped or killed delays everybody who publishes to it, by
     half a millisecond each time and by seconds now and then.
     """
-    if not any(name in os.environ for name in (*_PROFILES, "FASTDDS_BUILTIN_TRANSPORTS")):
+    if any(name in os.environ for name in (*_PROFILES, "FASTDDS_BUILTIN_TRANSPORTS")):
+        return
+    if os.environ.get(_DISCOVERY_RANGE) == "LOCALHOST":
+        os.environ.update(this_machine_only())
+    else:
         os.environ[_PROFILES[0]] = _profile("network")
 
 

@@ -145,9 +145,9 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         if self.active:
             self.trigger_deactivate()
 
-    def _unmatched(self) -> str:
+    def unmatched(self) -> str:
         """Return what is missing of the readers: those named or, if none are, any."""
-        missing = super()._unmatched()
+        missing = super().unmatched()
         if not missing and not any(self._readers):
             missing = f"nobody reads {', '.join(self._writers)}"
         now = time.monotonic()

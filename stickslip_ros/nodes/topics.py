@@ -5,6 +5,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
+from rclpy.duration import Infinite
 from rclpy.qos import (
     HistoryPolicy,
     QoSCompatibility,
@@ -55,14 +56,27 @@ RECORDED_TOPICS = (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE)
 """What the analyzer writes to its bag."""
 
 
-def mismatch(writer: QoSProfile, reader: QoSProfile) -> str:
-    """Return why a reader cannot hear a writer, or nothing, by reliability and durability.
+def type_name(message_type: Any) -> str:
+    """Return the name of a message class, such as `sensor_msgs/msg/JointState`."""
+    return f"{message_type.__module__.partition('.')[0]}/msg/{message_type.__name__}"
 
-    What the graph tells of the other policies does not compare with what a node has asked for.
-    """
-    both = [
-        QoSProfile(depth=1, reliability=profile.reliability, durability=profile.durability)
-        for profile in (writer, reader)
-    ]
-    compatibility, reason = qos_check_compatible(*both)
+
+def mismatch(writer: QoSProfile, reader: QoSProfile) -> str:
+    """Return why a reader cannot hear a writer, or nothing."""
+    compatibility, reason = qos_check_compatible(_explicit(writer), _explicit(reader))
     return reason if compatibility == QoSCompatibility.ERROR else ""
+
+
+def _explicit(profile: QoSProfile) -> QoSProfile:
+    """Return the profile as the graph tells it: there what is not set is infinite."""
+    return QoSProfile(
+        depth=1,
+        reliability=profile.reliability,
+        durability=profile.durability,
+        deadline=profile.deadline if profile.deadline.nanoseconds > 0 else Infinite,
+        liveliness_lease_duration=(
+            profile.liveliness_lease_duration
+            if profile.liveliness_lease_duration.nanoseconds > 0
+            else Infinite
+        ),
+    )

@@ -21,7 +21,7 @@ from tests.nodes.processes import Processes
 PERIOD = 10_000_000
 FIRST = 1_000_000_000
 NO_FORCE = "no control force"
-SILENT_RECORDER = "recorder is silent"
+SILENT_RECORDER = "the recorder has gone or is silent"
 
 
 class Watch:
