@@ -18,6 +18,7 @@ from rclpy.validate_namespace import validate_namespace
 from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.controllers import find_controllers, find_managed, near_misses
+from stickslip_ros.nodes.managed import ERROR
 from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario, load_scenario
 from stickslip_ros.testing.composition import Composition
@@ -32,6 +33,8 @@ ours (washout), whatever the test starts by itself (external), or nothing."""
 
 _OF_A_TEST = ("plant.pace=lockstep", "plant.reply_timeout=5.0")
 """Where the caller asks for nothing else. A busy machine does not stand still for so long."""
+
+_EXPECTS_CONTROL, _BAG = "plant.expects_control", "analyzer.bag"
 
 _NODE_TIMEOUT, _PROCESS_TIMEOUT = 5.0, 30.0
 """Wall time, s, in which a controller has to be found, in this process or in one of its own."""
@@ -56,7 +59,8 @@ class ClosedLoop:
     rclpy.init, or another loop is open): then the controller must take `context`.
 
     A controller that is a command is started with `environment` and `ros_arguments`, and ended
-    with all that it has started. With "external" the test starts one, with the same.
+    with all that it has started; of its own --ros-args the parameters go first. With "external"
+    the test starts one, with the same. A scenario that expects no control has none of ours.
     """
 
     def __init__(
@@ -79,8 +83,12 @@ class ClosedLoop:
         self._to_control = controller
         self._name_or_path = fspath(scenario)
         self._overrides = {_target(text): text for text in (*_OF_A_TEST, *overrides)}
+        if controller is None:
+            self._overrides.setdefault(_EXPECTS_CONTROL, f"{_EXPECTS_CONTROL}=false")
         self.scenario = self._load(self._overrides)
         """The scenario as it is at present."""
+        if controller == "washout" and not self.scenario.plant.expects_control:
+            self._to_control = None
         self._bag = None if bag is None else Path(bag)
         if self._bag is not None:
             check_new_bag(self._bag)
@@ -90,7 +98,8 @@ class ClosedLoop:
 
     @property
     def environment(self) -> dict[str, str]:
-        """Environment of a process that is to meet this loop."""
+        """Environment of a process that is to meet this loop; RunError unless that is open."""
+        self._open_nodes()
         return {**os.environ, **domain_variables(self._domain)}
 
     @property
@@ -106,12 +115,15 @@ class ClosedLoop:
         self._runs = 0
         self._brought_up: set[str] = set()
         with ExitStack() as opened:
+            opened.callback(self._forget)
             self._domain = opened.enter_context(own_domain())
             self._directory = opened.enter_context(
                 tempfile.TemporaryDirectory(prefix="stickslip_ros_")
             )
             self.context = opened.enter_context(ros_context(self._domain, self.ros_arguments))
-            self._nodes = Composition(self.context, self._parameters(), washout=self._washout)
+            self._nodes = Composition(
+                self.context, self._parameters(), washout=self._to_control == "washout"
+            )
             opened.callback(self._nodes.close)
             self._start_controller(opened)
             self._opened = opened.pop_all()
@@ -123,7 +135,7 @@ class ClosedLoop:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._nodes, running, self._running = None, self._running, None
+        running = self._running
         with self._opened:
             if isinstance(running, ControllerNode) and running.unreported and error is None:
                 running.check()
@@ -133,7 +145,8 @@ class ClosedLoop:
 
         Run again, the motion goes on from where it was, in a new segment of samples, the first of
         which stands a period after the last one. Raises RunError if the controller raises or ends,
-        if it is not found on the topics, or if the run takes more than `timeout` of wall time (s).
+        if it is not found on the topics, if the run takes more than `timeout` of wall time (s), or
+        if it could not be recorded in whole.
         """
         nodes = self._open_nodes()
         if not 0.0 < duration < float("inf"):
@@ -154,7 +167,10 @@ class ClosedLoop:
             for node in (nodes.plant, nodes.analyzer):
                 if node.active:
                     node.trigger_deactivate()
-        return result_of(self._bag_of_run, self.scenario.analyzer.window, diagnostics)
+        result = result_of(self._bag_of_run, self.scenario.analyzer.window, diagnostics)
+        if result.lost_samples and self.scenario.plant.pace == "lockstep":
+            raise RunError(f"the recording of the run failed: {result.lost_samples} samples lost")
+        return result
 
     def set(self, *overrides: str) -> None:
         """Change parameters, NODE.PARAMETER=VALUE each, from the next sample or run on.
@@ -171,8 +187,9 @@ class ClosedLoop:
                     f"{node} is not part of this loop, whose nodes are {', '.join(nodes.nodes)}"
                 )
             values.setdefault(node, {})[parameter] = scenario.as_dict()[node][parameter]
-        for node, parameters in values.items():
-            nodes.set_parameters(nodes.nodes[node], parameters)
+        # Only an active node may still refuse, and no more than one is active between runs.
+        for node in sorted(values, key=lambda name: not nodes.nodes[name].active):
+            nodes.set_parameters(nodes.nodes[node], values[node])
         self.scenario, self._overrides = scenario, changed
 
     def disturb(self, force: float) -> None:
@@ -189,21 +206,29 @@ class ClosedLoop:
         )
 
     @property
-    def _washout(self) -> bool:
-        return self._to_control == "washout" and self.scenario.plant.expects_control
-
-    @property
     def _bag_of_run(self) -> Path:
         bag = self._bag or Path(self._directory, "bag")
         return bag if self._runs == 1 else bag.with_name(f"{bag.name}_{self._runs}")
 
     def _load(self, overrides: Mapping[str, str]) -> Scenario:
-        return load_scenario(
+        if _BAG in overrides:
+            raise InvalidInputError(
+                f"{overrides[_BAG]} is refused: where to is said by `bag` of ClosedLoop"
+            )
+        scenario = load_scenario(
             self._name_or_path,
             list(overrides.values()),
             self.namespace,
             other_nodes=self._to_control not in ("washout", None),
         )
+        if self._to_control is None and scenario.plant.expects_control:
+            raise InvalidInputError(
+                f"{overrides[_EXPECTS_CONTROL]} is refused: this loop has no controller"
+            )
+        return scenario
+
+    def _forget(self) -> None:
+        self._nodes = self._running = self.controller = None
 
     def _open_nodes(self) -> Composition:
         if self._nodes is None:
@@ -213,8 +238,6 @@ class ClosedLoop:
     def _parameters(self) -> dict[str, dict[str, Any]]:
         parameters = self.scenario.as_dict()
         parameters["analyzer"]["bag"] = str(self._bag or Path(self._directory, "bag"))
-        if self._to_control is None:
-            parameters["plant"]["expects_control"] = False
         return parameters
 
     def _start_controller(self, opened: ExitStack) -> None:
@@ -224,7 +247,10 @@ class ClosedLoop:
             opened.callback(self._running.close)
             self._running.start()
         elif self._to_control not in ("washout", "external", None):
-            command = [*self._to_control, *self.ros_arguments]
+            command = list(self._to_control)
+            # rcl lets later parameters win: those of the command are to.
+            at = command.index("--ros-args") if "--ros-args" in command else len(command)
+            command[at : at + 1] = self.ros_arguments
             self._running = ControllerProcess(command, domain_variables(self._domain))
             opened.callback(self._running.close)
 
@@ -248,7 +274,7 @@ class ClosedLoop:
     def _close_the_loop(self, nodes: Composition) -> None:
         """Activate the plant as soon as plant and controller have found each other."""
         listeners = ["analyzer"]
-        if self._washout:
+        if self._to_control == "washout":
             listeners.append("washout_controller")
             controller = nodes.nodes["washout_controller"]
             if not controller.active:
@@ -272,7 +298,7 @@ class ClosedLoop:
 
         self._wait(nodes, lambda: bool(find_controllers(plant) or managed()), timeout)
         for name in managed():
-            bring_up(nodes, name)
+            bring_up(nodes, name, timeout, self._check_running)
             self._brought_up.add(name)
             self._wait(nodes, lambda: bool(find_controllers(plant)), timeout)
         found = find_controllers(plant)
@@ -289,15 +315,21 @@ class ClosedLoop:
         """Run our nodes until the condition holds; RunError as soon as the controller ends."""
         running = self._running
         nodes.spin_until(lambda: condition() or (running is not None and running.ended), timeout)
-        if running is not None:
-            running.check()
+        self._check_running()
         return condition()
+
+    def _check_running(self) -> None:
+        if self._running is not None:
+            self._running.check()
 
     def _end_run(self, nodes: Composition) -> dict[str, Diagnostics]:
         """Let the analyzer take in what is under way and close its bag; return all diagnostics."""
         if isinstance(self._running, ControllerNode):
             self._running.settle()
             self._running.check()
+        level, complaint, _ = nodes.analyzer.diagnose()
+        if level == ERROR:
+            raise RunError(f"the recording of the run failed: {complaint}")
         diagnostics = {
             name: Diagnostics(*node.diagnose())
             for name, node in nodes.nodes.items()

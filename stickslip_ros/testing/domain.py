@@ -3,20 +3,24 @@
 import gc
 import os
 import socket
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
 from threading import Lock
 
 import rclpy
 from rclpy.context import Context
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from stickslip_ros.errors import RunError
+from stickslip_ros.nodes.process import this_machine_only
 
 DOMAINS = range(1, 102)
 """Domains all ports of which are below those that the system gives away."""
 
-_THIS_MACHINE_ONLY = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_STATIC_PEERS": ""}
+_DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_NO_PEERS = {"ROS_STATIC_PEERS": ""}
 
 _NO_LOGS_ELSEWHERE = ("--disable-external-lib-logs", "--disable-rosout-logs")
 """No files in the home directory; and no topic, of which a process has one for each node name."""
@@ -26,6 +30,7 @@ _FREE_PORT = 5
 """A port of the domain that DDS leaves alone, as are those of TCP."""
 _DISCOVERY_PORTS = (0, 10, 12, 14, 16)
 """What DDS listens on in every process of a domain, and in the first few."""
+_FIRST_PROCESS = 10
 
 _initialising = Lock()
 
@@ -38,26 +43,18 @@ def own_domain() -> Generator[int]:
     left alone. Raises RunError if none is left.
     """
     for domain in DOMAINS:
-        first = _FIRST_PORT + _PORTS_OF_A_DOMAIN * domain
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as held:
-            if not _bind(held, "127.0.0.1", first + _FREE_PORT):
+            if not _bind(held, "127.0.0.1", _port(domain, _FREE_PORT)):
                 continue
-            if all(_is_free(first + port) for port in _DISCOVERY_PORTS):
+            if all(_is_free(_port(domain, port)) for port in _DISCOVERY_PORTS):
                 yield domain
                 return
     raise RunError(f"every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use on this machine")
 
 
 def domain_variables(domain: int) -> dict[str, str]:
-    """Return the environment variables of a process that is to be in a domain, on this machine.
-
-    Fast DDS is to do without shared memory there, which a process that is killed leaves behind.
-    """
-    return {
-        **_THIS_MACHINE_ONLY,
-        "ROS_DOMAIN_ID": str(domain),
-        "FASTDDS_BUILTIN_TRANSPORTS": os.environ.get("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4"),
-    }
+    """Return the environment variables of a process that is to be in a domain, on this machine."""
+    return {**this_machine_only(), **_NO_PEERS, "ROS_DOMAIN_ID": str(domain)}
 
 
 @contextmanager
@@ -69,21 +66,8 @@ def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
     """
     with _initialising:
         context = Context() if rclpy.ok() else rclpy.get_default_context()
-        before = {name: os.environ.get(name) for name in _THIS_MACHINE_ONLY}
-        os.environ.update(_THIS_MACHINE_ONLY)
-        try:
-            rclpy.init(
-                args=[*arguments, *_NO_LOGS_ELSEWHERE],
-                context=context,
-                domain_id=domain,
-                signal_handler_options=SignalHandlerOptions.NO,
-            )
-        finally:
-            for name, value in before.items():
-                if value is None:
-                    del os.environ[name]
-                else:
-                    os.environ[name] = value
+        with _environment({**_this_process_only_here(), **_NO_PEERS}):
+            _initialise(context, domain, arguments)
     try:
         yield context
     finally:
@@ -96,9 +80,54 @@ def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
         gc.collect()
 
 
-def _is_free(port: int) -> bool:
+@cache
+def _this_process_only_here() -> Mapping[str, str]:
+    """Return the environment variables that keep ROS in this process on this machine.
+
+    Fast DDS reads a profile once per process. Where ROS was in use before ours could be read, it
+    listens on every address, and LOCALHOST, which takes shared memory, has to do.
+    """
+    variables = this_machine_only()
+    context = Context()
+    with own_domain() as domain, _environment({**variables, _DISCOVERY_RANGE: "OFF"}):
+        _initialise(context, domain, ["--ros-args"])
+        node = Node("which_addresses", context=context)
+        elsewhere_free = _is_free(_port(domain, _FIRST_PROCESS), "127.0.0.2")
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+    return variables if elsewhere_free else {_DISCOVERY_RANGE: "LOCALHOST"}
+
+
+def _initialise(context: Context, domain: int, arguments: Sequence[str]) -> None:
+    rclpy.init(
+        args=[*arguments, *_NO_LOGS_ELSEWHERE],
+        context=context,
+        domain_id=domain,
+        signal_handler_options=SignalHandlerOptions.NO,
+    )
+
+
+@contextmanager
+def _environment(variables: Mapping[str, str]) -> Generator[None]:
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _port(domain: int, number: int) -> int:
+    return _FIRST_PORT + _PORTS_OF_A_DOMAIN * domain + number
+
+
+def _is_free(port: int, address: str = "") -> bool:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        return _bind(probe, "", port)
+        return _bind(probe, address, port)
 
 
 def _bind(free: socket.socket, address: str, port: int) -> bool:

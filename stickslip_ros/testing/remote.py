@@ -1,5 +1,8 @@
 """Nodes in other processes: getting them ready, and knowing that they are."""
 
+import time
+from collections.abc import Callable
+
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import GetParameters
@@ -17,20 +20,28 @@ _NEXT = {
 }
 
 
-def bring_up(nodes: Composition, name: str) -> None:
+def bring_up(nodes: Composition, name: str, timeout: float, check: Callable[[], None]) -> None:
     """Configure and activate a managed node that does not do so by itself.
 
-    Raises RunError if it refuses.
+    Raises RunError if it refuses or is not active within so much wall time (s), and what `check`
+    raises, which is called again and again meanwhile.
     """
-    state = _state(nodes, name)
-    while state in _NEXT:
-        transition, done = _NEXT[state]
-        if not nodes.spin_until(lambda s=state: _state(nodes, name) != s, _AUTOSTART_TIMEOUT):
+    deadline = time.monotonic() + timeout
+    asked: set[int] = set()
+    done = "brought up"
+    while (state := _state(nodes, name)) != State.PRIMARY_STATE_ACTIVE:
+        check()
+        if state in asked or state == State.PRIMARY_STATE_FINALIZED:
+            raise RunError(f"the controller {name} could not be {done}; its log says why")
+        if time.monotonic() >= deadline:
+            raise RunError(f"the controller {name} was not active within {timeout:g} s")
+        if state in _NEXT and not nodes.spin_until(
+            lambda s=state: _state(nodes, name) != s, _AUTOSTART_TIMEOUT
+        ):
+            asked.add(state)
+            transition, done = _NEXT[state]
             request = ChangeState.Request(transition=Transition(id=transition))
             nodes.ask(ChangeState, f"{name}/change_state", request, _ANSWER_TIMEOUT)
-            if _state(nodes, name) == state:
-                raise RunError(f"the controller {name} could not be {done}; its log says why")
-        state = _state(nodes, name)
 
 
 def greet(nodes: Composition, name: str) -> None:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
+from stickslip_ros.errors import RunError
 from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.physics.measures import Measures
 from stickslip_ros.physics.samples import RunMeter
@@ -56,10 +57,15 @@ class RunResult:
 
 
 def result_of(bag: Path, window: int, diagnostics: dict[str, Diagnostics]) -> RunResult:
-    """Read and measure a run, over the last `window` cycles; raises BagError if it cannot."""
+    """Read and measure a run, over the last `window` cycles.
+
+    Raises RunError if the recording is not complete, BagError if it cannot be read.
+    """
     with Recording(bag) as recording:
         states, forces = recording.joint_states, recording.control_forces
         disturbances = recording.applied_disturbances
+        if not recording.complete:
+            raise RunError(f"the recording of the run failed: {'; '.join(recording.missing)}")
     meter = RunMeter(window)
     meter.motion.feed(states.stamp, states.position, states.velocity, states.belt_velocity)
     meter.force.feed(forces.stamp, forces.force)

@@ -1,6 +1,7 @@
 """Controllers as a user writes them: plain rclpy nodes that know nothing of this package."""
 
 import sys
+import time
 from contextlib import suppress
 from threading import Event
 from typing import Any
@@ -92,6 +93,32 @@ class Refusing(LifecycleNode):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         return TransitionCallbackReturn.FAILURE
+
+
+class RefusingToStart(Managed):
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        raise ValueError("no")
+
+
+class Slow(Managed):
+    """Is configured for longer than an answer is waited for."""
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        time.sleep(5.0)
+        return super().on_configure(state)
+
+
+class WithGain(VelocityFeedback):
+    """Answers with its parameter."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.declare_parameter("gain", 0.0)
+
+    def answer(self, state: JointState) -> None:
+        force = WrenchStamped(header=state.header)
+        force.wrench.force.x = self.get_parameter("gain").value
+        self.force.publish(force)
 
 
 def main() -> None:

@@ -15,6 +15,7 @@ from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 
 from stickslip_ros.bags import Recording
+from stickslip_ros.bags.recorder import Recorder
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.physics.motion import Motion
@@ -42,6 +43,7 @@ def test_a_controller_of_ones_own_acts_as_it_does_without_ros() -> None:
         result = loop.run(3.0)
         assert isinstance(loop.controller, WithoutArguments)
         assert loop.controller.answered == 301
+    assert loop.controller is None
     assert result.states.stamp.tolist() == [sample.stamp for sample in samples]
     assert result.states.position.tolist() == [sample.position for sample in samples]
     assert result.forces.stamp.tolist() == result.states.stamp.tolist()
@@ -74,6 +76,7 @@ def test_every_kind_of_controller_answers_every_sample(controller: Any) -> None:
     [
         process(WithoutArguments),
         process(controllers.Managed),
+        process(controllers.Slow),
         [sys.executable, "-m", WashoutControllerNode.__module__],
         ["sh", "-c", '"$0" "$@"; exit', *process(WithoutArguments)],
     ],
@@ -84,6 +87,30 @@ def test_a_controller_in_a_process_of_its_own_answers_every_sample(command: list
     for result in results:
         assert result.late_forces == 0
         assert result.forces.stamp.tolist() == result.states.stamp.tolist()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("own", "gain"), [([], 0.5), (["--ros-args", "-p", "gain:=0.25"], 0.25)])
+def test_parameters_of_a_command_are_those_of_the_scenario_unless_it_has_its_own(
+    tmp_path: Path, own: list[str], gain: float
+) -> None:
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text(
+        "/**/plant: {ros__parameters: {pace: lockstep}}\n"
+        "/**/velocity_feedback: {ros__parameters: {gain: 0.5}}\n",
+        encoding="utf-8",
+    )
+    with ClosedLoop(scenario, controller=[*process(controllers.WithGain), *own]) as loop:
+        assert set(loop.run(0.1).forces.force) == {gain}
+
+
+@pytest.mark.long
+def test_a_managed_controller_that_does_not_start_is_told() -> None:
+    with (
+        pytest.raises(RunError, match="/feed_drive/managed_feedback could not be activated"),
+        ClosedLoop("paper", controller=process(controllers.RefusingToStart)) as loop,
+    ):
+        loop.run(1.0)
 
 
 @pytest.mark.long
@@ -100,7 +127,7 @@ def test_the_test_may_start_a_controller_by_itself() -> None:
 def test_the_motion_goes_on_in_a_further_run(tmp_path: Path) -> None:
     with ClosedLoop("paper", bag=tmp_path / "bag") as loop:
         first, second = loop.run(1.0), loop.run(2.0)
-    assert len(first.states.stamp), len(second.states.stamp) == (101, 201)
+    assert (len(first.states.stamp), len(second.states.stamp)) == (101, 201)
     assert second.states.stamp[0] == first.states.stamp[-1] + SECOND // 100
     assert second.states.position[0] == first.states.position[-1]
     for name, result in (("bag", first), ("bag_2", second)):
@@ -136,6 +163,54 @@ def test_parameters_and_disturbance_are_changed_between_runs() -> None:
     assert before.disturbances.force.tolist() == []
     assert after.disturbances.force.tolist() == [0.25]
     assert after.disturbances.stamp[0] == after.states.stamp[0]
+
+
+def test_a_scenario_that_expects_no_control_has_no_controller() -> None:
+    variants: list[dict[str, Any]] = [{"controller": None}, {}]
+    for options in variants:
+        overrides = () if options else ("plant.expects_control=false",)
+        with ClosedLoop("paper", *overrides, **options) as loop:
+            assert not loop.scenario.plant.expects_control
+            result = loop.run(0.1)
+            with pytest.raises(InvalidInputError, match="=true is refused: this loop has no contr"):
+                loop.set("plant.expects_control=true")
+        assert (len(result.states.stamp), len(result.forces.stamp)) == (11, 0)
+    with pytest.raises(InvalidInputError, match="this loop has no controller"):
+        ClosedLoop("paper", "plant.expects_control=true", controller=None)
+
+
+def test_a_bag_elsewhere_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match=r"analyzer\.bag=elsewhere is refused.*`bag`"):
+        ClosedLoop("paper", "analyzer.bag=elsewhere")
+    with ClosedLoop("paper") as loop:
+        with pytest.raises(InvalidInputError, match=r"analyzer\.bag=elsewhere is refused"):
+            loop.set("analyzer.bag=elsewhere")
+        loop.run(0.1)
+
+
+@pytest.mark.parametrize("written", [0, 100, 401])
+def test_a_run_that_cannot_be_recorded_fails(monkeypatch: pytest.MonkeyPatch, written: int) -> None:
+    write, left = Recorder.write, iter(range(written))
+
+    def write_some(self: Recorder, *message: Any) -> None:
+        if next(left, None) is None:
+            raise BagError("no space left")
+        write(self, *message)
+
+    monkeypatch.setattr(Recorder, "write", write_some)
+    with (
+        ClosedLoop("paper") as loop,
+        pytest.raises(RunError, match="the recording of the run failed"),
+    ):
+        loop.run(2.0)
+
+
+def test_a_change_that_an_active_node_refuses_changes_nothing() -> None:
+    with ClosedLoop("paper") as loop:
+        loop.run(0.1)
+        with pytest.raises(InvalidInputError, match="wait_for cannot be changed while"):
+            loop.set("plant.belt_speed=0.2", "washout_controller.wait_for=[plant]")
+        assert set(loop.run(0.1).states.belt_velocity) == {0.4}
 
 
 def test_a_bad_change_changes_nothing() -> None:
@@ -252,6 +327,8 @@ def test_a_loop_has_to_be_open_and_to_run_for_some_time(tmp_path: Path) -> None:
     loop = ClosedLoop("paper")
     with pytest.raises(RunError, match="not open"):
         loop.run(1.0)
+    with pytest.raises(RunError, match="not open"):
+        _ = loop.environment
     with loop:
         for duration in (0.0, -1.0, float("inf"), float("nan")):
             with pytest.raises(InvalidInputError, match=f"duration = {duration} s is refused"):

@@ -1,3 +1,4 @@
+import os
 import signal
 import socket
 import subprocess
@@ -8,6 +9,7 @@ import pytest
 from stickslip_ros.errors import RunError
 from stickslip_ros.testing import domain as domains
 from stickslip_ros.testing import own_domain
+from tests.testing import controllers
 
 HOLDER = """
 import signal
@@ -16,6 +18,35 @@ with own_domain() as domain:
     print(domain, flush=True)
     signal.pause()
 """
+
+EARLIER = """
+import rclpy
+with own_domain() as domain:
+    rclpy.init(domain_id=domain)
+    rclpy.create_node("earlier").destroy_node()
+    rclpy.shutdown()
+"""
+LOOP = """
+import sys
+from stickslip_ros.testing import ClosedLoop, own_domain
+{earlier}
+with ClosedLoop("paper", controller=sys.argv[1:]) as loop:
+    assert loop.run(0.1).late_forces == 0
+    print(sum("/dev/shm/fast" in line for line in open("/proc/self/maps")))
+"""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("earlier", "shared_memory"), [("", False), (EARLIER, True)])
+def test_a_loop_meets_its_controller_whatever_ros_was_used_for_before(
+    earlier: str, shared_memory: bool
+) -> None:
+    controller = [sys.executable, controllers.__file__, "WithoutArguments"]
+    command = [sys.executable, "-c", LOOP.format(earlier=earlier), *controller]
+    here = os.environ | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    finished = subprocess.run(command, env=here, capture_output=True, text=True, timeout=60)
+    assert finished.returncode == 0, finished.stderr
+    assert (int(finished.stdout) > 0) == shared_memory
 
 
 def test_nobody_else_gets_the_same_domain() -> None:
