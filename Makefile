@@ -11,8 +11,8 @@ PYTHON ?= $(shell for python in python3.12 python3.13 python3.11 python3; do \
 # Python 3.11 comes with a pip that takes twice as long: it is replaced first.
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
-# A test that hangs fails by itself, with its name.
-PYTEST := $(BIN)/python -m pytest --timeout=300
+# A test that hangs fails by itself, with its name. Two at a time: half of it is waiting.
+PYTEST := $(BIN)/python -m pytest --timeout=300 --numprocesses=2 --dist=loadscope
 
 .PHONY: setup demo test test-long test-all lint bench clean
 

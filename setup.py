@@ -83,6 +83,6 @@ setup(
             "rosbags",
             "setuptools>=70.1",  # the first to make wheels unaided
         ],
-        "dev": ["colcon-common-extensions", "colcon-ros", "pyright", "ruff"],
+        "dev": ["colcon-common-extensions", "colcon-ros", "pyright", "pytest-xdist", "ruff"],
     },
 )
