@@ -72,12 +72,12 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._channels: dict[str, int] = {}
         self._tick = min(_TAKE_PERIOD, self.parameters.flush_period / 2.0)
         self._connections.append(self.every(self._tick, self._on_tick))
+        self._connections.append(self.every(_MEASURE_PERIOD, self._on_time_to_measure))
 
     def start(self) -> None:
         """Open a bag, start to measure, and then listen: who is heard is not lost."""
         self._meter = RunMeter(self.parameters.window)
         self._cycles = self._told = 0
-        self._measured_at = time.monotonic()
         self._complaint = self._bag_failure = ""
         self._recorder: Recorder | None = None
         if self.parameters.bag:
@@ -134,10 +134,11 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         return (WARN if self._complaint else OK), self._complaint, figures
 
     def _on_tick(self) -> None:
-        if not self.active:
-            return
-        self._take_in()
-        if time.monotonic() >= self._measured_at + _MEASURE_PERIOD:
+        if self.active:
+            self._take_in()
+
+    def _on_time_to_measure(self) -> None:
+        if self.active:
             self._measure()
 
     def _take_in(self) -> None:
@@ -170,7 +171,6 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def _measure(self) -> None:
         """Decode and measure what was taken in since the last time."""
-        self._measured_at = time.monotonic()
         states = self._columns(JOINT_STATES, joint_state_columns)
         for cycle in self._meter.motion.feed(
             states.stamp, states.position, states.velocity, states.belt_velocity

@@ -30,7 +30,7 @@ def start(command: Sequence[str], *, guarded: bool = False) -> subprocess.Popen[
         [*guard, *command],
         env=os.environ | {_PARENT_VARIABLE: str(os.getpid())},
         stdin=subprocess.DEVNULL,
-        stdout=sys.stderr,
+        stdout=2,  # not sys.stderr: what stands in for it need not be a file
         start_new_session=True,  # Ctrl-C is for this process, which ends them in order
     )
 

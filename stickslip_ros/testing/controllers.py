@@ -2,9 +2,7 @@
 
 import shlex
 import shutil
-import sys
 from collections.abc import Mapping, Sequence
-from contextlib import redirect_stderr
 from threading import Event, Thread
 
 from rclpy.executors import SingleThreadedExecutor
@@ -101,8 +99,7 @@ class ControllerProcess:
         if shutil.which(command[0]) is None:
             raise InvalidInputError(f"the controller {self._name}: no command {command[0]!r}")
         setting = [f"{name}={value}" for name, value in variables.items()]
-        with redirect_stderr(sys.__stderr__):  # it asks for a file, which pytest may not have there
-            self._process = lifeline.start(["env", *setting, *command], guarded=True)
+        self._process = lifeline.start(["env", *setting, *command], guarded=True)
 
     @property
     def ended(self) -> bool:
