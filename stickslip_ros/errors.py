@@ -1,8 +1,13 @@
 """The exception family of the package: everything it raises on purpose derives from one class."""
 
+from stickslip_ros.printable import printable
+
 
 class StickslipError(Exception):
     """Base of every error that stickslip_ros raises on purpose; its text is one clear sentence."""
+
+    def __str__(self) -> str:
+        return printable(super().__str__())
 
 
 class InvalidInputError(StickslipError):

@@ -1,7 +1,7 @@
 """What every node of this package has: life cycle, parameters from one model, diagnostics."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Generic, TypeVar, cast
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -9,6 +9,7 @@ from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
+from rclpy.exceptions import ParameterException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -19,7 +20,7 @@ from rclpy.timer import Timer
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.topics import DIAGNOSTICS, Topic, mismatch, type_name
 from stickslip_ros.scenario import parameters
-from stickslip_ros.scenario.parameters import NodeParameters
+from stickslip_ros.scenario.parameters import Fixed, NodeParameters, shown
 
 ParametersT = TypeVar("ParametersT", bound=NodeParameters)
 
@@ -34,7 +35,7 @@ STATE = "state"
 _DIAGNOSTICS_PERIOD = 1.0
 _AUTOSTART_PERIOD = 0.05
 _DELIVERY_TIMEOUT = 1.0
-_OWNED_BY_ROS = ("qos_overrides.", "start_type_description_service")
+_OWNED_BY_ROS = ("start_type_description_service",)
 
 
 class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
@@ -58,13 +59,18 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
         Raises InvalidInputError for a parameter that is refused.
         """
         given = [Parameter(name, value=value) for name, value in (overrides or {}).items()]
-        super().__init__(
-            name,
-            context=context,
-            namespace=namespace,
-            parameter_overrides=given,
-            automatically_declare_parameters_from_overrides=True,
-        )
+        try:
+            super().__init__(
+                name,
+                context=context,
+                namespace=namespace,
+                parameter_overrides=given,
+                automatically_declare_parameters_from_overrides=True,
+            )
+        except (ParameterException, ValueError) as error:  # an empty list, for one
+            raise InvalidInputError(
+                f"{name}: ROS refuses a parameter (an empty list is to be left out): {error}"
+            ) from None
         self.stopped = Future()
         """Done when the node's process may end; carries the refusal, if that was the reason."""
         self.active = False
@@ -231,12 +237,10 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
 
     def _autostart(self) -> None:
         """Configure, then try to activate until those waited for are there."""
-        state = self._state_machine.current_state[1]
-        if state == "unconfigured":
+        if self._state_machine.current_state[1] == "unconfigured":
             self.trigger_configure()
-        elif state == "inactive" and self.unmatched():
-            return
-        elif state == "inactive":
+        # In one go, if nobody is missing: a plant may take whoever is there for one that answers.
+        if self._state_machine.current_state[1] == "inactive" and not self.unmatched():
             self.trigger_activate()
         if self.active or self.stopped.done():
             self._end_autostart()
@@ -281,12 +285,10 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
         given = {
             name: cast(Parameter, parameter).value
             for name, parameter in self.get_parameters_by_prefix("").items()
-            if not name.startswith(_OWNED_BY_ROS)
+            if name not in _OWNED_BY_ROS
         }
         validated = model.validated(given, self.get_fully_qualified_name())
-        values = validated.flat()
-        known = list(parameters.parameters_of(model))
-        for parameter in known:
+        for parameter in parameters.known_parameters(model).values():
             if parameter.name == "use_sim_time":
                 continue  # declared by rclpy
             if self.has_parameter(parameter.name):
@@ -297,37 +299,52 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
                 _descriptor(parameter),
                 ignore_override=True,
             )
-        floats = {p.name for p in known if p.kind is float}
-        self.set_parameters([Parameter(p.name, _ROS_TYPES[p.kind], values[p.name]) for p in known])
-        self.add_pre_set_parameters_callback(lambda new: _with_floats(new, floats))
-        self.add_on_set_parameters_callback(self._check_change)
-        self.add_post_set_parameters_callback(self._take_change)
+        super().set_parameters(self._as_ros(validated.flat()))
         return validated
 
-    def _changed(self, changes: Sequence[Parameter]) -> ParametersT:
-        values = self.parameters.flat() | {
-            change.name: change.value
-            for change in changes
-            if not change.name.startswith(_OWNED_BY_ROS)
-        }
-        return self._model.validated(values, self.get_fully_qualified_name())
+    def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
+        """Set each parameter by itself."""
+        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
 
-    def _check_change(self, changes: list[Parameter]) -> SetParametersResult:
-        fixed = {p.name for p in parameters.parameters_of(self._model) if p.fixed}
-        present = self.parameters.flat()
-        for change in changes:
-            if self.active and change.name in fixed and change.value != present[change.name]:
-                reason = f"{change.name} cannot be changed while the node is active"
-                return SetParametersResult(successful=False, reason=reason)
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set all parameters or none; what is refused is named, with what is allowed.
+
+        Whole numbers are taken where numbers are declared, as parameter files and -p do.
+        """
+        given = {parameter.name: parameter for parameter in parameter_list}
+        owned = [parameter for name, parameter in given.items() if name in _OWNED_BY_ROS]
+        values = {name: p.value for name, p in given.items() if name not in _OWNED_BY_ROS}
+        source = self.get_fully_qualified_name()
         try:
-            self._changed(changes)
+            changed = self._model.validated(self.parameters.flat() | values, source)
+            self._check_fixed(values, source)
         except InvalidInputError as error:
             return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+        flat = changed.flat()
+        taken = self._as_ros({name: flat[name] for name in values})
+        result = super().set_parameters_atomically([*owned, *taken])
+        if result.successful:
+            self.parameters = changed
+            self.apply_parameters()
+        return result
 
-    def _take_change(self, changes: list[Parameter]) -> None:
-        self.parameters = self._changed(changes)
-        self.apply_parameters()
+    def _check_fixed(self, values: Mapping[str, Any], source: str) -> None:
+        """Refuse to change what must stay in the present state."""
+        present = self.parameters.flat()
+        known = parameters.known_parameters(self._model)
+        configured = self._state_machine.current_state[1] != "unconfigured"
+        states = {Fixed.NEVER: False, Fixed.ACTIVE: self.active, Fixed.CONFIGURED: configured}
+        for name, value in values.items():
+            fixed = known[name].fixed
+            if states[fixed] and value != present[name]:
+                raise InvalidInputError(
+                    f"{source}: {name} = {shown(value)} is refused: {name} cannot be changed while "
+                    f"the node is {fixed}, and is {shown(present[name])}"
+                )
+
+    def _as_ros(self, values: Mapping[str, Any]) -> list[Parameter]:
+        known = parameters.known_parameters(self._model)
+        return [Parameter(name, _ROS_TYPES[known[name].kind], v) for name, v in values.items()]
 
 
 def take_waiting(subscription: Subscription) -> Iterator[bytes]:
@@ -339,16 +356,6 @@ def take_waiting(subscription: Subscription) -> Iterator[bytes]:
 
 def _left_waiting(_: bytes) -> None:
     """Stand for a callback where there is none."""
-
-
-def _with_floats(changes: list[Parameter], floats: set[str]) -> list[Parameter]:
-    """Take whole numbers where numbers are declared, as parameter files and -p do."""
-    return [
-        Parameter(change.name, Parameter.Type.DOUBLE, float(cast(int, change.value)))
-        if change.name in floats and change.type_ is Parameter.Type.INTEGER
-        else change
-        for change in changes
-    ]
 
 
 _ROS_TYPES = {

@@ -7,8 +7,10 @@ from typing import Any, NamedTuple, Self
 import heyoka as hy
 import numpy as np
 
+from stickslip_ros.errors import RunError
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.equations import Equations, WashoutGains
+from stickslip_ros.physics.friction import FrictionLaw
 from stickslip_ros.physics.knots import FloatArray, Knots
 
 # heyoka warns on standard output, which is for results, where a marker's polynomial is nothing but
@@ -18,8 +20,16 @@ hy.set_logger_level_error()
 UNBOUNDED_SPEED = 1e3
 """Dimensionless speed of the slide beyond which the motion is said to run away."""
 
+_LARGEST_FORCE = 1e100
+"""Dimensionless; any that is larger makes the motion run away at once, too, and is taken for it."""
+
 _BELT_SPEED_REACHED, _RUN_AWAY = 0, 1
 """The terminal events of the slipping motion, in heyoka's numbering."""
+
+_SPARE_STEPS, _STEPS_PER_RADIAN = 1_000_000, 10_000
+"""Steps of integration that a motion may take: seconds of work, and a thousand times the usual."""
+_STEPS_OF_A_PHASE = 10
+"""For which the work counts that a phase of stick or slip causes besides its integration."""
 
 _NO_EVENT = int(hy.taylor_outcome.time_limit)
 _NOT_FINITE = int(hy.taylor_outcome.err_nf_state)
@@ -72,10 +82,13 @@ class Motion:
         self._controller = WashoutGains(drive.angular_frequency, 0.0, 0.0)
         self._gains = self._controller.scaled(drive)
         self._force = 0.0
+        self._steps_left = _SPARE_STEPS
         self._time = self._knot_time = 0.0
         self._x = self._y = self._w = 0.0
         self._drive = drive
-        self._compile()
+        self._compiled: dict[type[FrictionLaw], tuple[Equations, _Integrator, _Integrator]] = {}
+        self._use_law(type(drive.friction))
+        self._set_parameters()
         self.restart(position, velocity)
 
     def restart(self, position: float, velocity: float) -> None:
@@ -98,7 +111,7 @@ class Motion:
         position, velocity, filter_output = self.position, self.velocity, self._filter_output
         self._drive = drive
         if type(drive.friction) is not type(old.friction):
-            self._compile()
+            self._use_law(type(drive.friction))
         if drive.speed_scale != old.speed_scale or drive.length_scale != old.length_scale:
             self._x, self._y = position / drive.length_scale, velocity / drive.speed_scale
         self._scale_controller(filter_output)
@@ -113,7 +126,7 @@ class Motion:
 
     @force.setter
     def force(self, force: float) -> None:
-        self._force = force / self._drive.normal_force
+        self._force = max(-_LARGEST_FORCE, min(_LARGEST_FORCE, force / self._drive.normal_force))
         self._set_parameter("force", self._force)
 
     def set_gains(self, corner_frequency: float, linear: float, cubic: float) -> None:
@@ -153,11 +166,15 @@ class Motion:
         return float(coefficient) * self._drive.normal_force
 
     def advance(self, duration: float) -> None:
-        """Integrate over `duration` (s), the force held; stop early if the motion runs away."""
+        """Integrate over `duration` (s), the force held; stop early if the motion runs away.
+
+        Raises RunError for a motion so stiff that it would take for ever.
+        """
         if self.unbounded:
             return
         end = duration * self._drive.angular_frequency
         now = 0.0
+        self._steps_left = min(self._steps_left, _SPARE_STEPS) + int(_STEPS_PER_RADIAN * end)
         self._settle()
         while now < end and not self.unbounded:
             now = self._stick(now, end) if self.sticking else self._slip(now, end)
@@ -255,17 +272,29 @@ class Motion:
             state[2] = self._w
         taylor.time = now
         if self._sudden_speed == inf:
-            outcome = int(taylor.propagate_until(end)[0])
+            reached = taylor.propagate_until(end, self._steps_left)
         else:
-            outcome = int(taylor.propagate_until(end, max_delta_t=self._longest_step())[0])
+            reached = taylor.propagate_until(end, self._steps_left, self._longest_step())
+        outcome = int(reached[0])
+        self._steps_left -= reached[3] + _STEPS_OF_A_PHASE
+        if outcome == _NOT_FINITE:  # what it takes for that drives it past any speed in no time
+            taylor.reset_cooldowns()
+            self._sign = copysign(1.0, -self._reaction())
+            self._y = self._sign * UNBOUNDED_SPEED
+            return _RUN_AWAY, now
         self._x, self._y = float(state[0]), float(state[1])
         if self._continuous_control:
             self._w = float(state[2])
         if outcome == _NO_EVENT:
             return None, end
+        if self._steps_left <= 0:
+            taylor.reset_cooldowns()
+            frequency = self._drive.angular_frequency
+            raise RunError(
+                "the motion is too stiff to be followed: it takes more than "
+                f"{_STEPS_PER_RADIAN} steps of integration for {1.0 / frequency:g} s"
+            )
         taylor.reset_cooldowns()  # what it integrates next is another slip or stick
-        if outcome == _NOT_FINITE:
-            return _RUN_AWAY, now
         return -outcome - 1, float(taylor.time)
 
     def _longest_step(self) -> float:
@@ -283,8 +312,13 @@ class Motion:
             self._knot_time = max(self._knot_time, time)  # not back by the rounding of a step
             self._recorded.append((self._knot_time, x, y, sticking))
 
-    def _compile(self) -> None:
-        equations = Equations(type(self._drive.friction), self._continuous_control)
+    def _use_law(self, law: type[FrictionLaw]) -> None:
+        if law not in self._compiled:
+            self._compiled[law] = self._compile(law)
+        self._equations, self._slipping, self._sticking = self._compiled[law]
+
+    def _compile(self, law: type[FrictionLaw]) -> tuple[Equations, _Integrator, _Integrator]:
+        equations = Equations(law, self._continuous_control)
         initial = [0.0] * len(equations.slip)
         falling = hy.event_direction.negative
         # It runs away in the direction it slips in. Of the order of one, since heyoka's error is
@@ -296,7 +330,6 @@ class Motion:
                 hy.nt_event(equations.slip[0][1], callback=_marker(self._marks, turning=True)),
                 hy.nt_event(equations.acceleration, callback=_marker(self._marks)),
             ]
-        self._equations = equations
         slipping = hy.taylor_adaptive(
             self._system(equations.slip),
             initial,
@@ -315,8 +348,7 @@ class Motion:
                 hy.t_event(equations.static + equations.reaction, direction=falling),
             ],
         )
-        self._slipping, self._sticking = _Integrator.of(slipping), _Integrator.of(sticking)
-        self._set_parameters()
+        return equations, _Integrator.of(slipping), _Integrator.of(sticking)
 
     def _system(self, right_hand_side: Any) -> Any:
         """Return what is integrated for a right-hand side: here, only that."""

@@ -3,7 +3,9 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
+from sys import float_info
 from typing import Any, ClassVar, cast
 
 import yaml
@@ -22,6 +24,8 @@ from stickslip_ros.scenario.parameters import (
 DEFAULT_NAMESPACE = "/feed_drive"
 
 _PARAMETERS_KEY = "ros__parameters"
+_LARGEST = 1_000_000
+"""Characters of a scenario file."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,7 @@ def load_scenario(
     for override in overrides:
         node, parameter, value = _parse_override(override)
         values[node][parameter] = value
-        given[node] += f" -p {override}"
+        given[node] += f" -p {override:.80}"
     models: dict[str, Any] = {
         node: NODE_PARAMETERS[node].validated(
             parameters, f"{path} with{given[node]}, {node}" if given[node] else f"{path}, {node}"
@@ -150,6 +154,27 @@ class _RosLoader(yaml.SafeLoader):
         return super().compose_node(parent, index)
 
 
+def _whole_number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float | str:
+    """Return a number for a whole one beyond 64 bits, and its text for one beyond any number."""
+    try:
+        value = loader.construct_yaml_int(node)
+        return value if -(2**63) <= value < 2**63 else float(value)
+    except (ValueError, OverflowError):
+        return str(node.value)
+
+
+def _number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> float | str:
+    """Return the text of a number that overflows or underflows."""
+    text: str = node.value.lower()
+    value = float(loader.construct_yaml_float(node))
+    zero = not text.partition("e")[0].strip("+-.0")
+    if zero or text.endswith(("inf", "nan")) or float_info.min <= abs(value) < inf:
+        return value
+    return str(node.value)
+
+
+_RosLoader.add_constructor("tag:yaml.org,2002:int", _whole_number)
+_RosLoader.add_constructor("tag:yaml.org,2002:float", _number)
 _RosLoader.yaml_implicit_resolvers = {}
 _BOOLEANS = [
     spelling
@@ -185,14 +210,25 @@ def _parse_yaml(text: str, source: str) -> Any:
     except yaml.YAMLError as error:
         reason = " ".join(str(error).split())
         raise InvalidInputError(f"{source} is not YAML: {reason}") from None
+    except RecursionError:
+        raise InvalidInputError(f"{source} is not taken: it is nested too deep") from None
+    except (ArithmeticError, AttributeError, LookupError, ValueError):
+        raise InvalidInputError(
+            f"{source} is not YAML: a tag (!!) does not suit its value"
+        ) from None
 
 
 def _sections(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """Yield the node name pattern and the parameters, flat, of each section of the file."""
     try:
-        text = path.read_text(encoding="utf-8")
+        with path.open(encoding="utf-8") as file:
+            text = file.read(_LARGEST + 1)
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidInputError(f"cannot read scenario {path}: {error}") from None
+    if len(text) > _LARGEST:
+        raise InvalidInputError(
+            f"cannot read scenario {path}: it is longer than {_LARGEST} characters"
+        )
     yield from _walk(_parse_yaml(text, str(path)), "", path)
 
 
@@ -255,9 +291,9 @@ def _parse_override(override: str) -> tuple[str, str, Any]:
     target, equals, text = override.partition("=")
     node, _, parameter = target.partition(".")
     if not equals or not parameter:
-        raise InvalidInputError(f"-p {override}: must be NODE.PARAMETER=VALUE")
+        raise InvalidInputError(f"-p {override:.80}: must be NODE.PARAMETER=VALUE")
     if node not in NODE_PARAMETERS:
         raise InvalidInputError(
-            f"-p {override}: unknown node {node}; known are {', '.join(NODE_PARAMETERS)}"
+            f"-p {override:.80}: unknown node {node:.80}; known are {', '.join(NODE_PARAMETERS)}"
         )
-    return node, parameter, _parse_yaml(text, f"-p {override}: the value")
+    return node, parameter, _parse_yaml(text, f"-p {override:.80}: the value")

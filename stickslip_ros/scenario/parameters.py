@@ -8,7 +8,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from math import isinf
+from functools import cache
+from math import isinf, pi, sqrt
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -28,17 +29,34 @@ class Pace(StrEnum):
     LOCKSTEP = "lockstep"
 
 
+class Fixed(StrEnum):
+    """From which state of the node on a parameter cannot be changed."""
+
+    NEVER = ""
+    ACTIVE = "active"
+    CONFIGURED = "configured"
+
+
+_SMALLEST, _LARGEST = 1e-30, 1e30
+"""Magnitudes, in SI units, between which no product or power in the physics overflows."""
+_LONGEST_SHOWN = 80
+_SHORTEST = 1e-3
+"""Shortest time, s, that a node looks at the clock for."""
+
+
 def _field(
     default: Any,
     meaning: str,
     unit: str | None = None,
     *,
-    fixed: bool = False,
+    fixed: Fixed = Fixed.NEVER,
     choices: Iterable[str] = (),
     **bounds: Any,
 ) -> Any:
-    """Describe a parameter; `fixed` ones cannot be changed while the node is active."""
+    """Describe a parameter."""
     extra: Any = {"unit": unit, "fixed": fixed, "choices": tuple(choices)}
+    if isinstance(default, float) and "allow_inf_nan" not in bounds:
+        bounds = {"ge": -_LARGEST, "le": _LARGEST} | bounds
     return Field(default, description=meaning, json_schema_extra=extra, **bounds)
 
 
@@ -67,12 +85,15 @@ class Friction(_Model):
     static: float = _field(0.4, "Static (break-away) coefficient mu_s.", ge=0.0)
     minimum: float = _field(0.25, "Smallest kinetic coefficient mu_m (stribeck).", ge=0.0)
     minimum_speed: float = _field(
-        0.5, "Relative speed v_m of the smallest coefficient (stribeck).", "m/s", gt=0.0
+        0.5, "Relative speed v_m of the smallest coefficient (stribeck).", "m/s", ge=_SMALLEST
     )
     slope: float = _field(0.45, "Fall of the coefficient with relative speed (linear).", "s/m")
     kinetic: float = _field(0.25, "Kinetic coefficient mu_k (exponential).", ge=0.0)
     decay_speed: float = _field(
-        0.5, "Speed v_s over which the static coefficient decays (exponential).", "m/s", gt=0.0
+        0.5,
+        "Speed v_s over which the static coefficient decays (exponential).",
+        "m/s",
+        ge=_SMALLEST,
     )
     viscous: float = _field(0.0, "Rise of the coefficient with speed (exponential).", "s/m")
 
@@ -81,8 +102,10 @@ class Friction(_Model):
         """Refuse a kinetic coefficient of the law in use that is above the static one."""
         lower = {"stribeck": "minimum", "exponential": "kinetic"}.get(self.law)
         if lower is not None and getattr(self, lower) > self.static:
-            message = f"{lower} = {getattr(self, lower)} must not exceed static = {self.static}"
-            raise ValueError(message)
+            raise ValueError(
+                f"friction.{lower} = {getattr(self, lower)} must not exceed "
+                f"friction.static = {self.static}"
+            )
         return self
 
     def as_law(self) -> FrictionLaw:
@@ -110,17 +133,17 @@ class DisturbanceParameters(_Model):
     amplitude: float = _field(0.0, "Amplitude of the disturbance.", "N")
     start: float = _field(0.0, "Simulated time at which it starts.", "s", ge=0.0, le=1e9)
     duration: float = _field(float("inf"), "How long it lasts.", "s", ge=0.0, allow_inf_nan=True)
-    frequency: float = _field(1.0, "Frequency of the sine.", "Hz", gt=0.0, le=1e9)
+    frequency: float = _field(1.0, "Frequency of the sine.", "Hz", ge=_SMALLEST, le=1e9)
 
 
 class NodeParameters(_Model):
     """Parameters that every node has."""
 
-    autostart: bool = _field(True, "Configure and activate at start.", fixed=True)
+    autostart: bool = _field(True, "Configure and activate at start.", fixed=Fixed.ACTIVE)
     wait_for: list[str] = _field(
         [],
         "Nodes that must be there to read what this one writes before it is activated.",
-        fixed=True,
+        fixed=Fixed.ACTIVE,
     )
     use_sim_time: bool = _field(False, "Let ROS time follow /clock.")
 
@@ -129,7 +152,7 @@ class NodeParameters(_Model):
         """Refuse to wait for a node of a name that none can have."""
         if not all(_NODE_NAME.fullmatch(name) for name in self.wait_for):
             message = (
-                f"wait_for = {self.wait_for} is refused: must be names of nodes, "
+                f"wait_for = {shown(self.wait_for)} is refused: must be names of nodes, "
                 "of letters, digits and _, not beginning with a digit"
             )
             raise ValueError(message)
@@ -141,11 +164,11 @@ class NodeParameters(_Model):
 
         Raises InvalidInputError naming `source`, parameter, value and what is allowed.
         """
-        known = {parameter.name for parameter in parameters_of(cls)}
+        known = known_parameters(cls)
         for name, value in values.items():
             if name not in known:
                 raise InvalidInputError(
-                    f"{source}: unknown parameter {name} = {value!r}; "
+                    f"{source}: unknown parameter {name:.80} = {shown(value)}; "
                     f"known are {', '.join(sorted(known))}"
                 )
         try:
@@ -161,53 +184,61 @@ class NodeParameters(_Model):
 class PlantParameters(NodeParameters):
     """Parameters of the plant node."""
 
-    mass: float = _field(1.0, "Mass of the slide.", "kg", gt=0.0)
+    mass: float = _field(1.0, "Mass of the slide.", "kg", ge=_SMALLEST)
     damping: float = _field(0.02, "Viscous damping of the transmission.", "N s/m", ge=0.0)
-    stiffness: float = _field(1.0, "Stiffness of the transmission.", "N/m", gt=0.0)
-    normal_force: float = _field(1.0, "Force pressing slide and belt together.", "N", gt=0.0)
+    stiffness: float = _field(1.0, "Stiffness of the transmission.", "N/m", ge=_SMALLEST)
+    normal_force: float = _field(1.0, "Force pressing slide and belt together.", "N", ge=_SMALLEST)
     belt_speed: float = _field(0.4, "Speed of the belt (feed speed), of either sign.", "m/s")
     friction: Friction = Friction()
     initial: Initial = Initial()
-    rate: float = _field(100.0, "Samples per second.", "Hz", fixed=True, gt=0.0, le=1e9)
+    rate: float = _field(100.0, "Samples per second.", "Hz", fixed=Fixed.ACTIVE, ge=1e-6, le=1e9)
     pace: Pace = _field(
         Pace.LOCKSTEP,
         "Whether the plant keeps to the clock or waits for the answer to each sample.",
         choices=Pace,
         strict=False,
-        fixed=True,
+        fixed=Fixed.ACTIVE,
     )
     real_time_factor: float = _field(
-        1.0, "Simulated over wall time in pace realtime.", fixed=True, gt=0.0
+        1.0, "Simulated over wall time in pace realtime.", fixed=Fixed.ACTIVE, ge=_SMALLEST
     )
     force_delay: float = _field(
-        0.0, "Delay from a sample to the start of its force.", "s", fixed=True, ge=0.0
+        0.0, "Delay from a sample to the start of its force.", "s", fixed=Fixed.ACTIVE, ge=0.0
     )
     force_jitter: float = _field(
-        0.0, "Largest random addition to the delay of each force.", "s", fixed=True, ge=0.0
+        0.0, "Largest random addition to the delay of each force.", "s", fixed=Fixed.ACTIVE, ge=0.0
     )
     force_jitter_seed: int = _field(
-        0, "What the random additions follow from.", fixed=True, ge=0, le=1_000_000_000
+        0, "What the random additions follow from.", fixed=Fixed.ACTIVE, ge=0, le=1_000_000_000
     )
     force_timeout: float = _field(
-        0.1, "Age up to which a force is held on in pace realtime.", "s", fixed=True, ge=0.0
+        0.1, "Age up to which a force is held on in pace realtime.", "s", fixed=Fixed.ACTIVE, ge=0.0
     )
     reply_timeout: float = _field(
-        10.0, "Wall time that lockstep waits for a force or a reader.", "s", fixed=True, gt=0.0
+        10.0,
+        "Wall time that lockstep waits for a force or a reader.",
+        "s",
+        fixed=Fixed.ACTIVE,
+        ge=_SHORTEST,
     )
-    expects_control: bool = _field(True, "Whether a controller is to answer.", fixed=True)
+    expects_control: bool = _field(True, "Whether a controller is to answer.", fixed=Fixed.ACTIVE)
     flow_window: int = _field(
-        1000, "Samples by which lockstep may run ahead of the recorder.", "samples", fixed=True,
-        ge=200, le=4_000,
-    )  # fmt: skip
+        1000,
+        "Samples by which lockstep may run ahead of the recorder.",
+        "samples",
+        fixed=Fixed.ACTIVE,
+        ge=200,
+        le=4_000,
+    )
     duration: float = _field(
         float("inf"),
         "Simulated time after which the plant pauses by itself.",
         "s",
-        fixed=True,
+        fixed=Fixed.ACTIVE,
         ge=0.0,
         allow_inf_nan=True,
     )
-    publish_clock: bool = _field(False, "Publish simulated time on /clock.", fixed=True)
+    publish_clock: bool = _field(False, "Publish simulated time on /clock.", fixed=Fixed.CONFIGURED)
     disturbance: DisturbanceParameters = DisturbanceParameters()
 
     @model_validator(mode="after")
@@ -219,6 +250,17 @@ class PlantParameters(NodeParameters):
                 "must not exceed 1e6 periods of rate together"
             )
             raise ValueError(message)
+        return self
+
+    @model_validator(mode="after")
+    def _samples_are_short(self) -> Self:
+        """Refuse a period of samples that holds more than a thousand natural ones."""
+        natural = sqrt(self.stiffness / self.mass) / (2.0 * pi)
+        if self.rate < natural / 1000.0:
+            raise ValueError(
+                f"rate = {self.rate} Hz must be at least a thousandth of the natural frequency, "
+                f"{natural:g} Hz with mass = {self.mass} kg and stiffness = {self.stiffness} N/m"
+            )
         return self
 
     @property
@@ -246,7 +288,9 @@ class PlantParameters(NodeParameters):
 class WashoutControllerParameters(NodeParameters):
     """Parameters of the washout controller node."""
 
-    corner_frequency: float = _field(2.0, "Corner frequency d of the filter.", "rad/s", gt=0.0)
+    corner_frequency: float = _field(
+        2.0, "Corner frequency d of the filter.", "rad/s", ge=_SMALLEST
+    )
     linear_gain: float = _field(-1.0, "Linear gain k1; negative takes energy out.", "N s/m")
     cubic_gain: float = _field(-1.0, "Cubic gain k2.", "N s^3/m^3")
     force_limit: float = _field(
@@ -267,16 +311,22 @@ class WashoutControllerParameters(NodeParameters):
 class AnalyzerParameters(NodeParameters):
     """Parameters of the analyzer node."""
 
-    bag: str = _field("", "Directory to record to; empty: none.", fixed=True)
-    window: int = _field(20, "Cycles to average over.", "cycles", fixed=True, ge=1, le=100_000)
+    bag: str = _field("", "Directory to record to; empty: none.", fixed=Fixed.ACTIVE)
+    window: int = _field(
+        20, "Cycles to average over.", "cycles", fixed=Fixed.ACTIVE, ge=1, le=100_000
+    )
     flush_period: float = _field(
-        1.0, "Wall time after which what was recorded is on disk.", "s", fixed=True, gt=0.0
+        1.0,
+        "Wall time after which what was recorded is on disk.",
+        "s",
+        fixed=Fixed.CONFIGURED,
+        ge=_SHORTEST,
     )
     max_bag_size: int = _field(
         0,
         "Size from which on a bag goes on in a further file; 0: any.",
         "bytes",
-        fixed=True,
+        fixed=Fixed.ACTIVE,
         ge=0,
         le=2**62,
     )
@@ -284,26 +334,28 @@ class AnalyzerParameters(NodeParameters):
         0.0,
         "Time between stamps beyond which a bag goes on in a further file; 0: any.",
         "s",
-        fixed=True,
+        fixed=Fixed.ACTIVE,
         ge=0.0,
         le=1e9,
     )
     compression: Literal["lz4", "zstd", "none"] = _field(
-        "lz4", "Compression of the bag.", fixed=True, choices=("lz4", "zstd", "none")
+        "lz4", "Compression of the bag.", fixed=Fixed.ACTIVE, choices=("lz4", "zstd", "none")
     )
 
 
 class ReplayParameters(NodeParameters):
     """Parameters of the replay node, which is part of no scenario."""
 
-    bag: str = _field("", "Bag to replay: its directory, or one of its files.", fixed=True)
-    rate: float = _field(1.0, "Recorded time over wall time.", fixed=True, gt=0.0)
-    loop: bool = _field(False, "Begin anew at the end of the bag.", fixed=True)
+    bag: str = _field(
+        "", "Bag to replay: its directory, or one of its files.", fixed=Fixed.CONFIGURED
+    )
+    rate: float = _field(1.0, "Recorded time over wall time.", fixed=Fixed.ACTIVE, ge=_SMALLEST)
+    loop: bool = _field(False, "Begin anew at the end of the bag.", fixed=Fixed.ACTIVE)
     start: float = _field(
         0.0,
         "Recorded time, from the bag's first message on, to begin at.",
         "s",
-        fixed=True,
+        fixed=Fixed.CONFIGURED,
         ge=0.0,
         le=1e10,
     )
@@ -311,12 +363,14 @@ class ReplayParameters(NodeParameters):
         float("inf"),
         "Recorded time to replay.",
         "s",
-        fixed=True,
-        gt=0.0,
+        fixed=Fixed.CONFIGURED,
+        ge=_SMALLEST,
         allow_inf_nan=True,
     )
-    topics: list[str] = _field([], "Topics to replay; none: all of the bag.", fixed=True)
-    clock: bool = _field(False, "Publish recorded time on /clock.", fixed=True)
+    topics: list[str] = _field(
+        [], "Topics to replay; none: all of the bag.", fixed=Fixed.CONFIGURED
+    )
+    clock: bool = _field(False, "Publish recorded time on /clock.", fixed=Fixed.CONFIGURED)
 
 
 NODE_PARAMETERS: dict[str, type[NodeParameters]] = {
@@ -338,12 +392,13 @@ class Parameter:
     default: Any
     unit: str | None
     meaning: str
-    fixed: bool
-    """Whether it cannot be changed while the node is active."""
+    fixed: Fixed
     choices: tuple[str, ...]
     """What a parameter of kind str may be; empty: anything."""
     bounds: str
-    """What is allowed, in words; empty: anything finite."""
+    """What is allowed, in words; empty: anything."""
+    finite: bool
+    """Whether a number must be finite."""
 
 
 def parameters_of(model: type[BaseModel], prefix: str = "") -> Iterator[Parameter]:
@@ -354,6 +409,12 @@ def parameters_of(model: type[BaseModel], prefix: str = "") -> Iterator[Paramete
             yield from parameters_of(kind, f"{prefix}{name}.")
         else:
             yield _parameter(prefix + name, field)
+
+
+def shown(value: Any) -> str:
+    """Return a value as messages show it, a long one cut."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
 
 
 def _parameter(name: str, field: FieldInfo) -> Parameter:
@@ -371,7 +432,16 @@ def _parameter(name: str, field: FieldInfo) -> Parameter:
         fixed=extra["fixed"],
         choices=choices,
         bounds=_bounds(field, choices),
+        finite=not any(
+            getattr(constraint, "allow_inf_nan", False) for constraint in field.metadata
+        ),
     )
+
+
+@cache
+def known_parameters(model: type[BaseModel]) -> Mapping[str, Parameter]:
+    """Return the parameters of a node's model by their flat names."""
+    return {parameter.name: parameter for parameter in parameters_of(model)}
 
 
 _COMPARISONS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
@@ -380,11 +450,15 @@ _COMPARISONS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
 def _bounds(field: FieldInfo, choices: tuple[str, ...]) -> str:
     if choices:
         return "one of " + ", ".join(choices)
-    return " and ".join(
-        f"{words} {getattr(constraint, name):g}"
+    limits = (
+        (words, getattr(constraint, name))
         for constraint in field.metadata
         for name, words in _COMPARISONS.items()
         if hasattr(constraint, name)
+    )
+    return " and ".join(
+        f"{words} {limit:g}" if isinstance(limit, float) else f"{words} {limit}"
+        for words, limit in limits
     )
 
 
@@ -407,7 +481,7 @@ def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
 _KIND_NAMES = {
     bool: "true or false",
     int: "a whole number",
-    float: "a finite number",
+    float: "a number",
     str: "a string",
     list: "a list of strings",
 }
@@ -415,19 +489,21 @@ _KIND_NAMES = {
 
 def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str, Any]) -> str:
     """Return in one line which values are refused, and what is allowed."""
-    known = {parameter.name: parameter for parameter in parameters_of(model)}
+    known = known_parameters(model)
     complaints: list[str] = []
     for detail in error.errors():
         place = [part for part in detail["loc"] if isinstance(part, str)]
         name = ".".join(place)
         if name not in known:
-            complaints.append(f"{name} {detail['msg'].removeprefix('Value error, ')}".strip())
+            complaints.append(detail["msg"].removeprefix("Value error, "))
             continue
         parameter = known[name]
         allowed = _KIND_NAMES[parameter.kind]
+        if parameter.kind is float and parameter.finite:
+            allowed = "a finite number"
         if parameter.bounds:
             allowed = parameter.bounds if parameter.choices else f"{allowed} {parameter.bounds}"
         unit = f" {parameter.unit}" if parameter.unit else ""
         value = values.get(name, detail["input"])
-        complaints.append(f"{name} = {value!r} is refused: must be {allowed}{unit}")
+        complaints.append(f"{name} = {shown(value)} is refused: must be {allowed}{unit}")
     return "; ".join(complaints)

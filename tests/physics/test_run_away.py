@@ -1,13 +1,21 @@
 """Friction that falls faster than the damping rises drives the slide beyond all bounds."""
 
 from dataclasses import replace
+from math import inf, isfinite
 
 import pytest
 
-from stickslip_ros.physics.friction import Linear
+from stickslip_ros.physics.friction import Coulomb, Exponential, FrictionLaw, Linear
 from stickslip_ros.physics.measures import CycleMeter, Regime
 from stickslip_ros.physics.motion import Motion
 from tests.physics.drives import PAPER
+
+LAWS = [
+    PAPER.friction,
+    Coulomb(0.4),
+    Linear(static=0.4, slope=0.3),
+    Exponential(static=0.4, kinetic=0.25, decay_speed=0.5, viscous=0.1),
+]
 
 # The paper's printed slope, twice the tangent of its cubic law.
 STEEP = replace(PAPER, belt_speed=0.2, friction=Linear(static=0.4, slope=0.9))
@@ -62,3 +70,18 @@ def test_a_restart_forgets_it() -> None:
     assert not motion.unbounded
     motion.advance(0.5)
     assert motion.position == pytest.approx(0.1, rel=1e-12)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("force", [1e20, 1e100, 1.7e308, inf])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_enormous_force_makes_it_run_away_and_no_figure_overflow(
+    law: FrictionLaw, force: float, sign: float
+) -> None:
+    motion = Motion(replace(PAPER, friction=law), 0.0, 0.0)
+    motion.force = sign * force
+    motion.advance(0.01)
+    assert motion.unbounded
+    assert motion.velocity == pytest.approx(sign * 1e3)
+    assert abs(motion.position) < 1e-3
+    assert isfinite(motion.friction_force)

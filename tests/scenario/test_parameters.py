@@ -165,7 +165,7 @@ def test_parameters_cannot_be_assigned() -> None:
 @st.composite
 def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
     """Values for some of the parameters, within all bounds."""
-    numbers = st.floats(1e-6, 1e6)
+    numbers = st.floats(1e-3, 1e3)
     strategies: dict[type, st.SearchStrategy[Any]] = {
         bool: st.booleans(),
         int: st.integers(200, 4_000),
@@ -180,6 +180,8 @@ def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
         values[name] = draw(st.sampled_from(choices) if choices else strategies[kind])
     if "friction.static" in values or "friction.minimum" in values or "friction.kinetic" in values:
         values |= {"friction.static": 1e6}  # the largest of the coefficients
+    if values.keys() & {"mass", "stiffness", "rate"}:
+        values |= {"rate": 1e3}  # above all natural frequencies
     return values
 
 

@@ -1,0 +1,82 @@
+"""Whatever the parameters take, `simulate` ends, with numbers for figures or with a refusal."""
+
+from dataclasses import replace
+from math import isfinite
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from stickslip_ros.app.simulate import simulate
+from stickslip_ros.errors import StickslipError
+from stickslip_ros.scenario.files import Scenario, load_scenario
+from stickslip_ros.scenario.parameters import NODE_PARAMETERS, parameters_of
+from tests.scenario.values import good_values
+
+PAPER = load_scenario("paper")
+SAMPLES = 100
+
+
+@st.composite
+def extremes(draw: st.DrawFn, node: str) -> dict[str, Any]:
+    """Values of some parameters of a node, at their bounds more often than not."""
+    known = {parameter.name: parameter for parameter in parameters_of(NODE_PARAMETERS[node])}
+    names = draw(st.sets(st.sampled_from(sorted(known)), min_size=1, max_size=5))
+    values = {}
+    for name in sorted(names):
+        choices = st.sampled_from(good_values(known[name]))
+        ordinary = st.floats(-6.0, 6.0).map(lambda power: 10.0**power)
+        values[name] = draw(choices | ordinary if known[name].kind is float else choices)
+    return values
+
+
+def simulated(plant: dict[str, Any], controller: dict[str, Any], continuous: bool) -> None:
+    try:
+        scenario: Scenario = replace(
+            PAPER,
+            plant=type(PAPER.plant).validated(PAPER.plant.flat() | plant, "plant"),
+            washout_controller=type(PAPER.washout_controller).validated(
+                PAPER.washout_controller.flat() | controller, "controller"
+            ),
+        )
+        duration = min(
+            2.0 * scenario.plant.as_drive().natural_period, SAMPLES / scenario.plant.rate
+        )
+        measures = simulate(scenario, duration, continuous=continuous, progress=lambda _: None)
+    except StickslipError:
+        return
+    figures = [value for value in measures.as_dict().values() if isinstance(value, float)]
+    assert all(isfinite(figure) for figure in figures)
+
+
+arguments = {
+    "plant": extremes("plant"),
+    "controller": extremes("washout_controller"),
+    "continuous": st.booleans(),
+}
+
+
+@pytest.fixture(autouse=True)
+def _little_patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stickslip_ros.physics.motion._SPARE_STEPS", 10_000)
+
+
+@given(**arguments)
+@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_any_scenario_ends(
+    plant: dict[str, Any], controller: dict[str, Any], continuous: bool
+) -> None:
+    simulated(plant, controller, continuous)
+
+
+@pytest.mark.long
+@given(**arguments)
+@settings(
+    max_examples=200,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+def test_many_scenarios_end(
+    plant: dict[str, Any], controller: dict[str, Any], continuous: bool
+) -> None:
+    simulated(plant, controller, continuous)

@@ -1,0 +1,282 @@
+"""Parameters set from outside while the nodes live: refused by name, or taken exactly."""
+
+import random
+import struct
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.parameter import parameter_value_to_python
+
+from stickslip_ros.bags.messages import joint_state_columns
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.managed import ManagedNode
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.replay import ReplayNode
+from stickslip_ros.nodes.topics import JOINT_STATES
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.scenario.parameters import NODE_PARAMETERS, ReplayParameters, parameters_of
+from tests.nodes.graph import Graph
+from tests.scenario.values import UNKNOWN, bad_values, good_values
+
+SECOND = 1_000_000_000
+LEFT_OPEN = {
+    "unconfigured": ("", "active", "configured"),
+    "inactive": ("", "active"),
+    "active": ("",),
+}
+"""By state: what is fixed from which state on may still be set."""
+MODELS = {**NODE_PARAMETERS, "replay": ReplayParameters}
+NODES: dict[str, type[ManagedNode[Any]]] = {
+    "plant": PlantNode,
+    "washout_controller": WashoutControllerNode,
+    "analyzer": AnalyzerNode,
+    "replay": ReplayNode,
+}
+
+
+def message(name: str, value: Any) -> ParameterMessage:
+    return RosParameter(name, value=value).to_parameter_msg()
+
+
+def set_each(graph: Graph, node: str, *changes: tuple[str, Any]) -> list[str]:
+    """Set the parameters one by one in one request; return why each is refused, or nothing."""
+    request = SetParameters.Request(parameters=[message(*change) for change in changes])
+    results = graph.call(SetParameters, f"/test/{node}/set_parameters", request).results
+    return [result.reason or "no reason" if not result.successful else "" for result in results]
+
+
+def set_all(graph: Graph, node: str, **changes: Any) -> str:
+    """Set the parameters all at once; return why they are refused, or nothing."""
+    parameters = [message(name.replace("__", "."), value) for name, value in changes.items()]
+    request = SetParametersAtomically.Request(parameters=parameters)
+    name = f"/test/{node}/set_parameters_atomically"
+    result = graph.call(SetParametersAtomically, name, request).result
+    return result.reason or "no reason" if not result.successful else ""
+
+
+def told(graph: Graph, node: str) -> dict[str, Any]:
+    """Return the node's parameters as it tells them."""
+    names = [parameter.name for parameter in parameters_of(MODELS[node])]
+    request = GetParameters.Request(names=names)
+    values = graph.call(GetParameters, f"/test/{node}/get_parameters", request).values
+    found = [parameter_value_to_python(value) for value in values]
+    return dict(zip(names, found, strict=True))
+
+
+def bits(values: dict[str, Any]) -> dict[str, Any]:
+    """What tells -0.0 from 0.0."""
+    return {n: struct.pack("d", v) if isinstance(v, float) else v for n, v in values.items()}
+
+
+def in_turn(node: Any) -> Iterator[str]:
+    """Bring the node into each state in which it lives."""
+    yield "unconfigured"
+    node.trigger_configure()
+    yield "inactive"
+    node.trigger_activate()
+    yield "active"
+
+
+@pytest.mark.parametrize(
+    ("name", "pace"),
+    [("plant", "lockstep"), ("plant", "realtime"), ("washout_controller", ""), ("analyzer", "")],
+)
+def test_bad_values_are_refused_in_every_state_and_change_nothing(
+    graph: Graph, name: str, pace: str
+) -> None:
+    given = {"pace": pace} if name == "plant" else {}
+    node = graph.add(NODES[name], autostart=False, **given)
+    bad = [
+        (parameter.name, value)
+        for parameter in parameters_of(MODELS[name])
+        for value in bad_values(parameter)
+    ]
+    unknown = [item for item in UNKNOWN.items() if item[0] not in told(graph, name)]
+    for state in in_turn(node):
+        before = bits(told(graph, name))
+        reasons = set_each(graph, name, *bad, *unknown)
+        for (parameter, value), reason in zip(bad, reasons, strict=False):
+            assert f"/test/{name}: {parameter} = " in reason, (state, parameter, value)
+            assert " is refused: " in reason
+        for (parameter, _), reason in zip(unknown, reasons[len(bad) :], strict=True):
+            assert f"/test/{name}: unknown parameter {parameter:.80} = " in reason, state
+        assert bits(told(graph, name)) == before == bits(node.parameters.flat())
+    assert node.active
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_good_values_are_taken_exactly_in_every_state(graph: Graph, name: str) -> None:
+    node = graph.add(NODES[name], autostart=False)
+    known = list(parameters_of(MODELS[name]))
+    states = in_turn(node) if name != "replay" else ["unconfigured"]  # it would want a bag
+    for state in states:
+        start = told(graph, name)
+        settable = {p.name for p in known if p.fixed in LEFT_OPEN[state]}
+        for choice in (-1, -2):
+            changes = [(p.name, good_values(p)[max(choice, -len(good_values(p)))]) for p in known]
+            reasons = set_each(graph, name, *changes)
+            now = told(graph, name)
+            assert bits(now) == bits(node.parameters.flat())
+            for (parameter, value), reason in zip(changes, reasons, strict=True):
+                assert (
+                    bits(now)[parameter] == bits(start if reason else {parameter: value})[parameter]
+                )
+                allowed = ["must not exceed", "at least a thousandth"] if reason else [""]
+                if parameter not in settable and value != start[parameter]:
+                    allowed += [f"{parameter} cannot be changed while the node is "]
+                    assert reason
+                assert any(part in reason for part in allowed), (state, parameter, value, reason)
+            assert set_all(graph, name, **{name: start[name] for name in settable}) == ""
+            assert bits(told(graph, name)) == bits(start)
+
+
+def test_what_is_not_all_good_is_not_taken_at_all(graph: Graph) -> None:
+    node = graph.add(PlantNode, autostart=False)
+    for _ in in_turn(node):
+        before = told(graph, "plant")
+        good = {p.name: good_values(p)[0] for p in parameters_of(MODELS["plant"]) if not p.fixed}
+        for name, bad in (("mass", 0.0), ("friction.law", "dry"), ("masss", 1.0), ("mass", None)):
+            reason = set_all(graph, "plant", **(good | {name: bad}))
+            assert f"{name} = {bad!r}" in reason
+            assert bits(told(graph, "plant")) == bits(before) == bits(node.parameters.flat())
+        together = {"friction.static": 0.2, "friction.minimum": 0.1}
+        assert set_each(graph, "plant", *together.items())[0] != ""
+        assert set_all(graph, "plant", **together) == ""
+        assert bits(told(graph, "plant")) == bits(before | together)
+        assert set_all(graph, "plant", **before) == ""
+
+
+def test_what_is_set_while_inactive_acts_when_it_is_activated(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    plant = graph.add(PlantNode, autostart=False, expects_control=False, wait_for=["observer"])
+    plant.trigger_configure()
+    changes = {"rate": 10.0, "duration": 1.0, "initial.position": 0.25, "friction.law": "coulomb"}
+    assert set_all(graph, "plant", **changes) == ""
+    assert "while the node is configured" in set_all(graph, "plant", publish_clock=True)
+    graph.wait_until(lambda: not plant.unmatched(), "the observer is there")
+    plant.trigger_activate()
+    graph.wait_until(lambda: len(heard) == 11 and not plant.active, "eleven samples")
+    columns, _ = joint_state_columns(heard)
+    assert np.diff(columns.stamp).tolist() == [SECOND // 10] * 10
+    assert columns.position[0] == 0.25
+    assert columns.effort[0] == 0.4
+    assert set_all(graph, "plant", **{"initial.position": -1.0}) == ""
+    plant.trigger_activate()
+    graph.wait_until(lambda: len(heard) == 22, "it goes on")
+    columns, _ = joint_state_columns(heard)
+    assert columns.position[11] == columns.position[10]
+
+
+@pytest.mark.parametrize("pace", ["lockstep", "realtime"])
+def test_a_motion_that_has_become_too_stiff_pauses_the_plant(
+    graph: Graph, pace: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stickslip_ros.physics.motion._SPARE_STEPS", 1000)
+    heard = graph.listen(JOINT_STATES, raw=True)
+    plant = graph.add(PlantNode, pace=pace, expects_control=False, wait_for=["observer"])
+    graph.wait_until(lambda: plant.active and heard, "samples come")
+    assert set_all(graph, "plant", damping=1e12) == ""
+    graph.wait_until(lambda: not plant.active, "the plant pauses")
+    assert "too stiff" in plant.diagnose()[1]
+    assert set_all(graph, "plant", damping=0.02) == ""
+    before = len(heard)
+    plant.trigger_activate()
+    graph.wait_until(lambda: len(heard) > before + 10, "it goes on")
+
+
+def test_a_plant_pauses_where_stamps_end(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    slow = {"mass": 1e20, "rate": 1e-6}
+    plant = graph.add(PlantNode, expects_control=False, wait_for=["observer"], **slow)
+    graph.wait_until(
+        lambda: heard and not plant.active and len(heard) == plant.diagnose()[2]["samples"],
+        "it pauses by itself",
+    )
+    columns, _ = joint_state_columns(heard)
+    assert set(np.diff(columns.stamp) // SECOND) == {10**6}
+    assert 2**31 - 3 * 10**6 < columns.stamp[-1] // SECOND < 2**31
+    plant.trigger_activate()
+    assert not plant.active
+
+
+@pytest.mark.parametrize("pace", ["lockstep", "realtime"])
+@pytest.mark.long
+def test_thousands_of_changes_leave_the_motion_continuous(graph: Graph, pace: str) -> None:
+    period = 1e-3
+    heard = graph.listen(JOINT_STATES, raw=True)
+
+    def wait_for_more(samples: int) -> None:
+        count = len(heard)
+        graph.wait_until(lambda: len(heard) > count + samples, "samples go on coming")
+
+    controller = graph.add(WashoutControllerNode, force_limit=0.5)
+    waiting = ["observer", "washout_controller"]
+    plant = graph.add(
+        PlantNode, pace=pace, rate=1.0 / period, wait_for=waiting, **{"friction.slope": 0.01}
+    )
+    graph.wait_until(lambda: plant.active and len(heard) > 100, "samples come")
+    rival = graph.observer.create_client(
+        SetParametersAtomically, "/test/plant/set_parameters_atomically"
+    )
+    draw = random.Random(1)
+    for _ in range(20):
+        changes = [drawn(draw) for _ in range(150)]
+        request = SetParametersAtomically.Request(
+            parameters=[message(*change) for change in dict(drawn(draw) for _ in range(3)).items()]
+        )
+        if rival.service_is_ready():
+            rival.call_async(request)
+        reasons = set_each(graph, "plant", *changes)
+        for (name, value), reason in zip(changes, reasons, strict=True):
+            assert not reason or f"{name} = {value!r}" in reason
+        gains = [
+            ("linear_gain", draw.uniform(-1.0, 0.0)),
+            ("corner_frequency", draw.uniform(0.1, 9.0)),
+        ]
+        assert set_each(graph, "washout_controller", *gains) == ["", ""]
+        wait_for_more(20)
+    assert bits(told(graph, "plant")) == bits(plant.parameters.flat())
+    assert bits(told(graph, "washout_controller")) == bits(controller.parameters.flat())
+    wait_for_more(2000)
+
+    columns, refused = joint_state_columns(heard)
+    assert refused.number == 0
+    assert columns.belt_velocity[-1] == plant.parameters.belt_speed
+    position, velocity = columns.position, columns.velocity
+    assert np.isfinite([position, velocity, columns.effort]).all()
+    next_to_each_other = np.diff(columns.stamp) == round(period * SECOND)
+    assert next_to_each_other.mean() > 0.9
+    fastest = np.maximum(np.abs(velocity[1:]), np.abs(velocity[:-1]))
+    # Spring, damper, friction, control and disturbance, on half a kilogram.
+    force = 2.0 * np.abs(position[:-1]) + 0.2 * fastest + 2.0 * 10.0 + 0.5 + 1.0
+    leap = np.abs(np.diff(velocity)) > period * force / 0.5
+    jump = np.abs(np.diff(position)) > period * (fastest + period * force / 0.5)
+    assert not (leap & next_to_each_other).any()
+    assert not (jump & next_to_each_other).any()
+
+
+def drawn(draw: random.Random) -> tuple[str, Any]:
+    """Return a change of the plant, bad one time in some."""
+    ranges: dict[str, tuple[float, float]] = {
+        "mass": (0.5, 2.0),
+        "stiffness": (0.5, 2.0),
+        "damping": (-0.02, 0.2),
+        "normal_force": (0.5, 2.0),
+        "belt_speed": (-0.5, 0.5),
+        "friction.static": (0.2, 0.5),
+        "friction.minimum": (0.0, 0.25),
+        "friction.kinetic": (0.0, 0.25),
+        "disturbance.amplitude": (-1.0, 1.0),
+        "disturbance.frequency": (-0.1, 5.0),
+    }
+    texts = {
+        "friction.law": ["stribeck", "coulomb", "linear", "exponential", "dry"],
+        "disturbance.kind": ["none", "step", "sine", "on"],
+    }
+    name = draw.choice([*ranges, *texts])
+    return name, draw.uniform(*ranges[name]) if name in ranges else draw.choice(texts[name])

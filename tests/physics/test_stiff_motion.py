@@ -1,0 +1,54 @@
+"""A motion that would take for ever is refused within bounded work."""
+
+from dataclasses import replace
+
+import pytest
+
+from stickslip_ros.errors import RunError
+from stickslip_ros.physics.friction import Coulomb
+from stickslip_ros.physics.motion import Motion
+from tests.physics.drives import PAPER
+
+STIFF = replace(PAPER, damping=1e9)
+
+
+@pytest.fixture(autouse=True)
+def _little_patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stickslip_ros.physics.motion._SPARE_STEPS", 1000)
+
+
+def test_it_is_refused() -> None:
+    motion = Motion(STIFF, 0.0, 0.0)
+    with pytest.raises(RunError, match="too stiff"):
+        motion.advance(0.1)
+    assert not motion.unbounded
+
+
+def test_with_another_drive_it_goes_on_where_it_was() -> None:
+    motion = Motion(PAPER, 0.3, 0.1)
+    motion.drive = STIFF
+    with pytest.raises(RunError):
+        motion.advance(0.1)
+    position, velocity = motion.position, motion.velocity
+    motion.drive = PAPER
+    assert motion.position == position
+    assert motion.velocity == pytest.approx(velocity, rel=1e-12)
+    motion.advance(1.0)
+    fresh = Motion(PAPER, position, velocity)
+    fresh.advance(1.0)
+    assert motion.position == pytest.approx(fresh.position, rel=1e-9)
+
+
+def test_a_long_motion_that_is_not_stiff_is_followed_to_its_end() -> None:
+    motion = Motion(PAPER, 0.0, 0.0)
+    motion.advance(20_000.0)
+    assert not motion.unbounded
+
+
+def test_a_law_that_was_used_before_is_as_it_was() -> None:
+    changed, steady = Motion(PAPER, 0.0, 0.0), Motion(PAPER, 0.0, 0.0)
+    for drive in (replace(PAPER, friction=Coulomb(0.4)), PAPER) * 2:
+        changed.drive = drive
+    for motion in (changed, steady):
+        motion.advance(30.0)
+    assert changed.position == pytest.approx(steady.position, rel=1e-11)
