@@ -6,6 +6,7 @@ from pathlib import Path
 from stickslip_ros.app.arguments import add_json, seconds
 from stickslip_ros.app.output import print_figures, print_json
 from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.printable import printable
 from stickslip_ros.versions import versions
 
 HELP = "measure a recorded run, or set several side by side"
@@ -64,6 +65,6 @@ def run(arguments: argparse.Namespace) -> int:
         {bag if several else "": report for bag, report in reports.items()},
     )
     for bag, report in reports.items():
-        for sentence in report["missing"]:
-            print(f"{bag}: {sentence}" if several else sentence)
+        for sentence in [*report["missing"], *report["notes"]]:
+            print(printable(f"{bag}: {sentence}") if several else sentence)
     return 0

@@ -10,6 +10,7 @@ field, whatever was in memory.
 
 import itertools
 import math
+import reprlib
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,11 +25,16 @@ from stickslip_ros.physics.samples import NANOSECONDS
 SLIDE = "slide"
 BELT = "belt"
 
+END_OF_TIME = 2**31 * NANOSECONDS
+"""Stamp, ns, that ROS time does not reach; only nanoseconds beyond a second make one."""
+
 _LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 _ENCAPSULATION = len(_LITTLE_ENDIAN)
 
 _JOINT_STATE_VALUES = 5
 _WRENCH_VALUES = 1
+_MOST_JOINTS = 1000
+"""More are not looked through: that might take longer than the message stands for."""
 _STRUCTURES = 8
 """Different structures that are looked for in a block of messages."""
 
@@ -364,18 +370,22 @@ def _unpackable(kind: str, stamp: int, error: struct.error) -> BagError:
 def _joint_state_layout(data: bytes) -> _Layout:
     message = _Decoder(data, "joint state")
     stamp = message.header_stamp()
-    names = [message.string() for _ in range(message.count())]
+    joints = message.count()
+    if joints > _MOST_JOINTS:
+        raise BagError(f"a joint state of {joints} joints; at most {_MOST_JOINTS} are taken")
+    names = [message.string() for _ in range(joints)]
+    shown = reprlib.repr(names)
     (position, positions), (velocity, velocities), (effort, efforts) = (
         message.doubles(message.count()) for _ in range(3)
     )
     missing = [joint for joint in (SLIDE, BELT) if joint not in names]
     if missing:
         raise BagError(
-            f"a joint state names the joints {names}; {' and '.join(missing)} must be among them"
+            f"a joint state names the joints {shown}; {' and '.join(missing)} must be among them"
         )
     if (positions, velocities, efforts or len(names)) != (len(names),) * 3:
         raise BagError(
-            f"a joint state of the joints {names} has {positions} positions, {velocities} "
+            f"a joint state of the joints {shown} has {positions} positions, {velocities} "
             f"velocities and {efforts} efforts; one each is needed, of efforts one each or none"
         )
     slide, belt = 8 * names.index(SLIDE), 8 * names.index(BELT)

@@ -14,6 +14,8 @@ _DEFAULT_WINDOW = 20
 _LARGEST_WINDOW = 100_000
 _LONGEST = 9e9
 """Time, s, that stamps can tell."""
+_MOST_EARLY = 1_000_000
+"""Forces that are kept until there is a joint state."""
 _MEASURED_AT_ONCE = 20_000
 """Messages; to measure each chunk by itself would take twice as long."""
 
@@ -29,9 +31,10 @@ def report_of_bag(
     """Return measures, counts and completeness of the recording at `path`, ready for JSON.
 
     Only what lies from `start` on and before `end` (s after the first joint state or, where there
-    is none, the first force) is measured, over the last `window` whole cycles of it (None: as many
-    as the analyzer did). The drive is that in the ROS `namespace`, None where there is only one.
-    `complete` says whether `missing`, sentences on what the bag lacks, is empty.
+    is none, the first force; a start of 0 leaves nothing out) is measured, over the last `window`
+    whole cycles of it (None: as many as the analyzer did). The drive is that in the ROS
+    `namespace`, None where there is only one. `complete` says whether `missing`, sentences on what
+    the bag lacks, is empty; `notes` are sentences on what makes the measures doubtful.
 
     Raises BagError for what is no bag or holds neither joint states nor control forces, and
     InvalidInputError for an empty part.
@@ -72,7 +75,8 @@ class _RunReader:
         self.measured = 0
         """Joint states and forces in the part."""
         self._start, self._end = (
-            round(min(instant, _LONGEST) * NANOSECONDS) for instant in (start, end)
+            round(min(instant, _LONGEST) * NANOSECONDS)
+            for instant in (start if start > 0.0 else -_LONGEST, end)
         )
         self._early: list[WrenchColumns] = []
 
@@ -90,11 +94,13 @@ class _RunReader:
             )
         if self.first is None:
             self._early.append(forces)
+            if sum(len(forces.stamp) for forces in self._early) > _MOST_EARLY:
+                self.finish()
         else:
             self._feed_forces(forces, self.first)
 
     def finish(self) -> None:
-        """Measure the forces of a run without joint states."""
+        """Measure the forces before the first joint state, or without any."""
         stamps = [forces.stamp[0] for forces in self._early if len(forces.stamp) > 0]
         if stamps:
             self._begin(int(stamps[0]))

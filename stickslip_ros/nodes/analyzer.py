@@ -6,18 +6,16 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import islice
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from rcl_interfaces.srv import GetParameters
-from rclpy.client import Client
-from rclpy.parameter import parameter_value_to_python
 from rclpy.publisher import Publisher
-from rclpy.task import Future
 from std_msgs.msg import Float64
 
 from stickslip_ros.bags.messages import (
+    END_OF_TIME,
     Refused,
     joint_state_columns,
     pack_header,
@@ -25,12 +23,16 @@ from stickslip_ros.bags.messages import (
     wrench_columns,
 )
 from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
-from stickslip_ros.errors import BagError, StickslipError
+from stickslip_ros.errors import BagError
+from stickslip_ros.nodes.dropped import Dropped
+from stickslip_ros.nodes.inquiry import Inquiry
 from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode, take_waiting
 from stickslip_ros.nodes.process import run_node
+from stickslip_ros.nodes.rivals import rivals
 from stickslip_ros.nodes.topics import (
     AMPLITUDE,
     CONTROL_FORCE,
+    DEEP,
     FREQUENCY,
     JOINT_STATES,
     RECORDED,
@@ -69,6 +71,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if self.parameters.bag:
             check_new_bag(self._next_bag())
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
+        self._dropped = Dropped(self)
+        self._connections.append(self._dropped)
         self._channels: dict[str, int] = {}
         self._tick = min(_TAKE_PERIOD, self.parameters.flush_period / 2.0)
         self._connections.append(self.every(self._tick, self._on_tick))
@@ -78,7 +82,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         """Open a bag, start to measure, and then listen: who is heard is not lost."""
         self._meter = RunMeter(self.parameters.window)
         self._cycles = self._told = 0
-        self._complaint = self._bag_failure = ""
+        self._bag_failure = ""
+        self._dropped.clear()
         self._recorder: Recorder | None = None
         if self.parameters.bag:
             self._open_bag()
@@ -86,12 +91,11 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._recorded: Publisher = self.create_publisher(
             RECORDED.type, RECORDED.name, RECORDED.qos()
         )
-        self._to_ask: dict[str, Client] = {
-            node: self.create_client(GetParameters, f"{node}/get_parameters")
-            for node in NODE_PARAMETERS
+        self._inquiries = [
+            Inquiry(self, node, [p.name for p in parameters_of(model)], partial(self._keep, node))
+            for node, model in NODE_PARAMETERS.items()
             if node != "analyzer"
-        }
-        self._asked: list[Client] = []
+        ]
         self._to_measure: dict[Topic, list[bytes]] = {JOINT_STATES: [], CONTROL_FORCE: []}
         self._listening = {topic: self.collect(topic) for topic in RECORDED_TOPICS}
 
@@ -104,8 +108,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         for subscription in self._listening.values():
             self._connections.remove(subscription)
             self.destroy_subscription(subscription)
-        for client in [*self._to_ask.values(), *self._asked]:
-            self.destroy_client(client)
+        for inquiry in self._inquiries:
+            inquiry.close()
         self._keep("report", report)
         self._close_bag()
         if self._bag_failure:  # then it is nowhere else
@@ -122,16 +126,19 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         }
 
     def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
-        """Return the regime, counts of samples, and what is wrong with the bag or a message."""
+        """Return the regime, counts of samples, and what is wrong with the bag or messages."""
         if not self.active:
             return OK, "", {}
         report = self._meter.report()
-        figures = {name: report[name] for name in ("regime", "samples", "lost_samples")}
+        counts = {name: report[name] for name in ("regime", "samples", "lost_samples")}
+        figures = {**counts, **self._dropped.figures, "notes": "; ".join(report["notes"])}
         if self._bag_failure:
             return ERROR, self._bag_failure, figures
-        if report["lost_samples"] and not self._complaint:
-            return WARN, "samples were lost", figures
-        return (WARN if self._complaint else OK), self._complaint, figures
+        complaints = [self._dropped.complaint, *rivals(self, *RECORDED_TOPICS)]
+        if report["lost_samples"]:
+            complaints.append("samples were lost")
+        complaint = "; ".join(filter(None, complaints))
+        return WARN if complaint else OK, complaint, figures
 
     def _on_tick(self) -> None:
         if self.active:
@@ -155,14 +162,15 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def _take(self, topic: Topic) -> list[_Heard]:
         """Take the messages of a topic that wait; one without a proper stamp is dropped."""
         heard: list[_Heard] = []
-        for data in take_waiting(self._listening[topic]):
+        # Whoever sends faster than this can take must not keep it from all else.
+        for data in islice(take_waiting(self._listening[topic]), DEEP):
             try:
                 stamp = unpack_header(data)
-            except StickslipError as error:
-                self._complaint = str(error)
+            except BagError as error:
+                self._dropped.add(f"{topic.name}: {error}")
                 continue
-            if stamp <= 0:
-                self._complaint = f"a message on {topic.name} with the stamp {stamp} ns was dropped"
+            if not 0 < stamp < END_OF_TIME:
+                self._dropped.add(f"{topic.name}: a message with the stamp {stamp} ns")
                 continue
             heard.append(_Heard(topic, stamp, data))
         if topic in self._to_measure:
@@ -172,6 +180,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def _measure(self) -> None:
         """Decode and measure what was taken in since the last time."""
         states = self._columns(JOINT_STATES, joint_state_columns)
+        windows = self._cycles // self.parameters.window
         for cycle in self._meter.motion.feed(
             states.stamp, states.position, states.velocity, states.belt_velocity
         ):
@@ -179,11 +188,12 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             for publisher, figure in zip(self._limit_cycle, figures, strict=True):
                 publisher.publish(Float64(data=figure))
             self._cycles += 1
-            if self._cycles % self.parameters.window == 0:
-                self._log_measures()
+        if self._cycles // self.parameters.window > windows:
+            self._log_measures()
         forces = self._columns(CONTROL_FORCE, wrench_columns)
         self._meter.force.feed(forces.stamp, forces.force)
-        self._ask_for_parameters()
+        for inquiry in self._inquiries:
+            inquiry.pursue()
 
     def _log_measures(self) -> None:
         figures = self._meter.motion.measures().as_dict()
@@ -197,7 +207,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         messages, self._to_measure[topic] = self._to_measure[topic], []
         columns, refused = decode(messages)
         if refused.number > 0:
-            self._complaint = refused.reason
+            self._dropped.add(f"{topic.name}: {refused.reason}", refused.number)
         return columns
 
     def _next_bag(self) -> Path:
@@ -265,21 +275,6 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             except BagError as error:
                 self._give_up_recording(error)
             self._recorder = None
-
-    def _ask_for_parameters(self) -> None:
-        """Ask plant and controller, as soon as they are there, what they run with."""
-        for node, client in list(self._to_ask.items()):
-            if client.service_is_ready():
-                names = [p.name for p in parameters_of(NODE_PARAMETERS[node])]
-                answer = client.call_async(GetParameters.Request(names=names))
-                answer.add_done_callback(partial(self._on_parameters, node, names))
-                self._asked.append(self._to_ask.pop(node))
-
-    def _on_parameters(self, node: str, names: list[str], answer: Future) -> None:
-        response = answer.result()
-        if self.active and response is not None:
-            values = [parameter_value_to_python(value) for value in response.values]
-            self._keep(node, dict(zip(names, values, strict=False)))
 
 
 def main() -> None:

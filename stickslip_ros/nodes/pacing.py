@@ -10,6 +10,7 @@ from math import inf
 from threading import TIMEOUT_MAX, Event, Lock, Thread
 from typing import Any
 
+from stickslip_ros.errors import StickslipError
 from stickslip_ros.nodes.managed import ManagedNode
 from stickslip_ros.nodes.topics import RECORDED
 from stickslip_ros.physics.sampled_loop import Sample, SampledLoop
@@ -152,8 +153,9 @@ class LockstepPacer(Pacer):
         super().__init__(loop, publish, end)
         self._node = node
         self._reply_timeout = node.parameters.reply_timeout
+        recorded = node.resolve_topic_name(RECORDED.name)
         self._flow = FlowWindow(
-            node.parameters.flow_window, lambda: node.count_publishers(RECORDED.name) > 0
+            node.parameters.flow_window, lambda: node.count_publishers(recorded) > 0
         )
         self._scheduled = False
         self._seen = -1
@@ -194,7 +196,14 @@ class LockstepPacer(Pacer):
                 return
             if held_up:
                 return
-            sample = loop.advance()
+            try:
+                sample = loop.advance()
+            except StickslipError as error:
+                self.complaint = str(error)
+                self._node.get_logger().error(self.complaint)
+                self.stop()
+                self._end()
+                return
             self._publish(sample)
             self._flow.sent(sample.stamp)
         self._schedule()

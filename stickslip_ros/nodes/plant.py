@@ -10,9 +10,12 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from stickslip_ros.bags.messages import pack_joint_state, pack_wrench, unpack_header, unpack_wrench
+from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.nodes.dropped import Dropped
 from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer
 from stickslip_ros.nodes.process import run_node
+from stickslip_ros.nodes.rivals import rivals
 from stickslip_ros.nodes.topics import (
     APPLIED_DISTURBANCE,
     CLOCK,
@@ -22,9 +25,12 @@ from stickslip_ros.nodes.topics import (
     RECORDED,
 )
 from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, Sample, SampledLoop
+from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, Sample, SampledLoop, Verdict
 from stickslip_ros.physics.samples import NANOSECONDS
 from stickslip_ros.scenario.parameters import Pace, PlantParameters
+
+_LATEST_STAMP = (2**31 - 1) * NANOSECONDS
+"""ns; messages cannot hold a later one."""
 
 NEWEST_STAMP = "newest_stamp"
 """Key under which the diagnostics tell the stamp of the newest sample, ns."""
@@ -43,6 +49,8 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._next_start = LOCKSTEP_START
         self._disturbance = 0.0
         self._lock = threading.Lock()
+        self._dropped = Dropped(self)
+        self._connections.append(self._dropped)
         self._state = self.advertise(JOINT_STATES)
         self._applied = self.advertise(APPLIED_DISTURBANCE)
         self._clock_time = self.advertise(CLOCK) if self.parameters.publish_clock else None
@@ -53,6 +61,7 @@ class PlantNode(ManagedNode[PlantParameters]):
 
     def start(self) -> None:
         """Begin a segment: sample 0 now, further ones as the pacer lets them come."""
+        self._dropped.clear()
         if self._disturbance:  # whoever records the new segment has not heard of it
             self._disturbance = nan
         parameters = self.parameters
@@ -69,6 +78,11 @@ class PlantNode(ManagedNode[PlantParameters]):
             expects_control=parameters.expects_control,
             disturbance=parameters.as_disturbance(),
         )
+        stampable = self._loop.number(_LATEST_STAMP) - 1
+        if stampable < 0:
+            raise InvalidInputError(
+                f"no stamps are left behind {_LATEST_STAMP // NANOSECONDS} s: configure anew"
+            )
         if realtime:
             self._pacer = RealtimePacer(
                 self._loop,
@@ -80,7 +94,8 @@ class PlantNode(ManagedNode[PlantParameters]):
             )
         else:
             self._pacer = LockstepPacer(self._loop, self._publish, self._end, self)
-        self._pacer.start(parameters.last_sample)
+        last = parameters.last_sample
+        self._pacer.start(stampable if last is None else min(last, stampable))
 
     def stop(self) -> None:
         """Pause the motion, once the states sent have arrived."""
@@ -97,6 +112,9 @@ class PlantNode(ManagedNode[PlantParameters]):
                 self._loop.scenario_disturbance = self.parameters.as_disturbance()
         elif self._connections:
             self._motion.drive = self.parameters.as_drive()
+            if self._next_start == LOCKSTEP_START:  # it has not moved yet
+                initial = self.parameters.initial
+                self._motion.restart(initial.position, initial.velocity)
 
     def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
         """Return counts of samples, late and dropped forces and missed deadlines."""
@@ -110,6 +128,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             "missed_deadlines": pacer.missed_deadlines,
             "largest_lateness": round(pacer.largest_lateness, 6),
             "steps_per_second": round(pacer.steps_per_second, 1),
+            **self._dropped.figures,
             **{f"dropped: {reason}": count for reason, count in loop.dropped.items()},
         }
         if loop.unbounded:
@@ -117,11 +136,9 @@ class PlantNode(ManagedNode[PlantParameters]):
         complaints = [pacer.complaint]
         if self.parameters.expects_control and not loop.controller_present:
             complaints.append(NO_FORCE)
-        if loop.dropped:
-            complaints.append("forces were dropped")
-        if any(complaints):
-            return WARN, "; ".join(filter(None, complaints)), figures
-        return OK, "", figures
+        complaints += [self._dropped.complaint, *rivals(self, CONTROL_FORCE, DISTURBANCE_FORCE)]
+        complaint = "; ".join(filter(None, complaints))
+        return WARN if complaint else OK, complaint, figures
 
     def _publish(self, sample: Sample) -> None:
         friction = sample.friction_force
@@ -151,23 +168,39 @@ class PlantNode(ManagedNode[PlantParameters]):
     def _on_force(self, message: bytes) -> None:
         if not self.active:
             return
-        stamp, force = unpack_wrench(message)
+        try:
+            stamp, force = unpack_wrench(message)
+        except BagError as error:
+            self._dropped.add(f"control force: {error}")
+            return
         with self._lock:
-            self._loop.offer(stamp, force)
+            verdict = self._loop.offer(stamp, force)
+        if verdict is not Verdict.ACCEPTED:
+            self._dropped.add(f"control force {force} N stamped {stamp} ns: {verdict}")
         self._pacer.force_came()
 
     def _on_disturbance(self, message: bytes) -> None:
-        _, force = unpack_wrench(message)
+        try:
+            _, force = unpack_wrench(message)
+        except BagError as error:
+            self._dropped.add(f"disturbance force: {error}")
+            return
         if not self.active or not isfinite(force):
             why = "not finite" if self.active else "the plant is not active"
-            self.get_logger().warning(f"disturbance force {force} N dropped: {why}")
+            self._dropped.add(f"disturbance force {force} N: {why}")
             return
         with self._lock:
             self._loop.disturb(force)
 
     def _on_recorded(self, message: bytes) -> None:
-        if self.active:
-            self._pacer.recorder_came_to(unpack_header(message))
+        if not self.active:
+            return
+        try:
+            stamp = unpack_header(message)
+        except BagError as error:
+            self._dropped.add(f"{RECORDED.name}: {error}")
+            return
+        self._pacer.recorder_came_to(stamp)
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         initial = self.parameters.initial

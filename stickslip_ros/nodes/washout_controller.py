@@ -4,11 +4,14 @@ import sys
 from math import isfinite
 from typing import Any
 
-from stickslip_ros.bags.messages import pack_wrench, unpack_joint_state
-from stickslip_ros.errors import StickslipError
+from stickslip_ros.bags.messages import JointStateSample, pack_wrench, unpack_joint_state
+from stickslip_ros.errors import BagError
+from stickslip_ros.nodes.dropped import Dropped
 from stickslip_ros.nodes.managed import OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.process import run_node
+from stickslip_ros.nodes.rivals import rivals
 from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
+from stickslip_ros.physics.samples import LARGEST
 from stickslip_ros.physics.washout import Washout
 from stickslip_ros.scenario.parameters import WashoutControllerParameters
 
@@ -21,6 +24,8 @@ class WashoutControllerNode(ManagedNode[WashoutControllerParameters]):
 
     def connect(self) -> None:
         """Publish forces; take the newest joint state only."""
+        self._dropped = Dropped(self)
+        self._connections.append(self._dropped)
         self._force = self.advertise(CONTROL_FORCE)
         self.subscribe(JOINT_STATES, self._on_joint_state, depth=1)
 
@@ -28,7 +33,7 @@ class WashoutControllerNode(ManagedNode[WashoutControllerParameters]):
         """Start the filter on the next joint state."""
         self._washout = Washout(self.parameters.as_washout())
         self._answered = 0
-        self._refused = ""
+        self._dropped.clear()
 
     def stop(self) -> None:
         """Fall silent, once the forces sent have arrived."""
@@ -40,26 +45,33 @@ class WashoutControllerNode(ManagedNode[WashoutControllerParameters]):
             self._washout.parameters = self.parameters.as_washout()
 
     def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
-        """Return how many joint states were answered, and why the last refused one was."""
+        """Return how many joint states were answered, and what is wrong with others."""
         if not self.active:
             return OK, "", {}
-        level = WARN if self._refused else OK
-        return level, self._refused, {"answered": self._answered}
+        complaint = "; ".join(filter(None, [self._dropped.complaint, *rivals(self, JOINT_STATES)]))
+        figures = {"answered": self._answered, **self._dropped.figures}
+        return WARN if complaint else OK, complaint, figures
 
     def _on_joint_state(self, message: bytes) -> None:
         if not self.active:
             return
         try:
-            sample = unpack_joint_state(message)
-        except StickslipError as error:
-            self._refused = str(error)
+            self._answer(unpack_joint_state(message))
+        except BagError as error:
+            self._dropped.add(str(error))
+
+    def _answer(self, sample: JointStateSample) -> None:
+        stamp, velocity = sample.stamp, sample.velocity
+        if not abs(velocity) <= LARGEST:
+            self._dropped.add(f"a joint state stamped {stamp} ns with the velocity {velocity} m/s")
             return
-        if not isfinite(sample.velocity):
-            self._refused = f"a joint state with velocity {sample.velocity} was dropped"
-            return
-        force = self._washout.answer(sample.stamp, sample.velocity)
-        if force is not None:
-            self._force.publish(pack_wrench(sample.stamp, force))
+        force = self._washout.answer(stamp, velocity)
+        if force is None:
+            self._dropped.add(f"a joint state stamped {stamp} ns, which was answered already")
+        elif not isfinite(force):
+            self._dropped.add(f"to the velocity {velocity} m/s the force would be {force} N")
+        else:
+            self._force.publish(pack_wrench(stamp, force))
             self._answered += 1
 
 

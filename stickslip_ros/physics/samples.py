@@ -38,7 +38,7 @@ _SHORT_GAP = 5
 _FEW_GAPS = 3
 """So many short gaps off the grid, none of them behind steady steps, are jitter."""
 
-_LARGEST = 1e100
+LARGEST = 1e100
 """Magnitude up to which positions (m) and speeds (m/s) are believed, and nothing overflows."""
 
 _RESTING_PART = 10
@@ -235,6 +235,8 @@ class SampleMeter:
         """Average over the last `window` cycles at most."""
         self.samples = 0
         """Samples seen."""
+        self.steps_back = 0
+        """Samples whose stamp was not later than the one before."""
         self._grid = _Grid()
         self._meter = CycleMeter(window)
         self._last: _Rows | None = None
@@ -254,13 +256,14 @@ class SampleMeter:
         """
         believed = np.ones(len(stamp), dtype=bool)
         for column in (position, velocity, belt_velocity):
-            believed &= np.abs(column) <= _LARGEST
+            believed &= np.abs(column) <= LARGEST
         rows = _Rows(stamp, position, velocity, belt_velocity).select(believed)
         self.samples += len(rows.stamp)
         if self._last is not None:
             rows = self._last.followed_by(rows)
         if len(rows.stamp) == 0:
             return []
+        self.steps_back += int((np.diff(rows.stamp) <= 0).sum())
         cycles: list[Cycle] = []
         segments = self._grid.segments(rows.stamp)
         ends = [*(segment.start for segment in segments[1:]), len(rows.stamp)]
@@ -363,12 +366,24 @@ class RunMeter:
         self.force = ForceMeter()
 
     def report(self) -> dict[str, Any]:
-        """Return the measures and counts by name, ready for JSON; SI units."""
+        """Return the measures and counts by name, ready for JSON; SI units.
+
+        `notes` are sentences on what makes the measures doubtful.
+        """
+        motion = self.motion
+        notes: list[str] = []
+        if motion.steps_back:
+            notes.append(
+                f"the stamp of {motion.steps_back} of {motion.samples} samples is not later than "
+                "the one before, and the motion is cut there: the plant was started anew, or "
+                "several nodes publish joint_states"
+            )
         return {
-            **self.motion.measures().as_dict(),
+            **motion.measures().as_dict(),
             "peak_force": self.force.peak_force,
             "resting_force": self.force.resting_force,
-            "samples": self.motion.samples,
-            "lost_samples": self.motion.lost_samples,
-            "duration": self.motion.duration,
+            "samples": motion.samples,
+            "lost_samples": motion.lost_samples,
+            "duration": motion.duration,
+            "notes": notes,
         }

@@ -44,10 +44,10 @@ class Washout:
         self._low_passed = 0.0
 
     def answer(self, stamp: int, velocity: float) -> float | None:
-        """Return the force (N) for the slide's `velocity` (m/s) measured at `stamp` (ns).
+        """Return the force (N) for the slide's finite `velocity` (m/s) measured at `stamp` (ns).
 
         The filter starts at rest on the first measurement, and again where time goes back. A
-        stamp that was answered already gets None.
+        stamp that was answered already gets None. The force is not finite where it overflows.
         """
         parameters = self.parameters
         if self._stamp is None or stamp < self._stamp:

@@ -51,6 +51,16 @@ def test_what_is_lost_is_counted_by_the_stamps(tmp_path):
     assert (report["samples"], report["lost_samples"]) == (993, 7)
 
 
+def test_a_plant_that_was_started_anew_is_measured_from_wherever_its_stamps_begin(tmp_path):
+    with Recorder(tmp_path / "bag") as recorder:
+        channel = recorder.add_topic(STATES, "sensor_msgs/msg/JointState", QosProfile(depth=10))
+        for stamp in [*STAMPS, *(stamp - 4 * SECOND for stamp in STAMPS)]:
+            recorder.write(channel, state(stamp), stamp)
+    report = report_of_bag(tmp_path / "bag")
+    assert (report["samples"], report["lost_samples"]) == (2000, 0)
+    assert len(report["notes"]) == 1
+
+
 def test_without_joint_states_the_forces_are_measured_and_it_is_said(tmp_path):
     record(tmp_path / "bag", states=[])
     report = report_of_bag(tmp_path / "bag")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from stickslip_ros.physics.measures import Regime
 from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.samples import SampleMeter
+from stickslip_ros.physics.samples import RunMeter, SampleMeter
 from tests.physics.drives import LIMIT_CYCLES, PAPER
 
 SECOND = 10**9
@@ -360,3 +360,37 @@ def test_a_leap_onto_the_belt_hides_no_extremes() -> None:
     for part in (samples, samples.later(400_000_000)):
         cycles += meter.feed(*part)
     assert [cycle.amplitude for cycle in cycles] == pytest.approx([0.16], rel=1e-3)
+
+
+@pytest.mark.filterwarnings("error")
+@given(
+    st.lists(
+        st.tuples(
+            st.one_of(st.integers(0, 10**12), st.integers(-(2**61), 2**61)),
+            st.floats(),
+            st.floats(),
+            st.floats(),
+        ),
+        max_size=60,
+    ),
+    st.integers(1, 60),
+)
+def test_no_samples_are_an_error(rows: list[tuple[int, float, float, float]], size: int) -> None:
+    meter = SampleMeter(window=20)
+    for first in range(0, len(rows), size):
+        stamp, *values = zip(*rows[first : first + size], strict=True)
+        meter.feed(np.array(stamp), *map(np.array, values))
+    measured = meter.measures().as_dict().values()
+    assert np.isfinite([figure for figure in measured if isinstance(figure, float)]).all()
+
+
+@pytest.mark.parametrize("size", [1, 7, 400])
+def test_two_publishers_on_one_topic_are_noted(size: int) -> None:
+    stamp = stamps(100, 200)
+    both = still(np.stack([stamp, stamp - SECOND // 2]).T.ravel())
+    meter = RunMeter(window=20)
+    for first in range(0, len(both.stamp), size):
+        meter.motion.feed(*both.rows(slice(first, first + size)))
+    (note,) = meter.report()["notes"]
+    assert "200 of 400 samples" in note
+    assert "several nodes publish joint_states" in note

@@ -1,9 +1,11 @@
 """Which forces a loop takes, and what acts where none has come."""
 
-from math import inf, nan
+from math import inf, isfinite, nan
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.sampled_loop import SampledLoop, Verdict
@@ -11,6 +13,7 @@ from tests.physics.drives import PAPER
 
 SECOND = 10**9
 PERIOD = SECOND // 100
+MOTION = Motion(PAPER, 0.0, 0.0)
 paces = pytest.mark.parametrize("realtime", [False, True], ids=["lockstep", "realtime"])
 
 
@@ -213,3 +216,29 @@ def test_answers_find_their_samples_where_stamps_are_rounded(rate: float) -> Non
         assert loop.offer(loop.sample.stamp, 0.1) is Verdict.ACCEPTED
         loop.advance()
     assert loop.late_forces == 0
+
+
+offers = st.tuples(
+    st.one_of(
+        st.integers(-3, 12).map(lambda number: SECOND + number * PERIOD),
+        st.integers(-(2**62), 2**62),
+    ),
+    st.floats(),
+)
+
+
+@pytest.mark.parametrize("realtime", [False, True])
+@given(st.lists(st.one_of(st.none(), offers), max_size=30))
+def test_whatever_is_offered_every_sample_is_finite(
+    realtime: bool, events: list[tuple[int, float] | None]
+) -> None:
+    MOTION.restart(0.0, 0.0)
+    loop = SampledLoop(MOTION, 100.0, SECOND, hold_late=realtime)
+    taken = 0
+    for event in events:
+        if event is None:
+            assert all(isfinite(figure) for figure in loop.advance())
+        else:
+            taken += loop.offer(*event) is Verdict.ACCEPTED
+    offered = sum(event is not None for event in events)
+    assert taken + loop.dropped.total() == offered

@@ -1,6 +1,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
-from math import exp, inf
+from math import exp, inf, isfinite
 
 import numpy as np
 import pytest
@@ -133,3 +133,18 @@ def test_it_starts_anew_where_time_goes_back() -> None:
         washout.answer(stamp, speed)
     for stamp, speed in [(2 * SECOND, 0.3), (2 * SECOND + 10**8, 0.5), (3 * SECOND, -0.4)]:
         assert washout.answer(stamp, speed) == fresh.answer(stamp, speed)
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(-(2**61), 2**61), st.floats(-1e100, 1e100)), min_size=1, max_size=20
+    ),
+    st.floats(1e-300, 1e300),
+)
+def test_no_stamp_and_no_speed_leaves_it_with_a_filter_that_is_not_finite(
+    steps: list[tuple[int, float]], corner_frequency: float
+) -> None:
+    washout = Washout(WashoutParameters(corner_frequency, -1.0, 0.0))
+    for stamp, speed in steps:
+        force = washout.answer(stamp, speed)
+        assert force is None or isfinite(force)

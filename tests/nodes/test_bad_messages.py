@@ -1,0 +1,299 @@
+"""What the nodes do with messages that are wrong, too many, or from somebody too many."""
+
+import random
+import resource
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from itertools import islice
+from math import inf, isfinite, nan
+from pathlib import Path
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.publisher import Publisher
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+
+from stickslip_ros.bags.messages import (
+    pack_header,
+    pack_joint_state,
+    pack_wrench,
+    unpack_header,
+    unpack_wrench,
+    wrench_columns,
+)
+from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.errors import BagError
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.managed import OK, WARN
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.topics import (
+    APPLIED_DISTURBANCE,
+    CONTROL_FORCE,
+    DIAGNOSTICS,
+    DISTURBANCE_FORCE,
+    JOINT_STATES,
+    RECORDED,
+    Topic,
+)
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from tests.nodes.graph import PATIENCE, Graph
+from tests.nodes.processes import Processes
+
+SECOND = 1_000_000_000
+TOPICS = (JOINT_STATES, CONTROL_FORCE, DISTURBANCE_FORCE, APPLIED_DISTURBANCE, RECORDED)
+PADDING = bytes(3)
+"""Fast DDS fills a message up to four bytes: one that was cut may arrive complete."""
+VALUES = (nan, inf, -inf, 1e308, -1e308, 1e100, 5e-324, 0.1, -3.0)
+paces = pytest.mark.parametrize("pace", ["lockstep", "realtime"])
+
+
+def publisher(graph: Graph, topic: Topic) -> Publisher:
+    """Return a publisher of the test's own, matched with somebody."""
+    made = graph.observer.create_publisher(topic.type, f"/test/{topic.name}", topic.qos())
+    graph.wait_until(made.get_subscription_count, f"{topic.name} is matched")
+    return made
+
+
+def close_the_loop(graph: Graph, bag: Path, **plant_parameters: object) -> tuple[Any, Any, Any]:
+    """Return analyzer, controller and plant, at work."""
+    analyzer = graph.add(AnalyzerNode, bag=str(bag))
+    controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
+    listeners = ["analyzer", "washout_controller"]
+    plant = graph.add(PlantNode, wait_for=listeners, reply_timeout=0.5, **plant_parameters)
+    graph.wait_until(lambda: plant.active and plant._loop.sample.number > 10, "the loop runs")
+    return analyzer, controller, plant
+
+
+def messages(seed: int, near: Callable[[], int]) -> Iterator[bytes]:
+    """Yield joint states, forces, headers and garbage; many are stamped near an instant (ns)."""
+    chance = random.Random(seed)
+    while True:
+        now = near()
+        stamp = chance.choice(
+            [now, now + 1, now - SECOND, now + SECOND, now + SECOND**2, 0, 1, -5 * SECOND]
+        )
+        stamp = max(-(2**31) * SECOND, min(stamp, 2**31 * SECOND - 1))
+        value, other = chance.choices(VALUES, k=2)
+        names = chance.choices(["slide", "belt", "arm", ""], k=chance.randrange(4))
+        state = JointState(name=names, position=[value] * chance.randrange(4), velocity=[other])
+        state.header.stamp.nanosec = chance.randrange(2**32)
+        message = bytearray(
+            chance.choice(
+                [
+                    pack_joint_state(stamp, (value, 0.0), (other, 0.4), (0.0, 0.0)),
+                    pack_wrench(stamp, value),
+                    pack_header(stamp),
+                    serialize_message(state),
+                    chance.randbytes(chance.randrange(1, 200)),
+                ]
+            )
+        )
+        for _ in range(chance.choice([0, 0, 1, 5])):
+            message[chance.randrange(len(message))] = chance.randrange(256)
+        # Fast DDS passes nothing on behind an empty message.
+        yield bytes(message[: chance.choice([None, None, chance.randrange(1, len(message) + 1)])])
+
+
+def too_strong(message: bytes) -> bool:
+    """Return whether it is a force that may make the motion run away, which pauses the plant."""
+    with suppress(BagError):
+        return 1.0 < abs(unpack_wrench(message + PADDING)[1]) < inf
+    return False
+
+
+def resident(process: int) -> int:
+    """Return the bytes of memory that a process holds."""
+    pages = int(Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1])
+    return pages * resource.getpagesize()
+
+
+def test_the_plant_says_what_it_dropped_and_waits_for_a_force_that_is_one(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    plant = graph.add(PlantNode, wait_for=["observer"])
+    force = graph.observer.create_publisher(
+        CONTROL_FORCE.type, f"/test/{CONTROL_FORCE.name}", CONTROL_FORCE.qos()
+    )
+    graph.wait_until(lambda: len(heard) == 1, "sample 0")
+    assert plant.diagnose()[0] == OK
+    for message in (b"\0", b"\xff" * 100, pack_wrench(SECOND, nan), pack_wrench(SECOND, -inf)):
+        force.publish(message)
+    graph.wait_until(lambda: plant.diagnose()[2]["dropped_messages"] == 4, "four are dropped")
+    level, sentence, figures = plant.diagnose()
+    assert level == WARN
+    assert "4 messages dropped so far, the last: control force -inf N" in sentence
+    assert figures["dropped: not finite"] == 2
+    assert len(heard) == 1
+    force.publish(pack_wrench(SECOND, 0.25))
+    graph.wait_until(lambda: len(heard) == 2, "sample 1")
+
+    for topic, message in ((DISTURBANCE_FORCE, pack_wrench(0, nan)), (RECORDED, b"\0\1\0")):
+        publisher(graph, topic).publish(message)
+    graph.wait_until(lambda: plant.diagnose()[2]["dropped_messages"] == 6, "six are dropped")
+    assert len(heard) == 2
+
+
+def test_of_two_controllers_the_first_answer_counts_and_both_are_named(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    plant = graph.add(PlantNode, wait_for=["observer"])
+    first, second = (
+        graph.observer.create_publisher(
+            CONTROL_FORCE.type, f"/test/{CONTROL_FORCE.name}", CONTROL_FORCE.qos()
+        )
+        for _ in range(2)
+    )
+    graph.wait_until(lambda: len(heard) == 1 and second.get_subscription_count() == 1, "matched")
+    first.publish(pack_wrench(SECOND, 0.25))
+    graph.wait_until(lambda: len(heard) == 2, "sample 1")
+    second.publish(pack_wrench(SECOND, 99.0))
+    graph.wait_until(lambda: plant.diagnose()[2]["dropped_messages"] == 1, "one is dropped")
+    assert plant.diagnose()[2]["dropped: already answered stamp"] == 1
+    assert plant._loop._newest == (0, 0.25)
+    level, sentence, _ = plant.diagnose()
+    assert level == WARN
+    assert "2 publishers of /test/control_force: /test/observer (2 times)" in sentence
+    graph.observer.destroy_publisher(second)
+    graph.wait_until(lambda: "publishers" not in plant.diagnose()[1], "the warning goes")
+
+
+def test_a_second_plant_is_named_while_it_is_there(graph: Graph, tmp_path: Path) -> None:
+    analyzer, controller, _ = close_the_loop(graph, tmp_path / "bag", pace="realtime")
+    assert "publishers" not in controller.diagnose()[1]
+    states = publisher(graph, JOINT_STATES)
+    disturbances = publisher(graph, APPLIED_DISTURBANCE)
+    names = "2 publishers of /test/joint_states: /test/observer, /test/plant"
+    graph.wait_until(lambda: names in controller.diagnose()[1], "the controller names both")
+    graph.wait_until(lambda: names in analyzer.diagnose()[1], "the analyzer names both")
+    assert "/test/applied_disturbance: /test/observer, /test/plant" in analyzer.diagnose()[1]
+    for made in (states, disturbances):
+        graph.observer.destroy_publisher(made)
+    for node in (analyzer, controller):
+        graph.wait_until(
+            lambda node=node: "publishers" not in node.diagnose()[1], "the warning goes"
+        )
+
+
+def test_the_controller_never_sends_what_is_not_finite(graph: Graph) -> None:
+    controller = graph.add(
+        WashoutControllerNode, wait_for=["observer"], corner_frequency=1e3, cubic_gain=-1e30
+    )
+    forces = graph.listen(CONTROL_FORCE, raw=True)
+    states = publisher(graph, JOINT_STATES)
+    graph.wait_until(lambda: controller.active, "the controller listens")
+
+    def send(number: int, velocity: float) -> None:
+        states.publish(pack_joint_state(number * SECOND, (0.0, 0.0), (velocity, 0.4), (0.0, 0.0)))
+        graph.wait_until(
+            lambda: controller._answered + controller.diagnose()[2]["dropped_messages"] == number,
+            f"state {number} is answered or dropped",
+        )
+
+    for number, velocity in enumerate([0.1, 1e100, -1e100, 1e308, inf, 0.1, 0.1], start=1):
+        send(number, velocity)
+    graph.wait_until(lambda: len(forces) == controller._answered, "all forces have come")
+    assert all(isfinite(force) for force in wrench_columns(forces)[0].force)
+    assert wrench_columns(forces)[0].stamp[-1] == 7 * SECOND
+
+
+def test_a_stamp_beyond_ros_time_is_dropped(graph: Graph, tmp_path: Path) -> None:
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
+    graph.wait_until(lambda: analyzer.active and controller.active, "both listen")
+    states = publisher(graph, JOINT_STATES)
+    graph.wait_until(lambda: states.get_subscription_count() == 2, "both are matched")
+    late = JointState(name=["slide", "belt"], position=[0.0, 0.0], velocity=[0.1, 0.4])
+    late.header.stamp.sec, late.header.stamp.nanosec = 2**31 - 1, 2**32 - 1
+    states.publish(late)
+    for node in (analyzer, controller):
+        graph.wait_until(lambda n=node: n.diagnose()[2]["dropped_messages"] == 1, "dropped")
+    states.publish(pack_joint_state(SECOND, (0.0, 0.0), (0.1, 0.4), (0.0, 0.0)))
+    graph.wait_until(lambda: controller._answered == 1, "the next one is answered")
+    graph.wait_until(lambda: analyzer._told == SECOND, "and recorded")
+
+
+@paces
+def test_messages_of_every_kind_harm_no_node(graph: Graph, tmp_path: Path, pace: str) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    forces = graph.listen(CONTROL_FORCE, raw=True)
+    analyzer, controller, plant = close_the_loop(graph, tmp_path / "bag", pace=pace)
+    strangers = [publisher(graph, topic) for topic in TOPICS]
+    sent = messages(17, lambda: plant._loop.sample.stamp)
+    chance = random.Random(17)
+    for _ in range(30):
+        for _ in range(20):
+            chance.choice(strangers).publish(next(sent))
+        rounds = iter(range(2))
+        graph.wait_until(lambda rounds=rounds: next(rounds, None) is None, "they are heard")
+    for node in (analyzer, plant):
+        graph.wait_until(lambda node=node: node.diagnose()[2]["dropped_messages"] > 10, "dropped")
+    for stranger in strangers:
+        graph.observer.destroy_publisher(stranger)
+    if not plant.active:  # a force of 1e308 N was for it
+        graph.wait_until(lambda: plant._loop.unbounded, "it says why")
+    heard.clear()
+    forces.clear()
+    if plant.active:
+        graph.wait_until(lambda: len(heard) > 20 and len(forces) > 10, "the loop goes on")
+    for node in (controller, analyzer):
+        assert node.active
+    graph.deactivate("analyzer")
+    report = report_of_bag(tmp_path / "bag")
+    assert report["notes"]
+    assert all(isfinite(figure) for figure in plant._loop.sample)
+
+
+@pytest.mark.long
+@paces
+def test_a_flood_of_garbage_leaves_no_trace_but_a_count(
+    graph: Graph, processes: Processes, tmp_path: Path, pace: str
+) -> None:
+    """Nodes in processes of their own, beside a neighbour that sends 15,000 messages."""
+    started = {
+        "analyzer": processes.node("analyzer", bag=tmp_path / "bag"),
+        "washout_controller": processes.node("washout_controller", force_limit=1.0),
+        "plant": processes.node("plant", pace=pace, reply_timeout=0.5),
+    }
+    health: dict[str, DiagnosticStatus] = {}
+
+    def hear(message: DiagnosticArray) -> None:
+        health.update({status.name.rpartition("/")[2]: status for status in message.status})
+
+    graph.observer.create_subscription(DIAGNOSTICS.type, DIAGNOSTICS.name, hear, 100)
+    heard = graph.listen(JOINT_STATES, raw=True)
+    graph.wait_until(lambda: len(heard) > 100 and health.keys() >= started.keys(), "they run")
+    strangers = [publisher(graph, topic) for topic in TOPICS]
+    newest = SECOND if pace == "lockstep" else unpack_header(heard[-1])
+    sent = messages(23, lambda: newest)
+    sizes: list[dict[str, int]] = []
+    for _ in range(3):  # the first one is to warm up
+        rounds = iter(range(100))
+
+        def send(rounds: Iterator[int] = rounds) -> bool:
+            for stranger in strangers:
+                for message in islice(sent, 10):
+                    if not too_strong(message):
+                        stranger.publish(message)
+            return next(rounds, None) is None
+
+        graph.wait_until(send, "all is sent")
+        sizes.append({name: resident(process.pid) for name, process in started.items()})
+    for stranger in strangers:
+        graph.observer.destroy_publisher(stranger)
+    for name in started:
+        assert sizes[-1][name] - sizes[0][name] < 20_000_000, name
+    health.clear()
+    graph.wait_until(
+        lambda: (
+            health.keys() >= started.keys()
+            and not any("messages dropped" in s.message for s in health.values())
+        ),
+        "nobody complains any more",
+    )
+    heard.clear()
+    graph.wait_until(lambda: len(heard) > 100, "the plant goes on")
+    for process in list(started.values())[::-1]:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 0
+    assert report_of_bag(tmp_path / "bag")["notes"]
