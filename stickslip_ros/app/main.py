@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from typing import TextIO
 
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.errors import InvalidInputError, StickslipError
@@ -41,9 +42,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"stickslip {command}: interrupted", file=sys.stderr)
         status = INTERRUPTED
     except BrokenPipeError:  # whoever read our output has seen enough
-        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - the interpreter flushes it at exit
+        sys.stdout = _nowhere()
         status = 0
+    except OSError as error:  # the disk that standard output goes to is full
+        sys.stdout = _nowhere()
+        print(f"stickslip {command}: {error}", file=sys.stderr)
+        status = 1
     sys.exit(status)
+
+
+def _nowhere() -> TextIO:
+    """Return what may stand in for standard output: the interpreter flushes it at exit."""
+    return open(os.devnull, "w")
 
 
 def _parser(given: Sequence[str]) -> argparse.ArgumentParser:

@@ -11,6 +11,8 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from stickslip_ros.printable import printable
+
 _PREFIXES = {1e9: "G", 1e6: "M", 1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
 
 _LABELS: dict[str, tuple[str, str]] = {
@@ -53,12 +55,12 @@ def print_figures(title: str, columns: Mapping[str, Mapping[str, Any]]) -> None:
 
 def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     """Print a table of which the first column stands to the left and the others to the right."""
-    table = Table(title=escape(title), title_justify="left")
+    table = Table(title=_shown(title), title_justify="left")
     for number, heading in enumerate(headings):
-        table.add_column(escape(heading), justify="right" if number else "left")
+        table.add_column(_shown(heading), justify="right" if number else "left")
     for row in rows:
-        table.add_row(*map(escape, row))
-    Console(soft_wrap=True).print(table)
+        table.add_row(*map(_shown, row))
+    _Console(soft_wrap=True).print(table)
 
 
 def quantities(values: Sequence[Any], unit: str, digits: int = 4) -> list[str]:
@@ -73,13 +75,27 @@ def quantities(values: Sequence[Any], unit: str, digits: int = 4) -> list[str]:
 @contextmanager
 def progress_bar(label: str, total: float | None) -> Generator[Callable[[float], None]]:
     """Show progress towards `total` on standard error while a person looks at it."""
-    columns = (TextColumn(label), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
-        task = bar.add_task(label, total=total)
+    if not console.is_terminal:
+        yield lambda done: None
+        return
+    text = TextColumn("{task.description}", markup=False)
+    columns = (text, BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(printable(label), total=total)
         yield lambda done: bar.update(task, completed=done)
+
+
+class _Console(Console):
+    """Leaves it to the command to end where nobody reads on."""
+
+    def on_broken_pipe(self) -> None:
+        raise BrokenPipeError
+
+
+def _shown(text: str) -> str:
+    """Return a text that rich shows as it is."""
+    return escape(printable(text))
 
 
 def _prefix(values: Iterable[Any]) -> tuple[float, str]:

@@ -9,6 +9,7 @@ from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.arguments import seconds
 from stickslip_ros.app.output import progress_bar
 from stickslip_ros.app.run import ros_nodes
+from stickslip_ros.printable import printable
 
 HELP = "publish the messages of a bag again, as they were spaced"
 DESCRIPTION = (
@@ -81,7 +82,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     def offering(topics: Sequence[str]) -> None:
         wait = f"until {', '.join(arguments.wait_for) or 'somebody'} reads them"
-        print(f"{arguments.bag}: {', '.join(topics)}, {reach}, waiting {wait}", file=sys.stderr)
+        offer = f"{arguments.bag}: {', '.join(topics)}, {reach}, waiting {wait}"
+        print(printable(offer), file=sys.stderr)
 
     names = ("rate", "loop", "start", "duration", "topics", "clock", "wait_for")
     parameters = {name: getattr(arguments, name) for name in names} | {"bag": str(arguments.bag)}

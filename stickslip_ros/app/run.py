@@ -5,9 +5,8 @@ import shlex
 import signal
 import sys
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
-from functools import partial
 from importlib import import_module
 from itertools import count
 from pathlib import Path
@@ -17,10 +16,12 @@ from typing import Any
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.arguments import add_json, add_scenario, made_of, scenario_of, seconds
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
+from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed import find_executable
+from stickslip_ros.printable import printable
 from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario
 from stickslip_ros.scenario.parameters import Pace
 
@@ -90,11 +91,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise InvalidInputError(
             "plant.expects_control = False is refused with --controller and --external-controller"
         )
-    bag = arguments.bag or (Path(scenario.analyzer.bag) if scenario.analyzer.bag else None)
-    bag = bag or default_bag(scenario.name)
+    bag = arguments.bag or _bag_of(scenario) or default_bag(scenario.name)
     check_new_bag(bag)
     reach = ros_nodes("process").keep_on_this_machine(arguments.network)
-    print(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}", file=sys.stderr)
+    _tell(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}")
     figures, interrupted = record(
         scenario, bag, namespace=namespace, composed=arguments.composed, controller=controller
     )
@@ -119,20 +119,24 @@ def record(
     """Run the nodes into `bag`; return the figures of the run, and whether it was interrupted.
 
     `controller` is the command of one in place of ours, empty for one that others start.
-    Raises KeyboardInterrupt where nothing was recorded before that.
+    Raises KeyboardInterrupt where nothing was recorded before that, and RunError, with what is
+    left, where the run failed.
     """
     duration = scenario.plant.duration
     total = duration if duration < float("inf") else None
     with progress_bar(f"running {scenario.name}", total) as progress:
-        outcome = ros_nodes("bringup").run_nodes(
-            scenario,
-            namespace=namespace,
-            bag=bag,
-            composed=composed,
-            controller=controller,
-            progress=progress,
-            tell=partial(print, file=sys.stderr),
-        )
+        try:
+            outcome = ros_nodes("bringup").run_nodes(
+                scenario,
+                namespace=namespace,
+                bag=bag,
+                composed=composed,
+                controller=controller,
+                progress=progress,
+                tell=_tell,
+            )
+        except RunError as error:
+            raise RunError(f"{error}; {_state_of(bag)}") from None
     try:
         return _figures(bag, outcome), outcome.interrupted
     except BagError:
@@ -173,6 +177,23 @@ def default_bag(scenario: str) -> Path:
     return next(path for path in candidates if not path.exists())
 
 
+def _bag_of(scenario: Scenario) -> Path | None:
+    """Return where the scenario says to record to; a file, unlike -p, says it of this directory."""
+    name = scenario.analyzer.bag
+    if not name or any(given.startswith("analyzer.bag=") for given in scenario.overrides):
+        return Path(name) if name else None
+    try:
+        inside = Path(name).resolve().is_relative_to(Path.cwd())
+    except (OSError, RuntimeError, ValueError):  # a loop of links, or no name of a file
+        inside = False
+    if not inside:
+        raise InvalidInputError(
+            f"{scenario.path}, analyzer: bag = {name!r} is refused: what a scenario names must be "
+            "below the current directory; --bag takes any"
+        )
+    return Path(name)
+
+
 def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
     """Return the command of the controller in place of ours, empty if somebody else starts it."""
     if arguments.controller is not None:
@@ -197,6 +218,26 @@ def _figures(bag: Path, outcome: Any) -> dict[str, Any]:
         "missed_deadlines": int(plant.get("missed_deadlines", 0)),
         "steps_per_second": float(plant.get("steps_per_second", 0.0)),
     }
+
+
+def _tell(sentence: str) -> None:
+    """Tell a person, if there still is one: a terminal that was closed does not end a run."""
+    with suppress(OSError):
+        print(printable(sentence), file=sys.stderr)
+
+
+def _state_of(bag: Path) -> str:
+    """Say what a run that failed has left."""
+    try:
+        with Recording(bag) as recording:
+            if recording.complete:
+                return f"the bag {bag} is closed"
+    except BagError:
+        return "nothing was recorded"
+    return (
+        f"the bag {bag} was not closed: `stickslip report` reads what it holds, "
+        "`stickslip repair` makes a sound one of it"
+    )
 
 
 def _namespace(text: str) -> str:

@@ -15,6 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import State, Transition, TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import SetParameters
+from rclpy.client import Client
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
@@ -25,17 +26,17 @@ from std_msgs.msg import Header
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.claim import claim
 from stickslip_ros.nodes.controllers import find_controllers, find_managed, near_misses
 from stickslip_ros.nodes.lifeline import GUARD_PATIENCE, start
 from stickslip_ros.nodes.managed import STATE, ManagedNode
 from stickslip_ros.nodes.plant import NEWEST_STAMP, PlantNode
-from stickslip_ros.nodes.process import spin, stop_on_signals
+from stickslip_ros.nodes.process import ROS_ARGUMENTS, spin, stop_on_signals
 from stickslip_ros.nodes.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.physics.samples import NANOSECONDS
 from stickslip_ros.scenario.files import Scenario, parameter_file, section_matches
 
-_LOGGING = ["--ros-args", "--log-level", "warn"]
 _READY_TIMEOUT = 30.0
 _ANSWER_TIMEOUT = 15.0
 _MATCH_TIMEOUT = 5.0
@@ -77,7 +78,7 @@ class RunOutcome:
     """What a run came to."""
 
     interrupted: bool = False
-    """Whether SIGINT or SIGTERM ended it."""
+    """Whether SIGINT, SIGTERM or SIGHUP ended it."""
     plant: dict[str, str] = field(default_factory=dict)
     """The plant's last figures, as in its diagnostics."""
     controller: str | None = None
@@ -100,15 +101,16 @@ def run_nodes(
     configured and activated if it is a managed (lifecycle) node. If the command is empty, somebody
     else starts one, and the plant waits for it.
     Every node is deactivated, and the bag closed, before this returns or raises RunError (a node
-    died, or did not become ready).
+    died, or did not become ready). Raises InvalidInputError if another run is in the namespace.
     """
-    rclpy.init(args=_LOGGING, signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=ROS_ARGUMENTS, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        bringup = _Bringup(scenario, namespace, controller, progress, tell)
-        try:
-            return bringup.run(_parameters(scenario, bag), composed)
-        finally:
-            bringup.close()
+        with claim(namespace, rclpy.get_default_context().get_domain_id()):
+            bringup = _Bringup(scenario, namespace, controller, progress, tell)
+            try:
+                return bringup.run(_parameters(scenario, bag), composed)
+            finally:
+                bringup.close()
     finally:
         rclpy.try_shutdown()
 
@@ -148,9 +150,11 @@ class _Bringup:
         self._executor: Executor = EventsExecutor()
         self._executor.add_node(self._node)
         self._stop = Future()
-        self._signal_handlers = stop_on_signals(self._stop, self._executor)
+        self._hurry = Future()
+        self._signal_handlers = stop_on_signals(self._executor, self._stop, self._hurry)
         self._composed: list[ManagedNode[Any]] = []
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._clients: dict[str, tuple[Client, float]] = {}
         self._active: list[str] = []
         self._failed = Future()
         self._plant_paused = Future()
@@ -175,19 +179,20 @@ class _Bringup:
             self._outcome.controller = f"{self._namespace.rstrip('/')}/washout_controller"
         if self._other is not None:
             nodes.remove("washout_controller")
-        with tempfile.TemporaryDirectory(prefix="stickslip_ros_") as directory:
-            file = Path(directory, "parameters.yaml")
-            file.write_text(parameter_file(parameters), encoding="utf-8")
-            if composed:
-                self._compose({node: parameters[node] for node in nodes})
-            else:
-                self._spawn(nodes, file)
-            try:
+        try:
+            # It is gone once the nodes have read it: a run that is killed cannot remove it.
+            with tempfile.TemporaryDirectory(prefix="stickslip_ros_") as directory:
+                file = Path(directory, "parameters.yaml")
+                file.write_text(parameter_file(parameters), encoding="utf-8")
+                if composed:
+                    self._compose({node: parameters[node] for node in nodes})
+                else:
+                    self._spawn(nodes, file)
                 self._start_other(file)
                 self._bring_up(nodes)
-                self._spin_until(self._plant_paused, None)
-            finally:
-                self._bring_down()
+            self._spin_until(self._plant_paused, None)
+        finally:
+            self._bring_down()
         if self._failed.done():
             raise RunError(self._failed.result())
         self._outcome.interrupted = self._stop.done()
@@ -205,6 +210,10 @@ class _Bringup:
     def _ended(self) -> bool:
         return self._stop.done() or self._failed.done()
 
+    def _is_over(self, always: bool) -> bool:
+        """Return whether nothing more is waited for, or only what is waited for `always`."""
+        return self._hurry.done() if always else self._ended
+
     def _compose(self, parameters: Mapping[str, Mapping[str, Any]]) -> None:
         for name, values in parameters.items():
             node = _NODES[name](namespace=self._namespace, overrides=values)
@@ -212,7 +221,7 @@ class _Bringup:
             self._executor.add_node(node)
 
     def _spawn(self, nodes: Iterable[str], file: Path) -> None:
-        arguments = [*_LOGGING, "--params-file", str(file), "-r", f"__ns:={self._namespace}"]
+        arguments = [*ROS_ARGUMENTS, "--params-file", str(file), "-r", f"__ns:={self._namespace}"]
         for name in nodes:
             module = _NODES[name].__module__
             self._processes[name] = start([sys.executable, "-m", module, *arguments])
@@ -323,29 +332,16 @@ class _Bringup:
     def _change_state(self, node: str, transition: int) -> None:
         """Take a node through a transition, again and again while it is not ready for it."""
         deadline = time.monotonic() + _READY_TIMEOUT
-        client = self._node.create_client(ChangeState, f"{node}/change_state")
-        made_at = time.monotonic()
-        request = ChangeState.Request(transition=Transition(id=transition))
-        while not self._ended:
-            if not client.service_is_ready() and time.monotonic() - made_at > _MATCH_TIMEOUT:
-                self._node.destroy_client(client)
-                client = self._node.create_client(ChangeState, f"{node}/change_state")
-                made_at = time.monotonic()
-            if client.service_is_ready():
-                answer = client.call_async(request)
-                self._spin_until(answer, _ANSWER_TIMEOUT)
-                response = answer.result() if answer.done() else None
-                if response is not None and response.success:
-                    if transition == Transition.TRANSITION_ACTIVATE:
-                        self._active.append(node)
-                    break
+        while not self._ended and not self._ask_for_transition(node, transition):
             if time.monotonic() > deadline:
                 self._fail(f"{node} did not become ready within {_READY_TIMEOUT:g} s")
             self._spin_for(_RETRY_PERIOD)
-        self._node.destroy_client(client)
 
     def _bring_down(self) -> None:
-        """Deactivate what is active, the analyzer last, and end the processes."""
+        """Deactivate what is active, the analyzer last, and end the processes.
+
+        Who is in a hurry, and says so by a second signal, does not wait for any answer.
+        """
         for node in reversed(self._active):
             if node == "analyzer":
                 self._let_the_analyzer_catch_up()
@@ -356,10 +352,12 @@ class _Bringup:
                 self._spin_until(self._last_words, _LAST_WORDS_TIMEOUT, always=True)
         for process in self._processes.values():
             process.terminate()
-        for process in self._processes.values():
+        deadline = time.monotonic() + _EXIT_TIMEOUT
+        for name, process in self._processes.items():
             try:
-                process.wait(_EXIT_TIMEOUT)
+                process.wait(max(deadline - time.monotonic(), 0.0))
             except subprocess.TimeoutExpired:
+                self._tell(f"the node {name} did not end within {_EXIT_TIMEOUT:g} s: killed")
                 process.kill()
                 process.wait()
 
@@ -367,7 +365,7 @@ class _Bringup:
         """Wait until it holds the plant's last sample; fail if it stops short of that."""
         last = int(self._outcome.plant.get(NEWEST_STAMP, 0))
         seen, seen_at = self._recorded, time.monotonic()
-        while self._recorded < last and not self._is_dead("analyzer"):
+        while self._recorded < last and not self._is_dead("analyzer") and not self._hurry.done():
             self._spin_until(Future(), _RETRY_PERIOD, always=True)
             if self._recorded > seen:
                 seen, seen_at = self._recorded, time.monotonic()
@@ -378,45 +376,61 @@ class _Bringup:
 
     def _deactivate(self, node: str) -> None:
         """Deactivate a node, unless somebody else has: rclpy leaves that request unanswered."""
-        if self._state_of(node, always=True) == _ACTIVE:
+        state = self._state_of(node, always=True)
+        if state == _ACTIVE:
             self._ask_for_transition(node, Transition.TRANSITION_DEACTIVATE, always=True)
+        elif not state and not self._hurry.done():
+            self._tell(f"the node {node} does not answer")
 
     def _state_of(self, node: str, *, always: bool = False) -> str:
         """Return the state of a managed node's life cycle, nothing if it does not say."""
         answer = self._ask(GetState, f"{node}/get_state", GetState.Request(), always=always)
         return answer.current_state.label if answer is not None else ""
 
-    def _ask_for_transition(self, node: str, transition: int, *, always: bool = False) -> None:
+    def _ask_for_transition(self, node: str, transition: int, *, always: bool = False) -> bool:
         request = ChangeState.Request(transition=Transition(id=transition))
         answer = self._ask(ChangeState, f"{node}/change_state", request, always=always)
-        if transition == Transition.TRANSITION_ACTIVATE and answer is not None and answer.success:
+        done = answer is not None and answer.success
+        if done and transition == Transition.TRANSITION_ACTIVATE:
             self._active.append(node)
+        return done
 
     def _ask(self, kind: Any, name: str, request: Any, *, always: bool = False) -> Any:
         """Call a service and return its answer, None if none comes."""
-        client = self._node.create_client(kind, name)
+        client = self._connected(kind, name, always)
+        if client is None:
+            return None
+        answer = client.call_async(request)
+        self._spin_until(answer, _ANSWER_TIMEOUT, always=always)
+        return answer.result() if answer.done() else None
+
+    def _connected(self, kind: Any, name: str, always: bool) -> Client | None:
+        """Return a client that has found its service; None if there is no such service."""
         deadline = time.monotonic() + _ANSWER_TIMEOUT
-        while not client.service_is_ready() and time.monotonic() < deadline:
-            if self._ended and not always:
-                break
+        while not self._is_over(always) and time.monotonic() < deadline:
+            if name not in self._clients:
+                self._clients[name] = self._node.create_client(kind, name), time.monotonic()
+            client, made_at = self._clients[name]
+            if client.service_is_ready():
+                return client
+            if time.monotonic() - made_at > _MATCH_TIMEOUT:
+                self._node.destroy_client(client)
+                del self._clients[name]
             self._spin_until(Future(), _RETRY_PERIOD, always=always)
-        answer = None
-        if client.service_is_ready():
-            future = client.call_async(request)
-            self._spin_until(future, _ANSWER_TIMEOUT, always=always)
-            answer = future.result() if future.done() else None
-        self._node.destroy_client(client)
-        return answer
+        return None
 
     def _spin_until(self, future: Future, timeout: float | None, *, always: bool = False) -> None:
-        """Run callbacks until the future is done, time is over or, unless `always`, the run is."""
+        """Run callbacks until the future is done, time is over or, unless `always`, the run is.
+
+        `always` ends where somebody is in a hurry.
+        """
         until = Future()
 
         def finish(_: object = None) -> None:
             if not until.done():
                 until.set_result(None)
 
-        for reason in [future] if always else [future, self._stop, self._failed]:
+        for reason in [future, *([self._hurry] if always else [self._stop, self._failed])]:
             reason.add_done_callback(finish)
         timer = self._node.create_timer(timeout, finish) if timeout is not None else None
         spin(self._executor, until)
@@ -433,7 +447,8 @@ class _Bringup:
     def _watch_processes(self) -> None:
         for name, process in self._processes.items():
             status = process.poll()
-            if status is not None:
+            ended_by_others = name == "plant" and status == 0 and self._plant_paused.done()
+            if status is not None and not ended_by_others:
                 how = f"killed by signal {-status}" if status < 0 else f"exit status {status}"
                 self._fail(f"the node {name} died ({how})")
 

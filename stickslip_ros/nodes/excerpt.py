@@ -15,6 +15,7 @@ from stickslip_ros.nodes.offers import message_type, offered_profile
 from stickslip_ros.nodes.player import JITTER, Message, Timeline
 from stickslip_ros.nodes.topics import CLOCK, JOINT_STATES, RECORDED
 from stickslip_ros.physics.samples import NANOSECONDS
+from stickslip_ros.printable import printable
 from stickslip_ros.scenario.parameters import ReplayParameters
 
 
@@ -99,7 +100,7 @@ class Excerpt:
                 kind = message_type(recording.topics[topic])
             except (BagError, InvalidTopicNameException) as error:
                 reason = str(error).splitlines()[0]
-                self.left_out.append(f"{topic} is left out: {reason}")
+                self.left_out.append(printable(f"{topic} is left out: {reason}"))
             else:
                 self.offers[topic] = Offer(kind, offered_profile(recording.offered_qos(topic)))
         if not self.offers:

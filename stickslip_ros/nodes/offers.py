@@ -87,5 +87,5 @@ def _policy(default: PolicyT, recorded: str | int | None) -> PolicyT:
 
 def _duration(recorded: Mapping[str, int] | None) -> Duration:
     values = recorded or {}
-    nanoseconds = values.get("sec", 0) * NANOSECONDS + values.get("nsec", 0)
+    nanoseconds = int(values.get("sec", 0)) * NANOSECONDS + int(values.get("nsec", 0))
     return Duration(nanoseconds=min(nanoseconds, _LONGEST))

@@ -21,13 +21,21 @@ from stickslip_ros.nodes.lifeline import die_with_parent
 from stickslip_ros.nodes.managed import ManagedNode
 from stickslip_ros.scenario.parameters import NodeParameters, parameters_of
 
+ROS_ARGUMENTS = ["--ros-args", "--log-level", "warn", "--disable-external-lib-logs"]
+"""Of the commands: they say on standard error what there is to say, and need no home directory."""
+
 _DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-_PROFILES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
+_DISCOVERY_SERVER = "ROS_DISCOVERY_SERVER"
+_LOCALHOST_ONLY = "ROS_LOCALHOST_ONLY"
+"""The range's predecessor, which overrules it."""
+_PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
+_NO_PROFILES_FROM_HERE = "SKIP_DEFAULT_XML_FILE"
+"""Set, it keeps Fast DDS from reading profiles of the working directory, which overrule others."""
 _SPIN_TIMEOUT = 0.2
 
 
 def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) -> int:
-    """Run one node as a process, until SIGINT or SIGTERM; return the exit status.
+    """Run one node as a process, until SIGINT, SIGTERM or SIGHUP; return the exit status.
 
     Status 2 says that a parameter or an argument was refused, with the reason on standard error.
     """
@@ -63,10 +71,10 @@ def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) 
 
 
 def run_until_stopped(node: ManagedNode[Any]) -> None:
-    """Run a node until SIGINT, SIGTERM or it itself ends that; raise what it was stopped with."""
+    """Run a node until a signal or it itself ends that; raise what it was stopped with."""
     executor = EventsExecutor()
     executor.add_node(node)
-    stop_on_signals(node.stopped, executor)
+    stop_on_signals(executor, node.stopped)
     spin(executor, node.stopped)
     if node.active:
         node.trigger_deactivate()
@@ -84,8 +92,9 @@ def keep_on_this_machine(network: bool) -> str:
     To be called before ROS is initialised. What the environment says holds, unless `network` asks
     for more.
     """
-    names = (_DISCOVERY_RANGE, *_PROFILES)
-    said = [f"{name}={os.environ[name]}" for name in names if name in os.environ]
+    _heed_predecessor()
+    names = (_DISCOVERY_RANGE, _DISCOVERY_SERVER, _PROFILES)
+    said = [f"{name}={os.environ[name]}" for name in names if os.environ.get(name)]
     if network:
         os.environ[_DISCOVERY_RANGE] = "SUBNET"
     elif not said:
@@ -101,9 +110,14 @@ def keep_on_this_machine(network: bool) -> str:
 def this_machine_only() -> dict[str, str]:
     """Return the environment variables that restrict ROS to this machine."""
     if "fastrtps" not in rclpy.get_rmw_implementation_identifier():
-        return {_DISCOVERY_RANGE: "LOCALHOST"}
-    # LOCALHOST would overrule the profile, and take shared memory.
-    return {_DISCOVERY_RANGE: "SYSTEM_DEFAULT", _PROFILES[0]: _profile("loopback")}
+        return {_DISCOVERY_RANGE: "LOCALHOST", _LOCALHOST_ONLY: ""}
+    return {
+        # LOCALHOST, of either name, would overrule the profile, and take shared memory.
+        _DISCOVERY_RANGE: "SYSTEM_DEFAULT",
+        _LOCALHOST_ONLY: "",
+        _PROFILES: _profile("loopback"),
+        _NO_PROFILES_FROM_HERE: "1",
+    }
 
 
 def prefer_prompt_middleware() -> None:
@@ -112,27 +126,41 @@ def prefer_prompt_middleware() -> None:
     In shared memory a reader that is stopped or killed delays everybody who publishes to it, by
     half a millisecond each time and by seconds now and then.
     """
-    if any(name in os.environ for name in (*_PROFILES, "FASTDDS_BUILTIN_TRANSPORTS")):
+    _heed_predecessor()
+    if any(os.environ.get(name) for name in (_PROFILES, "FASTDDS_BUILTIN_TRANSPORTS")):
         return
     if os.environ.get(_DISCOVERY_RANGE) == "LOCALHOST":
         os.environ.update(this_machine_only())
     else:
-        os.environ[_PROFILES[0]] = _profile("network")
+        os.environ[_PROFILES] = _profile("network")
+
+
+def _heed_predecessor() -> None:
+    """Put what the environment says by the range's predecessor in terms of the range."""
+    if os.environ.get(_LOCALHOST_ONLY) == "1":
+        os.environ.update({_DISCOVERY_RANGE: "LOCALHOST", _LOCALHOST_ONLY: ""})
 
 
 def _profile(name: str) -> str:
     return str(Path(__file__).with_name(f"{name}.xml"))
 
 
-def stop_on_signals(stopped: Future, executor: Executor) -> dict[signal.Signals, Any]:
-    """Let SIGINT and SIGTERM complete `stopped` with None; return the handlers there were."""
+def stop_on_signals(executor: Executor, *stopped: Future) -> dict[signal.Signals, Any]:
+    """Let each SIGINT, SIGTERM or SIGHUP complete the next of `stopped` with None.
+
+    Where SIGHUP is ignored, as under nohup, it still is. Return the handlers there were.
+    """
 
     def stop(*_: object) -> None:
-        if not stopped.done():
-            stopped.set_result(None)
+        due = next((future for future in stopped if not future.done()), None)
+        if due is not None:
+            due.set_result(None)
             executor.wake()
 
-    return {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        numbers.append(signal.SIGHUP)
+    return {number: signal.signal(number, stop) for number in numbers}
 
 
 def spin(executor: Executor, until: Future) -> None:

@@ -25,7 +25,7 @@ from stickslip_ros.nodes.excerpt import Excerpt
 from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.pacing import FlowWindow
 from stickslip_ros.nodes.player import Message, Player
-from stickslip_ros.nodes.process import run_node, run_until_stopped
+from stickslip_ros.nodes.process import ROS_ARGUMENTS, run_node, run_until_stopped
 from stickslip_ros.nodes.topics import CLOCK, JOINT_STATES, RECORDED
 from stickslip_ros.physics.samples import NANOSECONDS
 from stickslip_ros.scenario.parameters import PlantParameters, ReplayParameters
@@ -201,9 +201,7 @@ def replay_bag(
     `progress` now and then which share of the recorded time is done. Raises InvalidInputError for
     what is refused, BagError where the bag cannot be read on, and RunError where all else fails.
     """
-    rclpy.init(
-        args=["--ros-args", "--log-level", "warn"], signal_handler_options=SignalHandlerOptions.NO
-    )
+    rclpy.init(args=ROS_ARGUMENTS, signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = _OneReplay(offering, progress, overrides=parameters)
         return node.run()

@@ -15,7 +15,10 @@ from tests.app.conftest import Run
         (("run", "paper", "-p", "plantt.mass=1"), ("unknown node plantt", "plant")),
         (("run", "paper", "-p", "plant.masss=1"), ("unknown parameter masss", "mass")),
         (("simulate", "paper", "-p", "plant.mass=heavy"), ("plant: mass = 'heavy'", "number")),
-        (("run", "paper", "-p", "plant.mass=-1"), ("paper.yaml", "mass = -1", "above 0 kg")),
+        (
+            ("run", "paper", "-p", "plant.mass=-1"),
+            ("paper.yaml", "mass = -1", "at least 1e-30 and at most 1e+30 kg"),
+        ),
         (("run", "paper", "-p", "plant.belt_speed=.nan"), ("belt_speed = nan", "finite")),
         (("run", "paper", "-p", "plant.mass"), ("NODE.PARAMETER=VALUE",)),
         (("run", "paper", "--namespace", "a b"), ("--namespace 'a b'",)),

@@ -37,10 +37,10 @@ def wait_for(condition: Callable[[], object], what: str) -> None:
 class Graph:
     """Nodes on one executor, run only while the test waits for something."""
 
-    def __init__(self, domain: int) -> None:
+    def __init__(self, domain: int, *ros_arguments: str) -> None:
         self.context = Context()
         rclpy.init(
-            args=[],
+            args=["--ros-args", *ros_arguments],
             context=self.context,
             domain_id=domain,
             signal_handler_options=SignalHandlerOptions.NO,
@@ -65,6 +65,10 @@ class Graph:
         """Run the nodes until the condition holds; fail with `what` if it does not in time."""
         self._run_until(condition, PATIENCE)
         assert condition(), f"waited {PATIENCE} s in vain: {what}"
+
+    def run_for(self, seconds: float) -> None:
+        """Run the nodes for so long, of wall time."""
+        self._run_until(lambda: False, seconds)
 
     def _run_until(self, condition: Callable[[], object], patience: float) -> None:
         done = Future()

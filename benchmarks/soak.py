@@ -1,0 +1,292 @@
+"""Does the closed loop last? `stickslip run` in real time beside a busy processor, for minutes.
+
+The slide of this drive slips all the time, so that every force shows in its motion. Watched from
+outside are:
+
+- the memory of each process, every second;
+- the samples: by the stamps in the bag;
+- the deadlines: each sample comes with the time at which the middleware sent it. If that is after
+  the deadline of the next, its deadline was missed. The plant looks at the clock once it has sent
+  the sample, and so may count some more, but none fewer;
+- the late forces: each step of the motion in the bag tells which force acted.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from array import array
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.node import Node
+
+from stickslip_ros.bags.messages import unpack_header
+from stickslip_ros.bags.reader import Recording
+from stickslip_ros.nodes.topics import JOINT_STATES, RECORDED, Topic
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.samples import NANOSECONDS
+from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, load_scenario
+from stickslip_ros.scenario.parameters import PlantParameters
+from stickslip_ros.testing.domain import domain_variables, own_domain, ros_context
+
+SCENARIO = "feed_drive"
+OVERRIDES = (
+    "plant.pace=realtime",
+    "plant.belt_speed=0.046",
+    "plant.initial.position=0.0005",
+    "washout_controller.linear_gain=-100.0",
+    "washout_controller.start_after=0.0",
+)
+
+WARM_UP = 30.0
+"""Time, s, of the run after which the memory of a process is to stay as it is."""
+_LOOK_PERIOD = 0.02
+_MEMORY_PERIOD = 1.0
+_SAME_SPEED = 1e-14
+"""Difference, m/s, up to which speeds are equal; that of two forces makes a greater one."""
+_PAGE = os.sysconf("SC_PAGE_SIZE")
+
+
+class Sendings:
+    """Messages of a topic: their stamps, and when the middleware sent them, ns of wall time."""
+
+    def __init__(self, node: Node, topic: Topic) -> None:
+        self.stamps, self.sent = array("q"), array("q")
+        self.largest_delay = 0
+        """Until they were taken here, ns."""
+        self._subscription = node.create_subscription(
+            topic.type, f"{DEFAULT_NAMESPACE}/{topic.name}", print, topic.qos(), raw=True
+        )
+
+    @property
+    def span(self) -> float:
+        """Time from the first to the last, s."""
+        return (self.stamps[-1] - self.stamps[0]) / NANOSECONDS if self.stamps else 0.0
+
+    def take(self) -> None:
+        """Take what waits."""
+        handle = self._subscription.handle
+        with handle:
+            while taken := handle.take_message(self._subscription.msg_type, True):
+                sent = taken[1]["source_timestamp"]
+                self.stamps.append(unpack_header(taken[0]))
+                self.sent.append(sent)
+                self.largest_delay = max(self.largest_delay, time.time_ns() - sent)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a soak came to."""
+
+    run: dict[str, Any]
+    """What `stickslip run` said."""
+    memory: dict[str, list[int]]
+    """Resident memory by process, bytes, from the end of the warm-up on."""
+    seen: int
+    """Samples that the reader outside has seen, too."""
+    missing_stamps: int
+    """Gaps between the stamps in the bag, in samples."""
+    largest_backlog: int
+    """Samples that waited, at most, for being recorded."""
+    furthest_behind: int
+    """Samples by which analyzer, controller or the reader outside was behind, at most."""
+    missed_deadlines: int
+    """That were missed for sure."""
+    late_forces: int
+    """By the motion."""
+    unexplained_steps: int
+    """Of the motion: the next sample, or the force that leads to it, is missing in the bag."""
+
+
+def soak(duration: float, *, composed: bool, burners: int, directory: Path) -> Outcome:
+    """Run the drive for a duration (s) beside so many busy processes; its bag goes to `directory`.
+
+    Raises RuntimeError if the run fails.
+    """
+    bag = directory / "bag"
+    with own_domain() as domain, ros_context(domain, ["--ros-args"]) as context:
+        outside = Node("outside", context=context)
+        samples, recorded = Sendings(outside, JOINT_STATES), Sendings(outside, RECORDED)
+        memory: dict[str, list[int]] = {}
+        next_look = 0.0
+        with _burning(burners), _run(duration, domain, bag, composed=composed) as process:
+            while process.poll() is None:
+                samples.take()
+                recorded.take()
+                if WARM_UP <= samples.span < duration and time.monotonic() >= next_look:
+                    next_look = time.monotonic() + _MEMORY_PERIOD
+                    _look_at_memory(process.pid, memory)
+                time.sleep(_LOOK_PERIOD)
+            output, _ = process.communicate()
+        outside.destroy_node()
+    if process.returncode != 0:
+        raise RuntimeError(f"stickslip run ended with the status {process.returncode}")
+    plant = load_scenario(SCENARIO, OVERRIDES).plant
+    period = 1.0 / plant.rate
+    with Recording(bag) as recording:
+        stamps, answered = recording.joint_states.stamp, recording.control_forces.stamp
+        ages = force_ages(recording, plant)
+    largest_backlog = _largest_backlog(samples, recorded, period)
+    behind = max(samples.largest_delay, int(np.diff(answered).max())) / NANOSECONDS / period
+    return Outcome(
+        run=json.loads(output),
+        memory=memory,
+        seen=len(samples.stamps),
+        missing_stamps=round((stamps[-1] - stamps[0]) * plant.rate / NANOSECONDS) + 1 - len(stamps),
+        largest_backlog=largest_backlog,
+        furthest_behind=max(largest_backlog, round(behind)),
+        missed_deadlines=_missed_deadlines(samples, period),
+        late_forces=int(np.sum(ages > 0)),
+        unexplained_steps=int(np.sum(ages < 0)),
+    )
+
+
+def force_ages(recording: Recording, parameters: PlantParameters) -> NDArray[np.int64]:
+    """Return how old, in periods, the force was under which each sample led to the next.
+
+    Where there was none, it is older than any; where no force in the bag leads there, or the next
+    sample is missing, it is -1.
+    """
+    states, forces = recording.joint_states, recording.control_forces
+    stamps, positions = states.stamp.tolist(), states.position.tolist()
+    velocities = states.velocity.tolist()
+    force_of = dict(zip(forces.stamp.tolist(), forces.force.tolist(), strict=True))
+    longest_held = int(parameters.force_timeout * parameters.rate)
+    motion = Motion(parameters.as_drive(), positions[0], velocities[0])
+    ages = np.full(len(stamps) - 1, -1)
+    newest = 0
+    for number in range(len(ages)):
+        oldest = max(newest, number - longest_held)
+        # Its own or, most often, else, the one that was held before.
+        samples = dict.fromkeys([number, oldest, *range(number - 1, oldest, -1)])
+        for sample in [*(n for n in samples if stamps[n] in force_of), -1]:
+            motion.restart(positions[number], velocities[number])
+            motion.force = 0.0 if sample < 0 else force_of[stamps[sample]]
+            motion.advance(1.0 / parameters.rate)
+            if abs(motion.velocity - velocities[number + 1]) < _SAME_SPEED:
+                ages[number] = number - sample
+                newest = max(newest, sample)
+                break
+    return ages
+
+
+def _missed_deadlines(samples: Sendings, period: float) -> int:
+    stamps, sent = np.array(samples.stamps), np.array(samples.sent)
+    after_stamp = sent - stamps
+    # No sample is sent before its deadline: sample 0 was due so long after its stamp, at most.
+    longest_start = after_stamp.min()
+    return int(np.sum(after_stamp - longest_start > period * NANOSECONDS))
+
+
+def _largest_backlog(samples: Sendings, recorded: Sendings, period: float) -> int:
+    """Return how many samples were sent, at most, from what was told as recorded to the next."""
+    newest = np.searchsorted(samples.sent, recorded.sent[1:], side="right") - 1
+    behind = np.array(samples.stamps)[newest] - np.array(recorded.stamps[:-1])
+    return round(float(behind.max()) / (period * NANOSECONDS))
+
+
+@contextmanager
+def _run(
+    duration: float, domain: int, bag: Path, *, composed: bool
+) -> Generator[subprocess.Popen[str]]:
+    command = [sys.executable, "-m", "stickslip_ros.app.main", "run", SCENARIO, "--json"]
+    command += ["--bag", str(bag), "--duration", str(duration)]
+    command += ["--composed"] if composed else []
+    command += [part for override in OVERRIDES for part in ("-p", override)]
+    environment = os.environ | domain_variables(domain)
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+    try:
+        yield process
+    finally:
+        process.kill()  # its nodes end with it
+        process.wait()
+
+
+@contextmanager
+def _burning(count: int) -> Generator[None]:
+    burners = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for burner in burners:
+            burner.kill()
+            burner.wait()
+
+
+def _look_at_memory(pid: int, memory: dict[str, list[int]]) -> None:
+    for name, process in _processes(pid):
+        try:
+            pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
+        except (OSError, IndexError):  # it has ended
+            continue
+        memory.setdefault(name, []).append(pages * _PAGE)
+
+
+def _processes(pid: int) -> Iterator[tuple[str, int]]:
+    """Yield a process and those that it has started, each by the name of its module."""
+    for process in [pid, *_children(pid)]:
+        try:
+            arguments = Path(f"/proc/{process}/cmdline").read_text().split("\0")
+        except OSError:
+            continue
+        if "-m" in arguments:
+            yield arguments[arguments.index("-m") + 1].rpartition(".")[2], process
+
+
+def _children(pid: int) -> list[int]:
+    children: list[int] = []
+    for task in Path(f"/proc/{pid}/task").glob("*/children"):
+        try:
+            children += map(int, task.read_text().split())
+        except OSError:
+            continue
+    return children
+
+
+def lines(outcome: Outcome) -> Iterator[str]:
+    """Yield what a soak came to, as text."""
+    run = outcome.run
+    yield f"samples          {run['samples']} recorded, {outcome.seen} seen from outside, too"
+    yield f"lost samples     {run['lost_samples']}; by the stamps {outcome.missing_stamps}"
+    yield f"largest backlog  {outcome.largest_backlog} samples that were not recorded yet"
+    yield f"furthest behind  {outcome.furthest_behind} samples, of all readers"
+    yield f"missed deadlines {run['missed_deadlines']}; for sure {outcome.missed_deadlines}"
+    yield f"late forces      {run['late_forces']}; by the motion {outcome.late_forces}"
+    yield f"unexplained      {outcome.unexplained_steps} steps of the motion"
+    for name, sizes in outcome.memory.items():
+        warm, growth = sizes[0] / 1e6, (max(sizes) - sizes[0]) / 1e6
+        yield f"memory           {name}: {warm:.1f} MB after {WARM_UP:g} s, +{growth:.2f} MB"
+
+
+def main() -> None:
+    """Run a soak as the command line asks for, and print what it came to."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--minutes", type=float, default=30.0, help="(default: %(default)g)")
+    parser.add_argument("--composed", action="store_true", help="all nodes in one process")
+    parser.add_argument(
+        "--burners", type=int, default=1, help="busy processes beside it (default: %(default)s)"
+    )
+    chosen = parser.parse_args()
+    with tempfile.TemporaryDirectory() as directory:
+        outcome = soak(
+            60.0 * chosen.minutes,
+            composed=chosen.composed,
+            burners=chosen.burners,
+            directory=Path(directory),
+        )
+    print(*lines(outcome), sep="\n")
+
+
+if __name__ == "__main__":
+    main()

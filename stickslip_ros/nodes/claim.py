@@ -1,0 +1,48 @@
+"""A namespace is claimed by one run at a time: two plants on one topic would spoil both."""
+
+import socket
+import struct
+import sys
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
+from hashlib import sha256
+
+from stickslip_ros.errors import InvalidInputError
+
+_CREDENTIALS = struct.Struct("3i")
+_PATIENCE = 1.0
+
+
+@contextmanager
+def claim(namespace: str, domain: int) -> Generator[None]:
+    """Hold a namespace of a ROS domain on this machine; it is free when this process ends.
+
+    Raises InvalidInputError if another process of any user holds it. Linux only; elsewhere it does
+    nothing.
+    """
+    if sys.platform != "linux":
+        yield
+        return
+    # An abstract address: no file is left behind, and containers share it if they share a network.
+    address = f"\0stickslip_ros {sha256(f'{domain} {namespace}'.encode()).hexdigest()}"
+    with socket.socket(socket.AF_UNIX) as held:
+        try:
+            held.bind(address)
+        except OSError:
+            raise InvalidInputError(
+                f"the namespace {namespace} of the ROS domain {domain} is in use by another run"
+                f"{_holder(address)}: give this one another, by --namespace"
+            ) from None
+        held.listen()
+        yield
+
+
+def _holder(address: str) -> str:
+    """Return which process holds an address, in words, as far as that can be found out."""
+    with socket.socket(socket.AF_UNIX) as asking, suppress(OSError):
+        asking.settimeout(_PATIENCE)
+        asking.connect(address)
+        credentials = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+        process, _, _ = _CREDENTIALS.unpack(credentials)
+        return f" (process {process})"
+    return ""

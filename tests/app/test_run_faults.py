@@ -1,0 +1,124 @@
+"""`stickslip run` whose nodes, or which itself, are killed, stopped, or left without a terminal."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from stickslip_ros.bags.reader import Recording
+from tests.app.conftest import Run
+from tests.app.test_run import children, command, is_running, wait_for_samples
+from tests.nodes.graph import PATIENCE, wait_for
+
+Start = Callable[..., subprocess.Popen[str]]
+
+RUN = ("run", "feed_drive", "--bag", "bag", "-p", "analyzer.flush_period=0.2")
+
+
+def nodes_of(process: subprocess.Popen[str]) -> dict[str, int]:
+    """Return the process of each node of a run."""
+    return {
+        node: child
+        for child in children(process.pid)
+        for node in ("analyzer", "washout_controller", "plant")
+        if f"stickslip_ros.nodes.{node}".encode() in command(child)
+    }
+
+
+def test_what_a_killed_analyzer_leaves_is_told_and_can_be_repaired(
+    start_stickslip: Start, stickslip: Run, tmp_path: Path
+) -> None:
+    process = start_stickslip(*RUN)
+    wait_for_samples(process, tmp_path / "bag")
+    os.kill(nodes_of(process)["analyzer"], signal.SIGKILL)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert "the node analyzer died (killed by signal 9); the bag bag was not closed" in errors
+    assert stickslip("repair", "bag", "sound").returncode == 0
+    with Recording(tmp_path / "sound") as recording:
+        assert recording.complete
+        assert len(recording.joint_states.stamp) > 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("node", "number", "pace"),
+    [
+        ("plant", signal.SIGKILL, "realtime"),
+        ("plant", signal.SIGKILL, "lockstep"),
+        ("washout_controller", signal.SIGTERM, "lockstep"),
+    ],
+)
+def test_a_bag_is_closed_when_another_node_dies(
+    start_stickslip: Start, tmp_path: Path, node: str, number: signal.Signals, pace: str
+) -> None:
+    process = start_stickslip(*RUN, "--pace", pace)
+    wait_for_samples(process, tmp_path / "bag")
+    os.kill(nodes_of(process)[node], number)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert f"the node {node} died" in errors
+    assert "the bag bag is closed" in errors
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.complete
+
+
+@pytest.mark.parametrize("flags", [("--composed",), pytest.param((), marks=pytest.mark.long)])
+def test_a_terminal_that_is_closed_closes_the_bag(
+    start_stickslip: Start, tmp_path: Path, flags: tuple[str, ...]
+) -> None:
+    process = start_stickslip(*RUN, "--json", *flags)
+    wait_for_samples(process, tmp_path / "bag")
+    process.send_signal(signal.SIGHUP)
+    output, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130, errors
+    assert json.loads(output)["report"]["complete"]
+
+
+@pytest.mark.long
+def test_nodes_that_are_stopped_are_killed_at_the_second_signal(
+    start_stickslip: Start, tmp_path: Path
+) -> None:
+    process = start_stickslip(*RUN)
+    wait_for_samples(process, tmp_path / "bag")
+    nodes = nodes_of(process)
+    for node in nodes.values():
+        os.kill(node, signal.SIGSTOP)
+    process.send_signal(signal.SIGINT)
+    process.send_signal(signal.SIGTERM)  # two of a kind might count as one
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    for node, number in nodes.items():
+        assert f"the node {node} did not end within" in errors
+        assert not is_running(number)
+
+
+@pytest.mark.long
+def test_a_run_that_is_killed_leaves_no_file_behind(
+    start_stickslip: Start, process_environment: dict[str, str], tmp_path: Path
+) -> None:
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    process_environment["TMPDIR"] = str(folder)
+    process = start_stickslip(*RUN)
+    wait_for_samples(process, tmp_path / "bag")
+    nodes = nodes_of(process)
+    process.kill()
+    process.wait()
+    wait_for(lambda: not any(map(is_running, nodes.values())), "the nodes end")
+    assert list(folder.iterdir()) == []
+
+
+def test_who_reads_no_further_is_no_failure() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    reference = str(Path(__file__).parents[2] / "bags/reference")
+    report = [sys.executable, "-m", "stickslip_ros.app.main", "report", reference]
+    done = subprocess.run(report, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -1,0 +1,50 @@
+"""Topics under other names: the nodes find each other, and hold each other up, as before."""
+
+from pathlib import Path
+
+from std_srvs.srv import Trigger
+
+from stickslip_ros.bags.messages import pack_header, unpack_header
+from stickslip_ros.bags.reader import Recording
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.topics import JOINT_STATES, RECORDED
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from tests.nodes.graph import Graph
+
+REMAPPED = ("-r", "joint_states:=/x/y", "-r", "control_force:=/force", "-r", "recorded:=/held")
+
+
+def test_the_loop_is_closed_and_recorded_under_other_names(domain: int, tmp_path: Path) -> None:
+    graph = Graph(domain, *REMAPPED)
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
+    graph.wait_until(lambda: analyzer.active and controller.active, "both active")
+    waits_for = ["analyzer", "washout_controller"]
+    plant = graph.add(PlantNode, flow_window=200, duration=10.0, wait_for=waits_for)
+    graph.wait_until(lambda: plant.active, "plant active")
+    graph.wait_until(lambda: not plant.active, "plant pauses")
+    for node in waits_for[::-1]:
+        graph.deactivate(node)
+    graph.close()
+    with Recording(tmp_path / "bag") as recording:
+        names = [name for name, _, _ in recording.messages("/x/y", "/force")]
+        assert recording.complete
+    assert (names.count("/x/y"), names.count("/force")) == (1001, 1001)
+
+
+def test_the_recorder_is_waited_for_under_another_name(domain: int) -> None:
+    graph = Graph(domain, *REMAPPED)
+    heard: list[bytes] = []
+    graph.observer.create_subscription(
+        JOINT_STATES.type, "/x/y", heard.append, JOINT_STATES.qos(), raw=True
+    )
+    recorder = graph.observer.create_publisher(RECORDED.type, "/held", RECORDED.qos())
+    parameters = {"expects_control": False, "reply_timeout": 1e3, "wait_for": ["observer"]}
+    graph.add(PlantNode, flow_window=200, **parameters)
+    graph.wait_until(lambda: len(heard) >= 200, "the plant fills the window")
+    graph.call(Trigger, "/test/plant/reset", Trigger.Request())  # it has had its chance to go on
+    assert len(heard) == 200
+    recorder.publish(pack_header(unpack_header(heard[-1])))
+    graph.wait_until(lambda: len(heard) == 400, "the plant goes on")
+    graph.close()
