@@ -1,5 +1,7 @@
 """Unpacking what recorders pack, never into more memory than it is said to need."""
 
+import errno
+import shutil
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -7,7 +9,8 @@ from pathlib import Path
 from lz4.frame import LZ4FrameDecompressor
 from zstandard import ZstdDecompressor, ZstdError, frame_content_size
 
-_LARGEST = 1 << 28
+LARGEST = 1 << 28
+"""Bytes of the largest chunk, or message, that is taken for one."""
 _LARGEST_RATIO = 1000
 _SMALL = 1 << 20
 """Recorders close chunks at a few MB, which shrink a few times: what claims more is damaged."""
@@ -19,7 +22,7 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 def unpack(compression: str, data: bytes, size: int) -> bytes | None:
     """Return what was packed as `lz4`, `zstd` or not at all; None if that is not `size` bytes."""
-    if size > min(_LARGEST, max(_SMALL, _LARGEST_RATIO * len(data))):
+    if size > min(LARGEST, max(_SMALL, _LARGEST_RATIO * len(data))):
         return None
     match compression:
         case "":
@@ -42,9 +45,17 @@ def unpack_message(data: bytes) -> bytes:
 
 
 def unpack_file(packed: Path, unpacked: Path) -> None:
-    """Write what a file packed as zstd holds to another, as far as it is sound."""
+    """Write what a file packed as zstd holds to another, as far as it is sound.
+
+    Raises OSError, too, before that takes more than half of the free disk.
+    """
+    room = shutil.disk_usage(unpacked.parent).free // 2
     with packed.open("rb") as source, unpacked.open("wb") as target, suppress(ZstdError):
-        ZstdDecompressor().copy_stream(source, target)
+        for piece in ZstdDecompressor().read_to_iter(source, write_size=_PIECE):
+            room -= len(piece)
+            if room < 0:
+                raise OSError(errno.ENOSPC, f"it would fill {unpacked.parent}")
+            target.write(piece)
 
 
 def _unpack_lz4(data: bytes, size: int) -> bytes:

@@ -10,7 +10,7 @@ import re
 import struct
 import zlib
 from array import array
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterator
 from copy import copy
 from io import BytesIO
@@ -35,7 +35,7 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
-from stickslip_ros.bags.compression import ZSTD_MAGIC, unpack, unpack_message
+from stickslip_ros.bags.compression import LARGEST, ZSTD_MAGIC, unpack, unpack_message
 from stickslip_ros.bags.messages import joined
 from stickslip_ros.errors import BagError
 
@@ -54,6 +54,9 @@ _MESSAGE_LENGTH = _MESSAGE_SIZE - _HEAD.size
 """Of a message record's content, without the message."""
 _INDEX_HEAD = 6
 """Bytes of a message index before its pairs of log time and offset."""
+_INDEX_ENTRY = 16
+_ATTACHMENT_TIMES = 16
+"""Bytes of an attachment before its name."""
 _FOOTER_LENGTH = 20
 _FOOTER_CHECKED = 16
 _DATA_END = _HEAD.pack(Opcode.DATA_END, 4)
@@ -80,6 +83,12 @@ _PRIVATE = 0x80
 """Opcodes from here on mean what a program likes."""
 _INVENTORY = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.ATTACHMENT))
 """What stands between the messages and tells what they are or how they came about."""
+_LARGEST_TABLE = 16 << 20
+"""Bytes of the largest record of texts that is taken apart: that takes many times its size."""
+_MOST_NOTED = 32 << 20
+_NOTE = 200
+"""Bytes of memory for all that is noted of a file's inventory, and what a note takes itself."""
+_MOST_GAPS_TOLD = 20
 _CHECKED = 1_000_000
 """Weight of a definition with a checksum against those without."""
 
@@ -150,16 +159,23 @@ class MessageBlock:
         part.begin, part.end = self.begin[wanted], self.end[wanted]
         return part
 
-    def unpacked(self) -> "MessageBlock":
-        """Return them unpacked if rosbag2 packed each message by itself."""
+    def unpacked(self) -> Iterator["MessageBlock"]:
+        """Yield them, unpacked and in smaller blocks if rosbag2 packed each message by itself."""
         if len(self) == 0 or not self.data.startswith(ZSTD_MAGIC, int(self.begin[0])):
-            return self
+            yield self
+            return
         records: list[bytes] = []
+        size = 0
         for begin, end in zip(self.begin.tolist(), self.end.tolist(), strict=True):
             message = unpack_message(self.data[begin:end])
             head = _HEAD.pack(Opcode.MESSAGE, _MESSAGE_LENGTH + len(message))
             records.append(head + self.data[begin - _MESSAGE_LENGTH : begin] + message)
-        return _as_block(records)
+            size += len(records[-1])
+            if size > _WINDOW:
+                yield _as_block(records)
+                records, size = [], 0
+        if records:
+            yield _as_block(records)
 
     def _field(self, name: str) -> NDArray[Any]:
         """Return a field of the records' heads."""
@@ -190,8 +206,14 @@ class _OpenChunk(NamedTuple):
     """What is in a chunk."""
 
     messages: MessageBlock
-    others: list[_Place]
-    """Its other records, in the data of the messages."""
+    others_end: int
+    """Up to there the data of the messages may hold other records."""
+
+    @property
+    def others(self) -> Iterator[_Place]:
+        """Its records that tell what the messages are or how they came about."""
+        records = _records_in(self.messages.data[: self.others_end])
+        return (record for record in records if record[0] in _INVENTORY)
 
 
 class McapFile:
@@ -210,6 +232,7 @@ class McapFile:
         self._channel_ids: set[int] = set()
         self._tables: dict[int, str] = {}
         self._attachments: dict[int, str] = {}
+        self._noted = 0
         self._chunked = False
         self._gaps: dict[int, int] = {}
         self._lost: dict[int, int] = {}
@@ -234,10 +257,13 @@ class McapFile:
     def damage(self) -> list[str]:
         """What is known to be missing from the file, in sentences; reading may find more."""
         name = self.path.name
+        gaps = self._merged_gaps()
         found = [
             f"{name}: bytes {start} to {end - 1} of {self._size} cannot be read"
-            for start, end in self._merged_gaps()
+            for start, end in gaps[:_MOST_GAPS_TOLD]
         ]
+        if len(gaps) > _MOST_GAPS_TOLD:
+            found.append(f"{name}: nor can {len(gaps) - _MOST_GAPS_TOLD} further stretches of it")
         if not self._whole:
             found.append(
                 f"{name} does not end as it should: its recorder is still at work or was killed, "
@@ -277,7 +303,7 @@ class McapFile:
             if len(wanted) > 0:
                 numbers = np.bincount(wanted.channel)
                 counts.update({int(c): int(numbers[c]) for c in np.flatnonzero(numbers)})
-                yield wanted.unpacked()
+                yield from wanted.unpacked()
         recorded = self.statistics.channel_message_counts if self.statistics else {}
         for channel in set(channels) & set(self.channels):
             lost = recorded.get(channel, 0) - int(counts[channel])
@@ -316,9 +342,10 @@ class McapFile:
                     self._chunked = True
                     data = chunk.messages.data
                     for opcode, begin, end in chunk.others:
-                        self._note(opcode, record.start, data[begin:end], _CHECKED)
+                        content = data[begin : min(end, begin + _LARGEST_TABLE)]
+                        self._note(opcode, record.start, content, _CHECKED)
                 elif record.opcode in _INVENTORY:
-                    content = self._read(record.content, record.length)
+                    content = self._read(record.content, min(record.length, _LARGEST_TABLE))
                     self._note(record.opcode, record.start, content, 1)
             self._define()
         return begins_well and ends_well
@@ -342,7 +369,7 @@ class McapFile:
             return True
         # Looked at first: what a wrong place would have us read may be all the file.
         before = max(0, start - len(_DATA_END) - 4)
-        if start > end or self._read(before, len(_DATA_END)) != _DATA_END:
+        if not 0 <= end - start <= LARGEST or self._read(before, len(_DATA_END)) != _DATA_END:
             return False
         summary = self._read(start, end - start)
         checked = self._read(end, _HEAD.size + _FOOTER_CHECKED)
@@ -350,38 +377,67 @@ class McapFile:
             return False
         try:
             for opcode, begin, stop in _records_in(summary):
-                self._note(opcode, start, summary[begin:stop], _CHECKED)
+                content = summary[begin : min(stop, begin + _LARGEST_TABLE)]
+                self._note(opcode, start, content, _CHECKED)
         except _DamageError:
             return False
         self._define()
         return True
 
     def _note(self, opcode: int, start: int, content: bytes, weight: int) -> None:
-        """Note what a record, or the one with it in it that starts there, tells of the file."""
+        """Note what a record, or the one with it in it that starts there, tells of the file.
+
+        Of one that is too large the content is cut short: the name of an attachment still is there.
+        """
         try:
             match opcode:
                 case Opcode.SCHEMA | Opcode.CHANNEL:
                     number = int.from_bytes(content[:2], "little")
                     if opcode == Opcode.CHANNEL:
                         self._channel_ids.add(number)
-                    self._definitions[opcode, number, content] += weight
+                    definition = opcode, number, content
+                    if definition not in self._definitions:
+                        self._account_for(content)
+                    self._definitions[definition] += weight
                 case Opcode.STATISTICS:
                     self.statistics = _parse(Statistics.read, content)
                     self._chunked = self.statistics.chunk_count > 0
                 case Opcode.METADATA:
-                    self._tables[start] = _parse(Metadata.read, content).name
+                    self._tables[start] = self._name_in(content, 0)
                 case Opcode.METADATA_INDEX:
                     index = _parse(MetadataIndex.read, content)
+                    self._account_for(index.name)
                     self._tables[index.offset] = index.name
                 case Opcode.ATTACHMENT:
-                    self._attachments[start] = _parse(Attachment.read, content).name
+                    self._attachments[start] = self._name_in(content, _ATTACHMENT_TIMES)
                 case Opcode.ATTACHMENT_INDEX:
                     index = _parse(AttachmentIndex.read, content)
+                    self._account_for(index.name)
                     self._attachments[index.offset] = index.name
                 case _:
                     pass
         except _DamageError:
-            self._gaps[start] = start + _HEAD.size + len(content)
+            self._add_gap(start, start + _HEAD.size + len(content))
+
+    def _name_in(self, content: bytes, place: int) -> str:
+        """Return the text at a place of a record; raises _DamageError where there is none."""
+        name = _parse(lambda stream: stream.read_prefixed_string(), content[place:])
+        self._account_for(name)
+        return name
+
+    def _account_for(self, noted: bytes | str) -> None:
+        """Raise _DamageError if there is no room to note this."""
+        if self._noted + len(noted) + _NOTE > _MOST_NOTED:
+            raise _DamageError
+        self._noted += len(noted) + _NOTE
+
+    def _add_gap(self, start: int, end: int) -> None:
+        """Note that this cannot be read, within what was found before if that touches it."""
+        last = next(reversed(self._gaps), start)
+        if last <= start <= self._gaps.get(last, -1):
+            self._gaps[last] = max(end, self._gaps[last])
+        else:
+            self._gaps[start] = end
 
     def _define(self) -> None:
         """Take of each schema and channel the definition found in a sound chunk, or most often."""
@@ -407,7 +463,7 @@ class McapFile:
             if record is None or (record.opcode == Opcode.CHUNK and chunk is None):
                 # A record without a checksum may have covered the beginning of a chunk.
                 following = self._next_chunk(checked)
-                self._gaps[min(position, max(before, following - 1))] = following
+                self._add_gap(min(position, max(before, following - 1)), following)
                 position = following
                 continue
             yield record, chunk
@@ -426,7 +482,7 @@ class McapFile:
         if record.opcode == Opcode.MESSAGE:
             channel = int.from_bytes(self._read(record.content, 2), "little")
             # Where there are chunks all messages are in them; this is something else, damaged.
-            sound = channel in self._channel_ids and record.length >= _MESSAGE_LENGTH
+            sound = channel in self._channel_ids and _MESSAGE_LENGTH <= record.length <= LARGEST
             return record if sound and not self._chunked else None
         if record.opcode not in _FIELDS:
             # Another program's own kind, if another record follows.
@@ -445,6 +501,8 @@ class McapFile:
 
     def _opened(self, record: _Record) -> _OpenChunk | None:
         """Return what is in a chunk, None if that is not what was written."""
+        if record.length > LARGEST + _CHUNK_HEAD_SIZE:
+            return None
         try:
             chunk = _parse(Chunk.read, self._read(record.content, record.length))
             data = unpack(chunk.compression, chunk.data, chunk.uncompressed_size)
@@ -457,10 +515,13 @@ class McapFile:
     def _indexed(self, data: bytes, position: int) -> _OpenChunk | None:
         """Find the messages of a chunk by the indexes behind it; None if these are not right."""
         offsets: list[NDArray[np.int64]] = []
+        room = len(data) // _MESSAGE_SIZE * _INDEX_ENTRY
         while (record := self._record(position)) and record.opcode == Opcode.MESSAGE_INDEX:
-            entries = self._read(record.content + _INDEX_HEAD, record.length - _INDEX_HEAD)
-            if len(entries) % 16:
+            size = record.length - _INDEX_HEAD
+            room -= size
+            if size % _INDEX_ENTRY or room < 0:
                 return None
+            entries = self._read(record.content + _INDEX_HEAD, size)
             offsets.append(np.frombuffer(entries, "<i8").reshape(-1, 2)[:, 1])
             position = record.end
         if not offsets:
@@ -470,11 +531,12 @@ class McapFile:
             return None
         try:
             messages = MessageBlock(data, starts)
-            others = list(_records_in(data[: starts[0]]))
+            chunk = _OpenChunk(messages, int(starts[0]))
+            deque(chunk.others, maxlen=0)  # each of them has to be sound
         except _DamageError:
             return None
         joined = np.array_equal(messages.end[:-1], starts[1:]) and messages.end[-1] == len(data)
-        return _OpenChunk(messages, others) if joined else None
+        return chunk if joined else None
 
     def _next_chunk(self, position: int) -> int:
         """Return where the next chunk from a position on seems to start, or the file's size."""
@@ -504,6 +566,9 @@ class McapFile:
         record = None if start is None else self._record(start)
         if record is None or record.opcode != opcode:
             return None
+        if record.length > (LARGEST if opcode == Opcode.ATTACHMENT else _LARGEST_TABLE):
+            self._add_gap(record.start, record.end)
+            return None
         try:
             return _parse(read, self._read(record.content, record.length))
         except _DamageError:
@@ -525,14 +590,9 @@ def _as_block(messages: list[bytes]) -> MessageBlock:
 
 def _walked(data: bytes) -> _OpenChunk:
     """Find the messages of a chunk by going from record to record."""
-    starts = array("q")
-    others: list[_Place] = []
-    for place in _records_in(data):
-        if place[0] == Opcode.MESSAGE:
-            starts.append(place[1] - _HEAD.size)
-        elif place[0] in _INVENTORY:
-            others.append(place)
-    return _OpenChunk(MessageBlock(data, np.array(starts, np.int64)), others)
+    messages = (begin for opcode, begin, _ in _records_in(data) if opcode == Opcode.MESSAGE)
+    starts = np.array(array("q", messages), np.int64) - _HEAD.size
+    return _OpenChunk(MessageBlock(data, starts), len(data))
 
 
 def _records_in(data: bytes) -> Iterator[_Place]:

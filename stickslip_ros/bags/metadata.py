@@ -100,7 +100,7 @@ def _offered(qos: str) -> list[Any]:
     """Return the profiles, which another recorder may have left out or written otherwise."""
     try:
         profiles = yaml.safe_load(qos)
-    except yaml.YAMLError:
+    except Exception:  # there is no end to what may stand in a file of others
         return []
     return profiles if isinstance(profiles, list) else []
 

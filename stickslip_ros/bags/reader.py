@@ -3,7 +3,7 @@
 import os
 import re
 import tempfile
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import fields
@@ -27,9 +27,13 @@ from stickslip_ros.bags.messages import (
 )
 from stickslip_ros.bags.metadata import METADATA_FILE
 from stickslip_ros.errors import BagError
+from stickslip_ros.printable import printable
 
 _PACKED = ".mcap.zstd"
 """Ending of the files that rosbag2 packs as a whole."""
+
+_LARGEST_METADATA = 4_000_000
+"""Characters of a `metadata.yaml` that is read: that of a bag of some ten thousand files."""
 
 _JOINT_STATES = "joint_states"
 _CONTROL_FORCE = "control_force"
@@ -106,7 +110,7 @@ class Recording:
 
         That is an end that no recorder wrote, damage, and messages that could not be understood.
         """
-        return [
+        sentences = [
             *([self._undescribed] if self._undescribed else []),
             *self._unreadable,
             *(sentence for file in self.files for sentence in file.damage),
@@ -115,6 +119,7 @@ class Recording:
                 for topic, number in self._refused.items()
             ),
         ]
+        return [printable(sentence) for sentence in sentences]
 
     @cached_property
     def joint_states(self) -> JointStateColumns:
@@ -181,13 +186,14 @@ class Recording:
 
     def metadata(self, name: str) -> dict[str, str] | None:
         """Return the last table of texts of that name in the bag, None if there is none."""
-        found = [table for file in self.files for table in file.tables(name)]
-        return found[-1].metadata if found else None
+        last = deque((table for file in self.files for table in file.tables(name)), maxlen=1)
+        return last[0].metadata if last else None
 
     def attachment(self, name: str) -> bytes | None:
         """Return the last file of that name attached to the bag, None if there is none."""
-        found = [attachment for file in self.files for attachment in file.attachments(name)]
-        return found[-1].data if found else None
+        attachments = (found for file in self.files for found in file.attachments(name))
+        last = deque(attachments, maxlen=1)
+        return last[0].data if last else None
 
     def close(self) -> None:
         """Close the files."""
@@ -314,7 +320,7 @@ def _unpacked(path: Path, opened: ExitStack) -> Path:
     try:
         unpack_file(path, unpacked)
     except OSError as error:
-        raise BagError(f"the file {path} cannot be unpacked: {error}") from error
+        raise BagError(f"the file {path} cannot be unpacked: {error.strerror}") from error
     return unpacked
 
 
@@ -324,17 +330,29 @@ def _place_in_bag(file: Path) -> tuple[int, str]:
     return (int(number[1]) if number else 0), file.name
 
 
+def _listed(metadata: Path) -> set[str]:
+    """Return the files that a `metadata.yaml` lists."""
+    if metadata.exists() and not metadata.is_file():
+        raise ValueError
+    with metadata.open(encoding="utf-8") as file:
+        text = file.read(_LARGEST_METADATA + 1)
+    if len(text) > _LARGEST_METADATA:
+        raise ValueError
+    # This loader makes nothing but lists and tables of texts, whatever a file asks for.
+    described: Any = yaml.load(text, yaml.BaseLoader)
+    return {str(path) for path in described["rosbag2_bagfile_information"]["relative_file_paths"]}
+
+
 def _undescribed(directory: Path, files: Sequence[Path]) -> str:
     """Return in what the `metadata.yaml` of a bag fails to list its files, or nothing."""
     try:
-        described: Any = yaml.safe_load((directory / METADATA_FILE).read_text(encoding="utf-8"))
-        listed = set(described["rosbag2_bagfile_information"]["relative_file_paths"])
+        listed = _listed(directory / METADATA_FILE)
     except FileNotFoundError:
         return f"{METADATA_FILE} is missing: the recorder is still at work or was killed"
     except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError, RecursionError):
         return f"{METADATA_FILE} cannot be understood"
     present = {file.name for file in files}
-    if gone := sorted(map(str, listed - present)):
+    if gone := sorted(listed - present):
         return f"{', '.join(gone)} is listed in {METADATA_FILE} but not there"
     if new := sorted(present - listed):
         return f"{METADATA_FILE} does not list {', '.join(new)}: the recorder did not finish"

@@ -11,6 +11,7 @@ from stickslip_ros.bags.metadata import METADATA_FILE
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import Recorder, check_new_bag
 from stickslip_ros.errors import BagError
+from stickslip_ros.printable import printable
 
 _Definition = tuple[object, ...]
 _ROSBAG2 = "rosbag2"
@@ -85,7 +86,8 @@ def _copy_messages(
         schema = file.schemas.get(channel.schema_id)
         if schema is None:
             name = file.path.name
-            repaired.missing.append(f"{name}: {channel.topic} is left out: it has no known type")
+            topic = printable(channel.topic)
+            repaired.missing.append(f"{name}: {topic} is left out: it has no known type")
             continue
         details = (channel.message_encoding, *sorted(channel.metadata.items()))
         definition = (channel.topic, schema.name, schema.encoding, schema.data, details)

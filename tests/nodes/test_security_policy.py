@@ -1,0 +1,111 @@
+"""The policy for SROS2 against what the nodes of a run really use."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from rclpy.node import NodeNameNonExistentError
+
+from tests.nodes.graph import Graph
+
+POLICY = Path(__file__).parents[2] / "config" / "sros2_policy.xml"
+NAMESPACE = "/feed_drive"
+NODES = ("plant", "washout_controller", "analyzer", "bringup")
+RULES = ("publish", "subscribe", "reply", "request")
+
+Uses = dict[str, dict[str, set[str]]]
+"""Full names of topics and services by node and rule."""
+
+
+def allowed() -> Uses:
+    """Return what the policy allows each node."""
+    uses: Uses = {}
+    for profile in ElementTree.parse(POLICY).iter("profile"):
+        node = profile.attrib["node"]
+        assert profile.attrib["ns"] == NAMESPACE
+        assert node not in uses
+        uses[node] = {rule: set() for rule in RULES}
+        for rules in profile:
+            (rule,) = rules.attrib
+            assert rules.attrib[rule] == "ALLOW"
+            names = {full_name(expression.text or "", node) for expression in rules}
+            assert len(names) == len(rules)
+            uses[node][rule] |= names
+    return uses
+
+
+def full_name(name: str, node: str) -> str:
+    if name.startswith("/"):
+        return name
+    return f"{NAMESPACE}/{name.replace('~', node, 1)}"
+
+
+def look(graph: Graph, seen: Uses) -> None:
+    """Add what the nodes there use at present."""
+    observer = graph.observer
+    ask = {
+        "publish": observer.get_publisher_names_and_types_by_node,
+        "subscribe": observer.get_subscriber_names_and_types_by_node,
+        "reply": observer.get_service_names_and_types_by_node,
+        "request": observer.get_client_names_and_types_by_node,
+    }
+    for node in NODES:
+        for rule, names_of in ask.items():
+            with suppress(NodeNameNonExistentError):
+                seen[node][rule] |= {name for name, _ in names_of(node, NAMESPACE)}
+
+
+@pytest.fixture(params=[pytest.param([], marks=pytest.mark.long), pytest.param(["--composed"])])
+def run(
+    request: pytest.FixtureRequest, process_environment: dict[str, str], tmp_path: Path
+) -> Iterator[subprocess.Popen[bytes]]:
+    command = ["-m", "stickslip_ros.app.main", "run", "paper", "--pace", "realtime"]
+    run = subprocess.Popen(
+        [sys.executable, *command, *request.param], cwd=tmp_path, env=process_environment
+    )
+    yield run
+    run.kill()
+    run.wait()
+
+
+def test_each_node_is_allowed_what_it_uses_and_no_more(
+    graph: Graph, run: subprocess.Popen[bytes]
+) -> None:
+    permitted = allowed()
+    seen: Uses = {node: {rule: set() for rule in RULES} for node in NODES}
+
+    def is_all_seen() -> bool:
+        assert run.poll() is None
+        look(graph, seen)
+        nodes = [node for node in NODES if node != "bringup"]
+        return all(seen[node] == permitted[node] for node in nodes) or bool(
+            surplus(seen, permitted)
+        )
+
+    graph.wait_until(is_all_seen, "all that is allowed is used")
+    run.send_signal(signal.SIGINT)
+
+    def is_over() -> bool:
+        look(graph, seen)  # bringup asks for states at the end
+        return run.poll() is not None
+
+    graph.wait_until(is_over, "the run ends")
+    assert not surplus(seen, permitted)
+    # Its clients live only as long as a question.
+    del seen["bringup"]["request"], permitted["bringup"]["request"]
+    assert seen["bringup"] == permitted["bringup"]
+
+
+def surplus(seen: Uses, permitted: Uses) -> list[str]:
+    """Return what is used and not allowed."""
+    return [
+        f"{node}: {rule} {name}"
+        for node, rules in seen.items()
+        for rule, names in rules.items()
+        for name in names - permitted[node][rule]
+    ]

@@ -1,0 +1,71 @@
+"""Nothing in the package executes, unpickles or unfolds what it reads."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[2] / "stickslip_ros"
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+EXECUTING_MODULES = {"code", "codeop", "dill", "joblib", "marshal", "pickle", "runpy", "shelve"}
+EXECUTING_CALLS = {"__import__", "compile", "eval", "exec"}
+EXECUTING_METHODS = {
+    ("os", "popen"),
+    ("os", "system"),
+    ("yaml", "full_load"),
+    ("yaml", "unsafe_load"),
+    ("subprocess", "getoutput"),
+    ("subprocess", "getstatusoutput"),
+}
+SAFE_LOADERS = {"_RosLoader", "yaml.BaseLoader", "yaml.SafeLoader"}
+
+
+def offences(tree: ast.AST) -> list[str]:
+    """Return what in the code may execute data, one line each."""
+    found: list[str] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            module = node.module if isinstance(node, ast.ImportFrom) else None
+            names = [module or "", *(alias.name for alias in node.names)]
+            found += [ast.unparse(node) for n in names if n.split(".")[0] in EXECUTING_MODULES]
+        if isinstance(node, ast.Call) and not is_harmless(node):
+            found.append(ast.unparse(node))
+    return found
+
+
+def is_harmless(call: ast.Call) -> bool:
+    keywords = {k.arg: ast.unparse(k.value) for k in call.keywords}
+    if "True" in (keywords.get("shell"), keywords.get("allow_pickle"), keywords.get("usetex")):
+        return False
+    if isinstance(call.func, ast.Name):
+        return call.func.id not in EXECUTING_CALLS
+    if not isinstance(call.func, ast.Attribute):
+        return True
+    method = (ast.unparse(call.func.value), call.func.attr)
+    if method[0] == "yaml" and method[1] in ("load", "load_all"):
+        positional = ast.unparse(call.args[1]) if len(call.args) > 1 else ""
+        return keywords.get("Loader", positional) in SAFE_LOADERS
+    return method not in EXECUTING_METHODS
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_no_module_executes_data(module: Path) -> None:
+    assert offences(ast.parse(module.read_text(encoding="utf-8"))) == []
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "eval(text)",
+        "from pickle import loads",
+        "import marshal",
+        "yaml.load(text)",
+        "yaml.load(text, Loader=yaml.UnsafeLoader)",
+        "subprocess.run(text, shell=True)",
+        "os.system(text)",
+        "numpy.load(path, allow_pickle=True)",
+    ],
+)
+def test_what_executes_data_is_noticed(code: str) -> None:
+    assert offences(ast.parse(code))
