@@ -51,7 +51,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
-        (f"share/{NAME}/config", sorted(glob("config/*.yaml"))),
+        (f"share/{NAME}/config", sorted(glob("config/*"))),
     ],
     entry_points={
         "console_scripts": [f"{name} = {function}" for name, function in EXECUTABLES.items()],
@@ -60,18 +60,19 @@ setup(
     cmdclass={"install_scripts": InstallScripts},
     zip_safe=False,
     python_requires=">=3.11",
+    # Each from the oldest that continuous integration runs the tests with, on Python 3.12.
     install_requires=[
-        "heyoka",
-        "lz4",
-        "matplotlib",
+        "heyoka>=7.10.1",  # the oldest wheels for Python 3.11 to 3.13; it asks for numpy 2
+        "lz4>=4.3.3",  # the oldest wheels for 3.12
+        "matplotlib>=3.8.4",  # the first built for numpy 2
         "mcap>=1.5",  # the first whose writer can close a chunk on demand
-        "numpy",
-        "pillow",
-        "pydantic>=2",  # another API than 1, which some distributions still ship
-        "pyyaml",
-        "rich",
-        "scipy",
-        "zstandard",
+        "numpy>=2",
+        "pillow>=10.1",  # the oldest wheels for 3.12
+        "pydantic>=2.5",  # the first for 3.12; 1, which distributions still ship, has another API
+        "pyyaml>=6.0.1",  # the first that builds with the Cython of today
+        "rich>=13",
+        "scipy>=1.13",  # the first built for numpy 2
+        "zstandard>=0.22",  # the oldest wheels for 3.12
     ],
     extras_require={
         # ROS itself, where none is installed; the message packages come with these two.

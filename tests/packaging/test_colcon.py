@@ -26,12 +26,12 @@ def test_sourcing_puts_the_prefix_on_the_ament_prefix_path(workspace, sourced):
     assert sourced["AMENT_PREFIX_PATH"] == str(workspace)
 
 
-def test_manifest_and_scenarios_are_installed(workspace, checkout):
+def test_manifest_and_configuration_are_installed(workspace, checkout):
     share = workspace / "share" / workspace.name
     assert (share / "package.xml").read_text() == (checkout / "package.xml").read_text()
-    scenarios = {file.name for file in (checkout / "config").glob("*.yaml")}
-    assert scenarios
-    assert {file.name for file in (share / "config").iterdir()} == scenarios
+    written = {file.name for file in (checkout / "config").iterdir()}
+    assert written
+    assert {file.name for file in (share / "config").iterdir()} == written
 
 
 def test_ros2_run_finds_and_starts_every_executable(

@@ -47,11 +47,11 @@ def test_holds_every_file_of_the_package(content, checkout):
 def test_holds_what_ros_looks_for(content, stem, checkout, executables):
     name = checkout.name
     data = f"{stem}.data/data"
-    scenarios = {f"share/{name}/config/{file.name}" for file in checkout.glob("config/*.yaml")}
+    configuration = {f"share/{name}/config/{file.name}" for file in checkout.glob("config/*")}
     stubs = {f"lib/{name}/{executable}" for executable in executables}
     index = {f"share/ament_index/resource_index/packages/{name}", f"share/{name}/package.xml"}
     files = [entry for entry in content.namelist() if entry.startswith(data)]
-    assert {file.removeprefix(f"{data}/") for file in files} == scenarios | stubs | index
+    assert {file.removeprefix(f"{data}/") for file in files} == configuration | stubs | index
     for stub in stubs:
         assert content.getinfo(f"{data}/{stub}").external_attr >> 16 & 0o111 == 0o111
 
