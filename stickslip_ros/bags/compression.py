@@ -11,9 +11,6 @@ from zstandard import ZstdDecompressor, ZstdError, frame_content_size
 
 LARGEST = 1 << 28
 """Bytes of the largest chunk, or message, that is taken for one."""
-_LARGEST_RATIO = 1000
-_SMALL = 1 << 20
-"""Recorders close chunks at a few MB, which shrink a few times: what claims more is damaged."""
 _PIECE = 4 << 20
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
@@ -22,7 +19,7 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 def unpack(compression: str, data: bytes, size: int) -> bytes | None:
     """Return what was packed as `lz4`, `zstd` or not at all; None if that is not `size` bytes."""
-    if size > min(LARGEST, max(_SMALL, _LARGEST_RATIO * len(data))):
+    if size > LARGEST:
         return None
     match compression:
         case "":
@@ -54,7 +51,10 @@ def unpack_file(packed: Path, unpacked: Path) -> None:
         for piece in ZstdDecompressor().read_to_iter(source, write_size=_PIECE):
             room -= len(piece)
             if room < 0:
-                raise OSError(errno.ENOSPC, f"it would fill {unpacked.parent}")
+                raise OSError(
+                    errno.ENOSPC,
+                    f"it would take more than half of what is free in {unpacked.parent}",
+                )
             target.write(piece)
 
 

@@ -566,12 +566,12 @@ class McapFile:
         record = None if start is None else self._record(start)
         if record is None or record.opcode != opcode:
             return None
-        if record.length > (LARGEST if opcode == Opcode.ATTACHMENT else _LARGEST_TABLE):
-            self._add_gap(record.start, record.end)
-            return None
         try:
+            if record.length > (LARGEST if opcode == Opcode.ATTACHMENT else _LARGEST_TABLE):
+                raise _DamageError
             return _parse(read, self._read(record.content, record.length))
         except _DamageError:
+            self._add_gap(record.start, record.end)
             return None
 
     def _read(self, start: int, size: int) -> bytes:

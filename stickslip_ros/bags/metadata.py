@@ -15,6 +15,9 @@ from stickslip_ros.bags.mcap_file import McapFile
 
 METADATA_FILE = "metadata.yaml"
 
+_LARGEST_QOS = 100_000
+"""Characters of the YAML of a topic's profiles that is read: that of some hundred publishers."""
+
 # That of libyaml is five times as fast, which counts with thousands of files.
 _DUMPER: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
@@ -89,15 +92,22 @@ def _topic_entry(channel: Channel, type_name: str) -> dict[str, Any]:
             "name": channel.topic,
             "type": type_name,
             "serialization_format": channel.message_encoding,
-            "offered_qos_profiles": _offered(channel.metadata.get("offered_qos_profiles", "")),
+            "offered_qos_profiles": offered_profiles(
+                channel.metadata.get("offered_qos_profiles", "")
+            ),
             "type_description_hash": channel.metadata.get("topic_type_hash", ""),
         },
         "message_count": 0,
     }
 
 
-def _offered(qos: str) -> list[Any]:
-    """Return the profiles, which another recorder may have left out or written otherwise."""
+def offered_profiles(qos: str) -> list[Any]:
+    """Return the profiles of rosbag2's YAML, which others may have left out or written otherwise.
+
+    None are taken from what is far too long, or repeats itself by aliases.
+    """
+    if len(qos) > _LARGEST_QOS or "*" in qos:
+        return []
     try:
         profiles = yaml.safe_load(qos)
     except Exception:  # there is no end to what may stand in a file of others

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import fields
 from functools import cached_property
+from itertools import pairwise, takewhile
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self, TypeVar
@@ -34,6 +35,9 @@ _PACKED = ".mcap.zstd"
 
 _LARGEST_METADATA = 4_000_000
 """Characters of a `metadata.yaml` that is read: that of a bag of some ten thousand files."""
+
+_LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+"""That of libyaml is ten times as fast."""
 
 _JOINT_STATES = "joint_states"
 _CONTROL_FORCE = "control_force"
@@ -338,9 +342,14 @@ def _listed(metadata: Path) -> set[str]:
         text = file.read(_LARGEST_METADATA + 1)
     if len(text) > _LARGEST_METADATA:
         raise ValueError
-    # This loader makes nothing but lists and tables of texts, whatever a file asks for.
-    described: Any = yaml.load(text, yaml.BaseLoader)
-    return {str(path) for path in described["rosbag2_bagfile_information"]["relative_file_paths"]}
+    # Only this list is made, and of texts only, whatever the file asks for.
+    events: Iterator[Any] = yaml.parse(text, _LOADER)
+    for key, value in pairwise(events):
+        named = isinstance(key, yaml.ScalarEvent) and key.value == "relative_file_paths"
+        if named and isinstance(value, yaml.SequenceStartEvent):
+            listed = takewhile(lambda event: isinstance(event, yaml.ScalarEvent), events)
+            return {event.value for event in listed}
+    raise ValueError
 
 
 def _undescribed(directory: Path, files: Sequence[Path]) -> str:
@@ -349,7 +358,7 @@ def _undescribed(directory: Path, files: Sequence[Path]) -> str:
         listed = _listed(directory / METADATA_FILE)
     except FileNotFoundError:
         return f"{METADATA_FILE} is missing: the recorder is still at work or was killed"
-    except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError, RecursionError):
+    except (OSError, ValueError, yaml.YAMLError):
         return f"{METADATA_FILE} cannot be understood"
     present = {file.name for file in files}
     if gone := sorted(listed - present):

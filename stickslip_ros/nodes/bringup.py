@@ -20,7 +20,6 @@ from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from std_msgs.msg import Header
 
@@ -30,8 +29,8 @@ from stickslip_ros.nodes.claim import claim
 from stickslip_ros.nodes.controllers import find_controllers, find_managed, near_misses
 from stickslip_ros.nodes.lifeline import GUARD_PATIENCE, start
 from stickslip_ros.nodes.managed import STATE, ManagedNode
-from stickslip_ros.nodes.plant import NEWEST_STAMP, PlantNode
-from stickslip_ros.nodes.process import ROS_ARGUMENTS, spin, stop_on_signals
+from stickslip_ros.nodes.plant import FAILURE, NEWEST_STAMP, PlantNode
+from stickslip_ros.nodes.process import ROS_ARGUMENTS, initialise, spin, stop_on_signals
 from stickslip_ros.nodes.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.physics.samples import NANOSECONDS
@@ -101,9 +100,10 @@ def run_nodes(
     configured and activated if it is a managed (lifecycle) node. If the command is empty, somebody
     else starts one, and the plant waits for it.
     Every node is deactivated, and the bag closed, before this returns or raises RunError (a node
-    died, or did not become ready). Raises InvalidInputError if another run is in the namespace.
+    died, or did not become ready). Raises InvalidInputError if another run is in the namespace, or
+    ROS does not take what the environment says.
     """
-    rclpy.init(args=ROS_ARGUMENTS, signal_handler_options=SignalHandlerOptions.NO)
+    initialise()
     try:
         with claim(namespace, rclpy.get_default_context().get_domain_id()):
             bringup = _Bringup(scenario, namespace, controller, progress, tell)
@@ -460,9 +460,11 @@ class _Bringup:
         for status in message.status:
             if status.name == f"{self._namespace.rstrip('/')}/plant":
                 self._outcome.plant = {entry.key: entry.value for entry in status.values}
-                pausing = self._outcome.plant[STATE] in ("deactivating", "inactive")
+                pausing = self._outcome.plant.get(STATE) in ("deactivating", "inactive")
                 if pausing and self._active and not self._last_words.done():
                     self._last_words.set_result(None)
+                if FAILURE in self._outcome.plant:
+                    self._fail(f"the plant could not go on: {self._outcome.plant[FAILURE]}")
 
     def _on_plant_transition(self, event: TransitionEvent) -> None:
         left_active = event.goal_state.id == State.PRIMARY_STATE_INACTIVE and (

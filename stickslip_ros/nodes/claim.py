@@ -5,6 +5,7 @@ import struct
 import sys
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
+from errno import EADDRINUSE
 from hashlib import sha256
 
 from stickslip_ros.errors import InvalidInputError
@@ -17,8 +18,8 @@ _PATIENCE = 1.0
 def claim(namespace: str, domain: int) -> Generator[None]:
     """Hold a namespace of a ROS domain on this machine; it is free when this process ends.
 
-    Raises InvalidInputError if another process of any user holds it. Linux only; elsewhere it does
-    nothing.
+    Raises InvalidInputError if another process of any user holds it. Linux only; elsewhere, and
+    where a sandbox refuses such addresses, it does nothing.
     """
     if sys.platform != "linux":
         yield
@@ -28,12 +29,13 @@ def claim(namespace: str, domain: int) -> Generator[None]:
     with socket.socket(socket.AF_UNIX) as held:
         try:
             held.bind(address)
-        except OSError:
-            raise InvalidInputError(
-                f"the namespace {namespace} of the ROS domain {domain} is in use by another run"
-                f"{_holder(address)}: give this one another, by --namespace"
-            ) from None
-        held.listen()
+            held.listen()
+        except OSError as error:
+            if error.errno == EADDRINUSE:
+                raise InvalidInputError(
+                    f"the namespace {namespace} of the ROS domain {domain} is in use by another "
+                    f"run{_holder(address)}: give this one another, by --namespace"
+                ) from None
         yield
 
 
@@ -44,5 +46,6 @@ def _holder(address: str) -> str:
         asking.connect(address)
         credentials = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
         process, _, _ = _CREDENTIALS.unpack(credentials)
-        return f" (process {process})"
+        if process:  # otherwise it is none of this container
+            return f" (process {process})"
     return ""

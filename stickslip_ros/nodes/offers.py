@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import Any, TypeVar
 
-import yaml
 from rclpy.duration import Duration
 from rclpy.qos import (
     DurabilityPolicy,
@@ -16,6 +15,7 @@ from rclpy.qos import (
 )
 
 from stickslip_ros.bags.definitions import message_definition
+from stickslip_ros.bags.metadata import offered_profiles
 from stickslip_ros.errors import BagError
 from stickslip_ros.nodes.topics import DEEP
 from stickslip_ros.physics.samples import NANOSECONDS
@@ -50,7 +50,7 @@ def offered_profile(recorded: str) -> QoSProfile:
     differed, the topic is reliable.
     """
     try:
-        profiles = [_profile(values) for values in yaml.safe_load(recorded) or []]
+        profiles = [_profile(values) for values in offered_profiles(recorded)]
     except Exception:  # there is no end to what may stand in a file of others
         profiles = []
     if profiles and all(profile == profiles[0] for profile in profiles):

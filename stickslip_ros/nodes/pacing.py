@@ -99,6 +99,8 @@ class Pacer:
 
     complaint = ""
     """What is wrong, in words."""
+    failure = ""
+    """Why it could not go on, in words."""
     missed_deadlines = 0
     largest_lateness = 0.0
     """Time by which a sample was published after its deadline, s."""
@@ -199,8 +201,7 @@ class LockstepPacer(Pacer):
             try:
                 sample = loop.advance()
             except StickslipError as error:
-                self.complaint = str(error)
-                self._node.get_logger().error(self.complaint)
+                self.failure = str(error)
                 self.stop()
                 self._end()
                 return
@@ -282,7 +283,8 @@ class RealtimePacer(Pacer):
             _be_prompt()
             self._keep_deadlines()
         except Exception as error:  # it would end the thread without a word
-            self.complaint = f"{type(error).__name__}: {error}"
+            known = isinstance(error, StickslipError)
+            self.failure = str(error) if known else f"{type(error).__name__}: {error}"
             self._call_soon(self._end)
 
     def _keep_deadlines(self) -> None:

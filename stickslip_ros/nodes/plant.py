@@ -9,7 +9,13 @@ from typing import Any
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from stickslip_ros.bags.messages import pack_joint_state, pack_wrench, unpack_header, unpack_wrench
+from stickslip_ros.bags.messages import (
+    END_OF_TIME,
+    pack_joint_state,
+    pack_wrench,
+    unpack_header,
+    unpack_wrench,
+)
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.nodes.dropped import Dropped
 from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
@@ -29,11 +35,10 @@ from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, Sample, SampledLo
 from stickslip_ros.physics.samples import NANOSECONDS
 from stickslip_ros.scenario.parameters import Pace, PlantParameters
 
-_LATEST_STAMP = (2**31 - 1) * NANOSECONDS
-"""ns; messages cannot hold a later one."""
-
 NEWEST_STAMP = "newest_stamp"
 """Key under which the diagnostics tell the stamp of the newest sample, ns."""
+FAILURE = "failure"
+"""Key under which they tell why the plant could not go on, if so."""
 
 
 class PlantNode(ManagedNode[PlantParameters]):
@@ -78,10 +83,11 @@ class PlantNode(ManagedNode[PlantParameters]):
             expects_control=parameters.expects_control,
             disturbance=parameters.as_disturbance(),
         )
-        stampable = self._loop.number(_LATEST_STAMP) - 1
+        latest = END_OF_TIME - NANOSECONDS
+        stampable = self._loop.number(latest) - 1
         if stampable < 0:
             raise InvalidInputError(
-                f"no stamps are left behind {_LATEST_STAMP // NANOSECONDS} s: configure anew"
+                f"no stamps are left behind {latest // NANOSECONDS} s: configure anew"
             )
         if realtime:
             self._pacer = RealtimePacer(
@@ -133,6 +139,8 @@ class PlantNode(ManagedNode[PlantParameters]):
         }
         if loop.unbounded:
             return ERROR, "the motion runs away (regime unbounded)", figures
+        if pacer.failure:
+            return ERROR, pacer.failure, {**figures, FAILURE: pacer.failure}
         complaints = [pacer.complaint]
         if self.parameters.expects_control and not loop.controller_present:
             complaints.append(NO_FORCE)
@@ -159,9 +167,11 @@ class PlantNode(ManagedNode[PlantParameters]):
             self._clock_time.publish(clock)
 
     def _end(self) -> None:
-        """Pause by itself: the last sample was reached or the motion runs away."""
+        """Pause by itself: the last sample was reached, or the motion cannot go on."""
         if self._loop.unbounded:
             self.get_logger().error("the motion runs away (regime unbounded): plant deactivated")
+        elif self._pacer.failure:
+            self.get_logger().error(f"{self._pacer.failure}: plant deactivated")
         if self.active:
             self.trigger_deactivate()
 

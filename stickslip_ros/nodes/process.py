@@ -34,6 +34,17 @@ _NO_PROFILES_FROM_HERE = "SKIP_DEFAULT_XML_FILE"
 _SPIN_TIMEOUT = 0.2
 
 
+def initialise() -> None:
+    """Initialise ROS for a command, which handles the signals itself.
+
+    Raises InvalidInputError for what the environment says amiss.
+    """
+    try:
+        rclpy.init(args=ROS_ARGUMENTS, signal_handler_options=SignalHandlerOptions.NO)
+    except Exception as error:
+        raise InvalidInputError(_first_line(error)) from None
+
+
 def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) -> int:
     """Run one node as a process, until SIGINT, SIGTERM or SIGHUP; return the exit status.
 
@@ -93,7 +104,7 @@ def keep_on_this_machine(network: bool) -> str:
     for more.
     """
     _heed_predecessor()
-    names = (_DISCOVERY_RANGE, _DISCOVERY_SERVER, _PROFILES)
+    names = [_DISCOVERY_RANGE, *([_DISCOVERY_SERVER, _PROFILES] if _is_fast_dds() else [])]
     said = [f"{name}={os.environ[name]}" for name in names if os.environ.get(name)]
     if network:
         os.environ[_DISCOVERY_RANGE] = "SUBNET"
@@ -109,7 +120,7 @@ def keep_on_this_machine(network: bool) -> str:
 
 def this_machine_only() -> dict[str, str]:
     """Return the environment variables that restrict ROS to this machine."""
-    if "fastrtps" not in rclpy.get_rmw_implementation_identifier():
+    if not _is_fast_dds():
         return {_DISCOVERY_RANGE: "LOCALHOST", _LOCALHOST_ONLY: ""}
     return {
         # LOCALHOST, of either name, would overrule the profile, and take shared memory.
@@ -133,6 +144,10 @@ def prefer_prompt_middleware() -> None:
         os.environ.update(this_machine_only())
     else:
         os.environ[_PROFILES] = _profile("network")
+
+
+def _is_fast_dds() -> bool:
+    return "fastrtps" in rclpy.get_rmw_implementation_identifier()
 
 
 def _heed_predecessor() -> None:

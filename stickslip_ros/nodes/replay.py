@@ -15,7 +15,6 @@ import rclpy
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
-from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
@@ -25,7 +24,7 @@ from stickslip_ros.nodes.excerpt import Excerpt
 from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.pacing import FlowWindow
 from stickslip_ros.nodes.player import Message, Player
-from stickslip_ros.nodes.process import ROS_ARGUMENTS, run_node, run_until_stopped
+from stickslip_ros.nodes.process import initialise, run_node, run_until_stopped
 from stickslip_ros.nodes.topics import CLOCK, JOINT_STATES, RECORDED
 from stickslip_ros.physics.samples import NANOSECONDS
 from stickslip_ros.scenario.parameters import PlantParameters, ReplayParameters
@@ -201,7 +200,7 @@ def replay_bag(
     `progress` now and then which share of the recorded time is done. Raises InvalidInputError for
     what is refused, BagError where the bag cannot be read on, and RunError where all else fails.
     """
-    rclpy.init(args=ROS_ARGUMENTS, signal_handler_options=SignalHandlerOptions.NO)
+    initialise()
     try:
         node = _OneReplay(offering, progress, overrides=parameters)
         return node.run()

@@ -28,6 +28,10 @@ _BELT_SPEED_REACHED, _RUN_AWAY = 0, 1
 
 _SPARE_STEPS, _STEPS_PER_RADIAN = 1_000_000, 10_000
 """Steps of integration that a motion may take: seconds of work, and a thousand times the usual."""
+_STEPS_PER_ADVANCE = 1_000
+"""That it may take besides, however short the advance: milliseconds of work."""
+_MOST_STEPS = 1e18
+"""That heyoka can be told."""
 _STEPS_OF_A_PHASE = 10
 """For which the work counts that a phase of stick or slip causes besides its integration."""
 
@@ -174,7 +178,8 @@ class Motion:
             return
         end = duration * self._drive.angular_frequency
         now = 0.0
-        self._steps_left = min(self._steps_left, _SPARE_STEPS) + int(_STEPS_PER_RADIAN * end)
+        self._steps_left = min(self._steps_left, _SPARE_STEPS)
+        self._steps_left += _STEPS_PER_ADVANCE + int(min(_STEPS_PER_RADIAN * end, _MOST_STEPS))
         self._settle()
         while now < end and not self.unbounded:
             now = self._stick(now, end) if self.sticking else self._slip(now, end)

@@ -95,3 +95,14 @@ def test_an_existing_bag_is_left_as_it_is(stickslip: Run, tmp_path: Path) -> Non
     assert done.returncode == 2
     assert "exists already" in done.stderr
     assert [file.name for file in tmp_path.rglob("*")] == ["bag", "precious"]
+
+
+@pytest.mark.parametrize("arguments", [("run", "paper"), ("replay", "bag")])
+def test_an_impossible_domain_is_refused(
+    stickslip: Run, process_environment: dict[str, str], arguments: tuple[str, ...]
+) -> None:
+    process_environment["ROS_DOMAIN_ID"] = "here"
+    done = stickslip(*arguments)
+    assert done.returncode == 2
+    assert "ROS_DOMAIN_ID is not an integral number" in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr

@@ -1,5 +1,6 @@
 """Whatever the parameters take, `simulate` ends, with numbers for figures or with a refusal."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from math import isfinite
 from typing import Any
@@ -57,13 +58,15 @@ arguments = {
 }
 
 
-@pytest.fixture(autouse=True)
-def _little_patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stickslip_ros.physics.motion._SPARE_STEPS", 10_000)
+@pytest.fixture(autouse=True, scope="module")
+def _little_patience() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("stickslip_ros.physics.motion._SPARE_STEPS", 10_000)
+        yield
 
 
 @given(**arguments)
-@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
 def test_any_scenario_ends(
     plant: dict[str, Any], controller: dict[str, Any], continuous: bool
 ) -> None:
@@ -72,10 +75,7 @@ def test_any_scenario_ends(
 
 @pytest.mark.long
 @given(**arguments)
-@settings(
-    max_examples=200,
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
-)
+@settings(max_examples=200, suppress_health_check=[HealthCheck.too_slow])
 def test_many_scenarios_end(
     plant: dict[str, Any], controller: dict[str, Any], continuous: bool
 ) -> None:

@@ -30,6 +30,7 @@ def nodes_of(process: subprocess.Popen[str]) -> dict[str, int]:
     }
 
 
+@pytest.mark.long
 def test_what_a_killed_analyzer_leaves_is_told_and_can_be_repaired(
     start_stickslip: Start, stickslip: Run, tmp_path: Path
 ) -> None:
@@ -43,6 +44,18 @@ def test_what_a_killed_analyzer_leaves_is_told_and_can_be_repaired(
     with Recording(tmp_path / "sound") as recording:
         assert recording.complete
         assert len(recording.joint_states.stamp) > 0
+
+
+def test_a_plant_that_gives_up_is_told_and_its_bag_is_closed(
+    stickslip: Run, tmp_path: Path
+) -> None:
+    stiff = ("--composed", "--bag", "bag", "-p", "plant.damping=1e12")
+    done = stickslip("run", "paper", *stiff)
+    assert done.returncode == 1
+    assert "the plant could not go on: the motion is too stiff to be followed" in done.stderr
+    assert done.stderr.endswith("the bag bag is closed\n")
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.complete
 
 
 @pytest.mark.long
@@ -68,6 +81,7 @@ def test_a_bag_is_closed_when_another_node_dies(
         assert recording.complete
 
 
+@pytest.mark.skipif(signal.getsignal(signal.SIGHUP) is signal.SIG_IGN, reason="as under nohup")
 @pytest.mark.parametrize("flags", [("--composed",), pytest.param((), marks=pytest.mark.long)])
 def test_a_terminal_that_is_closed_closes_the_bag(
     start_stickslip: Start, tmp_path: Path, flags: tuple[str, ...]
@@ -107,6 +121,7 @@ def test_a_run_that_is_killed_leaves_no_file_behind(
     process_environment["TMPDIR"] = str(folder)
     process = start_stickslip(*RUN)
     wait_for_samples(process, tmp_path / "bag")
+    wait_for(lambda: not any(folder.iterdir()), "the nodes have read their parameters")
     nodes = nodes_of(process)
     process.kill()
     process.wait()

@@ -80,7 +80,7 @@ def motion_of(bag: Path) -> np.ndarray:
 def test_a_second_run_in_the_same_namespace_is_refused(
     stickslip: Run, start_stickslip: Start, tmp_path: Path
 ) -> None:
-    first = start_stickslip("run", "paper", "--pace", "realtime", "--bag", "first")
+    first = start_stickslip("run", "paper", "--composed", "--pace", "realtime", "--bag", "first")
     wait_for_samples(first, tmp_path / "first")
     done = stickslip("run", "paper", "--composed", "--bag", "second")
     assert done.returncode == 2

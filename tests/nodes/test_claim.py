@@ -1,3 +1,5 @@
+import errno
+import os
 import subprocess
 import sys
 from contextlib import ExitStack
@@ -18,27 +20,41 @@ with claim(sys.argv[1], int(sys.argv[2])):
 """
 
 
+def test_a_sandbox_that_refuses_to_bind_does_not_hinder_a_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr("socket.socket.bind", refuse)
+    with claim("/test/claimed", 7):
+        pass
+
+
 def test_a_namespace_is_free_as_soon_as_its_holder_is_killed() -> None:
-    command = [sys.executable, "-c", _HOLDER, "/test/claimed", "7"]
+    # All who test on this machine share these names.
+    namespace = f"/test/claimed_{os.getpid()}"
+    command = [sys.executable, "-c", _HOLDER, namespace, "7"]
     with (
         subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as holder,
         ExitStack() as ours,
     ):
+        ours.callback(holder.kill)
         assert holder.stdout is not None
         assert holder.stdout.readline() == "held\n"
-        ours.enter_context(claim("/test/claimed", 8))
-        ours.enter_context(claim("/test/claimed/further", 7))
+        ours.enter_context(claim(namespace, 8))
+        ours.enter_context(claim(f"{namespace}/further", 7))
         for _ in range(3):
-            with pytest.raises(InvalidInputError) as refusal, claim("/test/claimed", 7):
+            with pytest.raises(InvalidInputError) as refusal, claim(namespace, 7):
                 pass
-            assert "/test/claimed of the ROS domain 7 is in use" in str(refusal.value)
+            assert f"{namespace} of the ROS domain 7 is in use" in str(refusal.value)
             assert f"process {holder.pid}" in str(refusal.value)
         holder.kill()
         holder.wait()
 
         def is_free() -> bool:
             try:
-                ours.enter_context(claim("/test/claimed", 7))
+                ours.enter_context(claim(namespace, 7))
             except InvalidInputError:
                 return False
             return True

@@ -14,7 +14,7 @@ from rclpy.parameter import parameter_value_to_python
 
 from stickslip_ros.bags.messages import joint_state_columns
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.managed import ManagedNode
+from stickslip_ros.nodes.managed import ERROR, ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.topics import JOINT_STATES
@@ -182,7 +182,9 @@ def test_a_motion_that_has_become_too_stiff_pauses_the_plant(
     graph.wait_until(lambda: plant.active and heard, "samples come")
     assert set_all(graph, "plant", damping=1e12) == ""
     graph.wait_until(lambda: not plant.active, "the plant pauses")
-    assert "too stiff" in plant.diagnose()[1]
+    level, message, _ = plant.diagnose()
+    assert level == ERROR
+    assert "too stiff" in message
     assert set_all(graph, "plant", damping=0.02) == ""
     before = len(heard)
     plant.trigger_activate()

@@ -7,6 +7,7 @@ import pytest
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.friction import Coulomb
 from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.theory.sensitivity import SensitiveMotion, TooStiffError
 from tests.physics.drives import PAPER
 
 STIFF = replace(PAPER, damping=1e9)
@@ -43,6 +44,27 @@ def test_a_long_motion_that_is_not_stiff_is_followed_to_its_end() -> None:
     motion = Motion(PAPER, 0.0, 0.0)
     motion.advance(20_000.0)
     assert not motion.unbounded
+
+
+def test_a_motion_sampled_often_is_followed_to_its_end() -> None:
+    often, once = Motion(PAPER, 0.0, 0.0), Motion(PAPER, 0.0, 0.0)
+    for _ in range(1000):
+        often.advance(1e-6)
+    once.advance(1e-3)
+    assert often.velocity == pytest.approx(once.velocity, rel=1e-11)
+
+
+def test_a_stick_however_long_is_followed_to_its_end() -> None:
+    motion = Motion(replace(PAPER, belt_speed=1e-20), 0.0, 1e-20)
+    motion.advance(1e19)
+    assert motion.sticking
+    assert motion.position == pytest.approx(0.1)
+
+
+def test_theory_takes_it_for_too_stiff() -> None:
+    motion = SensitiveMotion(STIFF)
+    with pytest.raises(TooStiffError):
+        motion.advance(0.1)
 
 
 def test_a_law_that_was_used_before_is_as_it_was() -> None:

@@ -5,6 +5,7 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
+from stickslip_ros.errors import RunError
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.equations import WashoutGains
 from stickslip_ros.physics.knots import FloatArray
@@ -75,7 +76,10 @@ class SensitiveMotion(Motion):
         # From the identity each time: heyoka's error is relative to the largest of the variables.
         derivatives = integrator.state[self.order :].reshape(self.order, self.order)
         derivatives[:] = np.eye(self.order)
-        found = super()._propagate(integrator, now, end)
+        try:
+            found = super()._propagate(integrator, now, end)
+        except RunError:
+            raise TooStiffError from None
         self.transition = derivatives @ self.transition
         return found
 
