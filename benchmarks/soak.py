@@ -263,8 +263,13 @@ def lines(outcome: Outcome) -> Iterator[str]:
     yield f"late forces      {run['late_forces']}; by the motion {outcome.late_forces}"
     yield f"unexplained      {outcome.unexplained_steps} steps of the motion"
     for name, sizes in outcome.memory.items():
-        warm, growth = sizes[0] / 1e6, (max(sizes) - sizes[0]) / 1e6
-        yield f"memory           {name}: {warm:.1f} MB after {WARM_UP:g} s, +{growth:.2f} MB"
+        quarters = np.array_split(np.array(sizes) / 1e6, 4)
+        warm = quarters[0][0]
+        growth = ", ".join(f"+{quarter.max() - warm:.2f}" for quarter in quarters)
+        yield (
+            f"memory           {name}: {warm:.1f} MB after {WARM_UP:g} s; in the quarters of the "
+            f"time since, at most {growth} MB"
+        )
 
 
 def main() -> None:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -127,6 +128,53 @@ def test_a_run_that_is_killed_leaves_no_file_behind(
     process.wait()
     wait_for(lambda: not any(map(is_running, nodes.values())), "the nodes end")
     assert list(folder.iterdir()) == []
+
+
+NEIGHBOUR = """
+import rclpy
+from sensor_msgs.msg import JointState
+rclpy.init()
+node = rclpy.create_node("neighbour")
+publisher = node.create_publisher(JointState, "/feed_drive/elsewhere", 10)
+subscription = node.create_subscription(JointState, "/feed_drive/joint_states", print, 10)
+print("ready", flush=True)
+rclpy.spin(node)
+"""
+
+
+def shared_memory_of(process: int) -> set[Path]:
+    """Return the files in shared memory that are a process's alone."""
+    mapped = Path(f"/proc/{process}/maps").read_text()
+    segments = re.findall(r"/dev/shm/fastrtps_[0-9a-f]{16}\b", mapped)
+    return {Path(segment + end) for segment in segments for end in ("", "_el")}
+
+
+@pytest.mark.long
+def test_what_killed_nodes_leave_in_shared_memory_harms_no_run(
+    stickslip: Run, process_environment: dict[str, str]
+) -> None:
+    profile = ("FASTRTPS_DEFAULT_PROFILES_FILE", "SKIP_DEFAULT_XML_FILE")
+    kept = {name: value for name, value in process_environment.items() if name not in profile}
+    environment = {**kept, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    command = [sys.executable, "-c", NEIGHBOUR]
+    left: set[Path] = set()
+    try:
+        for _ in range(3):
+            with subprocess.Popen(
+                command, env=environment, stdout=subprocess.PIPE, text=True
+            ) as neighbour:
+                assert neighbour.stdout is not None
+                assert neighbour.stdout.readline() == "ready\n"
+                left |= shared_memory_of(neighbour.pid)
+                neighbour.kill()
+        assert any(file.exists() for file in left)
+        done = stickslip("run", "paper", "--duration", "5", "--json")
+        assert done.returncode == 0, done.stderr
+        outcome = json.loads(done.stdout)
+        assert (outcome["samples"], outcome["lost_samples"], outcome["late_forces"]) == (501, 0, 0)
+    finally:
+        for file in left:
+            file.unlink(missing_ok=True)
 
 
 def test_who_reads_no_further_is_no_failure() -> None:
