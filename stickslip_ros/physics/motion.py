@@ -26,7 +26,7 @@ _LARGEST_FORCE = 1e100
 _BELT_SPEED_REACHED, _RUN_AWAY = 0, 1
 """The terminal events of the slipping motion, in heyoka's numbering."""
 
-_SPARE_STEPS, _STEPS_PER_RADIAN = 1_000_000, 10_000
+_SPARE_STEPS, _STEPS_PER_RADIAN = 4_000_000, 10_000
 """Steps of integration that a motion may take: seconds of work, and a thousand times the usual."""
 _STEPS_PER_ADVANCE = 1_000
 """That it may take besides, however short the advance: milliseconds of work."""
