@@ -8,7 +8,7 @@ from benchmarks.soak import lines, soak
 from stickslip_ros.nodes.topics import JOINT_STATES
 
 MINUTES = 2
-GROWTH = 4e6
+GROWTH = 2e6
 MESSAGE = 1e3
 """Bytes, at most, that a message takes which waits for a reader."""
 
