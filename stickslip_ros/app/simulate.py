@@ -5,13 +5,12 @@ from math import isfinite
 
 from stickslip_ros.app.arguments import add_json, add_scenario, made_of, scenario_of, seconds
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures import CycleMeter, Measures
 from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.simulation import Progress, simulate_continuous, simulate_sampled
 from stickslip_ros.physics.washout import Washout
 from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.studies.settled import check_continuous, sampled_loop
 
 HELP = "run a scenario without ROS and measure its motion"
 
@@ -62,6 +61,8 @@ def simulate(
 
     Raises InvalidInputError for what continuous control does not have.
     """
+    if continuous:
+        check_continuous(scenario)
     plant, washout = scenario.plant, scenario.washout_controller.as_washout()
     controlled = washout if plant.expects_control else None
     initial = plant.initial
@@ -74,26 +75,6 @@ def simulate(
     )
     meter = CycleMeter(scenario.analyzer.window)
     if not continuous:
-        loop = SampledLoop(
-            motion,
-            plant.rate,
-            LOCKSTEP_START,
-            force_delay=plant.force_delay,
-            force_jitter=plant.force_jitter,
-            force_jitter_seed=plant.force_jitter_seed,
-            expects_control=plant.expects_control,
-            disturbance=plant.as_disturbance(),
-        )
         law = Washout(controlled) if controlled else None
-        return simulate_sampled(loop, motion, law, duration, meter, progress)
-    for name, value, needed in (
-        ("washout_controller.force_limit", washout.force_limit, float("inf")),
-        ("plant.force_delay", plant.force_delay, 0.0),
-        ("plant.force_jitter", plant.force_jitter, 0.0),
-        ("plant.disturbance.kind", str(plant.disturbance.kind), "none"),
-    ):
-        if value != needed:
-            raise InvalidInputError(
-                f"--continuous-control knows no {name}: it is {value}, and must be {needed}"
-            )
+        return simulate_sampled(sampled_loop(plant, motion), motion, law, duration, meter, progress)
     return simulate_continuous(motion, controlled, duration, meter, progress)

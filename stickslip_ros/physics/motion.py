@@ -76,11 +76,12 @@ class Motion:
 
         With `continuous_control` the force is that of the washout controller acting without
         sampling (eq. 19), its filter at rest; set `gains`. With `record` the knots of the motion
-        are kept for `take_knots`.
+        are kept for `take_knots`; see `recording`.
         """
         self.unbounded = False
         """Whether the motion has run away; it does not advance any further then."""
-        self._recorded: list[tuple[float, float, float, bool]] | None = [] if record else None
+        self._recording = record
+        self._recorded: list[tuple[float, float, float, bool]] = []
         self._marks: list[tuple[float, float, float]] = []
         self._continuous_control = continuous_control
         self._controller = WashoutGains(drive.angular_frequency, 0.0, 0.0)
@@ -90,9 +91,19 @@ class Motion:
         self._time = self._knot_time = 0.0
         self._x = self._y = self._w = 0.0
         self._drive = drive
-        self._compiled: dict[type[FrictionLaw], tuple[Equations, _Integrator, _Integrator]] = {}
+        self._compiled: dict[type[FrictionLaw], tuple[Equations, _Integrator]] = {}
+        self._compiled_slip: dict[tuple[type[FrictionLaw], bool], _Integrator] = {}
         self._use_law(type(drive.friction))
         self._set_parameters()
+        self.restart(position, velocity)
+
+    def begin(self, drive: Drive, position: float, velocity: float) -> None:
+        """Be as a motion newly made with these; only `recording` and the gains stay."""
+        self.drive = drive
+        self.force = 0.0
+        self._recorded.clear()
+        self._steps_left = _SPARE_STEPS
+        self._time = self._knot_time = 0.0
         self.restart(position, velocity)
 
     def restart(self, position: float, velocity: float) -> None:
@@ -114,14 +125,27 @@ class Motion:
         old, force = self._drive, self.force
         position, velocity, filter_output = self.position, self.velocity, self._filter_output
         self._drive = drive
-        if type(drive.friction) is not type(old.friction):
-            self._use_law(type(drive.friction))
+        self._use_law(type(drive.friction))
         if drive.speed_scale != old.speed_scale or drive.length_scale != old.length_scale:
             self._x, self._y = position / drive.length_scale, velocity / drive.speed_scale
         self._scale_controller(filter_output)
         self._set_parameters()
         self.force = force
         self._settle()
+
+    @property
+    def recording(self) -> bool:
+        """Whether knots are kept from now on: marking them costs more than the motion itself."""
+        return self._recording
+
+    @recording.setter
+    def recording(self, recording: bool) -> None:
+        if recording == self._recording:
+            return
+        self._recording = recording
+        self._use_law(type(self._drive.friction))
+        self._set_parameters()
+        self._append_knot(0.0, self._x, self._y, sticking=False)
 
     @property
     def force(self) -> float:
@@ -142,6 +166,15 @@ class Motion:
         self._controller = WashoutGains(corner_frequency, linear, cubic)
         self._scale_controller(filter_output)
         self._set_parameters()
+
+    @property
+    def low_passed(self) -> float:
+        """What the washout filter holds back of the speed, d w of eq. 17, m/s."""
+        return self._w * self._gains.corner_frequency * self._drive.speed_scale
+
+    @low_passed.setter
+    def low_passed(self, low_passed: float) -> None:
+        self._w = low_passed / (self._gains.corner_frequency * self._drive.speed_scale)
 
     @property
     def position(self) -> float:
@@ -312,32 +345,35 @@ class Motion:
         return self._sudden_speed / acceleration if acceleration > 0.0 else inf
 
     def _append_knot(self, now: float, x: float, y: float, *, sticking: bool) -> None:
-        if self._recorded is not None:
+        if self._recording:
             time = self._time + now / self._drive.angular_frequency
             self._knot_time = max(self._knot_time, time)  # not back by the rounding of a step
             self._recorded.append((self._knot_time, x, y, sticking))
 
     def _use_law(self, law: type[FrictionLaw]) -> None:
         if law not in self._compiled:
-            self._compiled[law] = self._compile(law)
-        self._equations, self._slipping, self._sticking = self._compiled[law]
+            equations = Equations(law, self._continuous_control)
+            self._compiled[law] = equations, self._compile_stick(equations)
+        self._equations, self._sticking = self._compiled[law]
+        slip = law, self._recording
+        if slip not in self._compiled_slip:
+            self._compiled_slip[slip] = self._compile_slip(self._equations)
+        self._slipping = self._compiled_slip[slip]
 
-    def _compile(self, law: type[FrictionLaw]) -> tuple[Equations, _Integrator, _Integrator]:
-        equations = Equations(law, self._continuous_control)
-        initial = [0.0] * len(equations.slip)
+    def _compile_slip(self, equations: Equations) -> _Integrator:
         falling = hy.event_direction.negative
         # It runs away in the direction it slips in. Of the order of one, since heyoka's error is
         # relative to the largest of states and events.
         runs_away = 1.0 - equations.sign * equations.slip[0][1] / UNBOUNDED_SPEED
         markers = []
-        if self._recorded is not None:
+        if self._recording:
             markers = [
                 hy.nt_event(equations.slip[0][1], callback=_marker(self._marks, turning=True)),
                 hy.nt_event(equations.acceleration, callback=_marker(self._marks)),
             ]
-        slipping = hy.taylor_adaptive(
+        taylor = hy.taylor_adaptive(
             self._system(equations.slip),
-            initial,
+            [0.0] * len(equations.slip),
             t_events=[
                 hy.t_event(equations.sign * equations.relative_speed, direction=falling),
                 hy.t_event(runs_away, direction=falling),
@@ -345,15 +381,19 @@ class Motion:
             nt_events=markers,
             fast_math=True,  # a quarter faster; the error stays below 2e-12 over 190 periods
         )
-        sticking = hy.taylor_adaptive(
+        return _Integrator.of(taylor)
+
+    def _compile_stick(self, equations: Equations) -> _Integrator:
+        falling = hy.event_direction.negative
+        taylor = hy.taylor_adaptive(
             self._system(equations.stick),
-            initial,
+            [0.0] * len(equations.stick),
             t_events=[
                 hy.t_event(equations.static - equations.reaction, direction=falling),
                 hy.t_event(equations.static + equations.reaction, direction=falling),
             ],
         )
-        return equations, _Integrator.of(slipping), _Integrator.of(sticking)
+        return _Integrator.of(taylor)
 
     def _system(self, right_hand_side: Any) -> Any:
         """Return what is integrated for a right-hand side: here, only that."""

@@ -35,32 +35,36 @@ class Washout:
     so that its output does not jump when the corner frequency is changed.
     """
 
-    def __init__(self, parameters: WashoutParameters) -> None:
+    def __init__(self, parameters: WashoutParameters, low_passed: float | None = None) -> None:
+        """Begin with what the filter holds back of the first measurement, m/s; None: all of it."""
         self.parameters = parameters
         """May be replaced at any time; acts from the next measurement on."""
         self._stamp: int | None = None
         self._first_stamp = 0
         self._velocity = 0.0
-        self._low_passed = 0.0
+        self._begins_with = low_passed
+        self.low_passed = 0.0
+        """What the filter held back of the newest measurement, z, m/s."""
 
     def answer(self, stamp: int, velocity: float) -> float | None:
         """Return the force (N) for the slide's finite `velocity` (m/s) measured at `stamp` (ns).
 
-        The filter starts at rest on the first measurement, and again where time goes back. A
-        stamp that was answered already gets None. The force is not finite where it overflows.
+        Where time goes back the filter starts anew, at rest. A stamp that was answered already
+        gets None. The force is not finite where it overflows.
         """
         parameters = self.parameters
         if self._stamp is None or stamp < self._stamp:
             self._first_stamp = stamp
-            self._low_passed = velocity
+            begins_with, self._begins_with = self._begins_with, None
+            self.low_passed = velocity if begins_with is None else begins_with
         elif stamp == self._stamp:
             return None
         else:
             exponent = -parameters.corner_frequency * ((stamp - self._stamp) * 1e-9)
-            self._low_passed -= expm1(exponent) * (self._velocity - self._low_passed)
+            self.low_passed -= expm1(exponent) * (self._velocity - self.low_passed)
         self._stamp = stamp
         self._velocity = velocity
         if (stamp - self._first_stamp) * 1e-9 < parameters.start_after:
             return 0.0
-        force = parameters.gains.force(velocity - self._low_passed)
+        force = parameters.gains.force(velocity - self.low_passed)
         return max(-parameters.force_limit, min(parameters.force_limit, force))
