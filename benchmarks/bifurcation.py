@@ -14,15 +14,11 @@ import heyoka as hy
 from benchmarks.slices import Row, by_turns, compare_times, show
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.motion import UNBOUNDED_SPEED
-from stickslip_ros.studies.bifurcation import (
-    MEASURED_PERIODS,
-    TRANSIENT_PERIODS,
-    bifurcation_diagram,
-)
+from stickslip_ros.studies.bifurcation import COURSE, bifurcation_diagram
 from stickslip_ros.studies.paper.figures import bifurcation_drives
 
 POINTS, ROUNDS = 1000, 3
-PERIODS = TRANSIENT_PERIODS + MEASURED_PERIODS
+PERIODS = COURSE.transient + COURSE.cycles + 1
 
 
 class BareMotion:

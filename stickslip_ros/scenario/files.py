@@ -2,11 +2,11 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 from sys import float_info
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, Self, cast
 
 import yaml
 
@@ -45,6 +45,21 @@ class Scenario:
     def as_dict(self) -> dict[str, dict[str, Any]]:
         """Return every node's parameters by node and flat name."""
         return {node: parameters.flat() for node, parameters in self._nodes()}
+
+    def changed(self, values: Mapping[str, Any]) -> Self:
+        """Return the scenario with other values of parameters, by NODE.PARAMETER.
+
+        Raises InvalidInputError for what is out of bounds, or does not go with the rest.
+        """
+        by_node: dict[str, dict[str, Any]] = {}
+        for target, value in values.items():
+            node, _, parameter = target.partition(".")
+            by_node.setdefault(node, {})[parameter] = value
+        changes: dict[str, Any] = {
+            node: NODE_PARAMETERS[node].validated({**getattr(self, node).flat(), **new}, node)
+            for node, new in by_node.items()
+        }
+        return replace(self, **changes)
 
     def _nodes(self) -> Iterator[tuple[str, NodeParameters]]:
         for node in NODE_PARAMETERS:

@@ -176,6 +176,18 @@ class NodeParameters(_Model):
         except ValidationError as error:
             raise InvalidInputError(f"{source}: {_explain(cls, error, values)}") from None
 
+    @classmethod
+    def check_bounds(cls, name: str, value: Any) -> None:
+        """Refuse a value that is out of its bounds whatever the other parameters are.
+
+        Raises InvalidInputError naming parameter, value and what is allowed.
+        """
+        try:
+            cls.model_validate(_nested({name: value}))
+        except ValidationError as error:
+            if any(".".join(map(str, detail["loc"])) == name for detail in error.errors()):
+                raise InvalidInputError(_explain(cls, error, {name: value})) from None
+
     def flat(self) -> dict[str, Any]:
         """Return the values by their flat names, as plain Python types."""
         return dict(_flat(self.model_dump(mode="python")))

@@ -10,10 +10,10 @@ from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.physics.measures import Measures
 from stickslip_ros.physics.simulation import Progress
-from stickslip_ros.studies.settled import Case, Settled, Settler, State
+from stickslip_ros.studies.settled import Case, Course, Settled, Settler, State
 
-TRANSIENT_PERIODS, MEASURED_PERIODS = 300.0, 6.0
-"""Natural periods from rest that are passed over, and that are looked at then."""
+COURSE = Course(transient=300.0, cycles=6)
+"""How long a motion from rest is followed, unless told otherwise."""
 
 
 @dataclass(frozen=True)
@@ -33,20 +33,13 @@ class BifurcationDiagram:
 def bifurcation_diagram(
     drives: Sequence[Drive],
     progress: Progress = lambda _: None,
-    *,
-    transient_periods: float = TRANSIENT_PERIODS,
-    measured_periods: float = MEASURED_PERIODS,
+    course: Course = COURSE,
 ) -> BifurcationDiagram:
-    """Return what each drive settles on from rest at X = 0.
-
-    The periods are natural ones of the respective drive.
-    """
+    """Return what each drive settles on from rest at X = 0."""
     settler = Settler()
     settled: list[Settled] = []
     for drive in drives:
-        period = drive.natural_period
-        times = transient_periods * period, measured_periods * period
-        settled.append(settler.settle(Case(drive), State(0.0, 0.0), *times))
+        settled.append(settler.settle(Case(drive), State(0.0, 0.0), course))
         progress(len(settled) / len(drives))
     counts = [len(motion.turning_points) for motion in settled]
     return BifurcationDiagram(

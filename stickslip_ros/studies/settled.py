@@ -20,6 +20,9 @@ from stickslip_ros.scenario.parameters import PlantParameters
 STEADY = 1e-3
 """Share by which the amplitudes of the cycles measured may differ in a motion that has settled."""
 
+LONGEST = 1e6
+"""Natural periods or cycles that a motion is followed for at most."""
+
 _LONGEST_LOADING = 50.0
 """Natural periods beyond which a slow belt's loading of the spring is not waited for."""
 
@@ -36,23 +39,23 @@ class State:
 
 @dataclass(frozen=True)
 class Course:
-    """How long a motion is followed.
-
-    In cycles: natural periods, each with the time besides in which the belt loads the spring, 50
-    natural periods at most.
-    """
+    """How long a motion is followed."""
 
     transient: float = 200.0
-    """Cycles that are passed over."""
-    measured: float = 6.0
-    """Cycles that are looked at then."""
+    """Natural periods that are passed over, besides the time in which a slow belt loads the spring
+    once, and, under control, `start_after`."""
+    cycles: int = 6
+    """Whole cycles that are then measured, where there are any."""
 
-    def seconds(self, drive: Drive) -> tuple[float, float]:
-        """Return how long the transient and the measurement are for a drive, s."""
-        cycle = natural = drive.natural_period
-        if drive.belt_speed != 0.0:
-            cycle += min(loading_time(drive), _LONGEST_LOADING * natural)
-        return self.transient * cycle, self.measured * cycle
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.transient <= LONGEST:
+            raise InvalidInputError(
+                f"a transient of {self.transient:g} natural periods: must be from 0 to {LONGEST:g}"
+            )
+        if not 1 <= self.cycles <= LONGEST:
+            raise InvalidInputError(
+                f"{self.cycles} cycles to measure: must be from 1 to {LONGEST:g}"
+            )
 
 
 @dataclass(frozen=True)
@@ -132,37 +135,47 @@ class Settler:
     def __init__(self) -> None:
         self._motions: dict[bool, Motion] = {}
 
-    def settle(self, case: Case, start: State, transient: float, measured: float) -> Settled:
-        """Follow the motion from `start` for `transient` (s) and measure it for `measured` (s).
+    def settle(self, case: Case, start: State, course: Course) -> Settled:
+        """Follow the motion from `start` and measure what is left after the transient.
 
-        The transient begins when the controller does, which may be later (`start_after`). Raises
-        RunError for a motion too stiff to be followed.
+        Raises RunError for a motion too stiff to be followed.
         """
-        continuous = case.washout is not None and case.sampled is None
-        motion = self._motion(case.drive, continuous)
+        drive, washout = case.drive, case.washout
+        continuous = washout is not None and case.sampled is None
+        motion = self._motion(drive, continuous)
         motion.recording = False
-        motion.begin(case.drive, start.position, start.velocity)
-        washout = case.washout
-        meter = _SectionMeter()
+        motion.begin(drive, start.position, start.velocity)
+        meter = _SectionMeter(course.cycles)
+        loading = _loading_time(drive)
+        transient = course.transient * drive.natural_period + loading
+        law = None
         if case.sampled is not None:
             loop = sampled_loop(case.sampled, motion)
-            law = Washout(washout, start.low_passed) if washout else None
             if washout is not None:
+                law = Washout(washout, start.low_passed)
                 transient += washout.start_after
-            simulate_sampled(loop, motion, law, transient, meter)
-            motion.recording = True
-            simulate_sampled(loop, motion, law, measured, meter)
-            low_passed = law.low_passed if law else None
+
+            def advance(duration: float) -> None:
+                simulate_sampled(loop, motion, law, duration, meter)
         else:
             if washout is not None:
                 _begin_control(motion, washout, start)
-            motion.advance(transient)
-            motion.recording = True
-            motion.advance(measured)
-            meter.feed(motion.take_knots(), case.drive.belt_speed)
-            low_passed = motion.low_passed if continuous else None
+
+            def advance(duration: float) -> None:
+                motion.advance(duration)
+                meter.feed(motion.take_knots(), drive.belt_speed)
+
+        advance(transient)
+        motion.recording = True
+        # One cycle is under way when it begins, and one when it ends.
+        block = (course.cycles + 1) * drive.natural_period
+        left = (course.cycles + 1) * (drive.natural_period + loading)
+        while left > 0.0 and not motion.unbounded and not meter.done:
+            advance(min(block, left))
+            left -= block
         if motion.unbounded:
             meter.report_run_away()
+        low_passed = motion.low_passed if continuous else law.low_passed if law else None
         return meter.settled(State(motion.position, motion.velocity, low_passed))
 
     def _motion(self, drive: Drive, continuous: bool) -> Motion:
@@ -171,6 +184,13 @@ class Settler:
                 drive, 0.0, 0.0, continuous_control=continuous, record=True
             )
         return self._motions[continuous]
+
+
+def _loading_time(drive: Drive) -> float:
+    """Return how long a slow belt may take to load the spring, as far as it is waited for, s."""
+    if drive.belt_speed == 0.0:
+        return 0.0
+    return min(loading_time(drive), _LONGEST_LOADING * drive.natural_period)
 
 
 def _begin_control(motion: Motion, washout: WashoutParameters, start: State) -> None:
@@ -182,10 +202,11 @@ def _begin_control(motion: Motion, washout: WashoutParameters, start: State) -> 
 
 
 class _SectionMeter(CycleMeter):
-    """Keeps the Poincare section, and the first of the cycles that are measured."""
+    """Keeps the Poincare section, and the amplitudes of the cycles that are measured."""
 
-    def __init__(self) -> None:
-        super().__init__(window=1_000_000)
+    def __init__(self, cycles: int) -> None:
+        super().__init__(cycles)
+        self._cycles_wanted = cycles
         self._sections = [np.empty(0)]
         self._amplitudes: list[float] = []
 
@@ -195,6 +216,13 @@ class _SectionMeter(CycleMeter):
         cycles = super().feed(knots, belt_speed)
         self._amplitudes += [cycle.amplitude for cycle in cycles]
         return cycles
+
+    @property
+    def done(self) -> bool:
+        """Whether there are cycles enough, or no more will come."""
+        if len(self._amplitudes) >= self._cycles_wanted:
+            return True
+        return self.measures().regime in (Regime.EQUILIBRIUM, Regime.STUCK)
 
     def settled(self, end: State) -> Settled:
         """Return what was found, the motion having come to `end`."""

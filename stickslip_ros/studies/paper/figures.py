@@ -16,7 +16,7 @@ from stickslip_ros.physics.friction import Coulomb, FrictionLaw, Linear, Stribec
 from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.physics.simulation import Progress
 from stickslip_ros.studies.bifurcation import (
-    TRANSIENT_PERIODS,
+    COURSE,
     BifurcationDiagram,
     bifurcation_diagram,
 )
@@ -202,7 +202,7 @@ def _gains(corner_frequency: float, gains: Sequence[tuple[float, float]]) -> lis
 _LONG = 3000.0
 """Time after which a motion has settled that is slow to do so."""
 
-_SETTLED_ON = f"What the motion from rest is after {TRANSIENT_PERIODS:g} natural periods"
+_SETTLED_ON = f"What the motion from rest is after {COURSE.transient:g} natural periods"
 
 _BIFURCATIONS = {
     2: _Bifurcation(

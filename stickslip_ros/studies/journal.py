@@ -1,0 +1,176 @@
+"""What a study has found so far, on disk as it comes: interrupted, it goes on from there."""
+
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple
+from pathlib import Path
+from tempfile import TemporaryFile
+from types import TracebackType
+from typing import Any, BinaryIO, Self
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.studies.settled import State
+from stickslip_ros.studies.study import Piece, Point, Study
+from stickslip_ros.versions import versions
+
+_FORMAT = "stickslip_ros study 1"
+
+
+class Journal:
+    """The points of a study that are done, in a file of lines of JSON; a context manager.
+
+    The first line says what study it is, each further one holds a piece. A line that was not
+    finished, the writer having been killed, is cut off. What is in memory is a bit for each point
+    and a few numbers for each piece.
+    """
+
+    def __init__(self, study: Study, path: Path | None = None) -> None:
+        """Begin the journal at `path`, or go on with the one that is there; None: one in passing.
+
+        Raises InvalidInputError for a file that is no journal of this study, that another process
+        writes, or that cannot be written.
+        """
+        self.study = study
+        self.count = 0
+        """How many points are done."""
+        self._done = bytearray((study.plan.size + 7) // 8)
+        self._lines: list[tuple[int, int]] = []
+        self._ends: dict[int, State | None] = {}
+        self._path = path
+        try:
+            self._file = _opened(path)
+        except OSError as error:
+            raise InvalidInputError(f"{path}: cannot be written: {error.strerror}") from None
+        try:
+            self._read()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._file.close()
+
+    def is_done(self, index: int) -> bool:
+        """Return whether a point is done."""
+        return bool(self._done[index >> 3] & 1 << (index & 7))
+
+    def state_after(self, index: int) -> State | None:
+        """Return where a point ended that is the last one of its piece."""
+        return self._ends[index]
+
+    def add(self, piece: Piece) -> None:
+        """Keep a piece; it is with the system when this returns."""
+        end = None if piece.end is None else astuple(piece.end)
+        line = {"points": [point.as_json() for point in piece.points], "end": end}
+        self._file.seek(0, os.SEEK_END)
+        offset = self._file.tell()
+        self._file.write(json.dumps(line, separators=(",", ":")).encode() + b"\n")
+        self._file.flush()
+        self._enter(offset, [point.number for point in piece.points], piece.end)
+
+    def points(self) -> Iterator[Point]:
+        """Yield the points that are done in the order of their index."""
+        for _, offset in sorted(self._lines):
+            self._file.seek(offset)
+            found = [Point.from_json(values) for values in _parsed(self._file.readline())["points"]]
+            yield from sorted(found, key=lambda point: point.number)
+
+    def discard(self) -> None:
+        """Remove the file: what was in it stands elsewhere now."""
+        if self._path is not None:
+            self._path.unlink()
+
+    def _enter(self, offset: int, indices: Sequence[int], end: State | None) -> None:
+        for index in indices:
+            self._done[index >> 3] |= 1 << (index & 7)
+        self.count += len(indices)
+        self._lines.append((min(indices), offset))
+        if self.study.plan.carried:
+            self._ends[indices[-1]] = end
+
+    def _read(self) -> None:
+        header = {"format": _FORMAT, "versions": versions(), **self.study.as_dict()}
+        header = json.loads(json.dumps(header))
+        first = self._file.readline()
+        if not first.endswith(b"\n"):
+            self._file.seek(0)
+            self._file.truncate()
+            self._file.write(json.dumps(header).encode() + b"\n")
+            self._file.flush()
+            return
+        self._compare(header, first)
+        while True:
+            offset = self._file.tell()
+            line = self._file.readline()
+            if not line.endswith(b"\n"):
+                break
+            try:
+                read = _parsed(line)
+                end = None if read["end"] is None else State(*read["end"])
+                indices = [values[0] for values in read["points"]]
+                repeated = any(self.is_done(index) for index in indices)
+            except (ValueError, LookupError, TypeError):
+                raise InvalidInputError(
+                    f"{self._path}: what begins at byte {offset} is no piece of a study"
+                ) from None
+            if not repeated:
+                self._enter(offset, indices, end)
+        self._file.seek(offset)
+        self._file.truncate()
+
+    def _compare(self, header: Mapping[str, Any], line: bytes) -> None:
+        try:
+            found = _parsed(line)
+        except ValueError:
+            found = {}
+        if found.get("format") != _FORMAT:
+            raise InvalidInputError(f"{self._path}: exists already, and is no study's journal")
+        differing = [key for key in header if found.get(key) != header[key]]
+        if differing:
+            raise InvalidInputError(
+                f"{self._path}: was begun by another study, which differs in "
+                f"{', '.join(_differences(found, header, differing))}; finish that one, or remove "
+                "the file"
+            )
+
+
+def _opened(path: Path | None) -> BinaryIO:
+    if path is None:
+        return TemporaryFile()
+    file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.close()
+        raise InvalidInputError(f"{path}: another process is writing it") from None
+    return file
+
+
+def _parsed(line: bytes) -> dict[str, Any]:
+    found = json.loads(line)
+    if not isinstance(found, dict):
+        raise ValueError
+    return found
+
+
+def _differences(
+    found: Mapping[str, Any], expected: Mapping[str, Any], keys: Sequence[str]
+) -> Iterator[str]:
+    """Yield in which entries the two differ, and how."""
+    for key in keys:
+        one, other = found.get(key), expected[key]
+        if isinstance(one, dict) and isinstance(other, dict):
+            inner = [name for name in other if one.get(name) != other[name]]
+            yield from (f"{key}.{text}" for text in _differences(one, other, inner))
+        else:
+            yield f"{key} ({one!r:.60}, not {other!r:.60})"

@@ -1,0 +1,186 @@
+"""Running a study: in this process, in several here, or wherever an executor takes its tasks."""
+
+import signal
+from collections.abc import Generator, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import active_children, get_context, parent_process
+from os import _exit
+from threading import Thread
+
+from stickslip_ros.errors import RunError
+from stickslip_ros.physics.simulation import Progress
+from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.settled import State
+from stickslip_ros.studies.study import Piece, compute, pieces_of
+
+IN_FLIGHT = 64
+"""Tasks that an executor holds at a time, unless told otherwise: memory is for these only."""
+
+_SECONDS_PER_TASK, _LARGEST_TASK = 0.25, 1000
+"""What a task takes, about, and how many points it has at most."""
+
+_TASKS_PER_WORKER = 16
+"""That a study is cut into at least, so that workers end at about the same time."""
+
+_DEATHS = 3
+"""So often in a row may workers die without a piece having been done."""
+
+
+def run(
+    journal: Journal,
+    executor: Executor | None = None,
+    *,
+    in_flight: int = IN_FLIGHT,
+    progress: Progress = lambda _: None,
+) -> None:
+    """Compute the points of the journal's study that it does not have yet.
+
+    In this process, or through any `executor`, which gets `in_flight` tasks at a time; a task is
+    some points. What is found does not depend on that, to the last bit on one kind of processor.
+    `progress` is told how many points are done. Interrupted, what was done is in the journal.
+    """
+    study = journal.study
+    size = _task_size(journal, 1 if executor is None else in_flight)
+    progress(journal.count)
+    chains = (_Chain(points, size, start) for points, start in _missing(journal))
+    if executor is None:
+        for chain in chains:
+            for points in chain:
+                chain.start = _keep(journal, compute(study, points, chain.start), progress)
+        return
+    waiting: dict[Future[Piece], _Chain] = {}
+
+    def submit(chain: "_Chain") -> bool:
+        points = next(chain, None)
+        if points is not None:
+            waiting[executor.submit(compute, study, points, chain.start)] = chain
+        return points is not None
+
+    parallel = _parallel(chains, carried=study.plan.carried)
+    try:
+        while True:
+            while len(waiting) < in_flight and (chain := next(parallel, None)) is not None:
+                submit(chain)
+            if not waiting:
+                return
+            for task in wait(waiting, return_when=FIRST_COMPLETED).done:
+                piece, chain = task.result(), waiting.pop(task)
+                chain.start = _keep(journal, piece, progress)
+                if study.plan.carried:
+                    submit(chain)
+    finally:
+        for task in waiting:
+            if task.done() and not task.cancelled() and task.exception() is None:
+                journal.add(task.result())
+            task.cancel()
+
+
+def run_here(journal: Journal, workers: int, progress: Progress = lambda _: None) -> None:
+    """Do as `run` does, in so many processes of this machine.
+
+    Should one be killed, others take its place. Raises RunError if they keep dying.
+    """
+    if workers == 1:
+        run(journal, progress=progress)
+        return
+    deaths = 0
+    while True:
+        before = journal.count
+        try:
+            with local_processes(workers) as pool:
+                run(journal, pool, in_flight=2 * workers, progress=progress)
+        except BrokenProcessPool:
+            deaths = 1 if journal.count > before else deaths + 1
+            if deaths == _DEATHS:
+                raise RunError(
+                    f"worker processes were killed {deaths} times without getting anywhere, "
+                    f"{journal.count} of {journal.study.plan.size} points being done: is memory "
+                    "short?"
+                ) from None
+        else:
+            return
+
+
+@contextmanager
+def local_processes(workers: int) -> Generator[ProcessPoolExecutor]:
+    """Provide so many processes here, which end when this one does, however it does.
+
+    They are not forked: heyoka's compiler has threads, which a fork would lose.
+    """
+    others = set(active_children())
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), initializer=_begin_worker)
+    try:
+        yield pool
+    except BaseException:
+        for child in set(active_children()) - others:
+            child.terminate()
+        pool.shutdown(cancel_futures=True)
+        raise
+    else:
+        pool.shutdown()
+
+
+def _begin_worker() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who is interrupted terminates its workers
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+    _exit(1)
+
+
+class _Chain:
+    """Pieces that are computed one after the other; an iterator of them."""
+
+    def __init__(self, points: range, size: int, start: State | None) -> None:
+        self.start = start
+        """Where the next piece begins."""
+        self._pieces = pieces_of(points, size)
+
+    def __iter__(self) -> Iterator[range]:
+        return self._pieces
+
+    def __next__(self) -> range:
+        return next(self._pieces)
+
+
+def _parallel(chains: Iterator[_Chain], *, carried: bool) -> Iterator[_Chain]:
+    """Yield a chain for every piece that may be begun now, which is all unless carried on."""
+    for chain in chains:
+        if carried:
+            yield chain
+        else:
+            for piece in chain:
+                yield _Chain(piece, len(piece), None)
+
+
+def _missing(journal: Journal) -> Iterator[tuple[range, State | None]]:
+    """Yield runs of points that are not done, and where the first one of each begins."""
+    carried = journal.study.plan.carried
+    for points in journal.study.plan.chains():
+        first = 0
+        for place in range(len(points) + 1):
+            if place < len(points) and not journal.is_done(points[place]):
+                continue
+            if first < place:
+                start = journal.state_after(points[first - 1]) if carried and first > 0 else None
+                yield points[first:place], start
+            first = place + 1
+
+
+def _keep(journal: Journal, piece: Piece, progress: Progress) -> State | None:
+    journal.add(piece)
+    progress(journal.count)
+    return piece.end
+
+
+def _task_size(journal: Journal, in_flight: int) -> int:
+    size = min(int(_SECONDS_PER_TASK / journal.study.cost()), _LARGEST_TASK)
+    if in_flight > 1 and not journal.study.plan.carried:
+        size = min(size, journal.study.plan.size // (_TASKS_PER_WORKER * in_flight // 2))
+    return max(size, 1)

@@ -1,0 +1,176 @@
+"""A study: many points of one scenario, each followed from its start to what it settles on."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from threading import local
+from typing import Any, NamedTuple, Self
+
+from stickslip_ros.errors import StickslipError
+from stickslip_ros.physics.measures import Measures, Regime
+from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.studies.plan import Plan
+from stickslip_ros.studies.settled import Case, Course, Settler, State
+
+MEASURES = tuple(measure.name for measure in fields(Measures))
+"""Names of the measures of a point."""
+
+_SECONDS_PER_PERIOD, _SECONDS_PER_SAMPLE = 2e-5, 1e-5
+"""What a natural period costs, about, and a sample where the loop is sampled."""
+
+
+class Point(NamedTuple):
+    """What became of one point."""
+
+    number: int
+    """In the plan, from 0 on."""
+    measures: Measures
+    steady: bool
+    """Whether it has settled (see `Settled`)."""
+    turning_points: tuple[float, ...]
+    """Poincare section x' = 0, m (see `Settled`)."""
+    reason: str | None
+    """Why it has no cycle to measure; None where it has, or rests."""
+
+    def as_json(self) -> list[Any]:
+        """Return what `from_json` makes the same point of, to the last bit."""
+        measures = [getattr(self.measures, name) for name in MEASURES]
+        return [self.number, *measures, self.steady, list(self.turning_points), self.reason]
+
+    @classmethod
+    def from_json(cls, values: Sequence[Any]) -> Self:
+        """Return the point that `as_json` has written down."""
+        number, *measures, steady, turning_points, reason = values
+        named: dict[str, Any] = dict(zip(MEASURES, measures, strict=True))
+        named["regime"] = None if named["regime"] is None else Regime(named["regime"])
+        return cls(number, Measures(**named), steady, tuple(turning_points), reason)
+
+
+class Piece(NamedTuple):
+    """Points of a study that one task has computed, in the order of the task."""
+
+    points: list[Point]
+    end: State | None
+    """Where the last one ended; None if it ran away or failed, or if nothing is carried on."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """The points of a plan, all else being as in a scenario.
+
+    A motion begins in the scenario's initial state, or, where the plan carries on, in the state in
+    which the neighbour's ended, filter included; what forces were under way is then forgotten, and
+    `start_after` is for the first point of a chain only.
+    """
+
+    scenario: Scenario
+    plan: Plan
+    course: Course = field(default_factory=Course)
+    continuous: bool = False
+    """Whether control acts without sampling (eq. 19)."""
+
+    def case(self, index: int) -> tuple[Case, State]:
+        """Return the drive and loop of a point, and its initial state.
+
+        Raises InvalidInputError where its values are out of bounds or do not go together.
+        """
+        values = dict(zip(self.plan.parameters, self.plan.values(index), strict=True))
+        scenario = self.scenario.changed(values)
+        initial = scenario.plant.initial
+        return Case.of(scenario, continuous=self.continuous), State(
+            initial.position, initial.velocity
+        )
+
+    def check(self) -> None:
+        """Raise InvalidInputError if none of the corners of the plan is a point that can be."""
+        refused: StickslipError | None = None
+        for index in {0, self.plan.size // 2, self.plan.size - 1}:
+            try:
+                self.case(index)
+            except StickslipError as error:
+                refused = refused or error
+            else:
+                return
+        if refused is not None:
+            raise refused
+
+    def cost(self) -> float:
+        """Return how long a point takes, about, s."""
+        case, _ = self._middle()
+        periods = self.course.transient + self.course.cycles + 1
+        if case.sampled is None:
+            return periods * _SECONDS_PER_PERIOD
+        return periods * case.drive.natural_period * case.sampled.rate * _SECONDS_PER_SAMPLE
+
+    def _middle(self) -> tuple[Case, State]:
+        for index in (self.plan.size // 2, 0, self.plan.size - 1):
+            try:
+                return self.case(index)
+            except StickslipError:
+                continue
+        return Case.of(self.scenario, continuous=self.continuous), State(0.0, 0.0)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what the result depends on, ready for JSON."""
+        plan: Any = self.plan
+        return {
+            "scenario": self.scenario.as_dict(),
+            "plan": {"kind": type(plan).__name__.lower(), **asdict(plan)},
+            "course": asdict(self.course),
+            "continuous_control": self.continuous,
+        }
+
+
+class _Settlers(local):
+    """One of each thread: integrators are compiled once, and used by one at a time."""
+
+    def __init__(self) -> None:
+        self.settler = Settler()
+
+
+_SETTLERS = _Settlers()
+
+
+def compute(study: Study, points: Sequence[int], start: State | None) -> Piece:
+    """Return what becomes of some points, in their order; a pure function, for any process.
+
+    Where the plan carries on, the first one begins in `start`; without, in its initial state, as
+    does the one after a point that failed or ran away.
+    """
+    carried, end = study.plan.carried, start
+    found: list[Point] = []
+    for index in points:
+        point, end = _compute_point(study, index, end if carried else None)
+        found.append(point)
+    return Piece(found, end if carried else None)
+
+
+def _compute_point(study: Study, index: int, start: State | None) -> tuple[Point, State | None]:
+    try:
+        case, initial = study.case(index)
+        if start is not None and case.washout is not None:
+            case = replace(case, washout=replace(case.washout, start_after=0.0))
+        settled = _SETTLERS.settler.settle(case, start or initial, study.course)
+    except (StickslipError, ArithmeticError) as error:
+        _SETTLERS.settler = Settler()
+        nothing = Measures(None, None, None, None, None, None, 0, None)
+        return Point(index, nothing, False, (), " ".join(str(error).split())), None
+    point = Point(
+        index,
+        settled.measures,
+        settled.steady,
+        tuple(settled.turning_points.tolist()),
+        _REASONS.get(settled.measures.regime),
+    )
+    return point, None if settled.measures.regime is Regime.UNBOUNDED else settled.end
+
+
+_REASONS: dict[Regime | None, str] = {
+    Regime.UNBOUNDED: "the motion runs away",
+    None: "no whole cycle in the time that is measured",
+}
+
+
+def pieces_of(points: range, size: int) -> Iterator[range]:
+    """Cut points into pieces of so many."""
+    for first in range(0, len(points), size):
+        yield points[first : first + size]
