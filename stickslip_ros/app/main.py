@@ -10,7 +10,18 @@ from typing import TextIO
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.errors import InvalidInputError, StickslipError
 
-_COMMANDS = ("run", "simulate", "stability", "design", "report", "repair", "replay", "paper")
+_COMMANDS = (
+    "run",
+    "simulate",
+    "stability",
+    "design",
+    "sweep",
+    "basin",
+    "report",
+    "repair",
+    "replay",
+    "paper",
+)
 """Each is a module here, imported when it is asked for: some import what takes seconds."""
 
 _PASSING_ON = ("run",)

@@ -39,9 +39,20 @@ _LABELS: dict[str, tuple[str, str]] = {
 
 
 def print_json(values: Mapping[str, Any]) -> None:
-    """Print one JSON object; what is infinite or not a number, JSON does not know, is null."""
-    json.dump(_finite(values), sys.stdout, indent=2, allow_nan=False)
+    """Print one JSON object, of what `finite` makes of the values."""
+    json.dump(finite(values), sys.stdout, indent=2, allow_nan=False)
     print()
+
+
+def finite(value: Any) -> Any:
+    """Return a value for JSON: null for what is infinite or not a number, which JSON lacks."""
+    if isinstance(value, Mapping):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [finite(item) for item in value]
+    if isinstance(value, float) and not abs(value) < float("inf"):
+        return None
+    return value
 
 
 def print_figures(title: str, columns: Mapping[str, Mapping[str, Any]]) -> None:
@@ -110,13 +121,3 @@ def _text(value: Any, scale: float, unit: str, digits: int) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value / scale:.{digits}g}{unit}" if isinstance(value, float) else str(value)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_finite(item) for item in value]
-    if isinstance(value, float) and not abs(value) < float("inf"):
-        return None
-    return value

@@ -2,9 +2,11 @@
 
 import csv
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 from shutil import copyfileobj
 from tempfile import TemporaryFile
 from typing import Any, Self, TextIO
@@ -13,9 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.physics.simulation import Progress
 from stickslip_ros.studies.journal import Journal
-from stickslip_ros.studies.plan import Carry, Grid, Plan
-from stickslip_ros.studies.study import MEASURES, Point
+from stickslip_ros.studies.plan import Grid, Plan
+from stickslip_ros.studies.runner import IN_FLIGHT, run, run_here
+from stickslip_ros.studies.study import MEASURES, Point, Study
 
 COLUMNS = (*MEASURES, "steady", "turning_points", "reason")
 """What a table has of each point, besides the values of the parameters."""
@@ -82,60 +86,88 @@ class Columns:
         )
 
 
-def write_csv(stream: TextIO, journal: Journal) -> None:
+def compute_columns(
+    study: Study,
+    *,
+    workers: int = 1,
+    executor: Executor | None = None,
+    in_flight: int = IN_FLIGHT,
+    path: Path | None = None,
+    progress: Progress = lambda _: None,
+) -> Columns:
+    """Compute a study and return what became of its points.
+
+    In this process, in several `workers` here, or through any `executor`, which then holds
+    `in_flight` tasks at a time; all give the same. `path` is a journal, from which a study that was
+    interrupted goes on, and which is there for the next time when it is done. `progress` is told
+    how many points are done. Raises RunError if workers keep dying.
+
+        scenario = load_scenario("paper", ["plant.expects_control=false"])
+        study = sweep_study(scenario, [Axis("plant.belt_speed", 0.02, 0.6, 59)])
+        found = compute_columns(study)
+        sticks = found.regime == Regime.STICK_SLIP
+        print(found.values["plant.belt_speed"][sticks].max())
+    """
+    with Journal(study, path) as journal:
+        if executor is not None:
+            run(journal, executor, in_flight=in_flight, progress=progress)
+        else:
+            run_here(journal, workers, progress)
+        return Columns.of(journal)
+
+
+Further = Mapping[str, Callable[[Point], Any]]
+"""Columns of a table before the measures: their names, and what makes them of a point."""
+
+
+def write_csv(stream: TextIO, journal: Journal, further: Further) -> None:
     """Write a row for each point that is done; turning points are separated by spaces."""
     plan = journal.study.plan
-    directions = ["direction"] if plan.carried else []
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([*plan.parameters, *directions, *COLUMNS])
+    writer.writerow([*plan.parameters, *further, *COLUMNS])
     for point in journal.points():
-        direction = [str(_direction(plan, point.number))] if plan.carried else []
-        *rest, turning_points, reason = _cells(point)
-        section = " ".join(map(repr, turning_points))
-        writer.writerow([*plan.values(point.number), *direction, *rest, section, reason])
+        cells = [*plan.values(point.number), *(make(point) for make in further.values())]
+        *measures, turning_points, reason = point.as_json()[1:]
+        writer.writerow([*cells, *measures, " ".join(map(repr, turning_points)), reason])
 
 
-def write_json(stream: TextIO, journal: Journal, made_of: Mapping[str, Any]) -> None:
+def write_json(
+    stream: TextIO, journal: Journal, further: Further, made_of: Mapping[str, Any]
+) -> None:
     """Write one object: the parameters, their values, and an array for each column.
 
     Of a grid, `values` has a list for each axis and the arrays are row-major over the axes, and
-    over `directions` before, if it is carried on; otherwise `values` too has one entry for each
-    point. `made_of`, ready for JSON, is written besides. The arrays pass through files: memory is
-    for one piece of the study.
+    over the directions before, if it is carried on; otherwise `values` has the parameters' values
+    of each point. `made_of`, ready for JSON, is written besides. The arrays pass through files:
+    memory is for one piece of the study.
     """
     study = journal.study
     plan = study.plan
-    head: dict[str, Any] = {"parameters": list(plan.parameters)}
+    values: dict[str, Callable[[Point], Any]] = {}
+    head: dict[str, Any] = {"parameters": plan.parameters}
     if isinstance(plan, Grid):
         head["values"] = [axis.values().tolist() for axis in plan.axes]
-        if plan.carried:
-            head["directions"] = plan.directions
     else:
-        head["values"] = list(zip(*map(plan.values, range(plan.size)), strict=True))
-    head |= {"course": study.as_dict()["course"], "continuous_control": study.continuous, **made_of}
+        values["values"] = lambda point: plan.values(point.number)
+    how = {name: found for name, found in study.as_dict().items() if name != "scenario"}
     stream.write("{\n")
-    for name, value in head.items():
-        stream.write(f' "{name}": {json.dumps(value)},\n')
+    for name, value in {**made_of, **how, **head}.items():
+        stream.write(f' "{name}": {json.dumps(value, allow_nan=False)},\n')
+    makers = {**values, **further}
+    names = [*makers, *COLUMNS]
     with ExitStack() as stack:
         files: dict[str, TextIO] = {}
-        for name in COLUMNS:
+        for name in names:
             files[name] = stack.enter_context(TemporaryFile("w+"))
         separator = ""
         for point in journal.points():
-            for file, cell in zip(files.values(), _cells(point), strict=True):
+            cells = [*(make(point) for make in makers.values()), *point.as_json()[1:]]
+            for file, cell in zip(files.values(), cells, strict=True):
                 file.write(f"{separator}{json.dumps(cell)}")
             separator = ", "
         for name, file in files.items():
             file.seek(0)
             stream.write(f' "{name}": [')
             copyfileobj(file, stream)
-            stream.write("],\n" if name != COLUMNS[-1] else "]\n")
+            stream.write("],\n" if name != names[-1] else "]\n")
     stream.write("}\n")
-
-
-def _cells(point: Point) -> list[Any]:
-    return point.as_json()[1:]
-
-
-def _direction(plan: Plan, number: int) -> Carry | None:
-    return plan.direction(number) if isinstance(plan, Grid) else None

@@ -46,6 +46,8 @@ class Course:
     once, and, under control, `start_after`."""
     cycles: int = 6
     """Whole cycles that are then measured, where there are any."""
+    patience: int = 1
+    """How often both may be done in all, one after the other, until the motion is steady."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.transient <= LONGEST:
@@ -55,6 +57,10 @@ class Course:
         if not 1 <= self.cycles <= LONGEST:
             raise InvalidInputError(
                 f"{self.cycles} cycles to measure: must be from 1 to {LONGEST:g}"
+            )
+        if not 1 <= self.patience <= LONGEST:
+            raise InvalidInputError(
+                f"a patience of {self.patience} transients: must be from 1 to {LONGEST:g}"
             )
 
 
@@ -121,7 +127,8 @@ class Settled(NamedTuple):
     """Displacements at which the velocity is zero, m: the Poincare section x' = 0. In equilibrium
     the one place of rest; none where the motion runs away."""
     steady: bool
-    """Whether the amplitude no longer changed, by more than a thousandth."""
+    """Whether the amplitude no longer changed by more than a thousandth, or, near the equilibrium,
+    no longer grew."""
     end: State
     """Where the motion ended."""
 
@@ -145,7 +152,6 @@ class Settler:
         motion = self._motion(drive, continuous)
         motion.recording = False
         motion.begin(drive, start.position, start.velocity)
-        meter = _SectionMeter(course.cycles)
         loading = _loading_time(drive)
         transient = course.transient * drive.natural_period + loading
         law = None
@@ -153,30 +159,41 @@ class Settler:
             loop = sampled_loop(case.sampled, motion)
             if washout is not None:
                 law = Washout(washout, start.low_passed)
-                transient += washout.start_after
+                simulate_sampled(loop, motion, law, washout.start_after, CycleMeter(1))
 
-            def advance(duration: float) -> None:
+            def advance(duration: float, meter: CycleMeter) -> None:
                 simulate_sampled(loop, motion, law, duration, meter)
         else:
             if washout is not None:
                 _begin_control(motion, washout, start)
 
-            def advance(duration: float) -> None:
+            def advance(duration: float, meter: CycleMeter) -> None:
                 motion.advance(duration)
                 meter.feed(motion.take_knots(), drive.belt_speed)
 
-        advance(transient)
-        motion.recording = True
         # One cycle is under way when it begins, and one when it ends.
         block = (course.cycles + 1) * drive.natural_period
-        left = (course.cycles + 1) * (drive.natural_period + loading)
-        while left > 0.0 and not motion.unbounded and not meter.done:
-            advance(min(block, left))
-            left -= block
-        if motion.unbounded:
-            meter.report_run_away()
-        low_passed = motion.low_passed if continuous else law.low_passed if law else None
-        return meter.settled(State(motion.position, motion.velocity, low_passed))
+
+        def observe() -> Settled:
+            motion.recording = False
+            meter = _SectionMeter(course.cycles)
+            advance(transient, meter)
+            motion.recording = True
+            left = (course.cycles + 1) * (drive.natural_period + loading)
+            while left > 0.0 and not motion.unbounded and not meter.done:
+                advance(min(block, left), meter)
+                left -= block
+            if motion.unbounded:
+                meter.report_run_away()
+            low_passed = motion.low_passed if continuous else law.low_passed if law else None
+            return meter.settled(State(motion.position, motion.velocity, low_passed))
+
+        settled = observe()
+        for _ in range(course.patience - 1):
+            if settled.steady:
+                break
+            settled = observe()
+        return settled
 
     def _motion(self, drive: Drive, continuous: bool) -> Motion:
         if continuous not in self._motions:
@@ -227,12 +244,14 @@ class _SectionMeter(CycleMeter):
     def settled(self, end: State) -> Settled:
         """Return what was found, the motion having come to `end`."""
         measures = self.measures()
-        section, steady = np.concatenate(self._sections), True
+        section, amplitudes = np.concatenate(self._sections), np.array(self._amplitudes)
         if measures.regime is Regime.UNBOUNDED:
-            section = np.empty(0)
+            section, steady = np.empty(0), True
         elif measures.regime is Regime.EQUILIBRIUM:
             section = np.array([measures.midpoint])
-        elif measures.regime is not Regime.STUCK:
-            amplitudes = np.array(self._amplitudes)
+            steady = len(amplitudes) < 2 or not amplitudes[-1] > (1.0 + STEADY) * amplitudes[0]
+        elif measures.regime is Regime.STUCK:
+            steady = True
+        else:
             steady = len(amplitudes) > 1 and bool(np.ptp(amplitudes) <= STEADY * amplitudes.max())
-        return Settled(measures, section, steady, end)
+        return Settled(measures, section, bool(steady), end)

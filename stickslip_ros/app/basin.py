@@ -1,0 +1,143 @@
+"""`stickslip basin`: which motion a start leads to."""
+
+import argparse
+import sys
+from dataclasses import asdict
+
+from stickslip_ros.app.arguments import (
+    add_json,
+    add_plot,
+    add_scenario,
+    check_picture,
+    made_of,
+    scenario_of,
+    writing,
+)
+from stickslip_ros.app.output import finite, print_table, quantities
+from stickslip_ros.app.studying import add_running, course_of, done, write_table
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.studies.basin import (
+    COURSE,
+    POSITION,
+    VELOCITY,
+    Attractor,
+    Basins,
+    basin_study,
+    default_axes,
+)
+from stickslip_ros.studies.columns import Further, write_json
+from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.plan import Axis, Grid, Plan, Sample
+
+HELP = "find which motion each start leads to, and the share of starts that each motion gets"
+
+_DESCRIPTION = f"""{HELP} (basin stability), over a grid of starts or a random sample. A start is a
+displacement and a velocity of the slide; the washout filter is at rest. Each motion is followed
+until it is steady, for {COURSE.patience} transients at most."""
+
+_COUNT = 40
+"""Positions and velocities of the grid."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.description = _DESCRIPTION
+    add_scenario(parser)
+    for name, what, unit in (("position", "displacements", "m"), ("velocity", "velocities", "m/s")):
+        parser.add_argument(
+            f"--{name}",
+            metavar="A:B:COUNT",
+            help=f"{what} of the grid, {unit}, as in --{name}=-2:2:{_COUNT} (default: {_COUNT}, "
+            "twice as far to either side as a vibration goes, about)",
+        )
+    parser.add_argument(
+        "--sample",
+        type=int,
+        metavar="COUNT",
+        help="so many random starts, uniformly distributed between the ends of --position and "
+        "--velocity, instead of the grid",
+    )
+    parser.add_argument(
+        "--seed", type=int, metavar="SEED", help="which sample it is, 0 or more (default: 0)"
+    )
+    add_running(parser, COURSE)
+    add_plot(parser, "which motion each start leads to")
+    add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command; return the exit status."""
+    scenario = scenario_of(arguments)
+    study = basin_study(
+        scenario,
+        _plan(arguments, scenario),
+        course=course_of(arguments, COURSE),
+        continuous=arguments.continuous_control,
+    )
+    if arguments.plot is not None:
+        check_picture(arguments.plot)
+    label = f"basins of {scenario.name}, {study.plan.size} starts"
+    with done(arguments, study, label) as journal:
+        basins = Basins.of(journal.points())
+        further: Further = {"attractor": basins.place}
+        made = {"attractors": [asdict(attractor) for attractor in basins.attractors]}
+        if arguments.plot is not None:
+            _draw(arguments, journal, basins)
+        if arguments.json:
+            write_json(sys.stdout, journal, further, finite({**made_of(scenario), **made}))
+        else:
+            _print(f"{scenario.name}, {study.plan.size} starts", basins)
+        if arguments.out is not None:
+            write_table(arguments.out, journal, further, made)
+    return 0
+
+
+def _plan(arguments: argparse.Namespace, scenario: Scenario) -> Plan:
+    if arguments.seed is not None and arguments.sample is None:
+        raise InvalidInputError(f"--seed {arguments.seed}: is for a random --sample")
+    if arguments.seed is not None and arguments.seed < 0:
+        raise InvalidInputError(f"--seed {arguments.seed}: must be 0 or more")
+    axes = list(default_axes(scenario, _COUNT))
+    for place, (option, parameter) in enumerate((("position", POSITION), ("velocity", VELOCITY))):
+        text: str | None = getattr(arguments, option)
+        if text is None:
+            continue
+        # Of a sample only the ends matter.
+        number = f"{text}:2" if arguments.sample is not None and text.count(":") == 1 else text
+        try:
+            axes[place] = Axis.parse(f"{parameter}={number}")
+        except InvalidInputError as error:
+            raise InvalidInputError(f"--{option}={text}: {error}") from None
+    if arguments.sample is None:
+        return Grid(tuple(axes))
+    return Sample(tuple(axes), arguments.sample, arguments.seed or 0)
+
+
+def _print(title: str, basins: Basins) -> None:
+    rows = [
+        [
+            _name(attractor),
+            *quantities([attractor.amplitude], "m"),
+            *quantities([attractor.midpoint], "m"),
+            str(attractor.count),
+            f"{attractor.share:.4f}",
+            f"{attractor.standard_error:.4f}",
+        ]
+        for attractor in basins.attractors
+    ]
+    headings = ["motion", "amplitude", "midpoint", "starts", "share", "standard error"]
+    print_table(title, headings, rows)
+
+
+def _name(attractor: Attractor) -> str:
+    name = str(attractor.regime or "not known")
+    return name if attractor.steady or attractor.regime is None else f"{name}, not steady"
+
+
+def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> None:
+    # Half as long again to import as everything else.
+    from stickslip_ros.plots.basin_picture import draw_basin
+
+    with writing("--plot", arguments.plot):
+        draw_basin(arguments.plot, journal, basins)

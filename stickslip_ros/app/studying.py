@@ -1,0 +1,143 @@
+"""What the commands that run studies have in common: their arguments, and running them."""
+
+import argparse
+import os
+import sys
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from stickslip_ros.app.arguments import made_of, writing
+from stickslip_ros.app.output import finite, progress_bar
+from stickslip_ros.errors import InvalidInputError, RunError
+from stickslip_ros.studies.columns import Further, write_csv, write_json
+from stickslip_ros.studies.dask_cluster import dask_executor
+from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.runner import run, run_here
+from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.study import Study
+
+_TABLES = (".csv", ".json")
+
+
+def add_running(parser: argparse.ArgumentParser, course: Course) -> None:
+    """Add how each point is followed, by default as in `course`, where, and what is kept of it."""
+    parser.add_argument(
+        "--continuous-control",
+        action="store_true",
+        help="let the controller act without sampling, as in the paper's eq. 19, which takes a "
+        "fraction of the time (default: the force is held from sample to sample)",
+    )
+    parser.add_argument(
+        "--transient",
+        type=float,
+        default=course.transient,
+        metavar="PERIODS",
+        help="natural periods that are passed over at each point (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--cycles",
+        type=int,
+        default=course.cycles,
+        metavar="COUNT",
+        help="whole cycles that are measured then (default: %(default)d)",
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--workers",
+        type=_workers,
+        default=1,
+        metavar="COUNT",
+        help="processes of this machine that share the points (default: 1); what is found is the "
+        "same, to the last bit",
+    )
+    where.add_argument(
+        "--dask",
+        metavar="ADDRESS",
+        help="compute the points on the Dask cluster with this scheduler, as in "
+        "--dask tcp://head:8786 (extra: stickslip_ros[dask])",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help=f"write a table of all points ({', '.join(_TABLES)}); an existing one is left alone. "
+        "Interrupted, what is done stays in FILE.part, and the same command goes on from there",
+    )
+
+
+def course_of(arguments: argparse.Namespace, default: Course) -> Course:
+    """Return how each point is to be followed, what cannot be asked for being as in `default`."""
+    return replace(default, transient=arguments.transient, cycles=arguments.cycles)
+
+
+@contextmanager
+def done(arguments: argparse.Namespace, study: Study, label: str) -> Generator[Journal]:
+    """Compute what is missing of the study, and provide its journal, complete."""
+    out: Path | None = arguments.out
+    if out is not None:
+        _refuse_table(out)
+    part = None if out is None else out.with_name(f"{out.name}.part")
+    with Journal(study, part) as journal:
+        kept = (
+            ""
+            if part is None
+            else (f"; what is done stays in {part}, and the same command goes on from there")
+        )
+        try:
+            with progress_bar(label, study.plan.size) as progress:
+                if arguments.dask is None:
+                    run_here(journal, arguments.workers, progress)
+                else:
+                    with dask_executor(arguments.dask) as (executor, in_flight):
+                        run(journal, executor, in_flight=in_flight, progress=progress)
+        except KeyboardInterrupt:
+            print(
+                f"stickslip {arguments.command}: {journal.count} of {study.plan.size} points are "
+                f"done{kept}",
+                file=sys.stderr,
+            )
+            raise
+        except RunError as error:
+            raise RunError(f"{error}{kept}") from None
+        yield journal
+
+
+def write_table(
+    path: Path, journal: Journal, further: Further, made: Mapping[str, Any] | None = None
+) -> None:
+    """Write the table of a complete journal, which is not needed any more then.
+
+    As JSON it also holds what was `made` of all points together.
+    """
+    new = path.with_name(f"{path.name}.new")
+    with writing("--out", path), new.open("w", encoding="utf-8", newline="") as stream:
+        if path.suffix.lower() == ".csv":
+            write_csv(stream, journal, further)
+        else:
+            head = {**made_of(journal.study.scenario), **(made or {})}
+            write_json(stream, journal, further, finite(head))
+    new.replace(path)
+    journal.discard()
+
+
+def _refuse_table(path: Path) -> None:
+    if path.suffix.lower() not in _TABLES:
+        raise InvalidInputError(f"--out {path}: must end in one of {', '.join(_TABLES)}")
+    if path.exists():
+        raise InvalidInputError(f"--out {path}: exists already, and is left as it is")
+    if not path.absolute().parent.is_dir():
+        raise InvalidInputError(f"--out {path}: there is no directory {path.parent}")
+
+
+def _workers(text: str) -> int:
+    most = 4 * (os.cpu_count() or 1)
+    try:
+        count = int(text)
+    except ValueError:
+        count = 0
+    if not 1 <= count <= most:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of processes, from 1 to {most}")
+    return count

@@ -1,0 +1,182 @@
+"""`stickslip sweep`: what a scenario settles on over the values of one parameter or two."""
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from itertools import groupby, islice
+from typing import NamedTuple, Self
+
+from stickslip_ros.app.arguments import (
+    add_json,
+    add_plot,
+    add_scenario,
+    check_picture,
+    made_of,
+    scenario_of,
+    writing,
+)
+from stickslip_ros.app.output import finite, print_table, quantities
+from stickslip_ros.app.studying import add_running, course_of, done, write_table
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.studies.columns import Columns, Further, write_json
+from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.plan import Axis, Carry, Grid
+from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.study import Point
+from stickslip_ros.studies.sweep import sweep_study
+
+HELP = "measure what a scenario settles on, over the values of one parameter or two"
+
+_DESCRIPTION = f"""{HELP}: amplitude, regime, stick fraction and the turning points of the settled
+motion, for a bifurcation diagram (one parameter) or a map (two). A point that fails or runs away
+is a row of the table, with the reason."""
+
+_MOST_RANGES = 60
+"""Rows of the table on the screen; where there are more, only their regimes are counted."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.description = _DESCRIPTION
+    add_scenario(parser)
+    parser.add_argument(
+        "--over",
+        action="append",
+        required=True,
+        metavar="NODE.PARAMETER=A:B:COUNT",
+        help="COUNT values from A to B of a parameter of plant or washout_controller, SI units, as "
+        "in --over plant.belt_speed=0.02:0.6:1000; A:B:COUNT:log for a geometric sequence. A "
+        "second --over makes it a map",
+    )
+    parser.add_argument(
+        "--carry",
+        type=Carry,
+        choices=list(Carry),
+        help="begin each point where its neighbour ended, filter included, along the (last) "
+        "parameter up, down or both ways, which shows hysteresis (default: every point begins in "
+        "the scenario's initial state)",
+    )
+    add_running(parser, Course())
+    add_plot(parser, "the bifurcation diagram, or the map")
+    parser.add_argument(
+        "--colour",
+        choices=("regime", "amplitude", "stick_fraction"),
+        default="regime",
+        help="what the map shows (default: %(default)s)",
+    )
+    add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command; return the exit status."""
+    axes = [_axis(text) for text in arguments.over]
+    if len(axes) == 1 and arguments.colour != "regime":
+        raise InvalidInputError(f"--colour {arguments.colour}: is for maps, of two parameters")
+    study = sweep_study(
+        scenario_of(arguments),
+        axes,
+        carry=arguments.carry,
+        course=course_of(arguments, Course()),
+        continuous=arguments.continuous_control,
+    )
+    if arguments.plot is not None:
+        check_picture(arguments.plot)
+    plan = study.plan
+    assert isinstance(plan, Grid)
+    label = f"sweep of {study.scenario.name}, {plan.size} points"
+    further: Further = {}
+    if plan.carried:
+        further = {"direction": lambda point: plan.direction(point.number)}
+    with done(arguments, study, label) as journal:
+        if arguments.plot is not None:
+            _draw(arguments, journal)
+        if arguments.json:
+            write_json(sys.stdout, journal, further, finite(made_of(study.scenario)))
+        else:
+            _print(journal, plan)
+        if arguments.out is not None:
+            write_table(arguments.out, journal, further)
+    return 0
+
+
+def _axis(text: str) -> Axis:
+    try:
+        return Axis.parse(text)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"--over {error}") from None
+
+
+def _draw(arguments: argparse.Namespace, journal: Journal) -> None:
+    # Half as long again to import as everything else.
+    from stickslip_ros.plots.sweep_picture import draw_diagram, draw_map
+
+    columns = Columns.of(journal)
+    with writing("--plot", arguments.plot):
+        if len(arguments.over) == 1:
+            draw_diagram(arguments.plot, columns, journal.study)
+        else:
+            draw_map(arguments.plot, columns, journal.study, arguments.colour)
+
+
+class _Kind(NamedTuple):
+    """What the points of a row of the table on the screen have in common."""
+
+    direction: str
+    regime: str
+
+    @classmethod
+    def of(cls, point: Point, plan: Grid) -> Self:
+        regime = point.measures.regime
+        return cls(str(plan.direction(point.number) or ""), str(regime or point.reason))
+
+
+def _print(journal: Journal, plan: Grid) -> None:
+    """Print in which ranges of the parameter there is which regime; of a map, how often."""
+    title = f"{journal.study.scenario.name}, {journal.count} points"
+    if len(plan.axes) == 1:
+        rows = list(islice(_ranges(journal, plan), _MOST_RANGES + 1))
+        if len(rows) <= _MOST_RANGES:
+            headings = ["regime", plan.parameters[0], "points", "amplitude", "stick fraction"]
+            print_table(title, headings, rows)
+            return
+    counts = Counter(_Kind.of(point, plan) for point in journal.points())
+    rows = [[" ".join(filter(None, kind)), str(count)] for kind, count in counts.items()]
+    print_table(title, ["regime", "points"], rows)
+
+
+def _ranges(journal: Journal, plan: Grid) -> Iterator[list[str]]:
+    unit = plan.axes[0].unit
+    for kind, points in groupby(journal.points(), lambda point: _Kind.of(point, plan)):
+        values, amplitudes, stick_fractions = _Extremes(), _Extremes(), _Extremes()
+        count = 0
+        for point in points:
+            count += 1
+            values.add(plan.values(point.number)[0])
+            amplitudes.add(point.measures.amplitude)
+            stick_fractions.add(point.measures.stick_fraction)
+        yield [
+            " ".join(filter(None, kind)),
+            values.shown(unit),
+            str(count),
+            amplitudes.shown("m"),
+            stick_fractions.shown(""),
+        ]
+
+
+class _Extremes:
+    """The least and the largest of some values."""
+
+    def __init__(self) -> None:
+        self._ends: tuple[float, float] | None = None
+
+    def add(self, value: float | None) -> None:
+        if value is not None:
+            low, high = self._ends or (value, value)
+            self._ends = min(low, value), max(high, value)
+
+    def shown(self, unit: str) -> str:
+        if self._ends is None:
+            return "-"
+        low, high = quantities(self._ends, unit)
+        return low if low == high else f"{low} to {high}"
