@@ -9,7 +9,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures import Regime
 from stickslip_ros.scenario.files import Scenario
 from stickslip_ros.studies.plan import Axis, Plan
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import CYCLES, Course
 from stickslip_ros.studies.study import Point, Study
 
 POSITION, VELOCITY = "plant.initial.position", "plant.initial.velocity"
@@ -20,8 +20,6 @@ COURSE = Course(transient=50.0, patience=80)
 
 _ALIKE = 0.02
 """Share of the amplitude by which amplitudes and midpoints of one attractor may differ."""
-
-_CYCLES = (Regime.STICK_SLIP, Regime.PURE_SLIP)
 
 _REACH = 2.0
 """How far starts go by default, in amplitudes that a vibration has, about."""
@@ -50,7 +48,7 @@ class Attractor:
     def of(cls, point: Point) -> Self:
         """Return the attractor that a motion has come to, for all that is known."""
         measures, steady = point.measures, point.steady
-        if steady and measures.regime in _CYCLES:
+        if steady and measures.regime in CYCLES:
             return cls(measures.regime, steady, measures.amplitude, measures.midpoint)
         return cls(measures.regime, steady, None, None)
 

@@ -17,6 +17,9 @@ from stickslip_ros.physics.washout import Washout, WashoutParameters
 from stickslip_ros.scenario.files import Scenario
 from stickslip_ros.scenario.parameters import PlantParameters
 
+CYCLES = (Regime.STICK_SLIP, Regime.PURE_SLIP)
+"""Regimes that have an amplitude to be steady."""
+
 STEADY = 1e-3
 """Share by which the amplitudes of the cycles measured may differ in a motion that has settled."""
 
@@ -47,7 +50,8 @@ class Course:
     cycles: int = 6
     """Whole cycles that are then measured, where there are any."""
     patience: int = 1
-    """How often both may be done in all, one after the other, until the motion is steady."""
+    """How often both may be done, one after the other, until the motion is steady and what is
+    measured twice the same: near an unstable cycle it may seem steady for a while."""
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.transient <= LONGEST:
@@ -190,9 +194,9 @@ class Settler:
 
         settled = observe()
         for _ in range(course.patience - 1):
-            if settled.steady:
+            before, settled = settled, observe()
+            if settled.steady and _alike(before.measures, settled.measures):
                 break
-            settled = observe()
         return settled
 
     def _motion(self, drive: Drive, continuous: bool) -> Motion:
@@ -216,6 +220,15 @@ def _begin_control(motion: Motion, washout: WashoutParameters, start: State) -> 
     motion.low_passed = start.velocity if start.low_passed is None else start.low_passed
     motion.advance(washout.start_after)
     motion.set_gains(washout.corner_frequency, washout.linear_gain, washout.cubic_gain)
+
+
+def _alike(before: Measures, after: Measures) -> bool:
+    """Return whether regime and amplitude are the same, the latter as in a steady motion."""
+    if before.regime is not after.regime or after.regime not in CYCLES:
+        return before.regime is after.regime
+    assert before.amplitude is not None
+    assert after.amplitude is not None
+    return abs(after.amplitude - before.amplitude) <= STEADY * after.amplitude
 
 
 class _SectionMeter(CycleMeter):
