@@ -96,13 +96,17 @@ class _Stretch:
         if last < first:
             return
         rows = slice(first, last + 1)
+        # Stretches are short: lists take a fraction of the time that arrays would.
+        position, velocity = knots.position[rows].tolist(), knots.velocity[rows].tolist()
         self.end = float(knots.time[last])
-        self.lowest = min(self.lowest, float(knots.position[rows].min()))
-        self.highest = max(self.highest, float(knots.position[rows].max()))
-        self.slowest = min(self.slowest, float(knots.velocity[rows].min()))
-        self.fastest = max(self.fastest, float(knots.velocity[rows].max()))
-        durations = np.diff(knots.time[first - 1 : last + 1])
-        self.stick_time += float(durations[knots.sticking[rows]].sum())
+        self.lowest = min(self.lowest, *position)
+        self.highest = max(self.highest, *position)
+        self.slowest = min(self.slowest, *velocity)
+        self.fastest = max(self.fastest, *velocity)
+        stuck = knots.sticking[rows]
+        if stuck.any():
+            durations = np.diff(knots.time[first - 1 : last + 1])
+            self.stick_time += float(durations[stuck].sum())
 
     @property
     def duration(self) -> float:
