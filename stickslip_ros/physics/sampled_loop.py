@@ -90,6 +90,8 @@ class SampledLoop:
         # In periods.
         self._delay, self._jitter = force_delay / self.period, force_jitter / self.period
         self._shortest_delay = whole, rest = whole_and_rest(self._delay)
+        # Whether each force acts at once: then none is ever under way.
+        self._immediate = self._shortest_delay == (0, 0.0) and self._jitter == 0.0
         # Of all generators, the one whose numbers are promised to stay the same.
         self._random = Random(force_jitter_seed)
         self._force_timeout = force_timeout
@@ -127,15 +129,15 @@ class SampledLoop:
     def offer(self, stamp: int, force: float) -> Verdict:
         """Take `force` (N) as the answer to the sample of that stamp (ns), if it is one."""
         number = self.number(stamp)
-        verdict = self._judge(number, stamp, force)
-        if verdict is Verdict.ACCEPTED:
+        refusal = self._refusal(number, stamp, force)
+        if refusal is None:
             self._newest = (number, force)
             self.controller_present = self._expects_control
-            return verdict
-        self.dropped[verdict] += 1
-        if verdict is Verdict.TOO_LATE:
+            return Verdict.ACCEPTED
+        self.dropped[refusal] += 1
+        if refusal is Verdict.TOO_LATE:
             self.controller_present = self._expects_control
-        return verdict
+        return refusal
 
     def disturb(self, force: float) -> None:
         """Add a disturbance of `force` (N) from the next sample on, until it is set again."""
@@ -151,23 +153,37 @@ class SampledLoop:
 
     def advance(self) -> Sample:
         """Move on to the next sample with the forces that have come, and return it."""
-        self._send(self._force_of_present_sample())
-        motion, period, under_way = self._motion, self.period, self._under_way
-        present, acting, disturbance = self.sample, self._acting, self.disturbance
+        motion, period, present = self._motion, self.period, self.sample
+        number, force = self._newest
+        if number != present.number:
+            force = self._stand_in()
         now = 0.0
-        while under_way and under_way[0][0] == present.number:
-            _, instant, force = under_way.popleft()
-            if instant > now:
-                motion.force = acting + disturbance
-                motion.advance((instant - now) * period)
-                now = instant
-            acting = force
-        self._acting = acting
-        motion.force = acting + disturbance
+        if self._immediate:
+            self._acting = force
+        else:
+            self._send(force)
+            now = self._deliver()
+        motion.force = self._acting + self.disturbance
         motion.advance((1.0 - now) * period)
         belt_position = present.belt_position + motion.drive.belt_speed * period
-        self.sample = self._take_sample(present.number + 1, belt_position)
-        return self.sample
+        sample = self.sample = self._take_sample(present.number + 1, belt_position)
+        return sample
+
+    def _deliver(self) -> float:
+        """Let the forces that arrive in the present period act up to the newest; return when.
+
+        In periods from the present sample on.
+        """
+        motion, under_way, number = self._motion, self._under_way, self.sample.number
+        now = 0.0
+        while under_way and under_way[0][0] == number:
+            _, instant, force = under_way.popleft()
+            if instant > now:
+                motion.force = self._acting + self.disturbance
+                motion.advance((instant - now) * self.period)
+                now = instant
+            self._acting = force
+        return now
 
     def _send(self, force: float) -> None:
         """Let the force for the present sample set out; what it overtakes is lost."""
@@ -203,22 +219,20 @@ class SampledLoop:
         scenario = self.scenario_disturbance.force(number, self.period)
         return scenario + self._asked_disturbance
 
-    def _force_of_present_sample(self) -> float:
-        number, force = self._newest
-        present = self.sample.number
-        if number == present:
-            return force
+    def _stand_in(self) -> float:
+        """Return what acts in place of the force for the present sample, which has not come."""
         if self._expects_control:
             self.late_forces += 1
         if not self._hold_late:
             self.controller_present = False
             return 0.0
-        if (present - number) * self.period <= self._force_timeout:
+        number, force = self._newest
+        if (self.sample.number - number) * self.period <= self._force_timeout:
             return force
         self.controller_present = False
         return 0.0
 
-    def _judge(self, number: int, stamp: int, force: float) -> Verdict:
+    def _refusal(self, number: int, stamp: int, force: float) -> Verdict | None:
         if not isfinite(force):
             return Verdict.NOT_FINITE
         if stamp == 0:
@@ -232,7 +246,7 @@ class SampledLoop:
             return Verdict.ANSWERED
         if number < present.number and not self._hold_late:
             return Verdict.TOO_LATE
-        return Verdict.ACCEPTED
+        return None
 
     def number(self, stamp: int) -> int:
         """Return the number of the sample whose stamp is nearest."""

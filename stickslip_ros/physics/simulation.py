@@ -26,18 +26,19 @@ def simulate_sampled(
     `motion` must record its knots; `washout` None leaves the loop without control.
     """
     samples = round(duration / loop.period)
+    sample = loop.sample
     for number in range(1, samples + 1):
         if washout is not None:
-            force = washout.answer(loop.sample.stamp, loop.sample.velocity)
+            force = washout.answer(sample.stamp, sample.velocity)
             if force is not None:
-                loop.offer(loop.sample.stamp, force)
-        loop.advance()
-        if number % BLOCK_SAMPLES == 0 or number == samples or loop.unbounded:
+                loop.offer(sample.stamp, force)
+        sample = loop.advance()
+        if number % BLOCK_SAMPLES == 0 or number == samples or motion.unbounded:
             meter.feed(motion.take_knots(), motion.drive.belt_speed)
             progress(number / samples)
-        if loop.unbounded:
-            meter.report_run_away()
-            break
+            if motion.unbounded:
+                meter.report_run_away()
+                break
     return meter.measures()
 
 

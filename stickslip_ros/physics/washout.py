@@ -67,4 +67,7 @@ class Washout:
         if (stamp - self._first_stamp) * 1e-9 < parameters.start_after:
             return 0.0
         force = parameters.gains.force(velocity - self.low_passed)
-        return max(-parameters.force_limit, min(parameters.force_limit, force))
+        limit = parameters.force_limit
+        if -limit < force < limit:
+            return force
+        return max(-limit, min(limit, force))

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import inf
 from pathlib import Path
 from sys import float_info
@@ -56,10 +57,14 @@ class Scenario:
             node, _, parameter = target.partition(".")
             by_node.setdefault(node, {})[parameter] = value
         changes: dict[str, Any] = {
-            node: NODE_PARAMETERS[node].validated({**getattr(self, node).flat(), **new}, node)
+            node: NODE_PARAMETERS[node].validated({**self._flat[node], **new}, node)
             for node, new in by_node.items()
         }
         return replace(self, **changes)
+
+    @cached_property
+    def _flat(self) -> dict[str, dict[str, Any]]:
+        return self.as_dict()
 
     def _nodes(self) -> Iterator[tuple[str, NodeParameters]]:
         for node in NODE_PARAMETERS:
