@@ -169,11 +169,11 @@ class CycleMeter:
             self._whole = True
             self._recent = []
             first = edge + 1
+        self._cycles.extend(completed)
         self._open.extend(knots, first, len(knots) - 1)
         self._follow_recent(knots, first)
         self._follow_sticking(knots)
         self._last = knots[len(knots) - 1 :]
-        self._cycles.extend(completed)
         return completed
 
     def measures(self) -> Measures:
@@ -217,15 +217,17 @@ class CycleMeter:
     def _follow_recent(self, knots: Knots, first: int) -> None:
         """Keep the extremes of the last half, at least, of the stretch since the last crossing.
 
-        Whenever the stretch has doubled, what went before the last doubling is forgotten.
+        Whenever the stretch, once longer than the last cycle, has doubled, what went before the
+        last doubling is forgotten.
         """
         assert self._open is not None
         if not self._recent:
             self._recent = [_Stretch.from_knot(knots, first - 1)]
         row, last = first, len(knots) - 1
+        earliest = self._open.start + (self._cycles[-1].period if self._cycles else 0.0)
         while row <= last:
             current = self._recent[-1]
-            due = 2.0 * current.start - self._open.start
+            due = max(2.0 * current.start - self._open.start, earliest)
             side = "left" if due > current.start else "right"
             doubled = row + int(np.searchsorted(knots.time[row:], due, side))
             current.extend(knots, row, min(doubled, last))

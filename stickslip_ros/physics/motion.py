@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import copysign, inf, ulp
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import heyoka as hy
 import numpy as np
@@ -65,11 +65,15 @@ class Motion:
     Slipping is integrated by heyoka's adaptive Taylor method, which finds the instant at which the
     slide reaches the belt's speed. There it sticks if friction can hold it, |h| <= mu_s N with the
     reaction h = k x + c v_belt - u, and otherwise passes through or slips the other way. Sticking
-    is motion with the belt until the reaction exceeds that limit.
+    is motion with the belt until the reaction exceeds that limit: in a straight line while the
+    force is held; under continuous control the filter goes on, and heyoka finds the instant.
 
     All quantities in and out are SI; drive, force and gains may be changed between calls of
     `advance` and act from then on.
     """
+
+    _more_variables: ClassVar[bool] = False
+    """Whether what is integrated has more variables than the motion (see `_system`)."""
 
     def __init__(
         self,
@@ -99,7 +103,7 @@ class Motion:
         self._time = self._knot_time = 0.0
         self._x = self._y = self._w = 0.0
         self._drive = drive
-        self._compiled: dict[type[FrictionLaw], tuple[Equations, _Integrator]] = {}
+        self._compiled: dict[type[FrictionLaw], tuple[Equations, _Integrator | None]] = {}
         self._compiled_slip: dict[tuple[type[FrictionLaw], bool], _Integrator] = {}
         self._use_law(type(drive.friction))
         self._set_parameters()
@@ -277,17 +281,34 @@ class Motion:
 
     def _stick(self, now: float, end: float) -> float:
         """Ride the belt until the reaction exceeds its limit, or to `end`; return the time."""
-        reaction = self._reaction()
-        margin = self._rounding(reaction)
-        if abs(reaction) > self._static - margin:
-            self._x -= copysign(margin, reaction)
-        self._sticking.parameters[self._equations.index["force"]] = self._force
-        breaks, now = self._propagate(self._sticking, now, end)
+        integrator = self._sticking
+        if integrator is None:
+            breaks, now = self._ride_straight(now, end)
+        else:
+            reaction = self._reaction()
+            margin = self._rounding(reaction)
+            if abs(reaction) > self._static - margin:
+                self._x -= copysign(margin, reaction)
+            integrator.parameters[self._equations.index["force"]] = self._force
+            event, now = self._propagate(integrator, now, end)
+            breaks = event is not None
         self._y = self._belt_speed
         self._append_knot(now, self._x, self._y, sticking=True)
-        if breaks is not None:
+        if breaks:
             self._sign = -copysign(1.0, self._reaction())
         return now
+
+    def _ride_straight(self, now: float, end: float) -> tuple[bool, float]:
+        """Ride the belt under a held force; return whether the limit was reached, and the time."""
+        speed = self._belt_speed
+        if speed != 0.0:
+            limit = copysign(self._static, speed) - self._damping * speed + self._force
+            time = max((limit - self._x) / speed, 0.0)
+            if time < end - now:
+                self._x = limit
+                return True, now + time
+        self._x += speed * (end - now)
+        return False, end
 
     def _slip(self, now: float, end: float) -> float:
         """Slip until the belt's speed is reached, or to `end`; return the time."""
@@ -370,7 +391,8 @@ class Motion:
     def _use_law(self, law: type[FrictionLaw]) -> None:
         if law not in self._compiled:
             equations = Equations(law, self._continuous_control)
-            self._compiled[law] = equations, self._compile_stick(equations)
+            curved = self._continuous_control or self._more_variables
+            self._compiled[law] = equations, self._compile_stick(equations) if curved else None
         self._equations, self._sticking = self._compiled[law]
         slip = law, self._recording
         if slip not in self._compiled_slip:
@@ -425,9 +447,10 @@ class Motion:
         values |= vars(self._gains)
         for name, value in values.items():
             index = self._equations.index[name]
-            for parameters in (self._slipping.parameters, self._sticking.parameters):
-                if index < len(parameters):  # heyoka keeps those up to the last one it uses
-                    parameters[index] = value
+            for integrator in (self._slipping, self._sticking):
+                # heyoka keeps those up to the last one it uses.
+                if integrator is not None and index < len(integrator.parameters):
+                    integrator.parameters[index] = value
 
 
 def _marker(
@@ -439,8 +462,7 @@ def _marker(
     """
 
     def mark(integrator: Any, now: float, _: int) -> None:
-        integrator.update_d_output(now)
-        x, y = integrator.d_output[:2].tolist()
+        x, y = integrator.update_d_output(now)[:2].tolist()
         marks.append((now, x, 0.0 if turning else y))
 
     return mark

@@ -13,8 +13,8 @@ from matplotlib.lines import Line2D
 from PIL import Image
 
 from stickslip_ros.physics.knots import FloatArray, Knots
-from stickslip_ros.physics.measures import Regime
-from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE
+from stickslip_ros.plots.regimes import REGIMES
+from stickslip_ros.plots.style import BLUE, GREEN, ORANGE
 from stickslip_ros.studies.paper.figures import (
     BifurcationFigure,
     Panel,
@@ -24,16 +24,6 @@ from stickslip_ros.studies.paper.figures import (
 from stickslip_ros.studies.paper.portraits import LAST_CYCLES, Portrait
 
 _DPI, _COLOURS = 110, 128
-
-_REGIMES: Mapping[Regime | None, tuple[str, str]] = {
-    Regime.STICK_SLIP: (ORANGE, "sticks and slips"),
-    Regime.PURE_SLIP: (BLUE, "slips only"),
-    Regime.EQUILIBRIUM: (GREEN, "comes to rest"),
-    Regime.STUCK: (GREY, "rests with the belt"),
-    Regime.UNBOUNDED: ("black", "runs away"),
-    None: (GREY, "completes no cycle"),
-}
-"""Colour and name of each regime."""
 
 _MOST_COLUMNS, _COLUMNS = 5, 4
 """Portraits in a row at most, and where a panel has more of them."""
@@ -84,7 +74,7 @@ def _bifurcation(figure: BifurcationFigure, marks: Mapping[str, float]) -> Figur
     above, below = drawn.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
     diagram = figure.diagram
     regimes = [measures.regime for measures in diagram.measures]
-    for regime, (colour, label) in _REGIMES.items():
+    for regime, (colour, label) in REGIMES.items():
         of_regime = np.array([found is regime for found in regimes])
         rows = of_regime[diagram.row]
         if rows.any():
@@ -179,7 +169,7 @@ def _framed(portrait: Portrait) -> Knots:
 
 def _outcome(portrait: Portrait) -> str:
     measures = portrait.measures
-    _, outcome = _REGIMES[measures.regime]
+    _, outcome = REGIMES[measures.regime]
     if portrait.runs_away:
         return f"{outcome}: {_FRAME:g} v0 at τ = {_framed(portrait).time[-1]:.1f}"
     if measures.period is None or measures.amplitude is None:

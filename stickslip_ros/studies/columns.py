@@ -144,15 +144,14 @@ def write_json(
     study = journal.study
     plan = study.plan
     values: dict[str, Callable[[Point], Any]] = {}
-    head: dict[str, Any] = {"parameters": plan.parameters}
-    if isinstance(plan, Grid):
-        head["values"] = [axis.values().tolist() for axis in plan.axes]
-    else:
-        values["values"] = lambda point: plan.values(point.number)
     how = {name: found for name, found in study.as_dict().items() if name != "scenario"}
     stream.write("{\n")
-    for name, value in {**made_of, **how, **head}.items():
+    for name, value in {**made_of, **how, "parameters": plan.parameters}.items():
         stream.write(f' "{name}": {json.dumps(value, allow_nan=False)},\n')
+    if isinstance(plan, Grid):
+        _write_values(stream, plan)
+    else:
+        values["values"] = lambda point: plan.values(point.number)
     makers = {**values, **further}
     names = [*makers, *COLUMNS]
     with ExitStack() as stack:
@@ -171,3 +170,14 @@ def write_json(
             copyfileobj(file, stream)
             stream.write("],\n" if name != names[-1] else "]\n")
     stream.write("}\n")
+
+
+def _write_values(stream: TextIO, grid: Grid) -> None:
+    """Write the values of each axis, one at a time."""
+    stream.write(' "values": [')
+    for place, axis in enumerate(grid.axes):
+        stream.write(", [" if place else "[")
+        for number in range(axis.count):
+            stream.write(f"{', ' if number else ''}{json.dumps(axis.value(number))}")
+        stream.write("]")
+    stream.write("],\n")

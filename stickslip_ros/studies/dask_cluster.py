@@ -1,5 +1,6 @@
 """A Dask cluster as the executor of a study."""
 
+import logging
 from collections.abc import Generator
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -26,14 +27,27 @@ def dask_executor(address: str) -> Generator[tuple[Executor, int]]:
         raise InvalidInputError(
             f"--dask {address}: Dask is not installed: pip install 'stickslip_ros[dask]'"
         ) from None
-    try:
-        client = distributed.Client(address, timeout=_TIMEOUT)
-    except (OSError, ValueError) as error:
-        reason = " ".join(str(error).split()) or "nothing answers"
-        raise InvalidInputError(f"--dask {address}: no scheduler found: {reason}") from None
-    with client:
-        threads = sum(client.nthreads().values())
+    with _silent_log():
         try:
-            yield client.get_executor(), max(2 * threads, IN_FLIGHT)
-        except distributed.KilledWorker as error:
-            raise RunError(f"--dask {address}: {error}") from None
+            client = distributed.Client(address, timeout=_TIMEOUT)
+        except (OSError, ValueError) as error:
+            reason = " ".join(str(error).split()) or "nothing answers"
+            raise InvalidInputError(f"--dask {address}: no scheduler found: {reason}") from None
+        with client:
+            threads = sum(client.nthreads().values())
+            try:
+                yield client.get_executor(), max(2 * threads, IN_FLIGHT)
+            except distributed.KilledWorker as error:
+                raise RunError(f"--dask {address}: {error}") from None
+
+
+@contextmanager
+def _silent_log() -> Generator[None]:
+    """Keep Dask from logging, with tracebacks, what is raised here as an error."""
+    logger = logging.getLogger("distributed")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)

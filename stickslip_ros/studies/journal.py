@@ -100,15 +100,14 @@ class Journal:
 
     def _read(self) -> None:
         header = {"format": _FORMAT, "versions": versions(), **self.study.as_dict()}
-        header = json.loads(json.dumps(header))
+        opening = json.dumps(header).encode() + b"\n"
         first = self._file.readline()
-        if not first.endswith(b"\n"):
+        if first != opening and opening.startswith(first):
             self._file.seek(0)
-            self._file.truncate()
-            self._file.write(json.dumps(header).encode() + b"\n")
+            self._file.write(opening)
             self._file.flush()
             return
-        self._compare(header, first)
+        self._compare(json.loads(opening), first)
         while True:
             offset = self._file.tell()
             line = self._file.readline()
@@ -117,7 +116,9 @@ class Journal:
             try:
                 read = _parsed(line)
                 end = None if read["end"] is None else State(*read["end"])
-                indices = [values[0] for values in read["points"]]
+                indices = [Point.from_json(values).number for values in read["points"]]
+                if not 0 <= min(indices) <= max(indices) < self.study.plan.size:
+                    raise ValueError
                 repeated = any(self.is_done(index) for index in indices)
             except (ValueError, LookupError, TypeError):
                 raise InvalidInputError(
@@ -157,7 +158,10 @@ def _opened(path: Path | None) -> BinaryIO:
 
 
 def _parsed(line: bytes) -> dict[str, Any]:
-    found = json.loads(line)
+    try:
+        found = json.loads(line)
+    except RecursionError:
+        raise ValueError from None
     if not isinstance(found, dict):
         raise ValueError
     return found

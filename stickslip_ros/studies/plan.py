@@ -1,6 +1,6 @@
 """Which points a study has: values of parameters on a grid, or random ones within ranges."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite, prod
@@ -164,8 +164,7 @@ class Grid:
     carry: Carry | None = None
 
     def __post_init__(self) -> None:
-        if len(set(self.parameters)) < len(self.axes):
-            raise InvalidInputError(f"{', '.join(self.parameters)}: must be different parameters")
+        _check_different(self.parameters)
         if self.size > MOST_POINTS:
             raise InvalidInputError(f"{self.size} points are more than {MOST_POINTS:,}")
 
@@ -233,6 +232,9 @@ class Sample:
     def __post_init__(self) -> None:
         if not 1 <= self.size <= MOST_POINTS:
             raise InvalidInputError(f"{self.size} points are not from 1 to {MOST_POINTS:,} of them")
+        if self.seed < 0:
+            raise InvalidInputError(f"seed {self.seed}: must be 0 or more")
+        _check_different(self.parameters)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -246,10 +248,17 @@ class Sample:
 
     def values(self, index: int) -> tuple[float, ...]:
         """Return the values of the parameters at a point."""
-        shares = np.random.default_rng((self.seed, index)).random(len(self.axes)).tolist()
+        # The index first: it is one word, and what numpy makes of words does not tell where a
+        # longer seed ends.
+        shares = np.random.default_rng((index, self.seed)).random(len(self.axes)).tolist()
         ends = zip(self.axes, shares, strict=True)
         return tuple(axis.first + (axis.last - axis.first) * share for axis, share in ends)
 
     def chains(self) -> Iterator[range]:
         """Yield all points at once."""
         yield range(self.size)
+
+
+def _check_different(parameters: Sequence[str]) -> None:
+    if len(set(parameters)) < len(parameters):
+        raise InvalidInputError(f"{', '.join(parameters)}: must be different parameters")

@@ -2,14 +2,21 @@
 
 import signal
 from collections.abc import Generator, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
 from os import _exit
 from threading import Thread
 
-from stickslip_ros.errors import RunError
+from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.physics.simulation import Progress
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.settled import State
@@ -21,11 +28,18 @@ IN_FLIGHT = 64
 _SECONDS_PER_TASK, _LARGEST_TASK = 0.25, 1000
 """What a task takes, about, and how many points it has at most."""
 
+_SCANNED = 100_000
+"""Points that are looked at, at most, before those missing among them are begun."""
+
 _TASKS_PER_WORKER = 16
 """That a study is cut into at least, so that workers end at about the same time."""
 
 _DEATHS = 3
 """So often in a row may workers die without a piece having been done."""
+
+
+class WorkersDiedError(RunError):
+    """An executor has lost those that do its work."""
 
 
 def run(
@@ -40,7 +54,10 @@ def run(
     In this process, or through any `executor`, which gets `in_flight` tasks at a time; a task is
     some points. What is found does not depend on that, to the last bit on one kind of processor.
     `progress` is told how many points are done. Interrupted, what was done is in the journal.
+    Raises WorkersDiedError if the executor gives up.
     """
+    if in_flight < 1:
+        raise InvalidInputError(f"{in_flight} tasks in flight: must be 1 or more")
     study = journal.study
     size = _task_size(journal, 1 if executor is None else in_flight)
     progress(journal.count)
@@ -70,6 +87,11 @@ def run(
                 chain.start = _keep(journal, piece, progress)
                 if study.plan.carried:
                     submit(chain)
+    except (BrokenExecutor, CancelledError) as error:
+        raise WorkersDiedError(
+            f"{type(executor).__name__} has lost its workers, {journal.count} of "
+            f"{study.plan.size} points being done: {error or 'a task was cancelled'}"
+        ) from None
     finally:
         for task in waiting:
             if task.done() and not task.cancelled() and task.exception() is None:
@@ -82,6 +104,8 @@ def run_here(journal: Journal, workers: int, progress: Progress = lambda _: None
 
     Should one be killed, others take its place. Raises RunError if they keep dying.
     """
+    if workers < 1:
+        raise InvalidInputError(f"{workers} workers: must be 1 or more")
     if workers == 1:
         run(journal, progress=progress)
         return
@@ -91,7 +115,7 @@ def run_here(journal: Journal, workers: int, progress: Progress = lambda _: None
         try:
             with local_processes(workers) as pool:
                 run(journal, pool, in_flight=2 * workers, progress=progress)
-        except BrokenProcessPool:
+        except WorkersDiedError:
             deaths = 1 if journal.count > before else deaths + 1
             if deaths == _DEATHS:
                 raise RunError(
@@ -162,7 +186,10 @@ def _parallel(chains: Iterator[_Chain], *, carried: bool) -> Iterator[_Chain]:
 def _missing(journal: Journal) -> Iterator[tuple[range, State | None]]:
     """Yield runs of points that are not done, and where the first one of each begins."""
     carried = journal.study.plan.carried
-    for points in journal.study.plan.chains():
+    chains = journal.study.plan.chains()
+    if not carried:
+        chains = (part for points in chains for part in pieces_of(points, _SCANNED))
+    for points in chains:
         first = 0
         for place in range(len(points) + 1):
             if place < len(points) and not journal.is_done(points[place]):

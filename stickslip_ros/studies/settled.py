@@ -257,7 +257,7 @@ class _SectionMeter(CycleMeter):
     def settled(self, end: State) -> Settled:
         """Return what was found, the motion having come to `end`."""
         measures = self.measures()
-        section, amplitudes = np.concatenate(self._sections), np.array(self._amplitudes)
+        section, amplitudes = np.concatenate(self._sections), self._amplitudes
         if measures.regime is Regime.UNBOUNDED:
             section, steady = np.empty(0), True
         elif measures.regime is Regime.EQUILIBRIUM:
@@ -266,5 +266,6 @@ class _SectionMeter(CycleMeter):
         elif measures.regime is Regime.STUCK:
             steady = True
         else:
-            steady = len(amplitudes) > 1 and bool(np.ptp(amplitudes) <= STEADY * amplitudes.max())
-        return Settled(measures, section, bool(steady), end)
+            largest = max(amplitudes, default=0.0)
+            steady = len(amplitudes) > 1 and largest - min(amplitudes) <= STEADY * largest
+        return Settled(measures, section, steady, end)

@@ -33,6 +33,8 @@ class SensitiveMotion(Motion):
     integration becomes too costly, starts counted together.
     """
 
+    _more_variables = True
+
     def __init__(self, drive: Drive, gains: WashoutGains | None = None) -> None:
         """Start at rest at X = 0: without force, or with `gains` (SI) under continuous control."""
         super().__init__(drive, 0.0, 0.0, continuous_control=gains is not None, record=True)

@@ -85,18 +85,25 @@ def _averaged(drive: Drive) -> float | str:
 
 def _followed(drive: Drive, reference: float) -> float | str:
     """Return the exact onset (m/s), or why there is none."""
-    release = _Release(drive)
+    release = Release()
     speeds = (reference * _FOLLOWED).tolist()
+
+    def excess(speed: float) -> float:
+        at_speed = replace(drive, belt_speed=speed)
+        return -1.0 if least_cycle(at_speed) is None else release.excess(at_speed)
+
     above = None
     for speed in speeds:
-        if release.excess(speed) > 0.0:
+        if excess(speed) > 0.0:
             break
         above = speed
     else:
         return f"it sticks at no belt speed from {speeds[-1]:.3g} to {speeds[0]:.3g} m/s"
     if above is not None:
-        return zero_between(lambda speed: np.tanh(release.excess(speed)), speed, above)
-    sticking = next((speed for speed in speeds if release.sticks_again(speed)), 0.0)
+        return zero_between(lambda speed: np.tanh(excess(speed)), speed, above)
+    sticking = next(
+        (speed for speed in speeds if release.sticks_again(replace(drive, belt_speed=speed))), 0.0
+    )
     if sticking == speed:
         return f"it still sticks at {speed:.3g} m/s, the highest belt speed tried"
     return (
@@ -105,45 +112,47 @@ def _followed(drive: Drive, reference: float) -> float | str:
     )
 
 
-class _Release:
-    """What a slide does when the belt lets go of it, which it always does in the same state."""
+class Release:
+    """What a slide does when the belt lets go of it, which it always does in the same state.
 
-    def __init__(self, drive: Drive) -> None:
-        self._motion = Motion(drive, 0.0, 0.0, record=True)
+    The belt moves, at a speed above zero. To be asked about many drives: compiling the integrator
+    costs more than most motions.
+    """
 
-    def excess(self, belt_speed: float) -> float:
-        """Return by what share of the belt's speed (m/s) the slide's next upward speed is above.
+    def __init__(self) -> None:
+        self._motion: Motion | None = None
 
-        -1 where it does not come up again, or cannot, for it gains no energy. Beyond the belt's
-        speed friction turns round: there the peak is that of the parabola which begins with the
-        slide's acceleration and loses v0 of it per unit of time, as an orbit does that touches.
+    def excess(self, drive: Drive) -> float:
+        """Return by what share of the belt's speed the slide's next upward speed is above.
+
+        -1 where it does not come up again. Beyond the belt's speed friction turns round: there the
+        peak is that of the parabola which begins with the slide's acceleration and loses v0 of it
+        per unit of time, as an orbit does that touches. Raises RunError for a motion too stiff to
+        be followed.
         """
-        if least_cycle(replace(self._motion.drive, belt_speed=belt_speed)) is None:
-            return -1.0
-        peaks = (_highest(knots, belt_speed) for knots in self._follow(belt_speed))
+        peaks = (_highest(knots, drive.belt_speed) for knots in self._follow(drive))
         peak = next((peak for peak in peaks if peak is not None), None)
         if peak is None:
             return -1.0
         position, velocity = peak
-        excess = velocity / belt_speed - 1.0
+        excess = velocity / drive.belt_speed - 1.0
         if abs(excess) > _ROUNDING:
             return excess
-        drive = self._motion.drive
         acceleration = (release_position(drive) - position) / drive.length_scale
-        excess = (acceleration / (belt_speed / drive.speed_scale)) ** 2 / 2.0
+        excess = (acceleration / (drive.belt_speed / drive.speed_scale)) ** 2 / 2.0
         return excess if excess > _ROUNDING else 0.0
 
-    def sticks_again(self, belt_speed: float) -> bool:
-        """Return whether it sticks again, be it that it overtakes the belt (m/s) before."""
-        *_, knots = self._follow(belt_speed)
+    def sticks_again(self, drive: Drive) -> bool:
+        """Return whether it sticks again, be it that it overtakes the belt before."""
+        *_, knots = self._follow(drive)
         return bool(np.any(knots.sticking & np.logical_or.accumulate(knots.velocity < 0.0)))
 
-    def _follow(self, belt_speed: float) -> Iterator[Knots]:
-        motion = self._motion
-        motion.drive = replace(motion.drive, belt_speed=belt_speed)
-        motion.restart(release_position(motion.drive), belt_speed)
-        motion.take_knots()
-        return follow(motion)
+    def _follow(self, drive: Drive) -> Iterator[Knots]:
+        if self._motion is None:
+            self._motion = Motion(drive, 0.0, 0.0, record=True)
+        self._motion.begin(drive, release_position(drive), drive.belt_speed)
+        self._motion.take_knots()
+        return follow(self._motion)
 
 
 def _highest(knots: Knots, belt_speed: float) -> tuple[float, float] | None:

@@ -1,0 +1,131 @@
+"""Where theory has the Hopf bifurcation and the onset of sticking, over any parameter."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import nan, tanh
+
+import numpy as np
+
+from stickslip_ros.errors import StickslipError
+from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
+from stickslip_ros.physics.theory.roots import zero_between
+from stickslip_ros.physics.theory.sampled import LinearSampledLoop
+from stickslip_ros.physics.theory.sticking import Release
+from stickslip_ros.studies.plan import Axis
+from stickslip_ros.studies.settled import Case
+from stickslip_ros.studies.study import Study
+
+HOPF_POINT = "Hopf point"
+
+STABILITY_LIMIT = "limit of stability"
+"""Of a sampled loop, a pair of whose multipliers leaves the unit circle there, or one at -1."""
+
+STICKING_ONSET = "onset of sticking"
+
+_SCANNED = 201
+"""Values of an axis between which sign changes are looked for."""
+
+_MAPPED = 50
+"""Values of each of two axes for which there are margins."""
+
+
+@dataclass(frozen=True)
+class TransitionMap:
+    """On which side of its transitions theory has the motion, over two parameters."""
+
+    first: FloatArray
+    """n values of the first parameter."""
+    second: FloatArray
+    """m values of the second one."""
+    margins: Mapping[str, FloatArray]
+    """By the name of a transition, what is zero there; NaN where theory has no say. (n, m)"""
+
+
+def hopf_margin(case: Case, *, coarse: bool = False) -> float:
+    """Return what is above zero where the equilibrium is stable, and zero at the Hopf bifurcation.
+
+    Without sampling it is the least Hurwitz determinant: of two or three eigenvalues only a pair
+    can cross, their product being other than zero. Of a sampled loop it is what the spectral radius
+    leaves to one, or with `coarse` that of nearly the same loop if its order is high. NaN on a belt
+    at rest, and for a loop that is not linear near the equilibrium, or not the same at each sample.
+    """
+    drive, washout, plant = case.drive, case.washout, case.sampled
+    if washout is None or plant is None:
+        expansion = expand(drive, None if washout is None else washout.gains)
+        return nan if expansion is None else float(hurwitz_determinants(expansion.jacobian).min())
+    loop = LinearSampledLoop.of(drive, plant.rate, plant.force_delay)
+    if loop is None or plant.force_jitter > 0.0 or washout.force_limit == 0.0:
+        return nan
+    return 1.0 - (loop.coarsened() if coarse else loop).spectral_radius(washout.gains)
+
+
+def grazing_margin(case: Case, release: Release) -> float:
+    """Return what is above zero where a slide that sticks comes back to the belt's speed.
+
+    There it sticks again, unless it comes with forces that friction cannot hold. At zero the cycle
+    grazes the belt's speed: the onset of sticking. NaN on a belt at rest, and under control or a
+    disturbance, for which there is no such theory.
+    """
+    drive = case.drive
+    if case.washout is not None or case.sampled is not None or drive.belt_speed == 0.0:
+        return nan
+    return tanh(release.excess(replace(drive, belt_speed=abs(drive.belt_speed))))
+
+
+def sign_changes(margin: Callable[[float], float], values: Sequence[float]) -> Iterator[float]:
+    """Yield where `margin` changes sign between neighbours of the `values`, to rounding."""
+    known = [(value, found) for value in values if (found := margin(value)) != 0.0]
+    for (before, one), (after, other) in pairwise(known):
+        if one * other < 0.0:
+            yield zero_between(margin, before, after)
+
+
+def transitions(study: Study, axis: Axis) -> dict[str, list[float]]:
+    """Return the values of the axis' parameter at the transitions there are, by name, SI units.
+
+    All else is as in the study's scenario. Two closer than a two-hundredth of the axis may be
+    overlooked.
+    """
+    values = replace(axis, count=_SCANNED).values().tolist()
+    found: dict[str, list[float]] = {}
+    for name, margin in _margins(study).items():
+
+        def at(value: float, margin: Callable[[Case], float] = margin) -> float:
+            return _at(study, {axis.parameter: value}, margin)
+
+        if places := list(sign_changes(at, values)):
+            found[name] = places
+    return found
+
+
+def transition_map(study: Study, axes: tuple[Axis, Axis]) -> TransitionMap:
+    """Return the margins over two axes of those transitions of which theory has a say."""
+    first, second = (replace(axis, count=_MAPPED).values() for axis in axes)
+    names = [axis.parameter for axis in axes]
+    places = [dict(zip(names, (one, two), strict=True)) for one in first for two in second]
+    margins: dict[str, FloatArray] = {}
+    for name, margin in _margins(study, coarse=True).items():
+        found = np.array([_at(study, place, margin) for place in places])
+        if not np.isnan(found).all():
+            margins[name] = found.reshape(len(first), len(second))
+    return TransitionMap(first, second, margins)
+
+
+def _margins(study: Study, *, coarse: bool = False) -> dict[str, Callable[[Case], float]]:
+    release = Release()
+    sampled = study.scenario.plant.expects_control and not study.continuous
+    return {
+        STABILITY_LIMIT if sampled else HOPF_POINT: lambda case: hopf_margin(case, coarse=coarse),
+        STICKING_ONSET: lambda case: grazing_margin(case, release),
+    }
+
+
+def _at(study: Study, values: Mapping[str, float], margin: Callable[[Case], float]) -> float:
+    """Return the margin where parameters have these values; NaN where they cannot, or it cannot."""
+    try:
+        case = Case.of(study.scenario.changed(values), continuous=study.continuous)
+        return margin(case)
+    except (StickslipError, ArithmeticError, np.linalg.LinAlgError):
+        return nan
