@@ -75,9 +75,12 @@ setup(
         "zstandard>=0.22",  # the oldest wheels for 3.12
     ],
     extras_require={
+        # Studies on a cluster (stickslip sweep --dask).
+        "dask": ["distributed>=2024.2.1"],
         # ROS itself, where none is installed; the message packages come with these two.
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [
+            "distributed",
             "hypothesis",
             "pytest",
             "pytest-timeout",

@@ -12,7 +12,7 @@ from typing import Any
 from benchmarks.slices import Row, table
 from stickslip_ros.versions import versions
 
-NAMES = ("motion", "bifurcation", "bags", "lockstep", "replay", "realtime")
+NAMES = ("motion", "bifurcation", "sweep", "bags", "lockstep", "replay", "realtime")
 TIMEOUT = 600.0
 
 

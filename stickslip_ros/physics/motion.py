@@ -154,9 +154,10 @@ class Motion:
     def recording(self, recording: bool) -> None:
         if recording == self._recording:
             return
+        parameters = self._slipping.parameters
         self._recording = recording
         self._use_law(type(self._drive.friction))
-        self._set_parameters()
+        self._slipping.parameters[:] = parameters
         self._append_knot(0.0, self._x, self._y, sticking=False)
 
     @property
@@ -445,12 +446,16 @@ class Motion:
         self._static = values["static"]
         self._sudden_speed = self._drive.friction.sudden_speed / self._drive.speed_scale
         values |= vars(self._gains)
-        for name, value in values.items():
-            index = self._equations.index[name]
-            for integrator in (self._slipping, self._sticking):
-                # heyoka keeps those up to the last one it uses.
-                if integrator is not None and index < len(integrator.parameters):
-                    integrator.parameters[index] = value
+        indices = self._equations.index
+        for integrator in (self._slipping, self._sticking):
+            if integrator is None:
+                continue
+            parameters = integrator.parameters
+            count = len(parameters)
+            for name, value in values.items():
+                index = indices[name]
+                if index < count:  # heyoka keeps those up to the last one an equation uses
+                    parameters[index] = value
 
 
 def _marker(

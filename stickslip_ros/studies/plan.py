@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import product
 from math import isfinite, prod
 from typing import Protocol, Self
 
@@ -16,6 +17,9 @@ MOST_POINTS = 1_000_000_000
 """Points of a study: what is to be kept of them has to go into a file."""
 
 _NODES = ("plant", "washout_controller")
+
+_TRIED = 10
+"""Points of a sample that stand for all of it."""
 
 
 class Carry(StrEnum):
@@ -147,6 +151,10 @@ class Plan(Protocol):
         """Return the values of the parameters at a point."""
         ...
 
+    def corners(self) -> Iterator[int]:
+        """Yield the points at the ends of the axes; of a sample, some."""
+        ...
+
     def chains(self) -> Iterator[range]:
         """Yield the points in the order in which they are carried on; else, all at once."""
         ...
@@ -205,6 +213,14 @@ class Grid:
             values.append(axis.value(number))
         return tuple(reversed(values))
 
+    def corners(self) -> Iterator[int]:
+        """Yield the points at the ends of all axes."""
+        for ends in product((0, 1), repeat=len(self.axes)):
+            index = 0
+            for axis, end in zip(self.axes, ends, strict=True):
+                index = index * axis.count + end * (axis.count - 1)
+            yield index
+
     def chains(self) -> Iterator[range]:
         """Yield the points in the order in which they are carried on; else, all at once."""
         if self.carry is None:
@@ -253,6 +269,10 @@ class Sample:
         shares = np.random.default_rng((index, self.seed)).random(len(self.axes)).tolist()
         ends = zip(self.axes, shares, strict=True)
         return tuple(axis.first + (axis.last - axis.first) * share for axis, share in ends)
+
+    def corners(self) -> Iterator[int]:
+        """Yield the first points."""
+        yield from range(min(self.size, _TRIED))
 
     def chains(self) -> Iterator[range]:
         """Yield all points at once."""

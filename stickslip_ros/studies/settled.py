@@ -47,7 +47,7 @@ class Course:
     transient: float = 200.0
     """Natural periods that are passed over, besides the time in which a slow belt loads the spring
     once, and, under control, `start_after`."""
-    cycles: int = 6
+    cycles: int = 4
     """Whole cycles that are then measured, where there are any."""
     patience: int = 1
     """How often both may be done, one after the other, until the motion is steady and what is
@@ -176,17 +176,19 @@ class Settler:
                 meter.feed(motion.take_knots(), drive.belt_speed)
 
         # One cycle is under way when it begins, and one when it ends.
-        block = (course.cycles + 1) * drive.natural_period
+        block = (course.cycles + 2) * drive.natural_period
 
         def observe() -> Settled:
             motion.recording = False
             meter = _SectionMeter(course.cycles)
             advance(transient, meter)
             motion.recording = True
-            left = (course.cycles + 1) * (drive.natural_period + loading)
-            while left > 0.0 and not motion.unbounded and not meter.done:
+            left = (course.cycles + 2) * (drive.natural_period + loading)
+            while not motion.unbounded:
                 advance(min(block, left), meter)
                 left -= block
+                if left <= 0.0 or meter.done:
+                    break
             if motion.unbounded:
                 meter.report_run_away()
             low_passed = motion.low_passed if continuous else law.low_passed if law else None
@@ -216,10 +218,14 @@ def _loading_time(drive: Drive) -> float:
 
 def _begin_control(motion: Motion, washout: WashoutParameters, start: State) -> None:
     """Let the filter run for `start_after`, and the controller act from then on."""
-    motion.set_gains(washout.corner_frequency, 0.0, 0.0)
+    gains = (washout.linear_gain, washout.cubic_gain)
+    motion.set_gains(
+        washout.corner_frequency, *(gains if washout.start_after == 0.0 else (0.0, 0.0))
+    )
     motion.low_passed = start.velocity if start.low_passed is None else start.low_passed
-    motion.advance(washout.start_after)
-    motion.set_gains(washout.corner_frequency, washout.linear_gain, washout.cubic_gain)
+    if washout.start_after > 0.0:
+        motion.advance(washout.start_after)
+        motion.set_gains(washout.corner_frequency, *gains)
 
 
 def _alike(before: Measures, after: Measures) -> bool:

@@ -81,9 +81,9 @@ class Study:
         )
 
     def check(self) -> None:
-        """Raise InvalidInputError if none of the corners of the plan is a point that can be."""
+        """Raise InvalidInputError if no corner of the plan, nor its middle, can be."""
         refused: StickslipError | None = None
-        for index in {0, self.plan.size // 2, self.plan.size - 1}:
+        for index in (*self.plan.corners(), self.plan.size // 2):
             try:
                 self.case(index)
             except StickslipError as error:
@@ -96,7 +96,7 @@ class Study:
     def cost(self) -> float:
         """Return how long a point takes, about, s."""
         case, _ = self._middle()
-        periods = self.course.transient + self.course.cycles + 1
+        periods = self.course.transient + self.course.cycles + 2
         if case.sampled is None:
             return periods * _SECONDS_PER_PERIOD
         return periods * case.drive.natural_period * case.sampled.rate * _SECONDS_PER_SAMPLE

@@ -1,0 +1,144 @@
+"""How much longer than bare heyoka does a sweep take, and what do two processes make of it?
+
+Ours: a whole sweep of the paper's drive over the belt speed, 100 natural periods a point and four
+measured cycles: the points' parameters checked, their motions, measures and turning points, the
+journal, the table. Peer: heyoka's integrators of slip and stick over the same times, compiled
+beforehand. Without control, and with the paper's, which acts without sampling.
+
+Sampled, at 100 Hz as the nodes do it, a point takes 67,000 steps. Peer: the slip integrator by
+itself from sample to sample, with the same terminal events, and the washout filter in a line.
+
+Two processes: by how much a sweep of 30,000 points is faster with two workers, their start
+included, over how much faster two bare processes are with half of the motions each.
+"""
+
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from io import StringIO
+from math import expm1
+from multiprocessing import get_context
+from statistics import median
+
+from benchmarks.bare import BareMotion
+from benchmarks.motion import bare_integrator
+from benchmarks.slices import Row, by_turns, compare_times, show
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.theory.returns import loading_time
+from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.studies.columns import write_csv
+from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.plan import Axis
+from stickslip_ros.studies.runner import run_here
+from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.study import Study
+from stickslip_ros.studies.sweep import sweep_study
+
+POINTS, SAMPLED_POINTS, ROUNDS = 1000, 3, 5
+MANY_POINTS, MANY_ROUNDS = 30_000, 3
+COURSE = Course(transient=100.0)
+LOW, HIGH = 0.02, 0.6
+PERIOD = 0.01
+GAINS = (2.0, -1.0, -1.0)
+NO_CONTROL = "plant.expects_control=false"
+
+
+def study(points: int, *, control: bool = False, continuous: bool = False) -> Study:
+    scenario = load_scenario("paper", [] if control else [NO_CONTROL])
+    axes = [Axis("plant.belt_speed", LOW, HIGH, points)]
+    return sweep_study(scenario, axes, course=COURSE, continuous=continuous)
+
+
+def drives(points: int) -> list[Drive]:
+    asked = study(points)
+    return [asked.case(number)[0].drive for number in range(points)]
+
+
+def end(drive: Drive) -> float:
+    periods = COURSE.transient + COURSE.cycles + 2
+    return periods * drive.natural_period + loading_time(drive)
+
+
+def ours(asked: Study, workers: int = 1) -> Callable[[], float]:
+    def run() -> float:
+        start = time.perf_counter()
+        with Journal(asked) as journal:
+            run_here(journal, workers)
+            write_csv(StringIO(), journal, {})
+        return time.perf_counter() - start
+
+    return run
+
+
+def bare(asked: list[Drive], *, controlled: bool = False) -> Callable[[], float]:
+    motion = BareMotion(controlled=controlled)
+
+    def run() -> float:
+        start = time.perf_counter()
+        for drive in asked:
+            motion.run(drive, end(drive), GAINS)
+        return time.perf_counter() - start
+
+    return run
+
+
+def bare_ticks(asked: list[Drive]) -> Callable[[], float]:
+    taylor = bare_integrator()
+    state, parameters = taylor.state, taylor.pars
+    corner, linear, cubic = GAINS
+    share = -expm1(-corner * PERIOD)
+
+    def run() -> float:
+        start = time.perf_counter()
+        for drive in asked:
+            state[:] = 0.0
+            taylor.time = low_passed = 0.0
+            for number in range(1, round(end(drive) / PERIOD) + 1):
+                filtered = float(state[1]) - low_passed
+                low_passed += share * filtered
+                parameters[0] = linear * filtered + cubic * filtered * filtered * filtered
+                taylor.propagate_until(number * PERIOD)
+        return time.perf_counter() - start
+
+    return run
+
+
+def half(number: int) -> float:
+    return bare(drives(MANY_POINTS)[number::2])()
+
+
+def two_bare_processes() -> float:
+    """Return the time of the slower one, its start left out."""
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+        return max(pool.map(half, range(2)))
+
+
+def measure() -> list[Row]:
+    rows: list[Row] = []
+    for what, controlled in (("without control", False), ("continuous control", True)):
+        asked = study(POINTS, control=controlled, continuous=controlled)
+        peer = bare(drives(POINTS), controlled=controlled)
+        times = by_turns(ROUNDS, ours(asked), peer)
+        what = f"{what}, {POINTS} points"
+        rows.append(compare_times(what, times[0], "bare heyoka", times[1], required=1 / 1.5))
+    asked = study(SAMPLED_POINTS, control=True)
+    times = by_turns(ROUNDS, ours(asked), bare_ticks(drives(SAMPLED_POINTS)))
+    what = f"sampled control, {SAMPLED_POINTS} points"
+    rows.append(compare_times(what, times[0], "bare heyoka", times[1], required=1 / 1.5))
+    many = study(MANY_POINTS)
+    one, two, bare_one, bare_two = by_turns(
+        MANY_ROUNDS, ours(many), ours(many, 2), bare(drives(MANY_POINTS)), two_bare_processes
+    )
+    gain, bare_gain = (
+        [alone / together for alone, together in zip(*times, strict=True)]
+        for times in ((one, two), (bare_one, bare_two))
+    )
+    what = f"two processes over one, {MANY_POINTS} points"
+    ratio = median(a / b for a, b in zip(gain, bare_gain, strict=True))
+    peer_gain = median(bare_gain)
+    rows.append(Row(what, "1", median(gain), "bare processes", peer_gain, ratio, 0.85))
+    return rows
+
+
+if __name__ == "__main__":
+    show(__doc__, measure)

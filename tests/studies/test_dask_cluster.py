@@ -1,0 +1,151 @@
+"""Studies on a Dask cluster: a scheduler and workers, each a process of its own."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import distributed
+import pytest
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.studies import dask_cluster
+from stickslip_ros.studies.columns import compute_columns
+from stickslip_ros.studies.dask_cluster import dask_executor
+from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.plan import Axis, Carry
+from stickslip_ros.studies.runner import WorkersDiedError, run
+from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.study import Study
+from stickslip_ros.studies.sweep import sweep_study
+
+PATIENCE = 60.0
+LOCAL = "127.0.0.1"
+
+
+def wait_until(condition: Callable[[], bool], what: str) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, what
+        time.sleep(0.05)
+
+
+class Cluster:
+    """A scheduler and workers without nannies: one that is killed stays dead."""
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+        self.processes: list[subprocess.Popen[bytes]] = []
+        file = directory / "scheduler.json"
+        self._start("scheduler", "--host", LOCAL, "--port", "0", "--scheduler-file", str(file))
+        wait_until(lambda: file.exists() and file.stat().st_size > 0, "no scheduler")
+        self.address = str(json.loads(file.read_text())["address"])
+
+    def add_worker(self) -> subprocess.Popen[bytes]:
+        alone = ("--no-nanny", "--nthreads", "1", "--no-dashboard")
+        return self._start("worker", self.address, "--host", LOCAL, *alone)
+
+    def wait_for_workers(self, count: int) -> None:
+        with distributed.Client(self.address) as client:
+            client.wait_for_workers(count, timeout=PATIENCE)
+
+    def _start(self, *arguments: str) -> subprocess.Popen[bytes]:
+        with (self._directory / "log").open("ab") as log:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "dask", *arguments],
+                cwd=self._directory,
+                stdout=log,
+                stderr=log,
+            )
+        self.processes.append(process)
+        return process
+
+    def end(self) -> None:
+        for process in self.processes:
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    cluster = Cluster(tmp_path)
+    yield cluster
+    cluster.end()
+
+
+def study(carry: Carry | None = None) -> Study:
+    scenario = load_scenario("paper", ["plant.expects_control=false"])
+    axes = [Axis("plant.damping", 0.0, 0.05, 8), Axis("plant.belt_speed", 0.1, 0.6, 100)]
+    return sweep_study(scenario, axes, carry=carry, course=Course(transient=100.0))
+
+
+@pytest.mark.parametrize("carry", [None, Carry.DOWN])
+def test_a_worker_killed_on_the_way_changes_nothing(cluster: Cluster, carry: Carry | None) -> None:
+    doomed = cluster.add_worker()
+    cluster.add_worker()
+    cluster.wait_for_workers(2)
+    asked = study(carry)
+    killed = threading.Event()
+
+    def kill_after_the_first_task(done: float) -> None:
+        if 0 < done < asked.plan.size and not killed.is_set():
+            os.kill(doomed.pid, signal.SIGKILL)
+            killed.set()
+
+    with Journal(asked) as journal, dask_executor(cluster.address) as (executor, in_flight):
+        run(journal, executor, in_flight=in_flight, progress=kill_after_the_first_task)
+        found = list(journal.points())
+    assert killed.is_set()
+    assert doomed.wait(PATIENCE) == -signal.SIGKILL
+    with Journal(asked) as journal:
+        run(journal)
+        assert found == list(journal.points())
+    assert len(found) == asked.plan.size
+
+
+def test_workers_that_come_late_are_waited_for(cluster: Cluster) -> None:
+    asked = study()
+    with dask_executor(cluster.address) as (executor, in_flight):
+        cluster.add_worker()
+        found = compute_columns(asked, executor=executor, in_flight=in_flight)
+    assert found.regime.tolist() == compute_columns(asked).regime.tolist()
+
+
+def test_a_scheduler_that_dies_is_an_error_and_what_was_done_is_kept(cluster: Cluster) -> None:
+    cluster.add_worker()
+    cluster.wait_for_workers(1)
+    asked = study()
+
+    def kill_after_the_first_task(done: float) -> None:
+        if done > 0:
+            cluster.processes[0].kill()
+
+    with Journal(asked) as journal:
+        with (
+            pytest.raises(WorkersDiedError, match="has lost its workers"),
+            dask_executor(cluster.address) as (executor, in_flight),
+        ):
+            run(journal, executor, in_flight=in_flight, progress=kill_after_the_first_task)
+        assert 0 < journal.count < asked.plan.size
+        run(journal)
+        assert journal.count == asked.plan.size
+
+
+def test_where_no_scheduler_answers_the_address_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dask_cluster, "_TIMEOUT", "1s")
+    with (
+        pytest.raises(InvalidInputError, match=r"--dask tcp://127.0.0.1:9: no scheduler"),
+        dask_executor("tcp://127.0.0.1:9"),
+    ):
+        pass
+
+
+def test_what_is_no_address_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match=r"--dask \?\?\?: "), dask_executor("???"):
+        pass
