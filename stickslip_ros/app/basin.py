@@ -4,6 +4,8 @@ import argparse
 import sys
 from dataclasses import asdict
 
+import numpy as np
+
 from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
@@ -26,7 +28,7 @@ from stickslip_ros.studies.basin import (
     basin_study,
     default_axes,
 )
-from stickslip_ros.studies.columns import Further, write_json
+from stickslip_ros.studies.columns import Columns, Further, write_json
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Grid, Plan, Sample
 
@@ -139,5 +141,26 @@ def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> No
     # Half as long again to import as everything else.
     from stickslip_ros.plots.basin_picture import draw_basin
 
+    plan, drive = journal.study.plan, journal.study.scenario.plant.as_drive()
+    columns = Columns.of(journal)
     with writing("--plot", arguments.plot):
-        draw_basin(arguments.plot, journal, basins)
+        draw_basin(
+            arguments.plot,
+            position=columns.values[POSITION],
+            velocity=columns.values[VELOCITY],
+            attractor=np.array([basins.place(point) for point in journal.points()]),
+            regimes=[attractor.regime for attractor in basins.attractors],
+            labels=[_label(attractor) for attractor in basins.attractors],
+            grid_shape=plan.shape if isinstance(plan, Grid) else None,
+            belt_speed=drive.belt_speed,
+            equilibrium_position=drive.equilibrium_position,
+        )
+
+
+def _label(attractor: Attractor) -> str:
+    """Return what a legend says of an attractor."""
+    amplitude = ""
+    if attractor.amplitude is not None:
+        amplitude = f", amplitude {quantities([attractor.amplitude], 'm', 3)[0]}"
+    share, error = 100.0 * attractor.share, 100.0 * attractor.standard_error
+    return f"{_name(attractor)}{amplitude}: {share:.1f} % \N{PLUS-MINUS SIGN} {error:.1f} %"

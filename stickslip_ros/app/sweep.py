@@ -179,4 +179,4 @@ class _Extremes:
         if self._ends is None:
             return "-"
         low, high = quantities(self._ends, unit)
-        return low if low == high else f"{low} to {high}"
+        return low if low == high else f"{low.split()[0]} to {high}"
