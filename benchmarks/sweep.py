@@ -24,7 +24,6 @@ from benchmarks.bare import BareMotion
 from benchmarks.motion import bare_integrator
 from benchmarks.slices import Row, by_turns, compare_times, show
 from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.theory.returns import loading_time
 from stickslip_ros.scenario.files import load_scenario
 from stickslip_ros.studies.columns import write_csv
 from stickslip_ros.studies.journal import Journal
@@ -55,8 +54,7 @@ def drives(points: int) -> list[Drive]:
 
 
 def end(drive: Drive) -> float:
-    periods = COURSE.transient + COURSE.cycles + 2
-    return periods * drive.natural_period + loading_time(drive)
+    return (COURSE.transient + COURSE.cycles + 2) * drive.natural_period
 
 
 def ours(asked: Study, workers: int = 1) -> Callable[[], float]:

@@ -100,6 +100,8 @@ def done(arguments: argparse.Namespace, study: Study, label: str) -> Generator[J
                 file=sys.stderr,
             )
             raise
+        except OSError as error:
+            raise RunError(f"{part or 'temporary file'}: {error.strerror}{kept}") from None
         except RunError as error:
             raise RunError(f"{error}{kept}") from None
         yield journal

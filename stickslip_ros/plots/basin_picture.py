@@ -34,7 +34,7 @@ def draw_basin(
     attractor: npt.NDArray[np.intp],
     regimes: Sequence[Regime | None],
     labels: Sequence[str],
-    grid_shape: tuple[int, int] | None,
+    grid_shape: tuple[int, ...] | None,
     belt_speed: float,
     equilibrium_position: float,
 ) -> None:

@@ -58,7 +58,11 @@ class Journal:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._file.close()
+        try:
+            self._file.close()
+        except OSError:  # what could not be written, once more
+            if error is None:
+                raise
 
     def is_done(self, index: int) -> bool:
         """Return whether a point is done."""

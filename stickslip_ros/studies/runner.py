@@ -136,6 +136,13 @@ def local_processes(workers: int) -> Generator[ProcessPoolExecutor]:
     others = set(active_children())
     pool = ProcessPoolExecutor(workers, get_context("spawn"), initializer=_begin_worker)
     try:
+        # They inherit what is blocked: who is interrupted terminates its workers.
+        unblocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            for _ in range(workers):
+                pool.submit(_stand_ready)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, unblocked)
         yield pool
     except BaseException:
         for child in set(active_children()) - others:
@@ -146,8 +153,11 @@ def local_processes(workers: int) -> Generator[ProcessPoolExecutor]:
         pool.shutdown()
 
 
+def _stand_ready() -> None:
+    """Do nothing, in a process that begins for it."""
+
+
 def _begin_worker() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who is interrupted terminates its workers
     Thread(target=_end_with_parent, daemon=True).start()
 
 

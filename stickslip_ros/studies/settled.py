@@ -12,7 +12,7 @@ from stickslip_ros.physics.measures import Cycle, CycleMeter, Measures, Regime
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.simulation import simulate_sampled
-from stickslip_ros.physics.theory.returns import loading_time
+from stickslip_ros.physics.theory.returns import loading_time, release_position
 from stickslip_ros.physics.washout import Washout, WashoutParameters
 from stickslip_ros.scenario.files import Scenario
 from stickslip_ros.scenario.parameters import PlantParameters
@@ -27,7 +27,11 @@ LONGEST = 1e6
 """Natural periods or cycles that a motion is followed for at most."""
 
 _LONGEST_LOADING = 50.0
-"""Natural periods beyond which a slow belt's loading of the spring is not waited for."""
+"""Natural periods beyond which a slow belt's loading of the spring is not waited for under control:
+without, the slide rides it in one step."""
+
+_TWICE_THE_SAME = 1e-4
+"""Share by which the amplitude may differ from that of one transient before."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ class Course:
 
     transient: float = 200.0
     """Natural periods that are passed over, besides the time in which a slow belt loads the spring
-    once, and, under control, `start_after`."""
+    at first, and, under control, `start_after`."""
     cycles: int = 4
     """Whole cycles that are then measured, where there are any."""
     patience: int = 1
@@ -89,9 +93,15 @@ class Case:
         washout = scenario.washout_controller.as_washout() if plant.expects_control else None
         if continuous:
             check_continuous(scenario)
+        drive = plant.as_drive()
+        if washout is not None and washout.start_after > LONGEST * drive.natural_period:
+            raise InvalidInputError(
+                f"washout_controller.start_after = {washout.start_after:g} s: in a study it must "
+                f"be at most {LONGEST:g} natural periods"
+            )
         disturbed = plant.disturbance.kind != "none"
         sampled = not continuous and (washout is not None or disturbed)
-        return cls(plant.as_drive(), washout, plant if sampled else None)
+        return cls(drive, washout, plant if sampled else None)
 
 
 def check_continuous(scenario: Scenario) -> None:
@@ -156,11 +166,18 @@ class Settler:
         motion = self._motion(drive, continuous)
         motion.recording = False
         motion.begin(drive, start.position, start.velocity)
-        loading = _loading_time(drive)
-        transient = course.transient * drive.natural_period + loading
-        law = None
+        loading = 0.0 if drive.belt_speed == 0.0 else loading_time(drive)
+        transient = course.transient * drive.natural_period
+        controlled = washout is not None or case.sampled is not None
+        if controlled:
+            loading = min(loading, _LONGEST_LOADING * drive.natural_period)
+            transient += loading
+        # One cycle is under way when it begins, and one when it ends.
+        block = (course.cycles + 2) * drive.natural_period
+        law = loop = None
         if case.sampled is not None:
             loop = sampled_loop(case.sampled, motion)
+            block = max(block, loop.period)
             if washout is not None:
                 law = Washout(washout, start.low_passed)
                 simulate_sampled(loop, motion, law, washout.start_after, CycleMeter(1))
@@ -175,31 +192,35 @@ class Settler:
                 motion.advance(duration)
                 meter.feed(motion.take_knots(), drive.belt_speed)
 
-        # One cycle is under way when it begins, and one when it ends.
-        block = (course.cycles + 2) * drive.natural_period
-
         def observe() -> Settled:
             motion.recording = False
             meter = _SectionMeter(course.cycles)
             advance(transient, meter)
+            if motion.sticking and not controlled and drive.belt_speed != 0.0:
+                left = (release_position(drive) - motion.position) / drive.belt_speed
+                if left > drive.natural_period:  # the transient is but begun
+                    motion.advance(left)
+                    motion.advance(transient)
             motion.recording = True
-            left = (course.cycles + 2) * (drive.natural_period + loading)
-            while not motion.unbounded:
-                advance(min(block, left), meter)
-                left -= block
-                if left <= 0.0 or meter.done:
-                    break
+            longest = (course.cycles + 2) * (drive.natural_period + loading)
+            done, step = 0.0, block
+            while not motion.unbounded and done < longest and not (done and meter.done):
+                advance(step, meter)
+                done, step = done + step, done + step  # a slow belt's cycles are that long
             if motion.unbounded:
                 meter.report_run_away()
-            low_passed = motion.low_passed if continuous else law.low_passed if law else None
-            return meter.settled(State(motion.position, motion.velocity, low_passed))
+            return meter.settled(start)
 
         settled = observe()
         for _ in range(course.patience - 1):
             before, settled = settled, observe()
             if settled.steady and _alike(before.measures, settled.measures):
                 break
-        return settled
+        low_passed = motion.low_passed if continuous else None
+        if law is not None and loop is not None:
+            law.answer(loop.sample.stamp, loop.sample.velocity)
+            low_passed = law.low_passed
+        return settled._replace(end=State(motion.position, motion.velocity, low_passed))
 
     def _motion(self, drive: Drive, continuous: bool) -> Motion:
         if continuous not in self._motions:
@@ -207,13 +228,6 @@ class Settler:
                 drive, 0.0, 0.0, continuous_control=continuous, record=True
             )
         return self._motions[continuous]
-
-
-def _loading_time(drive: Drive) -> float:
-    """Return how long a slow belt may take to load the spring, as far as it is waited for, s."""
-    if drive.belt_speed == 0.0:
-        return 0.0
-    return min(loading_time(drive), _LONGEST_LOADING * drive.natural_period)
 
 
 def _begin_control(motion: Motion, washout: WashoutParameters, start: State) -> None:
@@ -229,12 +243,12 @@ def _begin_control(motion: Motion, washout: WashoutParameters, start: State) -> 
 
 
 def _alike(before: Measures, after: Measures) -> bool:
-    """Return whether regime and amplitude are the same, the latter as in a steady motion."""
+    """Return whether regime and amplitude are the same."""
     if before.regime is not after.regime or after.regime not in CYCLES:
         return before.regime is after.regime
     assert before.amplitude is not None
     assert after.amplitude is not None
-    return abs(after.amplitude - before.amplitude) <= STEADY * after.amplitude
+    return abs(after.amplitude - before.amplitude) <= _TWICE_THE_SAME * after.amplitude
 
 
 class _SectionMeter(CycleMeter):
@@ -252,6 +266,13 @@ class _SectionMeter(CycleMeter):
         cycles = super().feed(knots, belt_speed)
         self._amplitudes += [cycle.amplitude for cycle in cycles]
         return cycles
+
+    def measures(self) -> Measures:
+        """Return the means; what only rode a slow belt so far is not at rest, but not known."""
+        found = super().measures()
+        if found.regime is Regime.EQUILIBRIUM and found.stick_fraction:
+            return Measures(None, None, None, None, None, None, 0, None)
+        return found
 
     @property
     def done(self) -> bool:

@@ -6,13 +6,17 @@ from threading import local
 from typing import Any, NamedTuple, Self
 
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.physics.measures import Measures, Regime
+from stickslip_ros.physics.measures import EQUILIBRIUM_SPEED, Measures, Regime
 from stickslip_ros.scenario.files import Scenario
 from stickslip_ros.studies.plan import Plan
-from stickslip_ros.studies.settled import Case, Course, Settler, State
+from stickslip_ros.studies.settled import Case, Course, Settled, Settler, State
 
 MEASURES = tuple(measure.name for measure in fields(Measures))
 """Names of the measures of a point."""
+
+_NUDGE = EQUILIBRIUM_SPEED / 2.0
+"""Share of the belt speed by which a slide at rest is pushed before it is carried on: where the
+next equilibrium is the same but unstable, rounding would take for ever, or be none."""
 
 _SECONDS_PER_PERIOD, _SECONDS_PER_SAMPLE = 2e-5, 1e-5
 """What a natural period costs, about, and a sample where the loop is sampled."""
@@ -50,7 +54,8 @@ class Piece(NamedTuple):
 
     points: list[Point]
     end: State | None
-    """Where the last one ended; None if it ran away or failed, or if nothing is carried on."""
+    """Where what follows the last one begins; None: in its own initial state, since that one ran
+    away or failed, or since nothing is carried on."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +64,8 @@ class Study:
 
     A motion begins in the scenario's initial state, or, where the plan carries on, in the state in
     which the neighbour's ended, filter included; what forces were under way is then forgotten, and
-    `start_after` is for the first point of a chain only.
+    `start_after` is for the first point of a chain only. Where it ended at rest it is pushed by
+    less than what counts as rest.
     """
 
     scenario: Scenario
@@ -161,7 +167,17 @@ def _compute_point(study: Study, index: int, start: State | None) -> tuple[Point
         tuple(settled.turning_points.tolist()),
         _REASONS.get(settled.measures.regime),
     )
-    return point, None if settled.measures.regime is Regime.UNBOUNDED else settled.end
+    return point, _carried_on(settled, case)
+
+
+def _carried_on(settled: Settled, case: Case) -> State | None:
+    """Return where the next point of a chain begins."""
+    end, regime = settled.end, settled.measures.regime
+    if regime is Regime.UNBOUNDED:
+        return None
+    if regime is Regime.EQUILIBRIUM:
+        return replace(end, velocity=end.velocity - _NUDGE * case.drive.belt_speed)
+    return end
 
 
 _REASONS: dict[Regime | None, str] = {

@@ -1,0 +1,54 @@
+"""Scenarios and studies of the tests: short ones, in which everything happens that can."""
+
+from stickslip_ros.physics.simulation import Progress
+from stickslip_ros.scenario.files import Scenario, load_scenario
+from stickslip_ros.studies.plan import Axis, Carry, Grid
+from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.study import Study
+
+SHORT = Course(transient=5.0, cycles=2)
+"""Long enough to tell one motion from another."""
+
+EXPONENTIAL = (
+    "plant.expects_control=false",
+    "plant.friction.law=exponential",
+    "plant.friction.static=1.0",
+    "plant.friction.kinetic=0.5",
+    "plant.friction.decay_speed=0.5",
+    "plant.friction.viscous=0.0",
+    "plant.damping=0.1",
+)
+"""A law under which rest and limit cycle coexist, from the Hopf point on."""
+
+HOPF_SPEED = 1.1512925464970229
+"""Of that law, where its slope is the damping: 0.5 ln 10 m/s."""
+
+CYCLE_LOST_SPEED = 1.8366
+"""Of that law, where its limit cycle meets the unstable one, m/s."""
+
+
+def paper(*overrides: str) -> Scenario:
+    """Return the scenario of the paper, under control."""
+    return load_scenario("paper", overrides)
+
+
+def free(*overrides: str) -> Scenario:
+    """Return the scenario of the paper without control."""
+    return paper("plant.expects_control=false", *overrides)
+
+
+def speeds(
+    count: int, first: float = 0.2, last: float = 0.6, *, carry: Carry | None = None
+) -> Study:
+    """Return a study of the free drive over so many belt speeds."""
+    return Study(free(), Grid((Axis("plant.belt_speed", first, last, count),), carry), SHORT)
+
+
+def stop_at(count: int) -> Progress:
+    """Return a progress that interrupts a study when so many of its points are done."""
+
+    def progress(done: float) -> None:
+        if done >= count:
+            raise KeyboardInterrupt
+
+    return progress

@@ -1,0 +1,259 @@
+"""Basins against published shares, and the counting of attractors."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import sqrt
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.measures import Measures, Regime
+from stickslip_ros.physics.theory.closed_loop import critical_gains
+from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.studies.basin import (
+    POSITION,
+    VELOCITY,
+    Basins,
+    basin_study,
+    default_axes,
+)
+from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.plan import Axis, Carry, Grid, Plan, Sample
+from stickslip_ros.studies.runner import run
+from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.study import Point
+from tests.studies.studies import EXPONENTIAL, free, paper
+
+PUBLISHED = {
+    1.0: 1.0,
+    1.1: 1.0,
+    1.175: 0.9874,
+    1.25: 0.9162,
+    1.325: 0.8622,
+    1.4: 0.7890,
+    1.475: 0.7176,
+    1.5: 0.6880,
+    1.55: 0.6364,
+    1.625: 0.5664,
+    1.7: 0.5088,
+    1.775: 0.4448,
+    1.85: 0.0,
+    2.0: 0.0,
+}
+"""Share of 5000 uniform starts that lead to the limit cycle, by belt speed, m/s (bSTAB, Stender
+and Hoffmann, Nonlinear Dyn 107, 2022; the results as stored with pyBasin)."""
+
+STARTS = (Axis(POSITION, -2.0, 2.0, 2), Axis(VELOCITY, 0.0, 2.0, 2))
+
+QUICK = (1.175, 1.5)
+
+
+def basins_of(scenario: Scenario, plan: Plan, *, continuous: bool = False) -> Basins:
+    with Journal(basin_study(scenario, plan, continuous=continuous)) as journal:
+        run(journal)
+        return Basins.of(journal.points())
+
+
+def share(basins: Basins, *regimes: Regime) -> float:
+    """Return the share of those regimes, all motions having settled."""
+    assert all(attractor.steady for attractor in basins.attractors)
+    return sum(a.share for a in basins.attractors if a.regime in regimes)
+
+
+def _check_published(belt_speed: float, count: int) -> None:
+    scenario = free(*EXPONENTIAL, f"plant.belt_speed={belt_speed}")
+    basins = basins_of(scenario, Sample(STARTS, count, 1))
+    cycle, expected = share(basins, Regime.STICK_SLIP), PUBLISHED[belt_speed]
+    variance = expected * (1.0 - expected)
+    assert abs(cycle - expected) <= 3.5 * sqrt(variance / count + variance / 5000)
+    assert cycle + share(basins, Regime.EQUILIBRIUM) == pytest.approx(1.0)
+    for attractor in basins.attractors:
+        assert attractor.count == round(attractor.share * count)
+        error = sqrt(attractor.share * (1.0 - attractor.share) / count)
+        assert attractor.standard_error == pytest.approx(error, rel=1e-12)
+
+
+@pytest.mark.parametrize("belt_speed", QUICK)
+def test_the_shares_are_the_published_ones(belt_speed: float) -> None:
+    _check_published(belt_speed, 1000)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("belt_speed", PUBLISHED)
+def test_of_many_starts_too_the_shares_are_the_published_ones(belt_speed: float) -> None:
+    _check_published(belt_speed, 5000)
+
+
+@pytest.mark.long
+def test_the_share_of_a_grid_is_that_of_a_finer_one_by_another_method() -> None:
+    scenario = free(*EXPONENTIAL, "plant.belt_speed=1.5")
+    # Each start is the middle of its part of the range.
+    position, velocity = Axis(POSITION, -1.98, 1.98, 100), Axis(VELOCITY, 0.02, 1.98, 50)
+    basins = basins_of(scenario, Grid((position, velocity)))
+    assert share(basins, Regime.STICK_SLIP) == pytest.approx(0.6929, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("belt_speed", "regime"), [(0.2, Regime.STICK_SLIP), (0.47, Regime.PURE_SLIP),
+                               (0.51, Regime.EQUILIBRIUM)]
+)  # fmt: skip
+def test_under_the_papers_law_everything_leads_to_the_one_attractor(
+    belt_speed: float, regime: Regime
+) -> None:
+    # Rest loses stability at 0.48876 m/s, and the cycle is born there.
+    scenario = free(f"plant.belt_speed={belt_speed}")
+    reach = Axis(POSITION, -1.0, 1.0, 7), Axis(VELOCITY, -1.0, 1.0, 7)
+    (attractor,) = basins_of(scenario, Grid(reach)).attractors
+    assert attractor.regime is regime
+    assert attractor.steady
+    assert (attractor.count, attractor.share, attractor.standard_error) == (49, 1.0, 0.0)
+
+
+def test_beyond_the_critical_cubic_gain_rest_cycle_and_running_away_coexist() -> None:
+    corner = "washout_controller.corner_frequency=0.5"
+    drive = paper().plant.as_drive()
+    washout = paper(corner).washout_controller.as_washout()
+    critical = critical_gains(drive, washout.gains)
+    assert critical is not None
+    assert critical.cubic is not None
+    linear, cubic = 1.1 * critical.linear, critical.cubic + 1.0
+    scenario = paper(
+        corner,
+        f"washout_controller.linear_gain={linear}",
+        f"washout_controller.cubic_gain={cubic}",
+    )
+    middle = drive.equilibrium_position
+    plan = Grid((Axis(POSITION, middle - 0.8, middle + 0.8, 9), Axis(VELOCITY, -0.8, 0.8, 9)))
+    basins = basins_of(scenario, plan, continuous=True)
+    assert {a.regime for a in basins.attractors} == {
+        Regime.EQUILIBRIUM, Regime.STICK_SLIP, Regime.UNBOUNDED
+    }  # fmt: skip
+    assert all(attractor.steady for attractor in basins.attractors)
+    # Where the bifurcation is supercritical, and with the same linear gain, there is no cycle.
+    soft = scenario.changed({"washout_controller.cubic_gain": -1.0})
+    (rest,) = basins_of(soft, plan, continuous=True).attractors
+    assert rest.regime is Regime.EQUILIBRIUM
+
+
+def point(
+    regime: Regime | None,
+    *,
+    amplitude: float | None = None,
+    midpoint: float | None = 0.5,
+    steady: bool = True,
+) -> Point:
+    measures = Measures(amplitude, amplitude, midpoint, 1.0, 1.0, 0.0, 6, regime)
+    return Point(0, measures, steady, (), None)
+
+
+SMALL = point(Regime.PURE_SLIP, amplitude=0.3)
+LARGE = point(Regime.STICK_SLIP, amplitude=1.2)
+SHIFTED = point(Regime.PURE_SLIP, amplitude=0.3, midpoint=0.55)
+REST = point(Regime.EQUILIBRIUM, amplitude=1e-9)
+AWAY = point(Regime.UNBOUNDED, midpoint=None)
+RUNNING_DOWN = point(Regime.EQUILIBRIUM, amplitude=1e-4, steady=False)
+GROWING = point(Regime.PURE_SLIP, amplitude=0.7, steady=False)
+FAILED = point(None, midpoint=None, steady=False)
+KINDS = [SMALL, LARGE, SHIFTED, REST, AWAY, RUNNING_DOWN, GROWING, FAILED]
+
+
+def blurred(kind: Point, share: float) -> Point:
+    """Return the point with amplitude and midpoint off by a share of the amplitude."""
+    measures = kind.measures
+    if measures.amplitude is None or measures.midpoint is None:
+        return kind
+    off = share * measures.amplitude
+    return kind._replace(
+        measures=replace(
+            measures, amplitude=measures.amplitude + off, midpoint=measures.midpoint - off
+        )
+    )
+
+
+@given(
+    counts=st.lists(st.integers(1, 9), min_size=len(KINDS), max_size=len(KINDS), unique=True),
+    random=st.randoms(use_true_random=False),
+)
+def test_the_order_of_the_points_changes_no_count(counts: list[int], random: Random) -> None:
+    points = [
+        blurred(kind, random.uniform(-0.009, 0.009))
+        for kind, count in zip(KINDS, counts, strict=True)
+        for _ in range(count)
+    ]
+    places = list(range(len(points)))
+    random.shuffle(places)
+    basins = Basins.of(points[place] for place in places)
+    total = sum(counts)
+    assert [attractor.count for attractor in basins.attractors] == sorted(counts, reverse=True)
+    for attractor in basins.attractors:
+        assert attractor.share == attractor.count / total
+        assert attractor.standard_error == pytest.approx(
+            sqrt(attractor.share * (1.0 - attractor.share) / total), rel=1e-12
+        )
+    by_kind = iter(points)
+    for kind, count in zip(KINDS, counts, strict=True):
+        (place,) = {basins.place(next(by_kind)) for _ in range(count)}
+        attractor = basins.attractors[place]
+        assert (attractor.count, attractor.regime) == (count, kind.measures.regime)
+
+
+def test_what_is_not_known_and_what_is_not_steady_stand_apart() -> None:
+    later = point(Regime.PURE_SLIP, amplitude=0.1, steady=False)
+    stopped = point(None, amplitude=0.2, steady=False)
+    basins = Basins.of([GROWING, later, FAILED, stopped, SMALL, SMALL, SMALL])
+    assert [(a.regime, a.steady, a.count) for a in basins.attractors] == [
+        (Regime.PURE_SLIP, True, 3),
+        (Regime.PURE_SLIP, False, 2),
+        (None, False, 2),
+    ]
+    assert [attractor.amplitude for attractor in basins.attractors] == [0.3, None, None]
+
+
+def test_no_points_have_no_attractors() -> None:
+    assert Basins.of([]).attractors == ()
+
+
+@pytest.mark.parametrize(
+    "axes",
+    [
+        (STARTS[0],),
+        (STARTS[0], Axis("plant.belt_speed", 0.1, 0.2, 2)),
+        (*STARTS, Axis("plant.belt_speed", 0.1, 0.2, 2)),
+    ],
+)
+def test_a_basin_over_anything_else_is_refused(axes: Sequence[Axis]) -> None:
+    message = f"over {POSITION} and {VELOCITY}, not {', '.join(axis.parameter for axis in axes)}"
+    for plan in (Grid(tuple(axes)), Sample(tuple(axes), 5)):
+        with pytest.raises(InvalidInputError, match=message):
+            basin_study(free(), plan)
+
+
+def test_a_basin_that_is_carried_on_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="a basin is over"):
+        basin_study(free(), Grid(STARTS, Carry.UP))
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [(), ("plant.normal_force=1000", "plant.mass=100", "plant.stiffness=1e6"),
+     ("plant.belt_speed=-0.4",), ("plant.belt_speed=0.0",), EXPONENTIAL],
+)  # fmt: skip
+def test_by_default_starts_reach_beyond_the_vibration(overrides: Sequence[str]) -> None:
+    scenario = free(*overrides)
+    position, velocity = default_axes(scenario, 5)
+    study = basin_study(scenario, Grid((position, velocity)), course=Course(100.0))
+    with Journal(study) as journal:
+        run(journal)
+        found = [point.measures for point in journal.points()]
+    for measures in found:
+        assert measures.amplitude is not None
+        assert measures.midpoint is not None
+        assert position.first < measures.midpoint - measures.amplitude
+        assert position.last > measures.midpoint + measures.amplitude
+        assert velocity.last > (measures.velocity_amplitude or 0.0)
+    drive = scenario.plant.as_drive()
+    assert position.value(2) == pytest.approx(drive.equilibrium_position, abs=1e-12)
+    assert velocity.value(2) == 0.0

@@ -1,0 +1,236 @@
+"""Columns and tables: what is read back is what was found, to the last bit."""
+
+import csv
+import json
+import tracemalloc
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from io import StringIO
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stickslip_ros.physics.measures import Measures, Regime
+from stickslip_ros.studies.columns import (
+    COLUMNS,
+    Columns,
+    Further,
+    compute_columns,
+    write_csv,
+    write_json,
+)
+from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.plan import Axis, Carry, Grid, Sample
+from stickslip_ros.studies.runner import run
+from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.study import MEASURES, Piece, Point, Study
+from tests.studies.studies import SHORT, free, speeds
+
+MINIMUM = Axis("plant.friction.minimum", 0.1, 0.6, 4)
+SPEED = Axis("plant.belt_speed", 0.0, 0.6, 5)
+SLOPE = Axis("plant.friction.slope", 0.3, 0.9, 3)
+STARTS = (
+    Axis("plant.initial.position", -1.0, 1.0, 2),
+    Axis("plant.initial.velocity", 0.0, 1.0, 2),
+)
+
+STUDIES = {
+    "grid": Study(free(), Grid((MINIMUM, SPEED)), SHORT),
+    "both ways": Study(free(), Grid((MINIMUM, SPEED), Carry.BOTH), SHORT),
+    "sample": Study(free(), Sample(STARTS, 9, 4), SHORT),
+    "running away": Study(
+        free("plant.friction.law=linear", "plant.belt_speed=0.2"), Grid((SLOPE,)), Course(40.0, 2)
+    ),
+}
+
+
+@pytest.fixture(params=STUDIES.values(), ids=list(STUDIES), scope="module")
+def journal(request: pytest.FixtureRequest) -> Iterator[Journal]:
+    with Journal(request.param) as journal:
+        run(journal)
+        yield journal
+
+
+NUMBERS = [name for name in MEASURES if name not in ("cycles", "regime")]
+
+
+def bits(values: Any) -> list[bytes]:
+    """Return the bytes of each number, which of two NaN are the same too."""
+    return [np.float64(nan if value in (None, "") else value).tobytes() for value in values]
+
+
+def test_columns_are_the_points_in_their_order(journal: Journal) -> None:
+    columns, points = Columns.of(journal), list(journal.points())
+    assert len(points) == journal.study.plan.size
+    for name in NUMBERS:
+        expected = [getattr(point.measures, name) for point in points]
+        assert bits(getattr(columns, name)) == bits(expected), name
+    assert columns.cycles.tolist() == [point.measures.cycles for point in points]
+    assert columns.regime.tolist() == [point.measures.regime for point in points]
+    assert columns.steady.tolist() == [point.steady for point in points]
+    assert columns.reason.tolist() == [point.reason for point in points]
+    assert columns.turning_points == tuple(point.turning_points for point in points)
+    rows = [journal.study.plan.values(number) for number in range(len(points))]
+    for place, parameter in enumerate(journal.study.plan.parameters):
+        assert columns.values[parameter].tolist() == [row[place] for row in rows]
+
+
+def test_a_point_that_is_not_done_has_nothing() -> None:
+    study = speeds(3)
+    done = Measures(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 2, Regime.PURE_SLIP)
+    with Journal(study) as journal:
+        journal.add(Piece([Point(1, done, True, (0.5,), None)], None))
+        columns = Columns.of(journal)
+    assert bits(columns.amplitude) == bits([None, 0.1, None])
+    assert columns.regime.tolist() == [None, Regime.PURE_SLIP, None]
+    assert columns.steady.tolist() == [False, True, False]
+    assert columns.cycles.tolist() == [0, 2, 0]
+    assert columns.turning_points == ((), (0.5,), ())
+    assert columns.reason.tolist() == [None] * 3
+
+
+FURTHER: Further = {"twice": lambda point: 2 * point.number}
+
+
+def test_a_csv_read_back_is_the_columns_to_the_last_bit(journal: Journal) -> None:
+    stream = StringIO()
+    write_csv(stream, journal, FURTHER)
+    columns, plan = Columns.of(journal), journal.study.plan
+    read = csv.DictReader(StringIO(stream.getvalue()))
+    rows = list(read)
+    assert read.fieldnames == [*plan.parameters, "twice", *COLUMNS]
+    assert len(rows) == plan.size
+    for name in (*NUMBERS, "cycles"):
+        assert bits(row[name] for row in rows) == bits(getattr(columns, name)), name
+    for parameter in plan.parameters:
+        assert bits(row[parameter] for row in rows) == bits(columns.values[parameter])
+    assert [row["regime"] or None for row in rows] == columns.regime.tolist()
+    assert [row["steady"] == "True" for row in rows] == columns.steady.tolist()
+    assert [row["reason"] or None for row in rows] == columns.reason.tolist()
+    assert [int(row["twice"]) for row in rows] == list(range(0, 2 * plan.size, 2))
+    for row, turning_points in zip(rows, columns.turning_points, strict=True):
+        assert bits(row["turning_points"].split()) == bits(turning_points)
+
+
+def refuse(constant: str) -> None:
+    raise AssertionError(f"{constant} is not JSON")
+
+
+def as_json(journal: Journal, further: Further | None = None, **made_of: Any) -> dict[str, Any]:
+    stream = StringIO()
+    write_json(stream, journal, further or {}, made_of)
+    read = json.loads(stream.getvalue(), parse_constant=refuse)
+    assert isinstance(read, dict)
+    return read
+
+
+def test_a_json_read_back_is_the_columns_to_the_last_bit(journal: Journal) -> None:
+    read, columns = as_json(journal, FURTHER), Columns.of(journal)
+    for name in (*NUMBERS, "cycles"):
+        assert bits(read[name]) == bits(getattr(columns, name)), name
+    assert read["regime"] == columns.regime.tolist()
+    assert read["steady"] == columns.steady.tolist()
+    assert read["reason"] == columns.reason.tolist()
+    assert [tuple(section) for section in read["turning_points"]] == list(columns.turning_points)
+    assert read["twice"] == list(range(0, 2 * journal.study.plan.size, 2))
+
+
+def test_the_arrays_of_a_grid_are_row_major_over_the_values_of_its_axes() -> None:
+    with Journal(STUDIES["both ways"]) as journal:
+        run(journal)
+        read, columns = as_json(journal, scenario={"plant.mass": 1.0}), Columns.of(journal)
+    assert read["parameters"] == ["plant.friction.minimum", "plant.belt_speed"]
+    assert read["values"] == [MINIMUM.values().tolist(), SPEED.values().tolist()]
+    amplitude = np.array(read["amplitude"], dtype=float).reshape(2, 4, 5)
+    first, last = columns.values["plant.friction.minimum"], columns.values["plant.belt_speed"]
+    for row, found in np.ndenumerate(amplitude):
+        place = np.ravel_multi_index(row, amplitude.shape)
+        assert first[place] == read["values"][0][row[1]]
+        assert last[place] == read["values"][1][row[2]]
+        assert bits([found]) == bits([columns.amplitude[place]])
+    assert read["scenario"] == {"plant.mass": 1.0}
+    assert read["plan"]["carry"] == "both"
+    assert read["course"] == {"transient": 5.0, "cycles": 2, "patience": 1}
+    assert read["continuous_control"] is False
+
+
+def test_of_a_sample_there_are_the_values_of_each_point() -> None:
+    with Journal(STUDIES["sample"]) as journal:
+        run(journal)
+        read, plan = as_json(journal), journal.study.plan
+    assert read["parameters"] == ["plant.initial.position", "plant.initial.velocity"]
+    assert [tuple(values) for values in read["values"]] == [plan.values(row) for row in range(9)]
+    assert read["plan"]["kind"] == "sample"
+    assert read["plan"]["seed"] == 4
+
+
+def test_whole_numbers_stay_whole_in_a_table() -> None:
+    seeds = Axis("plant.force_jitter_seed", 0.0, 10.0, 3)
+    with Journal(Study(free(), Grid((seeds,)), SHORT)) as journal:
+        run(journal)
+        assert [repr(value) for value in as_json(journal)["values"][0]] == ["0", "5", "10"]
+        write_csv(stream := StringIO(), journal, {})
+    rows = csv.reader(StringIO(stream.getvalue()))
+    assert [row[0] for row in rows] == ["plant.force_jitter_seed", "0", "5", "10"]
+
+
+def test_any_reason_is_read_back() -> None:
+    nothing = Measures(None, None, None, None, None, None, 0, None)
+    reason = 'a, "b"\n c; \u00e4'
+    with Journal(speeds(2)) as journal:
+        journal.add(Piece([Point(n, nothing, False, (), reason) for n in (0, 1)], None))
+        read = as_json(journal)
+        write_csv(stream := StringIO(), journal, {})
+    rows = list(csv.DictReader(StringIO(stream.getvalue(), newline="")))
+    assert read["reason"] == [row["reason"] for row in rows] == [reason] * 2
+
+
+def _peak(count: int, tmp_path: Path) -> tuple[int, int]:
+    """Return the peaks of memory, bytes, of writing a table of so many points as CSV and JSON."""
+    measures = Measures(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 6, Regime.PURE_SLIP)
+    with Journal(speeds(count)) as journal:
+        for first in range(0, count, 500):
+            numbers = range(first, first + 500)
+            points = [Point(number, measures, True, (0.1,), None) for number in numbers]
+            journal.add(Piece(points, None))
+        peaks: list[int] = []
+        for write in (write_csv, partial(write_json, made_of={})):
+            with (tmp_path / "table").open("w") as stream:
+                tracemalloc.start()
+                try:
+                    write(stream, journal, {})
+                    peaks.append(tracemalloc.get_traced_memory()[1])
+                finally:
+                    tracemalloc.stop()
+    return peaks[0], peaks[1]
+
+
+def test_the_memory_of_writing_a_table_is_for_one_piece_of_it(tmp_path: Path) -> None:
+    # Buffers of files fill up; a column of numbers would be a megabyte.
+    few, many = _peak(1_000, tmp_path), _peak(16_000, tmp_path)
+    for one, other in zip(few, many, strict=True):
+        assert other < one + 700_000
+
+
+def test_computing_columns_in_another_way_changes_no_bit(tmp_path: Path) -> None:
+    study = STUDIES["both ways"]
+    path = tmp_path / "study.part"
+    counts: list[float] = []
+    alone = compute_columns(study, path=path, progress=counts.append)
+    assert counts[-1] == study.plan.size
+    with ThreadPoolExecutor(2) as threads:
+        others = [
+            compute_columns(study, executor=threads, in_flight=3),
+            compute_columns(study, path=path, progress=counts.append),
+        ]
+    assert counts[-2:] == [study.plan.size] * 2
+    for other in others:
+        for name in NUMBERS:
+            assert bits(getattr(other, name)) == bits(getattr(alone, name))
+        assert other.turning_points == alone.turning_points
+        assert other.regime.tolist() == alone.regime.tolist()
+    assert path.exists()

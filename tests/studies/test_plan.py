@@ -1,0 +1,240 @@
+"""Plans: texts of axes, grids in row-major order, chains that are carried, random samples."""
+
+from dataclasses import replace
+from itertools import pairwise, product
+from math import isclose
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.studies.plan import MOST_POINTS, Axis, Carry, Grid, Sample
+
+SPEED = "plant.belt_speed"
+AXES = [
+    Axis(SPEED, 0.1, 0.7, 4),
+    Axis("plant.damping", 1e-3, 1.0, 3, logarithmic=True),
+    Axis("plant.friction.static", 0.9, 0.3, 2),
+]
+
+
+@pytest.mark.parametrize(
+    ("text", "axis"),
+    [
+        ("plant.belt_speed=0.02:0.6:59", Axis(SPEED, 0.02, 0.6, 59)),
+        ("plant.belt_speed=0.6:-0.02:2", Axis(SPEED, 0.6, -0.02, 2)),
+        ("plant.damping=1e-3:1:7:log", Axis("plant.damping", 1e-3, 1.0, 7, True)),
+        ("washout_controller.linear_gain=-1:-10:3:log",
+         Axis("washout_controller.linear_gain", -1.0, -10.0, 3, True)),
+        ("plant.friction.minimum=0:0.4:5", Axis("plant.friction.minimum", 0.0, 0.4, 5)),
+        ("plant.force_jitter_seed=0:9:10", Axis("plant.force_jitter_seed", 0.0, 9.0, 10)),
+    ],
+)  # fmt: skip
+def test_a_text_is_read_as_the_axis_it_stands_for(text: str, axis: Axis) -> None:
+    assert Axis.parse(text) == axis
+    assert Axis.parse(str(axis)) == axis
+
+
+FORM = "must be NODE.PARAMETER=A:B:COUNT, or A:B:COUNT:log"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", FORM),
+        ("plant.belt_speed", FORM),
+        ("plant.belt_speed=", FORM),
+        ("plant.belt_speed=1", FORM),
+        ("plant.belt_speed=1:2", FORM),
+        ("plant.belt_speed=1:2:", FORM),
+        ("plant.belt_speed=1:2:3:", FORM),
+        ("plant.belt_speed=1:2:3:linear", FORM),
+        ("plant.belt_speed=1:2:3:log:log", FORM),
+        ("plant.belt_speed=1:2:3:log:", FORM),
+        ("plant.belt_speed=one:2:3", FORM),
+        ("plant.belt_speed=1:2:3.0", FORM),
+        ("plant.belt_speed=1:2:1e3", FORM),
+        (f"plant.belt_speed=1:2:{'9' * 5000}", FORM),
+        ("belt_speed=1:2:3", "must be a parameter of plant or washout_controller"),
+        ("analyzer.window=1:2:3", "must be a parameter of plant or washout_controller"),
+        ("=1:2:3", "must be a parameter of plant or washout_controller"),
+        ("plant=1:2:3", "unknown parameter; numbers of plant are belt_speed, damping"),
+        ("plant.speed=1:2:3", "unknown parameter; numbers of plant are belt_speed, damping"),
+        (
+            "washout_controller.gain=1:2:3",
+            "numbers of washout_controller are corner_frequency, cubic_gain, force_limit",
+        ),
+        ("plant.friction.law=1:2:3", "is no number"),
+        ("plant.autostart=0:1:2", "is no number"),
+        ("plant.belt_speed=1:1:3", "1:1 must be two different finite numbers"),
+        ("plant.belt_speed=1:nan:3", "1:nan must be two different finite numbers"),
+        ("washout_controller.force_limit=1:inf:3", "1:inf must be two different finite numbers"),
+        ("plant.belt_speed=1:2:1", "1 values are not from 2 to 1,000,000,000"),
+        ("plant.belt_speed=1:2:-3", "-3 values are not from 2 to 1,000,000,000"),
+        (f"plant.belt_speed=1:2:{MOST_POINTS + 1}", "values are not from 2 to 1,000,000,000"),
+        ("plant.belt_speed=0:1:3:log", "with :log 0:1 must be of one sign, without zero"),
+        ("plant.belt_speed=-1:1:3:log", "with :log -1:1 must be of one sign, without zero"),
+        ("plant.mass=0:1:3", "plant.mass=0:1:3: mass = 0.0.* at least 1e-30"),
+        ("plant.mass=1:-1:3", "mass = -1.0.* at least 1e-30"),
+        ("plant.belt_speed=0:1e31:3", r"belt_speed = 1e\+31.* at most 1e\+30"),
+        ("plant.friction.static=-0.1:1:3", "friction.static = -0.1.* at least 0"),
+        ("plant.flow_window=100:300:3", "flow_window = 100.* at least 200"),
+    ],
+)
+def test_any_other_text_is_refused_with_what_was_allowed(text: str, message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message) as refusal:
+        Axis.parse(text)
+    assert len(str(refusal.value)) < 1000
+
+
+numbers = st.floats(-1e3, 1e3)
+
+
+@given(first=numbers, last=numbers, count=st.integers(2, 50))
+def test_the_values_go_from_the_first_to_the_last_exactly(
+    first: float, last: float, count: int
+) -> None:
+    if first == last:
+        return
+    values = Axis(SPEED, first, last, count).values()
+    assert values[0] == first
+    assert values[-1] == last
+    assert len(values) == count
+    steps = np.diff(values)
+    assert steps == pytest.approx((last - first) / (count - 1), abs=1e-12)
+
+
+@given(
+    first=st.floats(1e-30, 1e30),
+    last=st.floats(1e-30, 1e30),
+    sign=st.sampled_from([1.0, -1.0]),
+    count=st.integers(2, 50),
+)
+def test_logarithmic_values_have_one_ratio_and_exact_ends(
+    first: float, last: float, sign: float, count: int
+) -> None:
+    if isclose(first, last):
+        return
+    values = Axis(SPEED, sign * first, sign * last, count, logarithmic=True).values()
+    assert values[0] == sign * first
+    assert values[-1] == sign * last
+    ratio = (last / first) ** (1.0 / (count - 1))
+    assert values[1:] / values[:-1] == pytest.approx(ratio, rel=1e-9)
+
+
+def test_values_of_a_whole_number_are_whole() -> None:
+    axis = Axis("plant.force_jitter_seed", 0.0, 10.0, 4)
+    assert [axis.value(number) for number in range(4)] == [0, 3, 7, 10]
+    assert all(isinstance(axis.value(number), int) for number in range(4))
+    assert axis.values().tolist() == [0.0, 3.0, 7.0, 10.0]
+
+
+def test_an_axis_knows_its_unit() -> None:
+    assert Axis(SPEED, 0.0, 1.0, 2).unit == "m/s"
+    assert Axis("plant.friction.static", 0.4, 1.0, 2).unit == ""
+
+
+@pytest.mark.parametrize("axes", [AXES[:1], AXES[:2], AXES])
+def test_the_last_axis_of_a_grid_varies_fastest(axes: list[Axis]) -> None:
+    grid = Grid(tuple(axes))
+    expected = list(product(*(axis.values().tolist() for axis in axes)))
+    assert grid.size == len(expected)
+    assert [grid.values(index) for index in range(grid.size)] == expected
+    assert grid.parameters == tuple(axis.parameter for axis in axes)
+    assert list(grid.chains()) == [range(grid.size)]
+    assert not grid.carried
+
+
+@pytest.mark.parametrize("carry", [None, Carry.BOTH])
+def test_the_corners_of_a_grid_have_the_ends_of_its_axes(carry: Carry | None) -> None:
+    grid = Grid(tuple(AXES), carry)
+    corners = [grid.values(index) for index in grid.corners()]
+    assert corners == list(product(*((axis.first, axis.last) for axis in AXES)))
+
+
+axis_counts = st.lists(st.integers(2, 7), min_size=1, max_size=3)
+
+
+@given(counts=axis_counts, carry=st.sampled_from(Carry))
+def test_every_point_is_carried_on_once_from_its_neighbour(counts: list[int], carry: Carry) -> None:
+    axes = tuple(replace(axis, count=count) for axis, count in zip(AXES, counts, strict=False))
+    grid = Grid(axes, carry)
+    chains = list(grid.chains())
+    assert sorted(index for chain in chains for index in chain) == list(range(grid.size))
+    assert grid.size == len(carry.directions) * np.prod([axis.count for axis in axes])
+    along = axes[-1].values().tolist()
+    for chain in chains:
+        (direction,) = {grid.direction(index) for index in chain}
+        values = [grid.values(index) for index in chain]
+        assert len({value[:-1] for value in values}) == 1
+        in_order = along if direction is Carry.UP else along[::-1]
+        assert [value[-1] for value in values] == in_order
+
+
+def test_both_directions_have_the_same_values_one_after_the_other() -> None:
+    grid = Grid(tuple(AXES[:2]), Carry.BOTH)
+    one_way = grid.size // 2
+    assert [grid.direction(index) for index in (0, one_way - 1)] == [Carry.UP] * 2
+    assert [grid.direction(index) for index in (one_way, grid.size - 1)] == [Carry.DOWN] * 2
+    for index in range(one_way):
+        assert grid.values(index) == grid.values(index + one_way)
+
+
+def test_a_chain_begins_at_its_own_end() -> None:
+    up, down = Grid((AXES[0],), Carry.BOTH).chains()
+    assert (up[0], up[-1]) == (0, 3)
+    assert (down[0], down[-1]) == (7, 4)
+    assert all(abs(one - other) == 1 for one, other in pairwise(down))
+
+
+def test_a_grid_refuses_one_parameter_twice_and_too_many_points() -> None:
+    with pytest.raises(InvalidInputError, match="belt_speed: must be different parameters"):
+        Grid((AXES[0], Axis(SPEED, 0.0, 1.0, 2)))
+    many = replace(AXES[0], count=40_000), replace(AXES[1], count=40_000)
+    with pytest.raises(InvalidInputError, match="1600000000 points are more than 1,000,000,000"):
+        Grid(many)
+
+
+def test_a_larger_sample_begins_with_the_smaller_one() -> None:
+    small, large = Sample(tuple(AXES), 10, 3), Sample(tuple(AXES), 1000, 3)
+    assert [small.values(index) for index in range(10)] == [
+        large.values(index) for index in range(10)
+    ]
+    assert list(large.chains()) == [range(1000)]
+    assert not large.carried
+
+
+def test_samples_of_two_seeds_and_two_points_have_nothing_in_common() -> None:
+    samples = [Sample(tuple(AXES), 200, seed) for seed in (0, 1, 2, 2**32, 2**40)]
+    values = [value for sample in samples for i in range(200) for value in sample.values(i)]
+    assert len(set(values)) == len(values)
+
+
+def test_a_sample_is_uniform_and_its_axes_are_independent() -> None:
+    axes = (Axis(SPEED, -2.0, 2.0, 2), Axis("plant.damping", 0.0, 2.0, 2))
+    sample = Sample(axes, 4000, 7)
+    values = np.array([sample.values(index) for index in range(sample.size)])
+    shares = (values - [-2.0, 0.0]) / [4.0, 2.0]
+    assert shares.min() >= 0.0
+    assert shares.max() <= 1.0
+    # Five standard deviations of the counts in 8 x 8 boxes, of their mean 62.5 each.
+    counts, *_ = np.histogram2d(*shares.T, bins=8, range=[[0, 1], [0, 1]])
+    assert np.abs(counts - 62.5).max() < 5.0 * 62.5**0.5
+    neighbours = np.corrcoef(shares[:-1, 0], shares[1:, 0])[0, 1]
+    assert abs(neighbours) < 5.0 / 4000**0.5
+    assert abs(np.corrcoef(*shares.T)[0, 1]) < 5.0 / 4000**0.5
+
+
+@pytest.mark.parametrize("size", [0, -1, MOST_POINTS + 1])
+def test_a_sample_of_no_points_or_too_many_is_refused(size: int) -> None:
+    with pytest.raises(InvalidInputError, match=f"^{size} points are not from 1 to 1,000,000,000"):
+        Sample((AXES[0],), size)
+
+
+def test_a_sample_refuses_a_seed_below_zero_and_one_parameter_twice() -> None:
+    with pytest.raises(InvalidInputError, match="seed -1: must be 0 or more"):
+        Sample((AXES[0],), 5, -1)
+    with pytest.raises(InvalidInputError, match="belt_speed: must be different parameters"):
+        Sample((AXES[0], AXES[0]), 5)

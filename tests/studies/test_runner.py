@@ -1,0 +1,358 @@
+"""The runner: wherever the tasks are computed, and whoever dies, the points are the same."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Generator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import active_children, parent_process
+from pathlib import Path
+from select import select
+from threading import Condition, Thread
+from typing import Any
+
+import pytest
+
+from stickslip_ros.errors import InvalidInputError, RunError
+from stickslip_ros.studies import runner
+from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.plan import Axis, Carry, Grid
+from stickslip_ros.studies.runner import local_processes, run, run_here
+from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.study import Piece, Point, Study, compute
+from tests.studies.studies import SHORT, free, paper, speeds, stop_at
+
+MINIMUM = Axis("plant.friction.minimum", 0.1, 0.6, 6)
+SPEED = Axis("plant.belt_speed", 0.05, 0.6, 8)
+SLOPE = Axis("plant.friction.slope", 0.1, 0.9, 4)
+GAIN = Axis("washout_controller.linear_gain", -1.0, 100.0, 9)
+
+STUDIES = {
+    "each alone": Study(free(), Grid((MINIMUM, SPEED)), SHORT),
+    "up and down": Study(free(), Grid((SPEED, MINIMUM), Carry.BOTH), SHORT),
+    "running away": Study(
+        free("plant.friction.law=linear"), Grid((SPEED, SLOPE), Carry.DOWN), Course(20.0, 2)
+    ),
+    "sampled": Study(
+        paper("plant.rate=20.0", "plant.force_jitter=0.1"), Grid((GAIN,), Carry.UP), SHORT
+    ),
+}
+"""Among whose points some are refused and some run away."""
+
+
+class Shuffled(Executor):
+    """Computes tasks in random order, one at a time, in a thread."""
+
+    def __init__(self, seed: int = 0) -> None:
+        self.most_pending = 0
+        self.submitted: list[tuple[int, ...]] = []
+        self._random = random.Random(seed)
+        self._pending: list[tuple[Future[Any], Callable[[], Any]]] = []
+        self._unfinished = 0
+        self._ended = False
+        self._changed = Condition()
+        self._thread = Thread(target=self._work)
+        self._thread.start()
+
+    def submit(self, task: Any, /, *arguments: Any, **_: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        with self._changed:
+            self._pending.append((future, lambda: task(*arguments)))
+            self.submitted.append(tuple(arguments[1]))
+            self._unfinished += 1
+            self.most_pending = max(self.most_pending, self._unfinished)
+            self._changed.notify()
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        with self._changed:
+            self._ended = True
+            self._changed.notify()
+        self._thread.join()
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._ended or self._pending)
+                if not self._pending:
+                    return
+                future, task = self._pending.pop(self._random.randrange(len(self._pending)))
+            if future.set_running_or_notify_cancel():
+                result = task()
+                with self._changed:
+                    self._unfinished -= 1
+                future.set_result(result)
+
+
+@pytest.fixture(autouse=True)
+def _small_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "_LARGEST_TASK", 3)
+
+
+def computed(study: Study, executor: Executor | None = None, in_flight: int = 5) -> list[Point]:
+    with Journal(study) as journal:
+        run(journal, executor, in_flight=in_flight)
+        assert journal.count == study.plan.size
+        return list(journal.points())
+
+
+def at_once(study: Study) -> list[Point]:
+    """Return the points without a runner, each chain at once."""
+    points = [p for chain in study.plan.chains() for p in compute(study, chain, None).points]
+    return sorted(points, key=lambda point: point.number)
+
+
+@pytest.mark.parametrize("study", STUDIES.values(), ids=STUDIES)
+def test_in_this_process_in_threads_and_in_any_order_the_points_are_the_same(study: Study) -> None:
+    expected = at_once(study)
+    assert any(point.reason for point in expected)
+    assert any(point.reason is None for point in expected)
+    assert computed(study) == expected
+    with ThreadPoolExecutor(3) as threads:
+        assert computed(study, threads) == expected
+    for seed, in_flight in ((0, 5), (1, 2), (2, 1), (3, 1000)):
+        with Shuffled(seed) as shuffled:
+            assert computed(study, shuffled, in_flight) == expected
+
+
+@pytest.fixture(scope="module")
+def processes() -> Generator[Executor]:
+    with local_processes(2) as executor:
+        yield executor
+
+
+@pytest.mark.parametrize("study", STUDIES.values(), ids=STUDIES)
+def test_in_processes_the_points_are_the_same(study: Study, processes: Executor) -> None:
+    assert computed(study, processes) == at_once(study)
+
+
+@pytest.mark.parametrize("carry", [None, Carry.UP])
+def test_an_executor_never_has_more_tasks_than_asked_for(carry: Carry | None) -> None:
+    axes = (Axis("plant.friction.minimum", 0.1, 0.3, 20), Axis("plant.belt_speed", 0.2, 0.6, 5))
+    study = Study(free(), Grid(axes, carry), SHORT)
+    for in_flight in (1, 4, 7):
+        with Shuffled() as executor:
+            computed(study, executor, in_flight)
+            assert executor.most_pending == in_flight
+            tasks = sorted(index for task in executor.submitted for index in task)
+            assert tasks == list(range(study.plan.size))
+
+
+def test_an_executor_must_be_allowed_a_task() -> None:
+    with Journal(speeds(3)) as journal, ThreadPoolExecutor(1) as executor:
+        with pytest.raises(InvalidInputError, match="0 tasks in flight: must be 1 or more"):
+            run(journal, executor, in_flight=0)
+        with pytest.raises(InvalidInputError, match="0 workers: must be 1 or more"):
+            run_here(journal, 0)
+
+
+class _Instant(Executor):
+    """Takes a task for done, and counts it."""
+
+    def __init__(self) -> None:
+        self.tasks = 0
+        self.points = 0
+
+    def submit(self, task: Any, /, *arguments: Any, **_: Any) -> Future[Any]:
+        _, points, _ = arguments
+        self.tasks += 1
+        self.points += len(points)
+        future: Future[Any] = Future()
+        future.set_result(Piece(points, None))
+        return future
+
+
+class _Forgetful(Journal):
+    """Only counts what it is given."""
+
+    def add(self, piece: Piece) -> None:
+        self.count += len(piece.points)
+
+
+def test_a_million_points_are_a_few_thousand_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.undo()
+    study = Study(free(), speeds(1_000_000).plan, Course(10.0, 2))
+    executor = _Instant()
+    with _Forgetful(study) as journal:
+        run(journal, executor)
+    assert executor.points == 1_000_000
+    assert 16 * runner.IN_FLIGHT // 2 <= executor.tasks < 5_000
+
+
+def test_points_are_begun_before_all_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked_at: list[int] = []
+
+    class Seen(Journal):
+        def is_done(self, index: int) -> bool:
+            looked_at.append(index)
+            return super().is_done(index)
+
+    monkeypatch.setattr(runner, "_SCANNED", 50)
+    with Seen(speeds(1000)) as journal:
+        with pytest.raises(KeyboardInterrupt):
+            run(journal, progress=stop_at(1))
+        assert len(looked_at) <= 50
+        run(journal)
+        assert list(journal.points()) == at_once(journal.study)
+
+
+def test_a_few_points_still_are_several_tasks_for_each_worker() -> None:
+    executor = _Instant()
+    with _Forgetful(speeds(200)) as journal:
+        run(journal, executor, in_flight=4)
+    assert executor.tasks >= 4 * 8
+
+
+def test_progress_is_told_how_many_points_are_done(tmp_path: Path) -> None:
+    study = speeds(10)
+    path = tmp_path / "study.part"
+    told: list[float] = []
+    with Journal(study, path) as journal:
+        run(journal, progress=told.append)
+    assert told == [0, 3, 6, 9, 10]
+    with Journal(study, path) as journal:
+        run(journal, progress=(again := list[float]()).append)
+    assert again == [10]
+
+
+@pytest.mark.parametrize("study", STUDIES.values(), ids=STUDIES)
+def test_interrupted_threads_keep_what_is_done(study: Study, tmp_path: Path) -> None:
+    path = tmp_path / "study.part"
+    with ThreadPoolExecutor(2) as threads:
+        with Journal(study, path) as journal:
+            with pytest.raises(KeyboardInterrupt):
+                run(journal, threads, in_flight=6, progress=stop_at(4))
+            done = journal.count
+            assert 4 <= done < study.plan.size
+        with Journal(study, path) as journal:
+            assert journal.count == done
+            run(journal, threads)
+            assert list(journal.points()) == at_once(study)
+
+
+class _Held(Executor):
+    """Finishes the task before last when the next one comes: one is finished and not asked for."""
+
+    def __init__(self) -> None:
+        self._tasks: list[tuple[Future[Any], Callable[[], Any]]] = []
+
+    def submit(self, task: Any, /, *arguments: Any, **_: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        self._tasks.append((future, lambda: task(*arguments)))
+        if len(self._tasks) == 4:
+            for waiting, work in self._tasks[1:3]:
+                waiting.set_result(work())
+        return future
+
+
+def test_what_was_finished_when_it_is_interrupted_is_kept() -> None:
+    with Journal(speeds(60)) as journal:
+        with pytest.raises(KeyboardInterrupt):
+            run(journal, _Held(), in_flight=4, progress=stop_at(1))
+        assert journal.count == 2  # of one point each
+        assert [point.number for point in journal.points()] == [1, 2]
+
+
+def test_interrupted_processes_end_and_what_is_done_is_kept(tmp_path: Path) -> None:
+    study = speeds(60)
+    path = tmp_path / "study.part"
+    with Journal(study, path) as journal:
+        before = set(active_children())
+        with pytest.raises(KeyboardInterrupt):
+            run_here(journal, 2, stop_at(10))
+        assert set(active_children()) <= before
+        done = journal.count
+        assert 10 <= done < 60
+    with Journal(study, path) as journal:
+        assert journal.count == done
+        run(journal)
+        assert list(journal.points()) == at_once(study)
+
+
+@pytest.mark.parametrize("carry", [None, Carry.BOTH])
+def test_a_worker_that_is_killed_costs_no_point(carry: Carry | None) -> None:
+    study = Study(free(), Grid((MINIMUM, SPEED), carry), SHORT)
+    others = set(active_children())
+    killed: list[int] = []
+
+    def kill_one(done: float) -> None:
+        if done >= 10 and not killed:
+            victim = next(child for child in active_children() if child not in others)
+            assert victim.pid is not None
+            killed.append(victim.pid)
+            victim.kill()
+
+    with Journal(study) as journal:
+        run_here(journal, 2, kill_one)
+        assert killed
+        assert list(journal.points()) == at_once(study)
+
+
+@dataclass(frozen=True)
+class Deadly(Grid):
+    """A grid whose last point kills any worker that asks for its values."""
+
+    def values(self, index: int) -> tuple[float, ...]:
+        if index == self.size - 1 and parent_process() is not None:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().values(index)
+
+
+def test_workers_that_keep_dying_end_the_run_and_what_is_done_is_kept(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    study = Study(free(), Deadly((Axis("plant.belt_speed", 0.2, 0.6, 6),)), SHORT)
+    pools: list[int] = []
+
+    @contextmanager
+    def counted(workers: int) -> Generator[Executor]:
+        pools.append(workers)
+        with local_processes(workers) as pool:
+            yield pool
+
+    monkeypatch.setattr(runner, "local_processes", counted)
+    with Journal(study) as journal:
+        with pytest.raises(RunError, match=r"were killed 3 times without getting anywhere, . of 6"):
+            run_here(journal, 2)
+        assert 3 <= len(pools) <= 8
+        found = list(journal.points())
+        assert found == [point for point in at_once(study) if journal.is_done(point.number)]
+        assert not journal.is_done(5)
+
+
+_BEGIN = """
+from multiprocessing import active_children
+from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.runner import run_here
+from tests.studies.studies import speeds
+
+if __name__ == "__main__":
+    with Journal(speeds(100_000)) as journal:
+        run_here(journal, 2, lambda done: print(done, *[c.pid for c in active_children()],
+                                                flush=True))
+"""
+
+
+def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
+    script = tmp_path / "begin.py"
+    script.write_text(_BEGIN)
+    root = Path(__file__).parents[2]
+    with subprocess.Popen(
+        [sys.executable, script],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(root)},
+    ) as process:
+        assert process.stdout is not None
+        workers = next(pids for _, *pids in map(str.split, process.stdout) if len(pids) == 2)
+        descriptors = [os.pidfd_open(int(pid)) for pid in workers]
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        for descriptor in descriptors:
+            ended, *_ = select([descriptor], [], [], 30.0)
+            os.close(descriptor)
+            assert ended

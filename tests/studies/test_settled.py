@@ -1,0 +1,367 @@
+"""What a motion settles on: against reference cycles, and whatever was followed before."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stickslip_ros.app.simulate import simulate
+from stickslip_ros.errors import InvalidInputError, RunError
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.friction import Coulomb, Exponential, Linear
+from stickslip_ros.physics.measures import Regime
+from stickslip_ros.physics.washout import WashoutParameters
+from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.studies.settled import (
+    LONGEST,
+    Case,
+    Course,
+    Settled,
+    Settler,
+    State,
+    check_continuous,
+)
+from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, LimitCycle
+from tests.studies.studies import EXPONENTIAL, paper
+
+REST = State(0.0, 0.0)
+SETTLER = Settler()
+
+WEAK = ("washout_controller.linear_gain=-0.05", "washout_controller.cubic_gain=0.0")
+"""A controller under which the paper's drive still vibrates."""
+
+
+def settle(case: Case, start: State = REST, course: Course | None = None) -> Settled:
+    return SETTLER.settle(case, start, course or Course(cycles=6))
+
+
+def in_units(mass: float, length: float, time: float) -> Drive:
+    """Return the paper's drive in other units of kg, m and s."""
+    speed = length / time
+    return Drive(
+        mass=mass,
+        damping=PAPER.damping * mass / time,
+        stiffness=mass / time**2,
+        normal_force=mass * length / time**2,
+        belt_speed=PAPER.belt_speed * speed,
+        friction=PAPER.friction.scaled(1.0 / speed),
+    )
+
+
+@pytest.mark.parametrize("cycle", LIMIT_CYCLES, ids=lambda cycle: str(cycle.belt_speed))
+def test_it_is_the_reference_limit_cycle(cycle: LimitCycle) -> None:
+    measures = settle(
+        Case(replace(PAPER, belt_speed=cycle.belt_speed)), course=Course(300.0, 6)
+    ).measures
+    for name in ("amplitude", "velocity_amplitude", "stick_fraction", "midpoint"):
+        assert getattr(measures, name) == pytest.approx(getattr(cycle, name), abs=1e-9), name
+    assert measures.period == pytest.approx(cycle.period, abs=1e-8)
+    assert measures.cycles == 6
+
+
+@pytest.mark.parametrize("cycle", LIMIT_CYCLES, ids=lambda cycle: str(cycle.belt_speed))
+@pytest.mark.parametrize(
+    ("mass", "length", "time"), [(100.0, 1e-3, 1e-2), (1e-6, 1e4, 1e-5), (3e5, 7e-7, 20.0)]
+)
+def test_in_other_units_it_is_the_same_cycle(
+    cycle: LimitCycle, mass: float, length: float, time: float
+) -> None:
+    drive = in_units(mass, length, time)
+    drive = replace(drive, belt_speed=cycle.belt_speed * length / time)
+    settled = settle(Case(drive), course=Course(300.0, 6))
+    measures = settled.measures
+    assert settled.steady
+    assert measures.amplitude == pytest.approx(cycle.amplitude * length, rel=1e-8)
+    assert measures.velocity_amplitude == pytest.approx(
+        cycle.velocity_amplitude * length / time, rel=1e-8
+    )
+    assert measures.midpoint == pytest.approx(cycle.midpoint * length, rel=1e-8)
+    assert measures.period == pytest.approx(cycle.period * time, rel=1e-8)
+    assert measures.stick_fraction == pytest.approx(cycle.stick_fraction, abs=1e-9)
+
+
+def test_the_feed_drive_is_the_papers_in_other_units() -> None:
+    # Of those units the damping and so the drive differ by rounding only.
+    assert in_units(100.0, 1e-3, 1e-2).belt_speed == pytest.approx(FEED_DRIVE.belt_speed)
+    one, other = settle(Case(PAPER)).measures, settle(Case(FEED_DRIVE)).measures
+    assert one.amplitude is not None
+    assert other.amplitude == pytest.approx(1e-3 * one.amplitude, rel=1e-9)
+
+
+def _case(*overrides: str, continuous: bool = False, **drive: Any) -> Case:
+    case = Case.of(paper("plant.rate=20.0", *overrides), continuous=continuous)
+    return replace(case, drive=replace(case.drive, **drive))
+
+
+STIFF = Case(replace(PAPER, damping=1e9))
+MIXED: list[tuple[Case, State]] = [
+    (Case(PAPER), REST),
+    (Case(FEED_DRIVE), State(1e-4, 0.02)),
+    (Case(replace(PAPER, friction=Coulomb(0.4))), State(1.0, -0.3)),
+    (Case(replace(PAPER, friction=Exponential(0.4, 0.25, 0.1, 0.0), stiffness=2.0)), REST),
+    (Case(replace(PAPER, friction=Linear(0.4, 0.9), belt_speed=0.2)), REST),  # runs away
+    (Case(replace(PAPER, belt_speed=0.0)), State(2.0, 0.0)),
+    (Case(replace(PAPER, belt_speed=-0.3)), REST),
+    (STIFF, REST),
+    (_case(*WEAK), REST),
+    (_case(*WEAK, "plant.force_delay=0.07", "plant.force_jitter=0.09"), State(0.0, 0.2, 0.1)),
+    (_case("washout_controller.linear_gain=50.0"), REST),  # runs away
+    (
+        _case(
+            "plant.expects_control=false",
+            "plant.disturbance.kind=sine",
+            "plant.disturbance.amplitude=0.2",
+        ),
+        REST,
+    ),
+    (_case(*WEAK, continuous=True), REST),
+    (_case(*WEAK, "washout_controller.start_after=7.0", continuous=True), State(0.1, 0.2, -0.3)),
+    (_case("washout_controller.linear_gain=50.0", continuous=True), REST),  # runs away
+    (_case(continuous=True, friction=Exponential(0.4, 0.25, 0.1, 0.0)), State(0.3, 0.1)),
+    (_case(continuous=True, damping=1e9), REST),  # too stiff
+]
+"""Laws, units, control and ends of every kind."""
+
+
+def _found(settler: Settler, case: Case, start: State) -> object:
+    try:
+        settled = settler.settle(case, start, Course(5.0, 2, 2))
+    except RunError as error:
+        return str(error)
+    return settled._replace(turning_points=settled.turning_points.tolist())  # pyright: ignore
+
+
+@pytest.fixture(scope="module")
+def alone() -> list[object]:
+    """What each of the mixed cases comes to when its settler has done nothing before."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("stickslip_ros.physics.motion._SPARE_STEPS", 1000)
+        return [_found(Settler(), *mixed) for mixed in MIXED]
+
+
+@given(order=st.permutations(range(len(MIXED))))
+@settings(max_examples=4)
+def test_what_was_followed_before_changes_no_bit(alone: list[object], order: list[int]) -> None:
+    settler = Settler()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("stickslip_ros.physics.motion._SPARE_STEPS", 1000)
+        for number in order:
+            assert _found(settler, *MIXED[number]) == alone[number]
+
+
+def test_the_mixed_cases_are_of_every_kind(alone: list[object]) -> None:
+    regimes = {found.measures.regime for found in alone if isinstance(found, Settled)}
+    assert regimes >= {Regime.STICK_SLIP, Regime.STUCK, Regime.UNBOUNDED, Regime.PURE_SLIP}
+    assert sum(isinstance(found, str) and "too stiff" in found for found in alone) == 2
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        (),
+        WEAK,
+        (*WEAK, "plant.force_delay=0.123"),
+        ("washout_controller.force_limit=0.05", "plant.rate=50.0"),
+        (*WEAK, "washout_controller.start_after=20.0", "plant.belt_speed=-0.3"),
+    ],
+    ids=["rest", "weak", "delayed", "limited", "late"],
+)
+def test_a_sampled_loop_settles_on_what_simulate_measures(overrides: tuple[str, ...]) -> None:
+    scenario = paper("plant.belt_speed=0.3", "analyzer.window=6", *overrides)
+    settled = settle(Case.of(scenario), course=Course(20.0, 6))
+    duration = 27.0 * scenario.plant.as_drive().natural_period
+    measures = simulate(
+        scenario,
+        duration + scenario.washout_controller.start_after,
+        progress=lambda _: None,
+    )
+    assert settled.measures.regime is measures.regime
+    assert settled.measures.midpoint == pytest.approx(measures.midpoint, abs=1e-4)
+    assert settled.measures.amplitude == pytest.approx(measures.amplitude, abs=1e-4)
+    assert settled.measures.stick_fraction == pytest.approx(measures.stick_fraction, abs=2e-3)
+    assert settled.measures.period == pytest.approx(measures.period, rel=1e-4)
+
+
+def test_continuous_control_settles_on_what_simulate_measures() -> None:
+    scenario = paper("plant.belt_speed=0.3", "analyzer.window=6", *WEAK)
+    settled = settle(Case.of(scenario, continuous=True), course=Course(100.0, 6))
+    duration = 107.0 * scenario.plant.as_drive().natural_period
+    measures = simulate(scenario, duration, continuous=True, progress=lambda _: None)
+    assert measures.regime is Regime.STICK_SLIP
+    assert settled.measures.amplitude == pytest.approx(measures.amplitude, rel=1e-9)
+    assert settled.measures.period == pytest.approx(measures.period, rel=1e-9)
+
+
+def _in_two_halves(case: Case) -> tuple[Settled, Settled]:
+    """Return what a motion comes to at once, and carried on from its first half."""
+    start = State(0.1, 0.05)
+    once = settle(case, start, Course(4.0, 1, 2))
+    half = settle(case, start, Course(4.0, 1))
+    return once, settle(case, half.end, Course(4.0, 1))
+
+
+@pytest.mark.parametrize("continuous", [False, True], ids=["sampled", "continuous"])
+def test_the_filter_is_carried_on(continuous: bool) -> None:
+    # Neither steady nor at rest after the first half.
+    case = _case(
+        "washout_controller.corner_frequency=0.05",
+        "washout_controller.linear_gain=-0.02",
+        "washout_controller.cubic_gain=0.0",
+        "plant.belt_speed=0.3",
+        continuous=continuous,
+    )
+    once, halves = _in_two_halves(case)
+    # What the force was at the last sample is forgotten, and a sample is a small part of d.
+    exact = 1e-9 if continuous else 1e-3
+    assert halves.end.position == pytest.approx(once.end.position, abs=exact)
+    assert halves.end.velocity == pytest.approx(once.end.velocity, abs=exact)
+    assert halves.end.low_passed == pytest.approx(once.end.low_passed, abs=exact)
+    rested = settle(
+        case,
+        replace(settle(case, State(0.1, 0.05), Course(4.0, 1)).end, low_passed=None),
+        Course(4.0, 1),
+    )
+    assert rested.end.low_passed != pytest.approx(once.end.low_passed, abs=10 * exact)
+
+
+def test_a_free_motion_is_carried_on() -> None:
+    once, halves = _in_two_halves(Case(PAPER))
+    assert halves.end.position == pytest.approx(once.end.position, abs=1e-9)
+    assert halves.end.velocity == pytest.approx(once.end.velocity, abs=1e-9)
+    assert halves.end.low_passed is None
+
+
+def test_on_a_belt_at_rest_the_slide_sticks_where_friction_holds_it() -> None:
+    settled = settle(Case(replace(PAPER, belt_speed=0.0)), State(0.3, 0.0))
+    assert settled.measures.regime is Regime.STUCK
+    assert settled.measures.midpoint == 0.3
+    assert settled.steady
+    moved = settle(Case(replace(PAPER, belt_speed=0.0)), State(3.0, 0.0))
+    assert moved.measures.regime is Regime.STUCK
+    assert abs(moved.end.position) < 0.4
+
+
+def test_a_negative_belt_mirrors_the_motion() -> None:
+    one = settle(Case(replace(PAPER, belt_speed=0.3)), State(0.1, -0.2))
+    other = settle(Case(replace(PAPER, belt_speed=-0.3)), State(-0.1, 0.2))
+    assert one.measures.midpoint is not None
+    assert other.measures.midpoint == pytest.approx(-one.measures.midpoint, rel=1e-9)
+    assert other.measures.amplitude == pytest.approx(one.measures.amplitude, rel=1e-9)
+    assert other.measures.stick_fraction == pytest.approx(one.measures.stick_fraction, rel=1e-8)
+    assert other.end.position == pytest.approx(-one.end.position, abs=1e-8)
+
+
+@pytest.mark.parametrize("belt_speed", [1e-3, -1e-3, 3e-4])
+def test_a_slow_belt_loads_the_spring_and_then_the_slide_cycles(belt_speed: float) -> None:
+    settled = settle(Case(replace(PAPER, belt_speed=belt_speed)))
+    assert settled.measures.regime is Regime.STICK_SLIP
+    assert settled.measures.cycles == 6
+    assert settled.steady
+
+
+@pytest.mark.parametrize("belt_speed", [2e-4, 1e-6, 1e-12])
+def test_however_slow_the_belt_is_its_cycles_are_waited_for(belt_speed: float) -> None:
+    settled = settle(Case(replace(PAPER, belt_speed=belt_speed)))
+    assert settled.measures.regime is Regime.STICK_SLIP
+    assert settled.measures.cycles >= Course.cycles
+
+
+def test_a_slide_that_only_rode_the_belt_is_not_in_equilibrium() -> None:
+    washout = WashoutParameters(corner_frequency=2.0, linear_gain=0.0, cubic_gain=0.0)
+    settled = settle(Case(replace(PAPER, belt_speed=1e-6), washout))
+    assert settled.measures.regime is None
+    assert not settled.steady
+
+
+def _decaying(belt_speed: float) -> Settled:
+    """Return a small motion of the paper's drive near its Hopf point, at 0.4888 m/s."""
+    drive = replace(PAPER, belt_speed=belt_speed)
+    return settle(Case(drive), State(drive.equilibrium_position + 0.05, 0.0))
+
+
+def test_a_decaying_vibration_is_not_steady_and_a_limit_cycle_is() -> None:
+    dying, living = _decaying(0.4892), _decaying(0.48)
+    assert dying.measures.regime is Regime.PURE_SLIP
+    assert not dying.steady
+    assert living.measures.regime is Regime.PURE_SLIP
+    assert living.steady
+    assert settle(Case(PAPER)).steady
+
+
+def test_a_vibration_that_grows_out_of_rest_is_not_steady() -> None:
+    drive = replace(PAPER, belt_speed=0.485)
+    small = State(drive.equilibrium_position + 1e-5, 0.0)
+    growing = settle(Case(drive), small, Course(20.0, 6))
+    assert growing.measures.regime is Regime.EQUILIBRIUM
+    assert not growing.steady
+    at_rest = settle(Case(replace(PAPER, belt_speed=0.6)), small)
+    assert at_rest.measures.regime is Regime.EQUILIBRIUM
+    assert at_rest.steady
+
+
+UNSTABLE_CYCLE = 0.3154795877
+"""How far from rest the unstable cycle of the exponential law turns, m, at 1.175 m/s."""
+
+
+@pytest.mark.parametrize(
+    ("beyond", "regime"), [(-1e-3, Regime.EQUILIBRIUM), (1e-3, Regime.STICK_SLIP)]
+)
+def test_with_patience_a_start_near_an_unstable_cycle_ends_where_it_belongs(
+    beyond: float, regime: Regime
+) -> None:
+    case = Case.of(paper(*EXPONENTIAL, "plant.belt_speed=1.175"))
+    start = State(case.drive.equilibrium_position + UNSTABLE_CYCLE + beyond, 0.0)
+    soon = settle(case, start, Course(50.0))
+    assert soon.measures.regime is Regime.PURE_SLIP
+    late = settle(case, start, Course(50.0, patience=80))
+    assert late.measures.regime is regime
+    assert late.steady
+
+
+def test_patience_ends_when_the_motion_is_steady() -> None:
+    # Without that it would be followed for a billion periods.
+    settled = settle(Case(PAPER), course=Course(1000.0, patience=1_000_000))
+    assert settled.steady
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"transient": -1.0}, "-1 natural periods: must be from 0 to 1e"),
+        ({"transient": float("nan")}, "nan natural periods: must be from 0"),
+        ({"transient": 2 * LONGEST}, r"2e\+06 natural periods: must be from 0 to 1e\+06"),
+        ({"cycles": 0}, "0 cycles to measure: must be from 1 to"),
+        ({"patience": 0}, "patience of 0 transients: must be from 1 to"),
+    ],
+)
+def test_a_course_that_cannot_be_is_refused(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        Course(**values)
+
+
+@pytest.mark.parametrize(
+    "override",
+    [
+        "washout_controller.force_limit=1.0",
+        "plant.force_delay=0.1",
+        "plant.force_jitter=0.1",
+        "plant.disturbance.kind=step",
+    ],
+)
+def test_continuous_control_refuses_what_it_does_not_have(override: str) -> None:
+    scenario: Scenario = paper(override)
+    name, _, value = override.partition("=")
+    with pytest.raises(InvalidInputError, match=f"no {name}: it is {value}, and must be"):
+        check_continuous(scenario)
+    with pytest.raises(InvalidInputError, match=name):
+        Case.of(scenario, continuous=True)
+
+
+def test_without_control_and_disturbance_nothing_is_sampled() -> None:
+    without = "plant.expects_control=false"
+    assert Case.of(paper(without)) == Case(PAPER)
+    assert Case.of(paper(without, "plant.disturbance.kind=step")).sampled is not None
+    assert Case.of(paper()).sampled is not None
+    assert Case.of(paper(), continuous=True).sampled is None

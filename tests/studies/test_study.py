@@ -1,0 +1,269 @@
+"""Studies: every point is a row, whatever becomes of it, and is what it would be alone."""
+
+import json
+from dataclasses import asdict, replace
+from math import inf, nan, ulp
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.measures import Measures, Regime
+from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.studies.columns import Columns, compute_columns
+from stickslip_ros.studies.plan import Axis, Carry, Grid
+from stickslip_ros.studies.settled import Course, State
+from stickslip_ros.studies.study import Point, Study, compute, pieces_of
+from stickslip_ros.studies.sweep import sweep_study
+from tests.studies.studies import CYCLE_LOST_SPEED, EXPONENTIAL, HOPF_SPEED, SHORT, free, paper
+
+MINIMUM = Axis("plant.friction.minimum", 0.1, 0.6, 6)
+"""Of which what is above the static coefficient, 0.4, is refused."""
+
+SLOPE = Axis("plant.friction.slope", 0.1, 0.9, 5)
+"""Of the linear law, the last being the paper's printed one, with which the drive runs away."""
+
+DAMPING = Axis("plant.damping", 0.02, 1e9, 3)
+"""Too much of it is too stiff to be followed."""
+
+LINEAR = free("plant.friction.law=linear", "plant.belt_speed=0.2")
+
+MIXED = [
+    Study(free(), Grid((MINIMUM,)), SHORT),
+    Study(LINEAR, Grid((SLOPE,)), Course(40.0, 2)),
+    Study(free(), Grid((DAMPING, Axis("plant.belt_speed", 0.2, 0.3, 2))), SHORT),
+]
+
+
+@pytest.fixture(autouse=True)
+def _little_patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stickslip_ros.physics.motion._SPARE_STEPS", 1000)
+    monkeypatch.setattr("stickslip_ros.physics.motion._STEPS_PER_RADIAN", 100)
+
+
+def points(study: Study) -> list[Point]:
+    return compute(study, range(study.plan.size), None).points
+
+
+def test_what_cannot_be_runs_away_or_is_too_stiff_is_a_row_with_the_reason() -> None:
+    minimum, slope, damping = (points(study) for study in MIXED)
+    reasons = [point.reason for point in minimum]
+    assert reasons[:4] == [None] * 4
+    for value, reason in ((0.5, reasons[4]), (0.6, reasons[5])):
+        assert reason is not None
+        assert f"friction.minimum = {value} must not exceed friction.static = 0.4" in reason
+    assert [point.reason for point in slope] == [None] * 4 + ["the motion runs away"]
+    assert slope[-1].measures.regime is Regime.UNBOUNDED
+    assert slope[-1].turning_points == ()
+    assert [point.reason for point in damping[:2]] == [None] * 2
+    for point in damping[2:]:
+        assert "too stiff" in (point.reason or "")
+        assert point.measures == Measures(None, None, None, None, None, None, 0, None)
+        assert not point.steady
+
+
+@pytest.mark.parametrize("study", MIXED, ids=["out of bounds", "runs away", "too stiff"])
+def test_every_point_is_what_it_is_alone(study: Study) -> None:
+    together = points(study)
+    assert [point.number for point in together] == list(range(study.plan.size))
+    for index in range(study.plan.size):
+        assert compute(study, [index], None).points == [together[index]]
+    backwards = compute(study, range(study.plan.size)[::-1], None)
+    assert backwards.points == together[::-1]
+    assert backwards.end is None
+
+
+CHAINS = [
+    (replace(MINIMUM, first=0.6, last=0.3, count=4), Carry.UP, free(), 2),
+    (MINIMUM, Carry.DOWN, free(), 2),
+    (DAMPING, Carry.DOWN, free(), 2),
+    (SLOPE, Carry.DOWN, LINEAR, 1),
+]
+
+
+@pytest.mark.parametrize(
+    ("axis", "carry", "scenario", "failing"),
+    CHAINS,
+    ids=["out of bounds", "downwards", "too stiff", "runs away"],
+)
+def test_a_chain_begins_anew_after_a_point_that_failed(
+    axis: Axis, carry: Carry, scenario: Scenario, failing: int
+) -> None:
+    alone = Study(scenario, Grid((axis,)), Course(40.0, 2))
+    study = replace(alone, plan=Grid((axis,), carry))
+    (chain,) = study.plan.chains()
+    piece = compute(study, chain, None)
+    assert all(point.reason is not None for point in piece.points[:failing])
+    first, *_ = found = piece.points[failing:]
+    assert all(point.reason is None for point in found)
+    assert compute(alone, [first.number], None).points == [first]
+    assert piece.end is not None
+    only_failed = compute(study, chain[:failing], State(1.0, 0.0))
+    assert only_failed.end is None
+
+
+def test_a_chain_in_pieces_is_the_chain_at_once() -> None:
+    study = Study(free(), Grid((Axis("plant.belt_speed", 0.3, 0.6, 12),), Carry.DOWN), SHORT)
+    (chain,) = study.plan.chains()
+    at_once = compute(study, chain, None)
+    for size in (1, 5, 11):
+        start, found = None, []
+        for piece in pieces_of(chain, size):
+            result = compute(study, piece, start)
+            start = result.end
+            found += result.points
+        assert found == at_once.points
+        assert start == at_once.end
+
+
+def test_the_filter_is_carried_on_and_the_control_does_not_begin_anew() -> None:
+    scenario = paper("plant.rate=20.0", "washout_controller.start_after=100.0")
+    gain = Axis("washout_controller.linear_gain", -2.0, -1.9, 2)
+    study = Study(scenario, Grid((gain,), Carry.UP), Course(5.0, 1))
+    start = State(scenario.plant.as_drive().equilibrium_position, 0.0, 0.0)
+    at_rest = compute(study, [1], start).points[0].measures
+    assert at_rest.regime is Regime.EQUILIBRIUM
+    # Without control that is not stable; with it, a filter that is not at rest pushes.
+    alone = compute(study, [1], None).points[0].measures
+    pushed = compute(replace(study, course=Course(0.0, 1)), [1], replace(start, low_passed=1.0))
+    assert alone.amplitude is not None
+    assert alone.amplitude > 1e-3
+    (point,) = pushed.points
+    assert point.measures.amplitude is not None
+    assert point.measures.amplitude > 0.1
+
+
+STEP = 0.01
+
+
+@pytest.fixture(scope="module")
+def hysteresis() -> Columns:
+    """Belt speeds across the range in which rest and cycle coexist, up and then down."""
+    speed = Axis("plant.belt_speed", 1.05, 1.9, 86)
+    return compute_columns(sweep_study(free(*EXPONENTIAL), [speed], carry=Carry.BOTH))
+
+
+def test_upwards_the_cycle_is_kept_until_it_is_lost(hysteresis: Columns) -> None:
+    speed, regime = hysteresis.values["plant.belt_speed"][:86], hysteresis.regime[:86]
+    cycles = regime == Regime.STICK_SLIP
+    kept = cycles.sum()
+    assert cycles[:kept].all()
+    assert (regime[kept:] == Regime.EQUILIBRIUM).all()
+    assert speed[kept - 1] < CYCLE_LOST_SPEED < speed[kept] + STEP
+    assert (np.diff(hysteresis.amplitude[:kept]) > 0.0).all()
+    assert hysteresis.steady[:86].all()
+
+
+def test_downwards_rest_is_kept_to_the_hopf_point(hysteresis: Columns) -> None:
+    speed, regime = hysteresis.values["plant.belt_speed"][86:], hysteresis.regime[86:]
+    steady, amplitude = hysteresis.steady[86:], hysteresis.amplitude[86:]
+    rests = steady & (regime == Regime.EQUILIBRIUM)
+    cycles = regime == Regime.STICK_SLIP
+    assert HOPF_SPEED < speed[rests][0] < HOPF_SPEED + STEP
+    # Just below, where rest is barely unstable, the vibration has only begun to grow.
+    assert speed[cycles][-1] > HOPF_SPEED - 4 * STEP
+    assert (rests | cycles | ~steady).all()
+    assert amplitude[cycles] == pytest.approx(hysteresis.amplitude[:86][cycles], rel=1e-9)
+    assert (steady[cycles]).all()
+
+
+@pytest.mark.parametrize(
+    ("scenario", "axis", "critical"),
+    [
+        # The slope of the friction at 0.4 m/s.
+        (free(), Axis("plant.damping", 0.3, 0.0, 16), 0.162),
+        # By Routh and Hurwitz.
+        (paper(), Axis("washout_controller.linear_gain", -1.6, 0.0, 17), -0.9352960893854753),
+    ],
+    ids=["damping", "gain"],
+)
+def test_rest_is_not_carried_on_to_where_it_is_unstable(
+    scenario: Scenario, axis: Axis, critical: float
+) -> None:
+    # Neither parameter moves the equilibrium: nothing but a push takes the slide off it.
+    study = sweep_study(scenario, [axis], carry=Carry.BOTH, continuous=True)
+    found = compute_columns(study)
+    step = abs(axis.last - axis.first) / (axis.count - 1)
+    stable = (found.values[axis.parameter] - critical) * (axis.first - critical) > 0.0
+    near = np.abs(found.values[axis.parameter] - critical) < 1.5 * step
+    assert (found.regime[stable & ~near] == Regime.EQUILIBRIUM).all()
+    assert found.steady[stable & ~near].all()
+    assert set(found.regime[~stable & ~near]) == {Regime.PURE_SLIP, Regime.STICK_SLIP}
+    up, down = np.split(found.amplitude, 2)
+    away = ~np.split(stable | near, 2)[0]
+    assert up[away] == pytest.approx(down[away], rel=1e-6)
+
+
+numbers = st.one_of(st.none(), st.floats(allow_nan=False))
+
+
+@given(
+    measures=st.builds(
+        Measures,
+        amplitude=numbers,
+        velocity_amplitude=numbers,
+        midpoint=numbers,
+        period=numbers,
+        frequency=numbers,
+        stick_fraction=numbers,
+        cycles=st.integers(0),
+        regime=st.none() | st.sampled_from(Regime),
+    ),
+    turning_points=st.lists(st.floats(allow_nan=False)).map(tuple),
+    number=st.integers(0),
+    steady=st.booleans(),
+    reason=st.none() | st.text(),
+)
+def test_a_point_is_the_same_read_back(
+    measures: Measures,
+    turning_points: tuple[float, ...],
+    number: int,
+    steady: bool,
+    reason: str | None,
+) -> None:
+    point = Point(number, measures, steady, turning_points, reason)
+    read = Point.from_json(json.loads(json.dumps(point.as_json())))
+    assert read == point
+    assert type(read.measures.regime) is type(measures.regime)
+
+
+@pytest.mark.parametrize("value", [0.1 + 0.2, ulp(0.0), inf, -0.0, 1e22])
+def test_a_number_keeps_its_last_bit(value: float) -> None:
+    point = Point(0, Measures(value, nan, None, None, None, None, 0, None), True, (value,), None)
+    read = Point.from_json(json.loads(json.dumps(point.as_json())))
+    assert repr(asdict(read.measures)) == repr(asdict(point.measures))
+    assert repr(read.turning_points) == repr(point.turning_points)
+
+
+def test_a_study_without_a_point_that_can_be_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match=r"minimum = 0\.5 must not exceed friction\.static"):
+        Study(free(), Grid((replace(MINIMUM, first=0.5),)), SHORT).check()
+    Study(free(), Grid((MINIMUM,)), SHORT).check()
+
+
+@pytest.mark.parametrize("minimum", [(0.3, 0.5), (0.5, 0.3)])
+@pytest.mark.parametrize("static", [(0.2, 0.4), (0.4, 0.2)])
+@pytest.mark.parametrize("carry", [None, Carry.BOTH])
+def test_a_study_of_which_only_one_corner_can_be_is_not_refused(
+    minimum: tuple[float, float], static: tuple[float, float], carry: Carry | None
+) -> None:
+    axes = Axis("plant.friction.static", *static, 3), Axis(MINIMUM.parameter, *minimum, 3)
+    study = Study(free(), Grid(axes, carry), SHORT)
+    study.check()
+    assert any(point.reason is None for point in points(study))
+
+
+def test_what_continuous_control_does_not_have_is_refused_before_anything_is_computed() -> None:
+    delayed = paper("plant.force_delay=0.1")
+    with pytest.raises(InvalidInputError, match=r"force_delay: it is 0\.1, and must be 0"):
+        sweep_study(delayed, [Axis("plant.belt_speed", 0.1, 0.2, 2)], continuous=True)
+
+
+def test_a_point_under_continuous_control_with_a_delay_is_a_row() -> None:
+    delay = Axis("plant.force_delay", 0.0, 0.1, 2)
+    study = sweep_study(paper(), [delay], course=SHORT, continuous=True)
+    without, delayed = points(study)
+    assert without.reason is None
+    assert "knows no plant.force_delay" in (delayed.reason or "")
