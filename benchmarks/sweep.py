@@ -8,7 +8,7 @@ beforehand. Without control, and with the paper's, which acts without sampling.
 Sampled, at 100 Hz as the nodes do it, a point takes 67,000 steps. Peer: the slip integrator by
 itself from sample to sample, with the same terminal events, and the washout filter in a line.
 
-Two processes: by how much a sweep of 30,000 points is faster with two workers, their start
+Two processes: by how much a sweep of 20,000 points is faster with two workers, their start
 included, over how much faster two bare processes are with half of the motions each.
 """
 
@@ -34,7 +34,7 @@ from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.sweep import sweep_study
 
 POINTS, SAMPLED_POINTS, ROUNDS = 1000, 3, 5
-MANY_POINTS, MANY_ROUNDS = 30_000, 3
+MANY_POINTS, MANY_ROUNDS = 20_000, 3
 COURSE = Course(transient=100.0)
 LOW, HIGH = 0.02, 0.6
 PERIOD = 0.01

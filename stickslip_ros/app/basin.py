@@ -50,8 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             f"--{name}",
             metavar="A:B:COUNT",
-            help=f"{what} of the grid, {unit}, as in --{name}=-2:2:{_COUNT} (default: {_COUNT}, "
-            "twice as far to either side as a vibration goes, about)",
+            help=f"{what} of the grid, {unit}, as in --{name}=-2:2:{_COUNT} (with = before a minus "
+            f"sign; of a --sample A:B will do; default: {_COUNT}, twice as far to either side as a "
+            "vibration goes, about)",
         )
     parser.add_argument(
         "--sample",
@@ -86,12 +87,12 @@ def run(arguments: argparse.Namespace) -> int:
         made = {"attractors": [asdict(attractor) for attractor in basins.attractors]}
         if arguments.plot is not None:
             _draw(arguments, journal, basins)
+        if arguments.out is not None:
+            write_table(arguments.out, journal, further, made)
         if arguments.json:
             write_json(sys.stdout, journal, further, finite({**made_of(scenario), **made}))
         else:
             _print(f"{scenario.name}, {study.plan.size} starts", basins)
-        if arguments.out is not None:
-            write_table(arguments.out, journal, further, made)
     return 0
 
 
@@ -110,7 +111,8 @@ def _plan(arguments: argparse.Namespace, scenario: Scenario) -> Plan:
         try:
             axes[place] = Axis.parse(f"{parameter}={number}")
         except InvalidInputError as error:
-            raise InvalidInputError(f"--{option}={text}: {error}") from None
+            reason = str(error).partition(": ")[2].replace("NODE.PARAMETER=", "")
+            raise InvalidInputError(f"--{option}={text}: {reason}") from None
     if arguments.sample is None:
         return Grid(tuple(axes))
     return Sample(tuple(axes), arguments.sample, arguments.seed or 0)

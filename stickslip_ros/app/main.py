@@ -39,6 +39,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if command in _PASSING_ON and "--" in given:
         end = given.index("--")
         given, further = given[:end], given[end + 1 :]
+    if sys.stdout is None:  # closed by who called
+        sys.stdout = _nowhere()
     try:
         chosen = _parser(given).parse_args(given, argparse.Namespace(further=further))
         status: int = chosen.run(chosen)

@@ -121,6 +121,8 @@ def write_table(
         else:
             head = {**made_of(journal.study.scenario), **(made or {})}
             write_json(stream, journal, further, finite(head))
+        stream.flush()
+        os.fsync(stream.fileno())
     new.replace(path)
     journal.discard()
 

@@ -51,8 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--carry",
-        type=Carry,
-        choices=list(Carry),
+        choices=[str(carry) for carry in Carry],
         help="begin each point where its neighbour ended, filter included, along the (last) "
         "parameter up, down or both ways, which shows hysteresis (default: every point begins in "
         "the scenario's initial state)",
@@ -76,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     study = sweep_study(
         scenario_of(arguments),
         axes,
-        carry=arguments.carry,
+        carry=None if arguments.carry is None else Carry(arguments.carry),
         course=course_of(arguments, Course()),
         continuous=arguments.continuous_control,
     )
@@ -91,12 +90,12 @@ def run(arguments: argparse.Namespace) -> int:
     with done(arguments, study, label) as journal:
         if arguments.plot is not None:
             _draw(arguments, journal)
+        if arguments.out is not None:
+            write_table(arguments.out, journal, further)
         if arguments.json:
             write_json(sys.stdout, journal, further, finite(made_of(study.scenario)))
         else:
             _print(journal, plan)
-        if arguments.out is not None:
-            write_table(arguments.out, journal, further)
     return 0
 
 
@@ -127,8 +126,10 @@ class _Kind(NamedTuple):
 
     @classmethod
     def of(cls, point: Point, plan: Grid) -> Self:
-        regime = point.measures.regime
-        return cls(str(plan.direction(point.number) or ""), str(regime or point.reason))
+        regime = str(point.measures.regime or point.reason)
+        if point.reason is None and not point.steady:
+            regime += ", not steady"
+        return cls(str(plan.direction(point.number) or ""), regime)
 
 
 def _print(journal: Journal, plan: Grid) -> None:

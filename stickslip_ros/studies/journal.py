@@ -3,12 +3,16 @@
 import fcntl
 import json
 import os
+import stat
+from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple
 from pathlib import Path
 from tempfile import TemporaryFile
 from types import TracebackType
 from typing import Any, BinaryIO, Self
+
+import numpy as np
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.studies.settled import State
@@ -23,7 +27,7 @@ class Journal:
 
     The first line says what study it is, each further one holds a piece. A line that was not
     finished, the writer having been killed, is cut off. What is in memory is a bit for each point
-    and a few numbers for each piece.
+    and two numbers for each piece.
     """
 
     def __init__(self, study: Study, path: Path | None = None) -> None:
@@ -36,7 +40,7 @@ class Journal:
         self.count = 0
         """How many points are done."""
         self._done = bytearray((study.plan.size + 7) // 8)
-        self._lines: list[tuple[int, int]] = []
+        self._firsts, self._offsets = array("Q"), array("Q")
         self._ends: dict[int, State | None] = {}
         self._path = path
         try:
@@ -69,7 +73,7 @@ class Journal:
         return bool(self._done[index >> 3] & 1 << (index & 7))
 
     def state_after(self, index: int) -> State | None:
-        """Return where a point ended that is the last one of its piece."""
+        """Return where the newest point of a chain ended."""
         return self._ends[index]
 
     def add(self, piece: Piece) -> None:
@@ -84,8 +88,8 @@ class Journal:
 
     def points(self) -> Iterator[Point]:
         """Yield the points that are done in the order of their index."""
-        for _, offset in sorted(self._lines):
-            self._file.seek(offset)
+        for line in np.argsort(self._firsts):
+            self._file.seek(self._offsets[line])
             found = [Point.from_json(values) for values in _parsed(self._file.readline())["points"]]
             yield from sorted(found, key=lambda point: point.number)
 
@@ -98,8 +102,12 @@ class Journal:
         for index in indices:
             self._done[index >> 3] |= 1 << (index & 7)
         self.count += len(indices)
-        self._lines.append((min(indices), offset))
+        self._firsts.append(min(indices))
+        self._offsets.append(offset)
         if self.study.plan.carried:
+            # Of a chain the newest end is enough, whichever way it goes.
+            for neighbour in (indices[0] - 1, indices[0] + 1):
+                self._ends.pop(neighbour, None)
             self._ends[indices[-1]] = end
 
     def _read(self) -> None:
@@ -152,12 +160,19 @@ class Journal:
 def _opened(path: Path | None) -> BinaryIO:
     if path is None:
         return TemporaryFile()
-    file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NONBLOCK, 0o666)
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise InvalidInputError(f"{path}: exists already, and is no study's journal")
+    file = os.fdopen(descriptor, "r+b")
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+        there = os.path.samestat(os.fstat(descriptor), path.stat())
+    except (BlockingIOError, FileNotFoundError):
+        there = False
+    if not there:  # or whoever was has just finished, and removed it
         file.close()
-        raise InvalidInputError(f"{path}: another process is writing it") from None
+        raise InvalidInputError(f"{path}: another process is writing it")
     return file
 
 

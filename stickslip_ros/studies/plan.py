@@ -60,6 +60,8 @@ class Axis:
             raise InvalidInputError(
                 f"{self}: {self.count} values are not from 2 to {MOST_POINTS:,} of them"
             )
+        if self._parameter.kind is int and self.count > abs(self.last - self.first) + 1.0:
+            raise InvalidInputError(f"{self}: from {ends} there are fewer whole numbers")
         if self.logarithmic and not self.first * self.last > 0.0:
             raise InvalidInputError(f"{self}: with :log {ends} must be of one sign, without zero")
         for number in (0, self.count - 1):
@@ -92,14 +94,14 @@ class Axis:
 
     def value(self, number: int) -> float:
         """Return one of the values; of a parameter that is a whole number, the nearest such."""
-        share = number / (self.count - 1)
-        if number == self.count - 1:
-            value = self.last
-        elif self.logarithmic:
-            value = self.first * (self.last / self.first) ** share
-        else:
-            value = self.first + (self.last - self.first) * share
+        value = self.last if number == self.count - 1 else self.at(number / (self.count - 1))
         return round(value) if self._parameter.kind is int else value
+
+    def at(self, share: float) -> float:
+        """Return what lies at some share of the way, from 0 to 1."""
+        if self.logarithmic:
+            return self.first * (self.last / self.first) ** share
+        return self.first + (self.last - self.first) * share
 
     def values(self) -> FloatArray:
         """Return all values."""
@@ -234,14 +236,16 @@ class Grid:
 
 @dataclass(frozen=True)
 class Sample:
-    """Values that are uniformly distributed within the ends of some axes, independent of another.
+    """Values that are uniformly distributed between the ends of some axes, independent of another.
+
+    Between those of a logarithmic axis it is their logarithms that are.
 
     A point follows from the seed and its index: of two samples with one seed, the larger begins
     with the smaller.
     """
 
     axes: tuple[Axis, ...]
-    """Of which only the ends matter."""
+    """Whose counts do not matter."""
     size: int
     seed: int = 0
 
@@ -267,8 +271,7 @@ class Sample:
         # The index first: it is one word, and what numpy makes of words does not tell where a
         # longer seed ends.
         shares = np.random.default_rng((index, self.seed)).random(len(self.axes)).tolist()
-        ends = zip(self.axes, shares, strict=True)
-        return tuple(axis.first + (axis.last - axis.first) * share for axis, share in ends)
+        return tuple(axis.at(share) for axis, share in zip(self.axes, shares, strict=True))
 
     def corners(self) -> Iterator[int]:
         """Yield the first points."""

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
 from os import _exit
 from threading import Thread
+from typing import Self
 
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.physics.simulation import Progress
@@ -121,7 +122,7 @@ def run_here(journal: Journal, workers: int, progress: Progress = lambda _: None
                 raise RunError(
                     f"worker processes were killed {deaths} times without getting anywhere, "
                     f"{journal.count} of {journal.study.plan.size} points being done: is memory "
-                    "short?"
+                    "short, or does a script lack `if __name__ == '__main__':`?"
                 ) from None
         else:
             return
@@ -176,8 +177,8 @@ class _Chain:
         """Where the next piece begins."""
         self._pieces = pieces_of(points, size)
 
-    def __iter__(self) -> Iterator[range]:
-        return self._pieces
+    def __iter__(self) -> Self:
+        return self
 
     def __next__(self) -> range:
         return next(self._pieces)

@@ -75,9 +75,9 @@ def test_without_ranges_the_starts_are_around_the_equilibrium(stickslip: Run) ->
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--position=1:2"], "--position=1:2: plant.initial.position=1:2: must be"),
+        (["--position=1:2"], "--position=1:2: must be A:B:COUNT"),
         (["--velocity=a:b:3"], "--velocity=a:b:3: "),
-        (["--position=1:2:3:4"], "must be NODE.PARAMETER=A:B:COUNT"),
+        (["--position=1:2:3:4"], "--position=1:2:3:4: must be A:B:COUNT"),
         (["--seed", "1"], "--seed 1: is for a random --sample"),
         (["--sample", "0"], "0 points are not from 1 to"),
         (["--sample", "9", "--seed", "-1"], "--seed -1: must be 0 or more"),
