@@ -161,8 +161,13 @@ def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> No
 
 def _label(attractor: Attractor) -> str:
     """Return what a legend says of an attractor."""
+    from stickslip_ros.plots.regimes import REGIMES
+
     amplitude = ""
     if attractor.amplitude is not None:
         amplitude = f", amplitude {quantities([attractor.amplitude], 'm', 3)[0]}"
     share, error = 100.0 * attractor.share, 100.0 * attractor.standard_error
-    return f"{_name(attractor)}{amplitude}: {share:.1f} % \N{PLUS-MINUS SIGN} {error:.1f} %"
+    name = REGIMES[attractor.regime][1]
+    if not attractor.steady and attractor.regime is not None:
+        name += ", not steady"
+    return f"{name}{amplitude}: {share:.1f} % \N{PLUS-MINUS SIGN} {error:.1f} %"

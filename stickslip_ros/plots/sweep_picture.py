@@ -25,6 +25,10 @@ from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.transitions import TransitionMap, transition_map, transitions
 
+_FULL: Any = {"mew": 0.0}
+_HOLLOW: Any = {"mfc": "white", "mew": 0.8}
+"""Markers of motions that are steady, and of those that are not yet."""
+
 _DASHES = ("--", ":", "-.")
 """Of the transitions, one after the other."""
 
@@ -58,6 +62,7 @@ def draw_diagram(path: Path, columns: Columns, study: Study) -> None:
     """Write the bifurcation diagram of a sweep over one parameter to `path`.
 
     Turning points by regime, amplitude and stick fraction, and where theory has the transitions.
+    Hollow are the turning points of motions that are not steady yet.
     Carried both ways, what was found upward is narrow and dark, downward wide and pale. The format
     follows the ending.
     """
@@ -81,6 +86,12 @@ def draw_diagram(path: Path, columns: Columns, study: Study) -> None:
         Line2D([], [], color=colour, marker="o", ms=5.0, ls="", label=label)
         for _, colour, label in _present(columns)
     ]
+    if np.any(~columns.steady & ~_are(columns.regime, None)):
+        handles.append(
+            Line2D(
+                [], [], color="black", marker="o", ms=5.0, ls="", label="not steady yet", **_HOLLOW
+            )
+        )
     if both:
         handles += [
             Line2D([], [], color="black", marker="o", ms=2.5, label="carried up"),
@@ -179,9 +190,12 @@ def _draw_section(axes: Axes, columns: Columns, axis: Axis, rows: slice, *, wide
     rasterized = len(positions) > _MANY
     for regime, (colour, _) in REGIMES.items():
         shown = _are(regimes, regime)
-        places = np.repeat(values[shown], counts[shown])
         look: Any = {"color": _pale(colour) if wide else colour, "ls": "", "rasterized": rasterized}
-        axes.plot(places, positions[np.repeat(shown, counts)], marker="o", ms=size, mew=0.0, **look)
+        for steady, filled in ((True, _FULL), (False, _HOLLOW)):
+            some = shown & (columns.steady[rows] == steady)
+            places = np.repeat(values[some], counts[some])
+            heights = positions[np.repeat(some, counts)]
+            axes.plot(places, heights, marker="o", ms=size, **look, **filled)
         without = values[shown & (counts == 0)]
         height = np.full(len(without), 0.06 if wide else 0.02)
         axes.plot(without, height, marker="|", ms=9.0, transform=axes.get_xaxis_transform(), **look)

@@ -74,3 +74,21 @@ def test_a_law_that_was_used_before_is_as_it_was() -> None:
     for motion in (changed, steady):
         motion.advance(30.0)
     assert changed.position == pytest.approx(steady.position, rel=1e-11)
+
+
+def test_begun_anew_it_records_nothing_of_what_was_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    motion = Motion(PAPER, 0.0, 0.0, record=True)
+    motion.begin(replace(PAPER, belt_speed=1.0), 0.1, 0.0)
+    for budget, steps in (("_SPARE_STEPS", 0), ("_STEPS_PER_RADIAN", 0.01)):
+        monkeypatch.setattr(f"stickslip_ros.physics.motion.{budget}", steps)
+    monkeypatch.setattr("stickslip_ros.physics.motion._STEPS_PER_ADVANCE", 10)
+    with pytest.raises(RunError):
+        motion.advance(100.0)
+    monkeypatch.undo()
+    fresh = Motion(PAPER, 0.0, 0.0, record=True)
+    motion.begin(PAPER, 0.0, 0.0)
+    for one in (motion, fresh):
+        one.advance(5.0)
+    assert motion.take_knots().time.tolist() == fresh.take_knots().time.tolist()

@@ -84,7 +84,7 @@ def test_the_shares_are_the_published_ones(belt_speed: float) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("belt_speed", PUBLISHED)
 def test_of_many_starts_too_the_shares_are_the_published_ones(belt_speed: float) -> None:
-    _check_published(belt_speed, 5000)
+    _check_published(belt_speed, 2000)
 
 
 @pytest.mark.long
