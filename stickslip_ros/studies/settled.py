@@ -192,7 +192,7 @@ class Settler:
                 motion.advance(duration)
                 meter.feed(motion.take_knots(), drive.belt_speed)
 
-        def observe() -> Settled:
+        def observe() -> _SectionMeter:
             motion.recording = False
             meter = _SectionMeter(course.cycles)
             advance(transient, meter)
@@ -209,18 +209,19 @@ class Settler:
                 done, step = done + step, done + step  # a slow belt's cycles are that long
             if motion.unbounded:
                 meter.report_run_away()
-            return meter.settled(start)
+            return meter
 
-        settled = observe()
+        meter = observe()
         for _ in range(course.patience - 1):
-            before, settled = settled, observe()
-            if settled.steady and _alike(before.measures, settled.measures):
+            before, meter = meter, observe()
+            measures = meter.measures()
+            if meter.is_steady(measures) and _alike(before.measures(), measures):
                 break
         low_passed = motion.low_passed if continuous else None
         if law is not None and loop is not None:
             law.answer(loop.sample.stamp, loop.sample.velocity)
             low_passed = law.low_passed
-        return settled._replace(end=State(motion.position, motion.velocity, low_passed))
+        return meter.settled(State(motion.position, motion.velocity, low_passed))
 
     def _motion(self, drive: Drive, continuous: bool) -> Motion:
         if continuous not in self._motions:
@@ -284,15 +285,19 @@ class _SectionMeter(CycleMeter):
     def settled(self, end: State) -> Settled:
         """Return what was found, the motion having come to `end`."""
         measures = self.measures()
-        section, amplitudes = np.concatenate(self._sections), self._amplitudes
+        section = np.concatenate(self._sections)
         if measures.regime is Regime.UNBOUNDED:
-            section, steady = np.empty(0), True
+            section = np.empty(0)
         elif measures.regime is Regime.EQUILIBRIUM:
             section = np.array([measures.midpoint])
-            steady = len(amplitudes) < 2 or not amplitudes[-1] > (1.0 + STEADY) * amplitudes[0]
-        elif measures.regime is Regime.STUCK:
-            steady = True
-        else:
-            largest = max(amplitudes, default=0.0)
-            steady = len(amplitudes) > 1 and largest - min(amplitudes) <= STEADY * largest
-        return Settled(measures, section, steady, end)
+        return Settled(measures, section, self.is_steady(measures), end)
+
+    def is_steady(self, measures: Measures) -> bool:
+        """Return whether the motion has settled, its `measures` being those of this meter."""
+        amplitudes = self._amplitudes
+        if measures.regime in (Regime.STUCK, Regime.UNBOUNDED):
+            return True
+        if measures.regime is Regime.EQUILIBRIUM:
+            return len(amplitudes) < 2 or not amplitudes[-1] > (1.0 + STEADY) * amplitudes[0]
+        largest = max(amplitudes, default=0.0)
+        return len(amplitudes) > 1 and largest - min(amplitudes) <= STEADY * largest
