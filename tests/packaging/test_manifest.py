@@ -10,6 +10,7 @@ SOURCE = Path(__file__).parents[2]
 
 # What package.xml calls what setup.py names: rosdep keys, where there are any.
 KEYS = {
+    "distributed": set(),
     "heyoka": set(),
     "hypothesis": {"python3-hypothesis"},
     "lz4": set(),
@@ -72,6 +73,9 @@ def test_the_manifest_tells_what_has_no_key():
     text = (SOURCE / "package.xml").read_text()
     keyless = sorted(name for name in required("") if not KEYS[name])
     assert f"for want of a rosdep key: {', '.join(keyless)}." in text
+    (extra,) = required("dask")
+    assert not KEYS[extra]
+    assert f"to test them: {extra}." in text
 
 
 def test_the_docs_install_in_a_workspace_all_that_is_asked_for():
