@@ -81,11 +81,9 @@ def done(arguments: argparse.Namespace, study: Study, label: str) -> Generator[J
         _refuse_table(out)
     part = None if out is None else out.with_name(f"{out.name}.part")
     with Journal(study, part) as journal:
-        kept = (
-            ""
-            if part is None
-            else (f"; what is done stays in {part}, and the same command goes on from there")
-        )
+        kept = "; without --out nothing is kept"
+        if part is not None:
+            kept = f"; what is done stays in {part}, and the same command goes on from there"
         try:
             with progress_bar(label, study.plan.size) as progress:
                 if arguments.dask is None:
