@@ -11,9 +11,8 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from stickslip_ros.prefixes import prefix_for
 from stickslip_ros.printable import printable
-
-_PREFIXES = {1e9: "G", 1e6: "M", 1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
 
 _LABELS: dict[str, tuple[str, str]] = {
     "regime": ("regime", ""),
@@ -79,7 +78,8 @@ def quantities(values: Sequence[Any], unit: str, digits: int = 4) -> list[str]:
 
     A unit that begins with a number, such as 1/s, gets no prefix.
     """
-    scale, prefix = _prefix(values) if unit[:1].isalpha() else (1.0, "")
+    largest = max((abs(value) for value in values if isinstance(value, float)), default=0.0)
+    scale, prefix = prefix_for(largest) if unit[:1].isalpha() else (1.0, "")
     return [_text(value, scale, f" {prefix}{unit}".rstrip(), digits) for value in values]
 
 
@@ -107,12 +107,6 @@ class _Console(Console):
 def _shown(text: str) -> str:
     """Return a text that rich shows as it is."""
     return escape(printable(text))
-
-
-def _prefix(values: Iterable[Any]) -> tuple[float, str]:
-    """Return the scale, and its prefix, for a row of values: that of the largest."""
-    largest = max((abs(value) for value in values if isinstance(value, float)), default=0.0)
-    return next(((scale, p) for scale, p in _PREFIXES.items() if largest >= scale), (1.0, ""))
 
 
 def _text(value: Any, scale: float, unit: str, digits: int) -> str:
