@@ -24,9 +24,10 @@ from stickslip_ros.bags.messages import (
 )
 from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
 from stickslip_ros.errors import BagError
+from stickslip_ros.nodes.collecting import take_waiting
 from stickslip_ros.nodes.dropped import Dropped
-from stickslip_ros.nodes.inquiry import Inquiry
-from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode, take_waiting
+from stickslip_ros.nodes.inquiry import ask_parameters
+from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.process import run_node
 from stickslip_ros.nodes.rivals import rivals
 from stickslip_ros.nodes.topics import (
@@ -41,7 +42,7 @@ from stickslip_ros.nodes.topics import (
     Topic,
 )
 from stickslip_ros.physics.samples import RunMeter
-from stickslip_ros.scenario.parameters import NODE_PARAMETERS, AnalyzerParameters, parameters_of
+from stickslip_ros.scenario.parameters import NODE_PARAMETERS, AnalyzerParameters, known_parameters
 from stickslip_ros.versions import versions
 
 ColumnsT = TypeVar("ColumnsT")
@@ -92,7 +93,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             RECORDED.type, RECORDED.name, RECORDED.qos()
         )
         self._inquiries = [
-            Inquiry(self, node, [p.name for p in parameters_of(model)], partial(self._keep, node))
+            ask_parameters(self, node, list(known_parameters(model)), partial(self._keep, node))
             for node, model in NODE_PARAMETERS.items()
             if node != "analyzer"
         ]

@@ -1,4 +1,4 @@
-"""Asking another node what parameters it runs with."""
+"""Asking another node, where the middleware may not do its part at once."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -14,26 +14,33 @@ _PATIENCE = 10
 
 
 class Inquiry:
-    """Asks a node for parameters as soon as it is there, until it has answered.
+    """Calls a service as soon as it is there, until it has answered.
 
     A client may never match a service that is there, and an answer may be lost: then another asks.
+    So it may be asked more than once.
     """
 
     def __init__(
         self,
         inquirer: Node,
-        asked: str,
-        names: Sequence[str],
-        on_answer: Callable[[dict[str, Any]], None],
+        kind: Any,
+        service: str,
+        request: Any,
+        on_answer: Callable[[Any], None],
+        patience: int = _PATIENCE,
     ) -> None:
-        """Ask, for `inquirer`, the node `asked` for the parameters called `names`."""
+        """Call, for `inquirer`, a service of some kind, and pass on its answer.
+
+        `patience` is how often the inquiry is pursued before it is asked a second time.
+        """
         self._inquirer = inquirer
-        self._service = f"{asked}/get_parameters"
-        self._names = names
+        self._kind = kind
+        self._service = service
+        self._request = request
         self._on_answer = on_answer
         self._answered = self._closed = False
         self._pursued = 0
-        self._patience = _PATIENCE
+        self._patience = patience
         self._client = self._new_client()
         self._answer: Future | None = None
 
@@ -47,7 +54,7 @@ class Inquiry:
             self._inquirer.destroy_client(self._client)
             self._client, self._answer = self._new_client(), None
         if self._answer is None and self._client.service_is_ready():
-            self._answer = self._client.call_async(GetParameters.Request(names=self._names))
+            self._answer = self._client.call_async(self._request)
             self._answer.add_done_callback(self._take)
 
     def close(self) -> None:
@@ -56,12 +63,24 @@ class Inquiry:
         self._inquirer.destroy_client(self._client)
 
     def _new_client(self) -> Client:
-        return self._inquirer.create_client(GetParameters, self._service)
+        return self._inquirer.create_client(self._kind, self._service)
 
     def _take(self, answer: Future) -> None:
         response = answer.result()
         if response is None or self._answered or self._closed:
             return
         self._answered = True
+        self._on_answer(response)
+
+
+def ask_parameters(
+    inquirer: Node, asked: str, names: Sequence[str], on_answer: Callable[[dict[str, Any]], None]
+) -> Inquiry:
+    """Return an inquiry to the node `asked` for its parameters of these names."""
+
+    def take(response: Any) -> None:
         values = [parameter_value_to_python(value) for value in response.values]
-        self._on_answer(dict(zip(self._names, values, strict=False)))
+        on_answer(dict(zip(names, values, strict=False)))
+
+    request = GetParameters.Request(names=names)
+    return Inquiry(inquirer, GetParameters, f"{asked}/get_parameters", request, take)

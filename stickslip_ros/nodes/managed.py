@@ -1,7 +1,7 @@
 """What every node of this package has: life cycle, parameters from one model, diagnostics."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Generic, TypeVar, cast
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -18,6 +18,7 @@ from rclpy.task import Future
 from rclpy.timer import Timer
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.nodes.collecting import Collecting
 from stickslip_ros.nodes.topics import DIAGNOSTICS, Topic, mismatch, type_name
 from stickslip_ros.scenario import parameters
 from stickslip_ros.scenario.parameters import Fixed, NodeParameters, shown
@@ -38,7 +39,7 @@ _DELIVERY_TIMEOUT = 1.0
 _OWNED_BY_ROS = ("start_type_description_service",)
 
 
-class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
+class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
     """A managed (lifecycle) node whose parameters come from one validated model.
 
     A subclass says in `connect`, `start` and `stop` what it does when it is configured, activated
@@ -139,16 +140,10 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
         return subscription
 
     def collect(self, topic: Topic) -> Subscription:
-        """Let the serialized messages of a topic wait until they are taken.
-
-        No thread is woken for each of them, as it is where they are passed to a callback.
-        """
-        return self.subscribe(topic, _left_waiting)
-
-    @property
-    def subscriptions(self) -> Iterator[Subscription]:
-        """The subscriptions whose messages an executor is to pass on as they come."""
-        return (s for s in super().subscriptions if s.callback is not _left_waiting)
+        """Let the serialized messages of a topic wait until they are taken."""
+        subscription = self.collect_from(topic, topic.qos())
+        self._connections.append(subscription)
+        return subscription
 
     def wait_for_delivery(self, publisher: Publisher) -> None:
         """Wait, within bounds, until every reader has what was published."""
@@ -345,17 +340,6 @@ class ManagedNode(LifecycleNode, ABC, Generic[ParametersT]):
     def _as_ros(self, values: Mapping[str, Any]) -> list[Parameter]:
         known = parameters.known_parameters(self._model)
         return [Parameter(name, _ROS_TYPES[known[name].kind], v) for name, v in values.items()]
-
-
-def take_waiting(subscription: Subscription) -> Iterator[bytes]:
-    """Yield the serialized messages that wait for being taken, in order."""
-    with subscription.handle:
-        while taken := subscription.handle.take_message(subscription.msg_type, True):
-            yield taken[0]
-
-
-def _left_waiting(_: bytes) -> None:
-    """Stand for a callback where there is none."""
 
 
 _ROS_TYPES = {
