@@ -12,9 +12,10 @@ PYTHON ?= $(shell for python in python3.12 python3.13 python3.11 python3; do \
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
 # A test that hangs fails by itself, with its name. Two at a time: half of it is waiting.
-PYTEST := $(BIN)/python -m pytest --timeout=300 --numprocesses=2 --dist=loadscope
+# What was left out is told at the end, and why.
+PYTEST := $(BIN)/python -m pytest --timeout=300 --numprocesses=2 --dist=loadscope -rs
 
-.PHONY: setup demo test test-long test-all lint bench clean
+.PHONY: setup demo test test-long test-all lint bench screenshot clean
 
 setup: $(READY)
 
@@ -65,6 +66,11 @@ lint: setup
 bench: setup
 	@mkdir -p build
 	$(BIN)/python -m benchmarks --out build/benchmarks.json
+
+# The picture of the dashboard in README.md, made by its test.
+screenshot: setup
+	$(BIN)/python -m pytest -q tests/app/test_dashboard.py -k limit_cycle
+	cp build/dashboard.png docs/dashboard.png
 
 clean:
 	rm -rf .venv .venv-* build install log dist *.egg-info .pytest_cache .ruff_cache .hypothesis

@@ -16,6 +16,8 @@ EXECUTABLES = {
     "stickslip": "stickslip_ros.app.main:main",
 }
 
+DASHBOARD = ["fastapi", "nicegui>=3", "orjson", "uvicorn"]
+
 STUB = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
 
 
@@ -47,7 +49,7 @@ setup(
     maintainer_email=MANIFEST.find("maintainer").get("email"),
     license=MANIFEST.findtext("license"),
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed", "nodes/*.xml"]},
+    package_data={NAME: ["py.typed", "app/dashboard/*.js", "nodes/*.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -75,13 +77,17 @@ setup(
         "zstandard>=0.22",  # the oldest wheels for 3.12
     ],
     extras_require={
+        # A web page that shows a run (stickslip dashboard); all but NiceGUI are what it stands on.
+        "dashboard": DASHBOARD,
         # Studies on a cluster (stickslip sweep --dask).
         "dask": ["distributed>=2024.2.1"],
         # ROS itself, where none is installed; the message packages come with these two.
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [
+            *DASHBOARD,
             "distributed",
             "hypothesis",
+            "playwright",  # drives the browser of the system: no download of its own
             "pytest",
             "pytest-timeout",
             "rosbags",

@@ -41,6 +41,16 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_namespace(parser: argparse.ArgumentParser) -> None:
+    """Add --namespace, of nodes that run."""
+    parser.add_argument(
+        "--namespace",
+        default=DEFAULT_NAMESPACE,
+        metavar="NS",
+        help="ROS namespace of the nodes (default: %(default)s)",
+    )
+
+
 def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
     """Add --plot, which draws what is `shown`."""
     parser.add_argument(
@@ -87,6 +97,17 @@ def made_of(scenario: Scenario) -> dict[str, Any]:
         "overrides": list(scenario.overrides),
         "versions": versions(),
     }
+
+
+def namespace_of(text: str) -> str:
+    """Return a ROS namespace that was given; InvalidInputError if it is none."""
+    namespace = "/" + text.strip("/")
+    tokens = namespace.split("/")[1:]
+    if not all(token.isidentifier() and token.isascii() for token in tokens):
+        raise InvalidInputError(
+            f"--namespace {text!r}: must be names of letters, digits and _ joined by /"
+        )
+    return namespace
 
 
 def seconds(text: str) -> float:

@@ -12,6 +12,7 @@ from stickslip_ros.errors import InvalidInputError, StickslipError
 
 _COMMANDS = (
     "run",
+    "dashboard",
     "simulate",
     "stability",
     "design",

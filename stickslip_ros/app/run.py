@@ -2,19 +2,25 @@
 
 import argparse
 import shlex
-import signal
 import sys
 from collections.abc import Generator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from datetime import UTC, datetime
-from importlib import import_module
 from itertools import count
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from stickslip_ros.app import INTERRUPTED
-from stickslip_ros.app.arguments import add_json, add_scenario, made_of, scenario_of, seconds
+from stickslip_ros.app.arguments import (
+    add_json,
+    add_namespace,
+    add_scenario,
+    made_of,
+    namespace_of,
+    scenario_of,
+    seconds,
+)
+from stickslip_ros.app.optional import check_dashboard, ros_nodes
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import check_new_bag
@@ -61,11 +67,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="directory to record to; must not exist (default: bags/<scenario>-<UTC time>)",
     )
+    add_namespace(parser)
     parser.add_argument(
-        "--namespace",
-        default=DEFAULT_NAMESPACE,
-        metavar="NS",
-        help="ROS namespace of the nodes (default: %(default)s)",
+        "--dashboard",
+        action="store_true",
+        help="show the run on a web page, as `stickslip dashboard` does; the page ends with it",
     )
     parser.add_argument(
         "--network",
@@ -82,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
         overrides.append(f"plant.pace={arguments.pace}")
     if arguments.duration is not None:
         overrides.append(f"plant.duration={arguments.duration!r}")
-    namespace = _namespace(arguments.namespace)
+    namespace = namespace_of(arguments.namespace)
     controller = _other_controller(arguments)
     scenario = scenario_of(
         arguments, *overrides, namespace=namespace, other_nodes=controller is not None
@@ -93,11 +99,14 @@ def run(arguments: argparse.Namespace) -> int:
         )
     bag = arguments.bag or _bag_of(scenario) or default_bag(scenario.name)
     check_new_bag(bag)
+    if arguments.dashboard:
+        check_dashboard()
     reach = ros_nodes("process").keep_on_this_machine(arguments.network)
     _tell(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}")
-    figures, interrupted = record(
-        scenario, bag, namespace=namespace, composed=arguments.composed, controller=controller
-    )
+    with _dashboard(namespace) if arguments.dashboard else nullcontext():
+        figures, interrupted = record(
+            scenario, bag, namespace=namespace, composed=arguments.composed, controller=controller
+        )
     if arguments.json:
         command = shlex.join([arguments.controller, *arguments.further]) if controller else None
         print_json({**figures, "controller_command": command, **made_of(scenario)})
@@ -145,29 +154,23 @@ def record(
         raise
 
 
-def ros_nodes(module: str) -> ModuleType:
-    """Return a module of `nodes`; the commands that need no ROS do without."""
-    try:
-        with _interrupts_kept():
-            return import_module(f"stickslip_ros.nodes.{module}")
-    except ModuleNotFoundError as error:
-        raise RunError(
-            f"running nodes needs ROS 2, of which {error.name} is not installed: "
-            "pip install 'stickslip_ros[ros]', or source an installed ROS 2"
-        ) from None
-
-
 @contextmanager
-def _interrupts_kept() -> Generator[None]:
-    """Let SIGINT wait: where it meets a C extension being loaded, it becomes an ImportError."""
-    kept: list[int] = []
-    handler = signal.signal(signal.SIGINT, lambda number, _: kept.append(number))
+def _dashboard(namespace: str) -> Generator[None]:
+    """Serve the page in a process of its own, which has no part in whether the run succeeds."""
+    command = [
+        sys.executable,
+        "-m",
+        "stickslip_ros.app.main",
+        "dashboard",
+        "--namespace",
+        namespace,
+    ]
+    process = ros_nodes("lifeline").start(command)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, handler)
-        if kept:
-            signal.raise_signal(signal.SIGINT)
+        process.terminate()
+        process.wait()
 
 
 def default_bag(scenario: str) -> Path:
@@ -238,13 +241,3 @@ def _state_of(bag: Path) -> str:
         f"the bag {bag} was not closed: `stickslip report` reads what it holds, "
         "`stickslip repair` makes a sound one of it"
     )
-
-
-def _namespace(text: str) -> str:
-    namespace = "/" + text.strip("/")
-    tokens = namespace.split("/")[1:]
-    if not all(token.isidentifier() and token.isascii() for token in tokens):
-        raise InvalidInputError(
-            f"--namespace {text!r}: must be names of letters, digits and _ joined by /"
-        )
-    return namespace

@@ -9,7 +9,7 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 
-_PATIENCE = 10
+PATIENCE = 10
 """Times that an inquiry is pursued before another client asks; doubled with each."""
 
 
@@ -27,7 +27,7 @@ class Inquiry:
         service: str,
         request: Any,
         on_answer: Callable[[Any], None],
-        patience: int = _PATIENCE,
+        patience: int = PATIENCE,
     ) -> None:
         """Call, for `inquirer`, a service of some kind, and pass on its answer.
 
@@ -38,7 +38,9 @@ class Inquiry:
         self._service = service
         self._request = request
         self._on_answer = on_answer
-        self._answered = self._closed = False
+        self.answered = False
+        """Whether the answer has come."""
+        self._closed = False
         self._pursued = 0
         self._patience = patience
         self._client = self._new_client()
@@ -46,7 +48,7 @@ class Inquiry:
 
     def pursue(self) -> None:
         """Do what is due; to be called about ten times a second."""
-        if self._answered or not self._inquirer.count_services(self._service):
+        if self.answered or not self._inquirer.count_services(self._service):
             return
         self._pursued += 1
         if self._pursued > self._patience:
@@ -67,9 +69,9 @@ class Inquiry:
 
     def _take(self, answer: Future) -> None:
         response = answer.result()
-        if response is None or self._answered or self._closed:
+        if response is None or self.answered or self._closed:
             return
-        self._answered = True
+        self.answered = True
         self._on_answer(response)
 
 

@@ -1,4 +1,7 @@
-"""The topics: name, type and depth of history, each once. Names are relative to the namespace."""
+"""The topics: name, type, depth of history and meaning, each once.
+
+Names are relative to the namespace.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -29,6 +32,7 @@ class Topic:
     type: Any
     type_name: str
     depth: int = 10
+    meaning: str = ""
 
     def qos(self, depth: int | None = None) -> QoSProfile:
         """Return its quality of service, the history `depth` messages deep."""
@@ -39,19 +43,88 @@ class Topic:
         )
 
 
-JOINT_STATES = Topic("joint_states", JointState, "sensor_msgs/msg/JointState", DEEP)
-CONTROL_FORCE = Topic("control_force", WrenchStamped, "geometry_msgs/msg/WrenchStamped", DEEP)
-DISTURBANCE_FORCE = Topic("disturbance_force", WrenchStamped, "geometry_msgs/msg/WrenchStamped")
-APPLIED_DISTURBANCE = Topic(
-    "applied_disturbance", WrenchStamped, "geometry_msgs/msg/WrenchStamped", DEEP
+JOINT_STATES = Topic(
+    "joint_states",
+    JointState,
+    "sensor_msgs/msg/JointState",
+    DEEP,
+    meaning="State at each sample: `name` slide and belt, `position` m, `velocity` m/s, `effort` N "
+    "(friction on the slide, its reaction on the belt, under the force held up to then).",
 )
-RECORDED = Topic("recorded", Header, "std_msgs/msg/Header", 100)
-AMPLITUDE = Topic("limit_cycle/amplitude", Float64, "std_msgs/msg/Float64")
-STICK_FRACTION = Topic("limit_cycle/stick_fraction", Float64, "std_msgs/msg/Float64")
-FREQUENCY = Topic("limit_cycle/frequency", Float64, "std_msgs/msg/Float64")
-DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, "diagnostic_msgs/msg/DiagnosticArray", 100)
-CLOCK = Topic("/clock", Clock, "rosgraph_msgs/msg/Clock", 10)
+CONTROL_FORCE = Topic(
+    "control_force",
+    WrenchStamped,
+    "geometry_msgs/msg/WrenchStamped",
+    DEEP,
+    meaning="Force on the slide, `wrench.force.x` N, with the stamp of the state that it answers.",
+)
+DISTURBANCE_FORCE = Topic(
+    "disturbance_force",
+    WrenchStamped,
+    "geometry_msgs/msg/WrenchStamped",
+    meaning="A force of yours on the slide, `wrench.force.x` N, from the next sample on until the "
+    "next message; its stamp does not matter.",
+)
+APPLIED_DISTURBANCE = Topic(
+    "applied_disturbance",
+    WrenchStamped,
+    "geometry_msgs/msg/WrenchStamped",
+    DEEP,
+    meaning="All the disturbance that acts, `wrench.force.x` N, at each change, with the stamp of "
+    "the sample from which it acts.",
+)
+RECORDED = Topic(
+    "recorded",
+    Header,
+    "std_msgs/msg/Header",
+    100,
+    meaning="Stamp of the newest sample that the analyzer has taken in.",
+)
+AMPLITUDE = Topic(
+    "limit_cycle/amplitude",
+    Float64,
+    "std_msgs/msg/Float64",
+    meaning="Half the peak-to-peak displacement of each cycle as it is completed, m.",
+)
+STICK_FRACTION = Topic(
+    "limit_cycle/stick_fraction",
+    Float64,
+    "std_msgs/msg/Float64",
+    meaning="Share of that cycle during which the slide stuck.",
+)
+FREQUENCY = Topic(
+    "limit_cycle/frequency",
+    Float64,
+    "std_msgs/msg/Float64",
+    meaning="One over the period of that cycle, Hz.",
+)
+DIAGNOSTICS = Topic(
+    "/diagnostics",
+    DiagnosticArray,
+    "diagnostic_msgs/msg/DiagnosticArray",
+    100,
+    meaning="Health of the node, once a second of wall time, and when it is deactivated.",
+)
+CLOCK = Topic(
+    "/clock",
+    Clock,
+    "rosgraph_msgs/msg/Clock",
+    meaning="Simulated time, of a plant with `publish_clock`; recorded time, of a replay with "
+    "`clock`.",
+)
 
+TOPICS = (
+    JOINT_STATES,
+    CONTROL_FORCE,
+    DISTURBANCE_FORCE,
+    APPLIED_DISTURBANCE,
+    AMPLITUDE,
+    STICK_FRACTION,
+    FREQUENCY,
+    RECORDED,
+    DIAGNOSTICS,
+    CLOCK,
+)
 RECORDED_TOPICS = (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE)
 """What the analyzer writes to its bag."""
 

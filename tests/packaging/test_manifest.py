@@ -11,13 +11,17 @@ SOURCE = Path(__file__).parents[2]
 # What package.xml calls what setup.py names: rosdep keys, where there are any.
 KEYS = {
     "distributed": set(),
+    "fastapi": {"python3-fastapi"},
     "heyoka": set(),
     "hypothesis": {"python3-hypothesis"},
     "lz4": set(),
     "matplotlib": {"python3-matplotlib"},
     "mcap": set(),
+    "nicegui": set(),
     "numpy": {"python3-numpy"},
+    "orjson": {"python3-orjson"},
     "pillow": {"python3-pil"},
+    "playwright": {"chromium-browser"},  # what it drives; itself it has no key
     "pydantic": {"python3-pydantic"},
     "pytest": {"python3-pytest"},
     "pytest-timeout": {"python3-pytest-timeout"},
@@ -41,6 +45,7 @@ KEYS = {
     "rosbags": {"python3-rosbags-pip"},
     "scipy": {"python3-scipy"},
     "setuptools": {"python3-setuptools"},
+    "uvicorn": {"python3-uvicorn"},
     "zstandard": set(),
 }
 
@@ -76,6 +81,8 @@ def test_the_manifest_tells_what_has_no_key():
     (extra,) = required("dask")
     assert not KEYS[extra]
     assert f"to test them: {extra}." in text
+    keys = sorted(key for name in required("dashboard") for key in KEYS[name])
+    assert f"For the dashboard: {', '.join(keys)}, and nicegui from PyPI;" in text
 
 
 def test_the_docs_install_in_a_workspace_all_that_is_asked_for():

@@ -1,0 +1,53 @@
+"""`stickslip dashboard`: a web page that shows a running loop, and acts on it."""
+
+import argparse
+import os
+from contextlib import suppress
+
+from stickslip_ros.app.arguments import add_namespace, namespace_of
+from stickslip_ros.app.optional import check_dashboard, ros_nodes
+
+HELP = "show a running loop on a web page, live, and act on it"
+
+DEFAULT_PORT = 8642
+"""The first that is tried where none is asked for."""
+
+_LARGEST_PORT = 65_535
+_NICENESS = 10
+"""The simulation goes first."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    add_namespace(parser)
+    parser.add_argument(
+        "--port",
+        type=_port,
+        metavar="PORT",
+        help=f"port of the page on this machine (default: {DEFAULT_PORT}, or the next free one)",
+    )
+    parser.add_argument(
+        "--network",
+        action="store_true",
+        help="listen to nodes on other machines, too; the page stays on this one",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command; return the exit status."""
+    namespace = namespace_of(arguments.namespace)
+    check_dashboard()
+    reach = ros_nodes("process").keep_on_this_machine(arguments.network)
+    ros_nodes("lifeline").die_with_parent()
+    with suppress(OSError):
+        os.nice(_NICENESS)
+    from stickslip_ros.app.dashboard.server import serve  # it needs NiceGUI, and takes seconds
+
+    serve(namespace, arguments.port, reach)
+    return 0
+
+
+def _port(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= _LARGEST_PORT):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port, 1 to {_LARGEST_PORT}")
+    return int(text)

@@ -1,0 +1,295 @@
+"""The page: charts, measures, health and events of the nodes, and what a person may do."""
+
+import asyncio
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import orjson
+from fastapi import FastAPI, HTTPException
+from fastapi.responses import Response
+from nicegui import ui
+
+from stickslip_ros.app.dashboard.charts import CYCLES, PORTRAIT, TRACE
+from stickslip_ros.app.dashboard.frames import PERIODS, Frames
+from stickslip_ros.app.output import quantities
+from stickslip_ros.nodes.observer import ABSENT, SILENT, Answer, Health, ObserverNode
+from stickslip_ros.nodes.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
+from stickslip_ros.physics.measures import Regime
+from stickslip_ros.plots.live_trace import LiveTrace
+from stickslip_ros.plots.regimes import REGIMES
+from stickslip_ros.scenario.parameters import NODE_PARAMETERS, Fixed, known_parameters
+
+_CONTROLLER = "washout_controller"
+_FIRST = (
+    "plant.belt_speed",
+    f"{_CONTROLLER}.linear_gain",
+    f"{_CONTROLLER}.cubic_gain",
+    f"{_CONTROLLER}.corner_frequency",
+)
+"""Parameters with a field of their own; the others are chosen from a list."""
+_UNCOMPRESSED = {"Content-Encoding": "identity"}
+"""To compress a frame takes longer than the loopback does."""
+_REFRESH = 0.25
+_TAP_PART = 0.25
+"""Of the normal force, and of the natural period: what a tap is at first."""
+_LEVELS = ("well", "warning", "error", "stale")
+_STATE_TIMEOUT = 3.0
+
+
+def add_page(app: FastAPI, observer: ObserverNode, trace: LiveTrace) -> None:
+    """Add the page, and the frames of its charts."""
+    frames = Frames(observer, trace)
+    script = Path(__file__).with_name("page.js").read_text(encoding="utf-8")
+
+    @app.get("/frame")
+    async def frame(periods: int) -> Response:
+        if periods not in PERIODS:
+            raise HTTPException(422, f"periods={periods}: must be one of {PERIODS}")
+        body = orjson.dumps(frames.frame(periods), option=orjson.OPT_SERIALIZE_NUMPY)
+        return Response(body, headers=_UNCOMPRESSED, media_type="application/json")
+
+    @ui.page("/")
+    def page() -> None:
+        _Page(observer, frames, script)
+
+
+class _Page:
+    """One page that is open; it keeps nothing, so that closing it changes nothing."""
+
+    def __init__(self, observer: ObserverNode, frames: Frames, script: str) -> None:
+        self._observer = observer
+        self._frames = frames
+        self._busy = False
+        self._told = 0.0
+        with ui.row().classes("w-full items-center"):
+            ui.label(observer.get_namespace()).classes("text-2xl font-bold")
+            self._regime = ui.badge("").classes("text-base")
+            self._trouble = ui.label("").classes("text-red-700")
+            ui.space()
+            self._window = ui.toggle(
+                {periods: f"{periods} periods" for periods in PERIODS},
+                value=PERIODS[1],
+                on_change=self._show_window,
+            )
+            ui.button("Fit", on_click=lambda: ui.run_javascript("stickslip.fit()"))
+        with ui.row().classes("w-full no-wrap items-start"):
+            with ui.column().classes("w-2/3"):
+                trace = ui.echart(TRACE).classes("w-full h-[27rem]")
+                with ui.row().classes("w-full no-wrap"):
+                    portrait = ui.echart(PORTRAIT).classes("w-1/2 h-80")
+                    cycles = ui.echart(CYCLES).classes("w-1/2 h-80")
+                self._add_health()
+            with ui.column().classes("w-1/3"):
+                self._add_measures()
+                self._add_control()
+                self._add_parameters()
+                with _card("Events"):
+                    self._events = ui.log(max_lines=100).classes("w-full h-40")
+        ids = {"trace": trace.id, "portrait": portrait.id, "cycles": cycles.id}
+        start = {**ids, "periods": PERIODS[1]}
+        ui.add_body_html(
+            f"<script>window.stickslip = {json.dumps(start)}</script>"
+            f'<script type="module">{script}</script>'
+        )
+        ui.run_javascript("stickslip.start()")
+        self._refresh()
+        ui.timer(_REFRESH, self._refresh)
+
+    def _add_measures(self) -> None:
+        with _card("Last cycle"):
+            self._measures: dict[Any, ui.label] = {}
+            with ui.grid(columns=2).classes("w-full gap-1"):
+                for topic, name in (
+                    (AMPLITUDE, "amplitude"),
+                    (STICK_FRACTION, "stick fraction"),
+                    (FREQUENCY, "frequency"),
+                ):
+                    ui.label(name)
+                    self._measures[topic] = ui.label("-")
+
+    def _add_control(self) -> None:
+        with _card("Act"):
+            self._switch = ui.switch("washout controller", on_change=self._switch_control)
+            self._switch_refusal = _refusal()
+            with ui.row().classes("items-end no-wrap"):
+                self._tap_force = ui.number("force (N)", value=None, format="%g").classes("w-24")
+                self._tap_time = ui.number("for (s)", value=None, format="%g").classes("w-24")
+                ui.button("Tap", on_click=self._tap)
+                ui.button("Reset", on_click=self._reset)
+            self._act_refusal = _refusal()
+
+    def _add_parameters(self) -> None:
+        others = [
+            f"{node}.{parameter.name}"
+            for node in ("plant", _CONTROLLER)
+            for parameter in known_parameters(NODE_PARAMETERS[node]).values()
+            if parameter.kind is float and parameter.fixed is Fixed.NEVER
+        ]
+        with _card("Parameters"):
+            self._fields = [
+                _ParameterField(self._observer, name, lambda n=name: n) for name in _FIRST
+            ]
+            chosen = ui.select(
+                [name for name in others if name not in _FIRST], label="another parameter"
+            )
+            chosen.classes("w-full").props("dense")
+            self._fields.append(_ParameterField(self._observer, "value", lambda: chosen.value))
+
+    def _add_health(self) -> None:
+        columns = [
+            {"name": name, "label": name, "field": name, "align": "left"}
+            for name in ("node", "state", "health", "figures")
+        ]
+        with _card("Nodes"):
+            self._health = ui.table(columns=columns, rows=[], row_key="node")
+            self._health.classes("w-full").props("wrap-cells flat dense")
+
+    def _refresh(self) -> None:
+        observer, drive = self._observer, self._frames.drive
+        for topic, label in self._measures.items():
+            values = observer.cycles[topic]
+            unit = {AMPLITUDE: "m", FREQUENCY: "Hz"}.get(topic, "")
+            label.set_text(quantities([values[-1]], unit)[0] if values else "-")
+        self._show_regime(observer.health["analyzer"])
+        self._trouble.set_text(
+            ", ".join(
+                f"{node} {health.state}"
+                for node, health in observer.health.items()
+                if health.state in (ABSENT, SILENT)
+            )
+        )
+        if drive is not None and self._tap_force.value is None:
+            self._tap_force.value = float(f"{_TAP_PART * drive.normal_force:.2g}")
+            self._tap_time.value = float(f"{_TAP_PART * drive.natural_period:.2g}")
+        for field in self._fields:
+            field.refresh()
+        self._show_control(observer.health[_CONTROLLER])
+        rows = [_row(node, health) for node, health in sorted(observer.health.items())]
+        if rows != self._health.rows:
+            self._health.rows = rows
+        events = [event for event in list(observer.events) if event[0] > self._told]
+        for when, what in events:
+            self._events.push(f"{time.strftime('%H:%M:%S', time.localtime(when))} {what}")
+            self._told = when
+
+    def _show_regime(self, analyzer: Health) -> None:
+        regime = analyzer.figures.get("regime") if analyzer.state == "active" else None
+        known = regime in list(Regime)
+        look = REGIMES[Regime(regime) if known else None]
+        self._regime.set_text(look.label if known else "not measured")
+        self._regime.style(f"background-color: {look.colour} !important")
+
+    def _show_control(self, health: Health) -> None:
+        there = health.state not in (ABSENT, SILENT)
+        self._switch.set_enabled(there and not self._busy)
+        if not self._busy:
+            self._switch.set_value(health.state == "active")
+
+    async def _switch_control(self, event: Any) -> None:
+        active = bool(event.value)
+        observer = self._observer
+        if self._busy or active == (observer.health[_CONTROLLER].state == "active"):
+            return
+        self._busy = True
+        try:
+            await _report(observer.set_active(_CONTROLLER, active), self._switch_refusal)
+            deadline = time.monotonic() + _STATE_TIMEOUT
+            while time.monotonic() < deadline:
+                if active == (observer.health[_CONTROLLER].state == "active"):
+                    break
+                await asyncio.sleep(_REFRESH)
+        finally:
+            self._busy = False
+
+    async def _tap(self) -> None:
+        force, duration = self._tap_force.value, self._tap_time.value
+        if force is None or duration is None or not duration > 0.0:
+            self._act_refusal.set_text("a tap needs a force and a time above 0")
+            return
+        await _report(self._observer.tap(force, duration), self._act_refusal)
+
+    async def _reset(self) -> None:
+        await _report(self._observer.reset(), self._act_refusal)
+
+    def _show_window(self, event: Any) -> None:
+        ui.run_javascript(f"stickslip.periods = {int(event.value)}; stickslip.fit()")
+
+
+class _ParameterField:
+    """A field for the value of a parameter, with the one in force, and why another was refused."""
+
+    def __init__(
+        self, observer: ObserverNode, label: str, name_of: Callable[[], str | None]
+    ) -> None:
+        """Add the field; `name_of` returns which parameter it is for, as NODE.PARAMETER."""
+        self._observer = observer
+        self._name_of = name_of
+        self._hint = ""
+        self._field = ui.input(label).classes("w-full").props("dense")
+        self._field.on("keydown.enter", self._apply)
+        with self._field.add_slot("append"):
+            ui.button("Set", on_click=self._apply).props("flat dense")
+        self._refusal = _refusal()
+
+    def refresh(self) -> None:
+        """Show the value in force."""
+        hint = self._in_force()
+        if hint != self._hint:
+            self._hint = hint
+            self._field.props["hint"] = hint
+
+    async def _apply(self) -> None:
+        full_name = self._name_of()
+        if full_name is None:
+            self._refusal.set_text("choose a parameter first")
+            return
+        text: str = self._field.value or ""
+        try:
+            value = float(text)
+        except ValueError:
+            self._refusal.set_text(f"{text!r} is not a number")
+            return
+        node, _, name = full_name.partition(".")
+        await _report(self._observer.set_parameter(node, name, value), self._refusal)
+
+    def _in_force(self) -> str:
+        full_name = self._name_of()
+        if full_name is None:
+            return ""
+        node, _, name = full_name.partition(".")
+        value = self._observer.parameters[node].get(name)
+        unit = known_parameters(NODE_PARAMETERS[node])[name].unit or ""
+        return "not known" if value is None else f"now {value:g} {unit}"
+
+
+async def _report(answer: Answer, refusal: ui.label) -> None:
+    """Wait for an answer, and show it where it is a refusal."""
+    refusal.set_text(await asyncio.wrap_future(answer))
+
+
+def _card(title: str) -> ui.card:
+    card = ui.card().classes("w-full gap-2 p-3")
+    with card:
+        ui.label(title).classes("font-bold")
+    return card
+
+
+def _refusal() -> ui.label:
+    """Return a line for what was refused, and why."""
+    label = ui.label().classes("text-sm text-red-700")
+    return label.bind_visibility_from(label, "text")
+
+
+def _row(node: str, health: Health) -> dict[str, str]:
+    level = _LEVELS[min(health.level, 3)] if health.heard else ""
+    return {
+        "node": node,
+        "state": health.state,
+        "health": f"{level}: {health.message}" if health.message else level,
+        "figures": ", ".join(
+            f"{name} {value}" for name, value in health.figures.items() if value not in ("", "none")
+        ),
+    }

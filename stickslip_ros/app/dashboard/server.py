@@ -1,0 +1,87 @@
+"""Serves the page on this machine, beside a ROS node that listens for it."""
+
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Generator
+from contextlib import contextmanager
+from itertools import count
+
+import rclpy
+import uvicorn
+from fastapi import FastAPI
+from fastapi.middleware.trustedhost import TrustedHostMiddleware
+from nicegui import ui
+from rclpy.experimental import EventsExecutor
+from rclpy.task import Future
+
+from stickslip_ros.app.dashboard import DEFAULT_PORT
+from stickslip_ros.app.dashboard.page import add_page
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.nodes.observer import ObserverNode
+from stickslip_ros.nodes.process import initialise, spin
+from stickslip_ros.plots.live_trace import LiveTrace
+
+_HOST = "127.0.0.1"
+_AT_FIRST = 60.0
+"""Simulated time, s, that is kept while the drive is not known."""
+
+
+def serve(namespace: str, port: int | None, reach: str) -> None:
+    """Serve the page of a namespace until SIGINT or SIGTERM.
+
+    `reach` says which nodes are heard. Raises InvalidInputError for a port that is taken.
+    """
+    listening = _listen(port)
+    signal.signal(signal.SIGTERM, _exit)  # uvicorn passes it on at its end
+    trace = LiveTrace(_AT_FIRST)
+    initialise()
+    try:
+        with _running(ObserverNode(namespace, trace.feed)) as observer:
+            app = FastAPI()
+            # A page of somebody else's, whose name leads here, may not act on the drive.
+            app.add_middleware(TrustedHostMiddleware, allowed_hosts=[_HOST, "localhost"])
+            add_page(app, observer, trace)
+            ui.run_with(app, title=f"stickslip {namespace}", show_welcome_message=False)
+            host, port = listening.getsockname()
+            print(f"dashboard of {namespace}, {reach}: http://{host}:{port}", file=sys.stderr)
+            config = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1)
+            uvicorn.Server(config).run(sockets=[listening])
+    finally:
+        rclpy.try_shutdown()
+
+
+def _exit(*_: object) -> None:
+    sys.exit(0)
+
+
+def _listen(port: int | None) -> socket.socket:
+    """Return a socket that listens at the port, or the first one from the default on."""
+    for number in [port] if port is not None else count(DEFAULT_PORT):
+        try:
+            return socket.create_server((_HOST, number))
+        except OSError as error:
+            if port is not None:
+                raise InvalidInputError(f"--port {port}: {error.strerror}") from None
+    raise AssertionError
+
+
+@contextmanager
+def _running(node: ObserverNode) -> Generator[ObserverNode]:
+    """Run a node in a thread of its own."""
+    executor = EventsExecutor()
+    executor.add_node(node)
+    stop = Future()
+    thread = threading.Thread(target=spin, args=(executor, stop), name="ros", daemon=True)
+    thread.start()
+    try:
+        yield node
+    finally:
+        stop.set_result(None)
+        executor.wake()
+        thread.join()
+        node.close()
+        executor.remove_node(node)
+        node.destroy_node()
+        executor.shutdown()

@@ -1,0 +1,152 @@
+"""The last of a motion that is still going on, as few points as a picture of it needs."""
+
+from collections.abc import Sequence
+from threading import Lock
+from typing import NamedTuple
+
+import numpy as np
+
+from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
+from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.physics.samples import NANOSECONDS, IntArray
+from stickslip_ros.plots.decimation import peaks
+
+_MOST_ROWS = 200_000
+_LONGEST_GAP = 10
+"""Usual steps from one sample to the next that a line may bridge."""
+_ORBIT_BUCKETS = 1_000
+_FINE_BUCKETS = 10_000
+"""Of what is kept, once there are too many rows: many more than a picture has pixels."""
+
+
+class Line(NamedTuple):
+    """Points to connect; SI units."""
+
+    x: FloatArray
+    y: FloatArray
+
+
+class Frame(NamedTuple):
+    """What a picture shows; times in s before the newest sample, so none is positive; SI units."""
+
+    end: float
+    """Stamp of the newest sample, s from the first of all."""
+    position: Line
+    """Over time, as the next three."""
+    velocity: Line
+    belt_velocity: Line
+    force: Line
+    orbit: Line
+    """Velocity over displacement."""
+
+
+class LiveTrace:
+    """Takes in blocks of samples and forces as they come, and gives frames; from any threads.
+
+    However long it is fed, its memory is bounded: what becomes too much is thinned out, all peaks
+    kept. Stamps that do not go on, as those of a plant that was started again, begin it anew.
+    """
+
+    def __init__(self, longest: float) -> None:
+        """Keep the last `longest` seconds of simulated time."""
+        self._lock = Lock()
+        self.longest = longest
+        """How much is kept, s; a frame shows no more."""
+        self._begin()
+
+    def feed(self, states: JointStateColumns, forces: WrenchColumns) -> None:
+        """Take in what has come; blocks that are empty are welcome."""
+        longest = round(self.longest * NANOSECONDS)
+        with self._lock:
+            if len(states.stamp):
+                if states.stamp[0] <= self._states.newest:
+                    self._begin()
+                if self._first is None:
+                    self._first = int(states.stamp[0])
+                columns = states.position, states.velocity, states.belt_velocity
+                self._states.add(states.stamp, columns, longest)
+            if len(forces.stamp):
+                # A controller started again may answer for the past: the picture goes by stamps.
+                later = forces.stamp > self._forces.newest
+                self._forces.add(forces.stamp[later], [forces.force[later]], longest)
+
+    def frame(self, window: float, orbit: float, buckets: int) -> Frame | None:
+        """Return the last `window` s for `buckets` columns of pixels, and the last `orbit` s.
+
+        None before the first sample.
+        """
+        with self._lock:
+            if self._first is None:
+                return None
+            end = self._states.newest
+            begin = end - round(window * NANOSECONDS)
+            # On a fixed grid of times the points of a moving picture keep their places.
+            width = max((end - begin) // buckets, 1)
+            stamp, columns = self._states.since(begin)
+            force_stamp, (force,) = self._forces.since(begin)
+            turning = round(orbit * NANOSECONDS)
+            orbit_stamp, (x, v, _) = self._states.since(end - turning)
+            rows = peaks(orbit_stamp // max(turning // _ORBIT_BUCKETS, 1), x, v)
+            position, velocity, belt = (_line(stamp, c, end, width) for c in columns)
+            return Frame(
+                (end - self._first) / NANOSECONDS,
+                position,
+                velocity,
+                belt,
+                _line(force_stamp, force, end, width),
+                Line(x[rows], v[rows]),
+            )
+
+    def _begin(self) -> None:
+        self._first: int | None = None
+        self._states = _Rolling(3)
+        self._forces = _Rolling(1)
+
+
+class _Rolling:
+    """Columns by ascending stamp, of which the oldest are let go."""
+
+    def __init__(self, columns: int) -> None:
+        self._size = 0
+        self._stamp: IntArray = np.empty(0, dtype=np.int64)
+        self._columns = [np.empty(0) for _ in range(columns)]
+        self.newest = -1
+
+    def add(self, stamp: IntArray, columns: Sequence[FloatArray], longest: int) -> None:
+        """Append rows; let go what is older than the newest by more than `longest`, ns."""
+        if not len(stamp):
+            return
+        if self._size + len(stamp) > len(self._stamp):
+            self._make_room(len(stamp), longest)
+        rows = slice(self._size, self._size + len(stamp))
+        self._stamp[rows] = stamp
+        for kept, column in zip(self._columns, columns, strict=True):
+            kept[rows] = column
+        self._size = rows.stop
+        self.newest = int(stamp[-1])
+
+    def since(self, begin: int) -> tuple[IntArray, list[FloatArray]]:
+        """Return the rows from a stamp on, as long as nothing is added."""
+        rows = slice(int(np.searchsorted(self._stamp[: self._size], begin)), self._size)
+        return self._stamp[rows], [column[rows] for column in self._columns]
+
+    def _make_room(self, number: int, longest: int) -> None:
+        stamp, columns = self.since(self.newest - longest)
+        if len(stamp) + number > _MOST_ROWS:
+            rows = peaks(stamp // max(longest // _FINE_BUCKETS, 1), *columns)
+            stamp, columns = stamp[rows], [column[rows] for column in columns]
+        self._size = len(stamp)
+        room = self._size + 2 * number + 1024
+        self._stamp = np.concatenate([stamp, np.empty(room, dtype=np.int64)])
+        self._columns = [np.concatenate([column, np.empty(room)]) for column in columns]
+
+
+def _line(stamp: IntArray, column: FloatArray, end: int, width: int) -> Line:
+    """Return the points of a line that is broken, by NaN, where samples are missing."""
+    rows = peaks(stamp // width, column)
+    x, y = (stamp[rows] - end) / NANOSECONDS, column[rows]
+    if len(stamp) > 1:
+        usual = max(float(np.median(np.diff(stamp))), width)
+        gaps = np.flatnonzero(np.diff(stamp[rows]) > _LONGEST_GAP * usual) + 1
+        x, y = np.insert(x, gaps, x[gaps]), np.insert(y, gaps, np.nan)
+    return Line(x, y)

@@ -1,0 +1,224 @@
+"""The dashboard end to end: a real browser, a real server, real nodes."""
+
+import re
+import signal
+import socket
+import subprocess
+import threading
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from stickslip_ros.bags.reader import Recording
+from tests.app.browser import headless_browser
+from tests.nodes.conftest import processes  # noqa: F401 - a fixture used here
+from tests.nodes.graph import PATIENCE, wait_for
+from tests.nodes.processes import Processes
+
+Start = Callable[..., subprocess.Popen[str]]
+
+SCREENSHOT = Path(__file__).parents[2] / "build" / "dashboard.png"
+"""Where the picture in the README comes from: `make screenshot` copies it."""
+
+expect.set_options(timeout=PATIENCE * 1000.0)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with headless_browser() as browser:
+        yield browser
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    page = browser.new_page(viewport={"width": 1400, "height": 1060})
+    page.set_default_timeout(PATIENCE * 1000.0)
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    yield page
+    page.close()
+    assert not errors
+
+
+class Served:
+    """A command that serves the page, and what it says."""
+
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        self.process = process
+        self.said: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    @property
+    def url(self) -> str:
+        def found() -> list[str]:
+            return re.findall(r"http://127\.0\.0\.1:\d+", "".join(self.said))
+
+        wait_for(found, f"the address of the page; said {self.said}")
+        return found()[0]
+
+    def end(self) -> int:
+        """Interrupt it and return its status."""
+        self.process.send_signal(signal.SIGINT)
+        status = self.process.wait(PATIENCE)
+        self._reader.join(PATIENCE)
+        return status
+
+    def _read(self) -> None:
+        assert self.process.stderr is not None
+        self.said += iter(self.process.stderr.readline, "")
+
+
+def swing(page: Page) -> float:
+    """Return peak to peak of the displacement that the chart shows, in its unit; -1 for none."""
+    return page.evaluate("""() => {
+        const chart = window.getElement(stickslip.trace)?.chart;
+        const points = chart?.getOption().series[0].data ?? [];
+        const values = points.map((point) => point[1]);
+        return values.length ? Math.max(...values) - Math.min(...values) : -1;
+    }""")
+
+
+def last_amplitude(page: Page) -> float:
+    """Return the amplitude of the last cycle that the chart shows, in its unit."""
+    return page.evaluate("""() => {
+        const cycles = window.getElement(stickslip.cycles).chart.getOption().series[0].data;
+        return cycles[cycles.length - 1][1];
+    }""")
+
+
+def test_a_limit_cycle_is_seen_stopped_and_changed(
+    start_stickslip: Start, page: Page, tmp_path: Path
+) -> None:
+    # In slow motion a busy machine has time for each answer.
+    served = Served(
+        start_stickslip(
+            *("run", "feed_drive", "--dashboard", "--bag", "bag"),
+            *("-p", "plant.real_time_factor=0.25", "-p", "washout_controller.start_after=0"),
+        )
+    )
+    page.goto(served.url)
+    control = page.get_by_role("switch", name="washout controller")
+    expect(control).to_be_checked()
+
+    control.click()
+    expect(page.get_by_text("washout_controller inactive")).to_be_visible()
+    page.get_by_role("button", name="Reset").click()
+    expect(page.get_by_text("sticks and slips", exact=True)).to_be_visible()
+    expect(page.get_by_text(re.compile(r"^43\d(\.\d+)? µm$"))).to_be_visible()
+    wait_for(lambda: swing(page) > 800.0, "the limit cycle is drawn")  # µm
+    expect(control).not_to_be_checked()
+
+    control.click()
+    expect(control).to_be_checked()
+    wait_for(lambda: last_amplitude(page) < 200.0, "the limit cycle collapses")
+    SCREENSHOT.parent.mkdir(exist_ok=True)
+    page.screenshot(path=SCREENSHOT)
+    expect(page.get_by_text("comes to rest", exact=True)).to_be_visible()
+    page.get_by_text("10 periods").click()
+    wait_for(lambda: 0.0 <= swing(page) < 50.0, "the collapse is drawn")
+
+    speed = page.get_by_label("plant.belt_speed")
+    speed.fill("0.02")
+    speed.press("Enter")
+    expect(page.get_by_text("now 0.02 m/s")).to_be_visible()
+
+    corner = page.get_by_label("washout_controller.corner_frequency")
+    corner.fill("-3")
+    corner.press("Enter")
+    refusal = "corner_frequency = -3.0 is refused: must be a finite number at least"
+    expect(page.get_by_text(re.compile(re.escape(refusal)))).to_be_visible()
+    expect(page.get_by_text("now 20 rad/s")).to_be_visible()
+    corner.fill("fast")
+    corner.press("Enter")
+    expect(page.get_by_text("'fast' is not a number")).to_be_visible()
+
+    page.get_by_label("another parameter").click()
+    page.get_by_role("option", name="plant.damping").click()
+    value = page.get_by_label("value", exact=True)
+    value.fill("250")
+    value.press("Enter")
+    expect(page.get_by_text("now 250 N s/m")).to_be_visible()
+
+    page.get_by_role("button", name="Tap").click()
+    wait_for(lambda: swing(page) > 50.0, "the tap is drawn")
+    page.close()
+    assert served.end() == 130
+    assert "Traceback" not in "".join(served.said)
+    with Recording(tmp_path / "bag") as recording:
+        applied = recording.applied_disturbances.force
+    assert applied.max() == 250.0
+    assert applied[-1] == 0.0
+
+
+def test_a_page_that_comes_and_goes_changes_nothing(
+    start_stickslip: Start, browser: Browser, tmp_path: Path
+) -> None:
+    command = ("run", "paper", "--pace", "lockstep", "--duration", "100")
+    alone = start_stickslip(*command, "--bag", "alone")
+    assert alone.wait(PATIENCE) == 0
+    served = Served(start_stickslip(*command, "--bag", "watched", "--dashboard"))
+    for _ in range(2):
+        page = browser.new_page()
+        page.goto(served.url)
+        page.wait_for_function("stickslip.frames > 3 && stickslip.newest !== null")
+        page.close()
+    assert served.process.wait(PATIENCE) == 0
+    with Recording(tmp_path / "alone") as one, Recording(tmp_path / "watched") as other:
+        for kind in ("joint_states", "control_forces"):
+            columns, others = getattr(one, kind), getattr(other, kind)
+            for name in vars(columns):
+                assert np.array_equal(getattr(columns, name), getattr(others, name)), (kind, name)
+
+
+def test_a_node_that_dies_and_returns_is_shown_as_that(
+    start_stickslip: Start,
+    page: Page,
+    processes: Processes,  # noqa: F811
+) -> None:
+    drive = {"pace": "realtime", "rate": 200.0, "expects_control": False}
+    plant = processes.node("plant", **drive)
+    served = Served(start_stickslip("dashboard", "--namespace", "/test"))
+    page.goto(served.url)
+    expect(page.get_by_text("plant active")).to_be_visible()
+    expect(page.get_by_role("switch", name="washout controller")).to_be_disabled()
+    plant.kill()
+    expect(page.get_by_text("plant silent").first).to_be_visible()
+    processes.node("plant", **drive)
+    expect(page.get_by_text(re.compile("plant is back"))).to_be_visible()
+    before = page.evaluate("stickslip.newest")
+    page.wait_for_function("before => stickslip.newest !== before", arg=before)
+    assert served.end() == 130
+    assert "Traceback" not in "".join(served.said)
+
+
+def test_only_pages_of_this_machine_by_its_own_names_are_answered(start_stickslip: Start) -> None:
+    served = Served(start_stickslip("dashboard", "--namespace", "/test"))
+    address = served.url.removeprefix("http://").split(":")
+    wait_for(lambda: _status(served.url) == 200, "the page")
+    assert _status(served.url, Host="evil.example") == 400
+    assert _status(f"{served.url}/frame?periods=7") == 422
+    others = {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
+    for other in others - {address[0]}:
+        with socket.socket() as stranger:
+            assert stranger.connect_ex((other, int(address[1]))) != 0
+    taken = start_stickslip("dashboard", "--port", address[1])
+    _, said = taken.communicate(timeout=PATIENCE)
+    assert taken.returncode == 2
+    assert f"--port {address[1]}: Address already in use" in said
+    assert "Traceback" not in said
+
+
+def _status(url: str, **headers: str) -> int:
+    try:
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers)) as response:
+            return response.status
+    except urllib.error.HTTPError as error:
+        return error.code
+    except urllib.error.URLError:
+        return 0

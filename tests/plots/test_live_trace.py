@@ -1,0 +1,130 @@
+"""The last of a motion, in few points: no peak is lost, and memory is bounded."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
+from stickslip_ros.plots.live_trace import LiveTrace
+
+NO_FORCES = WrenchColumns(np.empty(0, dtype=np.int64), np.empty(0))
+SECOND = 1_000_000_000
+
+
+def states(stamps: range, position: np.ndarray) -> JointStateColumns:
+    stamp = np.asarray(stamps, dtype=np.int64)
+    ones = np.ones(len(stamp))
+    return JointStateColumns(stamp, position, 2.0 * position, ones, ones, 0.5 * ones)
+
+
+def forces(stamps: range, force: np.ndarray) -> WrenchColumns:
+    return WrenchColumns(np.asarray(stamps, dtype=np.int64), force)
+
+
+def test_before_the_first_sample_there_is_nothing_to_show() -> None:
+    trace = LiveTrace(1.0)
+    assert trace.frame(1.0, 1.0, 10) is None
+    trace.feed(states(range(0), np.empty(0)), forces(range(3), np.ones(3)))
+    assert trace.frame(1.0, 1.0, 10) is None
+
+
+@given(st.lists(st.integers(1, 400), min_size=1, max_size=30), st.integers(2, 50), st.data())
+def test_whatever_the_blocks_and_the_buckets_peaks_and_ends_are_shown(
+    blocks: list[int], buckets: int, data: st.DataObject
+) -> None:
+    count = sum(blocks)
+    position = np.asarray(
+        data.draw(st.lists(st.floats(-1e6, 1e6), min_size=count, max_size=count))
+        if count < 50
+        else np.random.default_rng(count).normal(size=count)
+    )
+    trace = LiveTrace(1e9)
+    edges = np.cumsum([0, *blocks])
+    for begin, end in pairwise(edges):
+        stamps = range(begin * 1_000_000, end * 1_000_000, 1_000_000)
+        trace.feed(states(stamps, position[begin:end]), forces(stamps, -position[begin:end]))
+    frame = trace.frame(1e6, 1e6, buckets)
+    assert frame is not None
+    assert frame.end == pytest.approx((count - 1) * 1e-3)
+    assert (np.diff(frame.position.x) > 0).all()
+    assert frame.position.x[-1] == 0.0
+    assert frame.position.x[0] == pytest.approx(-(count - 1) * 1e-3)
+    for line, column in (
+        (frame.position, position),
+        (frame.velocity, 2.0 * position),
+        (frame.force, -position),
+        (frame.orbit, 2.0 * position),
+    ):
+        assert line.y.min() == column.min()
+        assert line.y.max() == column.max()
+        assert line.y[-1] == column[-1]
+        assert set(line.y) <= set(column)
+    assert len(frame.position.x) <= 4 * (buckets + 1)
+
+
+def test_a_single_sample_out_of_many_is_seen_for_as_long_as_the_window() -> None:
+    trace = LiveTrace(1000.0)
+    seen = {}
+    for block in range(900):
+        position = np.zeros(1000)
+        if block == 300:
+            position[321] = 7.0
+        begin = block * SECOND
+        trace.feed(states(range(begin, begin + SECOND, 1_000_000), position), NO_FORCES)
+        if block % 100 in (0, 99):
+            frame = trace.frame(500.0, 1.0, 300)
+            assert frame is not None
+            seen[block] = float(frame.position.y.max()) == 7.0
+    assert seen == {block: 300 <= block < 800 for block in seen}
+
+
+def test_memory_stays_bounded_however_long_it_is_fed() -> None:
+    trace = LiveTrace(1e6)
+    for block in range(100):
+        position = np.sin(np.arange(5000) + 5000.0 * block)
+        begin = block * 5 * SECOND
+        trace.feed(states(range(begin, begin + 5 * SECOND, 1_000_000), position), NO_FORCES)
+    frame = trace.frame(1e6, 1e6, 10_000_000)
+    assert frame is not None
+    assert len(frame.position.x) < 250_000  # of 500,000
+    assert np.nanmax(frame.position.y) > 0.99
+    assert frame.position.x[0] == pytest.approx(-frame.end)
+
+
+def test_stamps_that_do_not_go_on_begin_it_anew() -> None:
+    trace = LiveTrace(1e3)
+    trace.feed(states(range(10 * SECOND, 11 * SECOND, 1_000_000), np.ones(1000)), NO_FORCES)
+    trace.feed(states(range(SECOND, SECOND + 10_000_000, 1_000_000), np.zeros(10)), NO_FORCES)
+    frame = trace.frame(1e3, 1e3, 100)
+    assert frame is not None
+    assert frame.end == pytest.approx(0.009)
+    assert frame.position.y.max() == 0.0
+
+
+def test_forces_for_the_past_are_left_out() -> None:
+    trace = LiveTrace(1e3)
+    trace.feed(
+        states(range(0, SECOND, 1_000_000), np.ones(1000)),
+        forces(range(0, SECOND, 1_000_000), np.ones(1000)),
+    )
+    trace.feed(states(range(0), np.empty(0)), forces(range(0, SECOND, 2_000_000), np.zeros(500)))
+    frame = trace.frame(1e3, 1e3, 100)
+    assert frame is not None
+    assert (np.diff(frame.force.x) > 0).all()
+    assert frame.force.y.min() == 1.0
+
+
+def test_a_line_is_broken_where_samples_are_missing() -> None:
+    trace = LiveTrace(1e3)
+    for begin in (1, 3):
+        stamps = range(begin * SECOND, (begin + 1) * SECOND, 1_000_000)
+        trace.feed(states(stamps, np.ones(1000)), forces(stamps, np.ones(1000)))
+    frame = trace.frame(1e3, 1e3, 100_000)
+    assert frame is not None
+    for line in (frame.position, frame.force):
+        (gap,) = np.flatnonzero(np.isnan(line.y))
+        assert line.x[gap - 1] == pytest.approx(-2.0)
+        assert line.x[gap] == line.x[gap + 1] == pytest.approx(-0.999)
