@@ -12,7 +12,16 @@ from typing import Any
 from benchmarks.slices import Row, table
 from stickslip_ros.versions import versions
 
-NAMES = ("motion", "bifurcation", "sweep", "bags", "lockstep", "replay", "realtime")
+NAMES = (
+    "motion",
+    "bifurcation",
+    "sweep",
+    "bags",
+    "lockstep",
+    "replay",
+    "realtime",
+    "dashboard",
+)
 TIMEOUT = 600.0
 
 

@@ -75,11 +75,9 @@ class Served:
 
 
 def swing(page: Page) -> float:
-    """Return peak to peak of the displacement that the chart shows, in its unit; -1 for none."""
+    """Return peak to peak of the displacement that is drawn, in its unit; -1 for none."""
     return page.evaluate("""() => {
-        const chart = window.getElement(stickslip.trace)?.chart;
-        const points = chart?.getOption().series[0].data ?? [];
-        const values = points.map((point) => point[1]);
+        const values = [...(stickslip.motion?.lines.position.y ?? [])].filter((y) => y === y);
         return values.length ? Math.max(...values) - Math.min(...values) : -1;
     }""")
 
@@ -166,7 +164,7 @@ def test_a_page_that_comes_and_goes_changes_nothing(
     for _ in range(2):
         page = browser.new_page()
         page.goto(served.url)
-        page.wait_for_function("stickslip.frames > 3 && stickslip.newest !== null")
+        page.wait_for_function("stickslip.frames > 3 && stickslip.motion")
         page.close()
     assert served.process.wait(PATIENCE) == 0
     with Recording(tmp_path / "alone") as one, Recording(tmp_path / "watched") as other:
@@ -191,8 +189,8 @@ def test_a_node_that_dies_and_returns_is_shown_as_that(
     expect(page.get_by_text("plant silent").first).to_be_visible()
     processes.node("plant", **drive)
     expect(page.get_by_text(re.compile("plant is back"))).to_be_visible()
-    before = page.evaluate("stickslip.newest")
-    page.wait_for_function("before => stickslip.newest !== before", arg=before)
+    before = page.evaluate("stickslip.motion.end")
+    page.wait_for_function("before => stickslip.motion.end !== before", arg=before)
     assert served.end() == 130
     assert "Traceback" not in "".join(served.said)
 

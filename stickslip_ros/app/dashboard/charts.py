@@ -1,4 +1,4 @@
-"""How the charts of the page look; what they show comes with each frame."""
+"""How the charts of the page look; what they show comes with each frame, and page.js draws it."""
 
 from typing import Any
 
@@ -32,30 +32,17 @@ TRACE: dict[str, Any] = {
         _AXIS | _CENTRED | {"gridIndex": 2, "name": "time before now (s)"},
     ],
     "yAxis": [_AXIS | {"gridIndex": index} for index in range(3)],
-    "series": [
-        _line(BLUE, xAxisIndex=0, yAxisIndex=0),
-        _line(BLUE, xAxisIndex=1, yAxisIndex=1),
-        _line(GREY, "dashed", xAxisIndex=1, yAxisIndex=1),
-        _line(ORANGE, xAxisIndex=2, yAxisIndex=2, step="end"),
-    ],
+    "series": [{"type": "line", "xAxisIndex": index, "yAxisIndex": index} for index in range(3)],
 }
-"""Displacement, velocity with the belt's, and control force over time."""
+"""Axes for displacement, velocity with the belt's, and control force over time."""
 
 PORTRAIT: dict[str, Any] = {
     "animation": False,
-    "legend": {"top": 0, "data": ["equilibrium", "slide"]},
+    "legend": {"top": 0, "data": ["equilibrium"]},
     "grid": {"left": 70, "right": 20, "top": 60, "bottom": 45},
     "xAxis": _AXIS | _CENTRED,
     "yAxis": _AXIS,
     "series": [
-        _line(
-            BLUE,
-            markLine={
-                "lineStyle": {"color": GREY, "type": "dashed"},
-                "label": {"formatter": "belt", "position": "insideEndTop"},
-                "data": [],
-            },
-        ),
         {
             "type": "scatter",
             "name": "equilibrium",
@@ -65,15 +52,19 @@ PORTRAIT: dict[str, Any] = {
             "silent": True,
         },
         {
-            "type": "scatter",
-            "name": "slide",
-            "symbolSize": 8,
-            "itemStyle": {"color": "black"},
-            "silent": True,
+            "type": "line",
+            "markLine": {
+                "symbol": "none",
+                "silent": True,
+                "animation": False,
+                "lineStyle": {"color": GREY, "type": "dashed"},
+                "label": {"formatter": "belt", "position": "insideEndTop"},
+                "data": [],
+            },
         },
     ],
 }
-"""Velocity over displacement, with belt speed, equilibrium and where the slide is."""
+"""The plane of velocity over displacement, with belt speed and equilibrium."""
 
 CYCLES: dict[str, Any] = {
     "animation": False,

@@ -1,15 +1,16 @@
 """What the charts of the page show at a moment, in the units of their axes."""
 
+import struct
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+import orjson
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.observer import ObserverNode
 from stickslip_ros.nodes.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.plots.live_trace import Line, LiveTrace
 from stickslip_ros.plots.units import Units
 from stickslip_ros.scenario.parameters import PlantParameters
@@ -51,60 +52,70 @@ class Frames:
         frequencies = self._observer.cycles[FREQUENCY]
         return 1.0 / frequencies[-1] if frequencies and frequencies[-1] > 0 else _UNKNOWN_PERIOD
 
-    def frame(self, periods: int) -> dict[str, Any]:
-        """Return what to draw: the last `periods` natural periods, and the last cycles."""
+    def frame(self, periods: int) -> bytes:
+        """Return what to draw: the last `periods` natural periods, and the last cycles.
+
+        It is the length of some JSON (4 bytes, little-endian), the JSON, padded with spaces to
+        a multiple of 4 bytes, and x and y of each line in turn (32-bit floats); how many points
+        each has stands in the JSON.
+        """
         period, drive = self.period, self.drive
         self._trace.longest = PERIODS[-1] * period
         frame = self._trace.frame(periods * period, _ORBIT_PERIODS * period, _BUCKETS)
-        cycles = self._cycles(drive)
-        if frame is None:
-            return {"samples": None, "cycles": cycles}
-        units = Units.of(drive)
-        magnitudes = _magnitudes(drive)
-        (length, *_), (speed, *_), (force, *_) = axes = [
-            units.axis(*quantity, magnitude)
-            for quantity, magnitude in zip(_QUANTITIES, magnitudes, strict=True)
-        ]
-        rest = None
-        if drive is not None and drive.belt_speed:
-            rest = drive.equilibrium_position / length
-        return {
-            "samples": {
+        body: dict[str, Any] = {"motion": None, "cycles": self._cycles(drive)}
+        lines: dict[str, list[FloatArray]] = {}
+        if frame is not None:
+            axes = _axes(drive)
+            length, speed, force = (scale for scale, _ in axes)
+            lines = {
+                "position": _scaled(frame.position, 1.0, length),
+                "velocity": _scaled(frame.velocity, 1.0, speed),
+                "belt": _scaled(frame.belt_velocity, 1.0, speed),
+                "force": _scaled(frame.force, 1.0, force),
+                "orbit": _scaled(frame.orbit, length, speed),
+            }
+            at_rest = drive is not None and drive.belt_speed
+            body["motion"] = {
                 "end": frame.end,
                 "window": periods * period,
-                "position": _points(frame.position, length),
-                "velocity": _points(frame.velocity, speed),
-                "belt": _points(frame.belt_velocity, speed),
-                "force": _points(frame.force, force),
-                "orbit": _points(frame.orbit, speed, length),
-                "equilibrium": rest,
+                "labels": [label for _, label in axes],
+                "counts": {name: len(line[0]) for name, line in lines.items()},
+                "equilibrium": drive.equilibrium_position / length if drive and at_rest else None,
                 "belt_speed": float(frame.belt_velocity.y[-1]) / speed,
-            },
-            "labels": [label for _, label in axes],
-            "cycles": cycles,
-        }
+            }
+        text = orjson.dumps(body)
+        text += b" " * (-len(text) % 4)
+        columns = [column for line in lines.values() for column in line]
+        floats = (column.astype("<f4").tobytes() for column in columns)
+        return b"".join([struct.pack("<I", len(text)), text, *floats])
 
     def _cycles(self, drive: Drive | None) -> dict[str, Any]:
         amplitudes = list(self._observer.cycles[AMPLITUDE])
-        scale, label = Units.of(drive).axis("amplitude", "m", _magnitudes(drive)[0])
+        scale, label = _axes(drive)[0]
         return {
             "count": self._observer.cycle_count,
             "amplitude": [amplitude / scale for amplitude in amplitudes],
             "stick_fraction": list(self._observer.cycles[STICK_FRACTION]),
-            "label": label,
+            "label": label.replace("displacement", "amplitude"),
         }
 
 
-def _magnitudes(drive: Drive | None) -> tuple[float, float, float]:
-    """Return how large displacement, speed and force are about.
+def _axes(drive: Drive | None) -> list[tuple[float, str]]:
+    """Return scale and label of displacement, speed and force.
 
-    That follows from the drive, not from the motion: so a vibration that dies away is seen to.
+    They follow from the drive, not from the motion: so a vibration that dies away is seen to.
     """
-    if drive is None:
-        return 1.0, 1.0, 1.0
-    friction = abs(float(drive.friction.static)) * drive.normal_force
-    return friction / drive.stiffness, abs(drive.belt_speed) or drive.speed_scale, friction
+    largest = (1.0, 1.0, 1.0)
+    if drive is not None:
+        friction = abs(float(drive.friction.static)) * drive.normal_force
+        speed = abs(drive.belt_speed) or drive.speed_scale
+        largest = (friction / drive.stiffness, speed, friction)
+    units = Units.of(drive)
+    return [
+        units.axis(*quantity, magnitude)
+        for quantity, magnitude in zip(_QUANTITIES, largest, strict=True)
+    ]
 
 
-def _points(line: Line, y_scale: float, x_scale: float = 1.0) -> NDArray[np.float32]:
-    return np.column_stack([line.x / x_scale, line.y / y_scale]).astype(np.float32)
+def _scaled(line: Line, x_scale: float, y_scale: float) -> list[FloatArray]:
+    return [line.x / x_scale, line.y / y_scale]

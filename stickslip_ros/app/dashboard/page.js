@@ -1,87 +1,167 @@
 // Draws thirty frames a second of the motion, or as many as it can. The page asks for each of them:
-// one that is hidden asks for none, and none queue up.
+// one that is hidden asks for none, and none queue up. The charts draw axes and marks, when these
+// change; lines go onto a canvas above them, since a simulation on the same machine comes first.
 
 const INTERVAL = 1000 / 30;
+const CYCLES_INTERVAL = 500;
 const MARGIN = 1.08;
+const page = window.stickslip;
 const limits = {};
-let drawnCycles = -1;
+const shown = {};
+let cyclesDrawn = { count: -1, at: -Infinity };
 
-const charts = {};
-for (const name of ["trace", "portrait", "cycles"]) {
-  const id = window.stickslip[name];
-  Object.defineProperty(charts, name, { get: () => window.getElement(id)?.chart });
-}
+const chartOf = (name) => window.getElement(page[name])?.chart;
 
 // An axis only grows: what dies away must be seen to. `fit` starts it anew.
-function range(name, values) {
+function range(name, lines) {
   let [low, high] = limits[name] ?? [Infinity, -Infinity];
-  for (const value of values) {
-    if (value === null) continue; // a gap
-    if (value < low) low = value * (value < 0 ? MARGIN : 1 / MARGIN);
-    if (value > high) high = value * (value > 0 ? MARGIN : 1 / MARGIN);
+  for (const { y } of lines) {
+    for (const value of y) {
+      if (value < low) low = value * (value < 0 ? MARGIN : 1 / MARGIN);
+      if (value > high) high = value * (value > 0 ? MARGIN : 1 / MARGIN);
+    }
   }
-  if (!(low < high)) [low, high] = [Math.min(low, 0), Math.max(high, 0)];
   limits[name] = [low, high];
-  return low < high ? { min: low, max: high } : { min: -1, max: 1 };
+  if (low < high) return { min: low, max: high };
+  return Number.isFinite(low) ? { min: low - 1, max: high + 1 } : { min: -1, max: 1 };
 }
 
-const second = (points) => points.map((point) => point[1]);
+function setChanged(name, option) {
+  const text = JSON.stringify(option);
+  if (shown[name] !== text) chartOf(name).setOption(option);
+  shown[name] = text;
+}
 
-function drawSamples(samples, labels) {
-  const { position, velocity, belt, force, orbit } = samples;
-  const speeds = range("velocity", second(velocity).concat(second(belt)));
-  const positions = range("position", second(position));
+// Returns the context of an empty canvas that lies upon a chart.
+function canvasOn(chart) {
+  const [width, height] = [chart.getWidth(), chart.getHeight()];
+  const ratio = window.devicePixelRatio;
+  let canvas = chart.getDom().querySelector("canvas.lines");
+  if (!canvas) {
+    canvas = document.createElement("canvas");
+    canvas.className = "lines";
+    canvas.style.cssText = "position:absolute;left:0;top:0;width:100%;height:100%;pointer-events:none";
+    chart.getDom().append(canvas);
+  }
+  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+  }
+  const context = canvas.getContext("2d", { willReadFrequently: true });
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, width, height);
+  context.lineWidth = 1.3;
+  context.lineJoin = "round";
+  return context;
+}
+
+// Returns what turns values into pixels: both axes are linear.
+function scaleOf(chart, gridIndex) {
+  const [x0, y0] = chart.convertToPixel({ gridIndex }, [0, 0]);
+  const [x1, y1] = chart.convertToPixel({ gridIndex }, [1, 1]);
+  return { x: (value) => x0 + value * (x1 - x0), y: (value) => y0 + value * (y1 - y0) };
+}
+
+function drawLine(context, scale, { x, y }, colour, { dashed = false, stepped = false } = {}) {
+  context.strokeStyle = colour;
+  context.setLineDash(dashed ? [5, 4] : []);
+  context.beginPath();
+  let down = false;
+  for (let i = 0; i < x.length; i += 1) {
+    const [px, py] = [scale.x(x[i]), scale.y(y[i])];
+    if (Number.isNaN(py)) {
+      down = false; // samples are missing
+    } else if (down) {
+      if (stepped) context.lineTo(px, scale.y(y[i - 1]));
+      context.lineTo(px, py);
+    } else {
+      context.moveTo(px, py);
+      down = true;
+    }
+  }
+  context.stroke();
+}
+
+function drawMotion({ lines, labels, window: width, equilibrium, belt_speed }) {
+  const { position, velocity, belt, force, orbit } = lines;
   const [displacement, speed, push] = labels;
-  const dotted = { symbol: "none", silent: true, animation: false };
-  charts.trace.setOption({
-    xAxis: [0, 1, 2].map(() => ({ min: -samples.window, max: 0 })),
+  const speeds = range("velocity", [velocity, belt]);
+  const positions = range("position", [position]);
+  setChanged("trace", {
+    xAxis: [0, 1, 2].map(() => ({ min: -width, max: 0 })),
     yAxis: [
       { name: displacement, ...positions },
       { name: speed, ...speeds },
-      { name: push, ...range("force", second(force)) },
+      { name: push, ...range("force", [force]) },
     ],
-    series: [{ data: position }, { data: velocity }, { data: belt }, { data: force }],
   });
-  charts.portrait.setOption({
+  setChanged("portrait", {
     xAxis: { name: displacement, ...positions },
     yAxis: { name: speed, ...speeds },
     series: [
-      {
-        data: orbit,
-        markLine: { ...dotted, data: [{ yAxis: samples.belt_speed }] },
-      },
-      { data: samples.equilibrium === null ? [] : [[samples.equilibrium, 0]] },
-      { data: orbit.slice(-1) },
+      { data: equilibrium === null ? [] : [[equilibrium, 0]] },
+      { markLine: { data: [{ yAxis: belt_speed }] } },
     ],
   });
+  const { BLUE, GREY, ORANGE } = page.colours;
+  const trace = chartOf("trace");
+  const context = canvasOn(trace);
+  drawLine(context, scaleOf(trace, 0), position, BLUE);
+  drawLine(context, scaleOf(trace, 1), velocity, BLUE);
+  drawLine(context, scaleOf(trace, 1), belt, GREY, { dashed: true });
+  drawLine(context, scaleOf(trace, 2), force, ORANGE, { stepped: true });
+  const portrait = chartOf("portrait");
+  const plane = canvasOn(portrait);
+  const scale = scaleOf(portrait, 0);
+  drawLine(plane, scale, orbit, BLUE);
+  plane.beginPath();
+  plane.arc(scale.x(orbit.x.at(-1)), scale.y(orbit.y.at(-1)), 4, 0, 2 * Math.PI);
+  plane.fill();
 }
 
 function drawCycles({ count, amplitude, stick_fraction, label }) {
-  if (count === drawnCycles) return;
-  drawnCycles = count;
+  const now = performance.now();
+  if (count === cyclesDrawn.count || now - cyclesDrawn.at < CYCLES_INTERVAL) return;
+  cyclesDrawn = { count, at: now };
   const numbered = (values) => values.map((value, index) => [count - values.length + index + 1, value]);
-  charts.cycles.setOption({
+  chartOf("cycles").setOption({
     yAxis: [{ name: label }, {}],
     series: [{ data: numbered(amplitude) }, { data: numbered(stick_fraction) }],
   });
 }
 
+// A frame is the length of some JSON, that JSON, and behind it the x and y of the lines it names.
 async function fetchFrame() {
-  const response = await fetch(`frame?periods=${window.stickslip.periods}`);
-  return response.ok ? response.json() : null;
+  const response = await fetch(`frame?periods=${page.periods}`);
+  if (!response.ok) return null;
+  const bytes = await response.arrayBuffer();
+  const [size] = new Uint32Array(bytes, 0, 1);
+  const frame = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, size)));
+  if (frame.motion) {
+    let offset = 4 + size;
+    const take = (count) => {
+      offset += 4 * count;
+      return new Float32Array(bytes, offset - 4 * count, count);
+    };
+    const lines = Object.entries(frame.motion.counts);
+    frame.motion.lines = Object.fromEntries(
+      lines.map(([name, count]) => [name, { x: take(count), y: take(count) }]),
+    );
+  }
+  return frame;
 }
 
-function draw({ samples, labels, cycles }) {
-  if (samples) drawSamples(samples, labels);
+function draw({ motion, cycles }) {
+  if (motion) drawMotion(motion);
   drawCycles(cycles);
-  window.stickslip.frames += 1;
-  window.stickslip.newest = samples?.end ?? null;
+  page.frames += 1;
+  page.motion = motion;
 }
 
 // While one frame is drawn, the next one is on its way.
 async function loop(coming) {
   const started = performance.now();
-  const visible = !document.hidden && charts.trace && charts.portrait && charts.cycles;
+  const visible = !document.hidden && chartOf("trace") && chartOf("portrait") && chartOf("cycles");
   let next = null;
   try {
     const frame = await coming;
@@ -91,10 +171,9 @@ async function loop(coming) {
   } catch (error) {
     console.debug(error);
   }
-  const pause = Math.max(INTERVAL - (performance.now() - started), 0);
-  setTimeout(() => loop(next), pause);
+  setTimeout(() => loop(next), Math.max(INTERVAL - (performance.now() - started), 0));
 }
 
-window.stickslip.fit = () => Object.keys(limits).forEach((name) => delete limits[name]);
-window.stickslip.frames = 0;
-window.stickslip.start = () => loop(null);
+page.fit = () => Object.keys(limits).forEach((name) => delete limits[name]);
+page.frames = 0;
+page.start = () => loop(null);

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import orjson
 from fastapi import FastAPI, HTTPException
 from fastapi.responses import Response
 from nicegui import ui
@@ -20,6 +19,7 @@ from stickslip_ros.nodes.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.physics.measures import Regime
 from stickslip_ros.plots.live_trace import LiveTrace
 from stickslip_ros.plots.regimes import REGIMES
+from stickslip_ros.plots.style import BLUE, GREY, ORANGE
 from stickslip_ros.scenario.parameters import NODE_PARAMETERS, Fixed, known_parameters
 
 _CONTROLLER = "washout_controller"
@@ -48,8 +48,8 @@ def add_page(app: FastAPI, observer: ObserverNode, trace: LiveTrace) -> None:
     async def frame(periods: int) -> Response:
         if periods not in PERIODS:
             raise HTTPException(422, f"periods={periods}: must be one of {PERIODS}")
-        body = orjson.dumps(frames.frame(periods), option=orjson.OPT_SERIALIZE_NUMPY)
-        return Response(body, headers=_UNCOMPRESSED, media_type="application/json")
+        body = frames.frame(periods)
+        return Response(body, headers=_UNCOMPRESSED, media_type="application/octet-stream")
 
     @ui.page("/")
     def page() -> None:
@@ -77,9 +77,9 @@ class _Page:
             ui.button("Fit", on_click=lambda: ui.run_javascript("stickslip.fit()"))
         with ui.row().classes("w-full no-wrap items-start"):
             with ui.column().classes("w-2/3"):
-                trace = ui.echart(TRACE).classes("w-full h-[27rem]")
+                trace = ui.echart(TRACE).classes("relative w-full h-[27rem]")
                 with ui.row().classes("w-full no-wrap"):
-                    portrait = ui.echart(PORTRAIT).classes("w-1/2 h-80")
+                    portrait = ui.echart(PORTRAIT).classes("relative w-1/2 h-80")
                     cycles = ui.echart(CYCLES).classes("w-1/2 h-80")
                 self._add_health()
             with ui.column().classes("w-1/3"):
@@ -88,8 +88,13 @@ class _Page:
                 self._add_parameters()
                 with _card("Events"):
                     self._events = ui.log(max_lines=100).classes("w-full h-40")
-        ids = {"trace": trace.id, "portrait": portrait.id, "cycles": cycles.id}
-        start = {**ids, "periods": PERIODS[1]}
+        start = {
+            "trace": trace.id,
+            "portrait": portrait.id,
+            "cycles": cycles.id,
+            "periods": PERIODS[1],
+            "colours": {"BLUE": BLUE, "GREY": GREY, "ORANGE": ORANGE},
+        }
         ui.add_body_html(
             f"<script>window.stickslip = {json.dumps(start)}</script>"
             f'<script type="module">{script}</script>'
@@ -154,13 +159,7 @@ class _Page:
             unit = {AMPLITUDE: "m", FREQUENCY: "Hz"}.get(topic, "")
             label.set_text(quantities([values[-1]], unit)[0] if values else "-")
         self._show_regime(observer.health["analyzer"])
-        self._trouble.set_text(
-            ", ".join(
-                f"{node} {health.state}"
-                for node, health in observer.health.items()
-                if health.state in (ABSENT, SILENT)
-            )
-        )
+        self._trouble.set_text(", ".join(self._missing()))
         if drive is not None and self._tap_force.value is None:
             self._tap_force.value = float(f"{_TAP_PART * drive.normal_force:.2g}")
             self._tap_time.value = float(f"{_TAP_PART * drive.natural_period:.2g}")
@@ -174,6 +173,15 @@ class _Page:
         for when, what in events:
             self._events.push(f"{time.strftime('%H:%M:%S', time.localtime(when))} {what}")
             self._told = when
+
+    def _missing(self) -> list[str]:
+        """Say which nodes of the loop are not heard."""
+        expects_control = self._observer.parameters["plant"].get("expects_control", True)
+        return [
+            f"{node} {health.state}"
+            for node, health in self._observer.health.items()
+            if health.state in (ABSENT, SILENT) and (expects_control or node != _CONTROLLER)
+        ]
 
     def _show_regime(self, analyzer: Health) -> None:
         regime = analyzer.figures.get("regime") if analyzer.state == "active" else None

@@ -1,0 +1,160 @@
+"""Does the dashboard slow the simulation down?
+
+Ours: plant, controller and analyzer as three processes, as `stickslip run` runs them, with a
+dashboard beside them whose page is open in a headless Chromium, which draws without a graphics
+processor. Peers: the same three with a dashboard that nobody looks at, and without one. Scenario
+`paper` in lockstep gives the steps per second, `feed_drive` in real time at 1 kHz the missed
+deadlines and the late forces; and the page how many frames it has drawn per second.
+
+All run by turns, a slice at a time; meanwhile the other dashboards are stopped, the other pages
+empty.
+"""
+
+import os
+import shutil
+import signal
+import socket
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Generator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from dataclasses import dataclass
+from functools import partial
+from statistics import median
+from urllib.error import URLError
+
+from playwright.sync_api import sync_playwright
+
+from benchmarks.parties import READY_TIMEOUT, ObservedPlant, Slice, closed_loop, party
+from benchmarks.slices import Row, by_turns, compare_rates, show
+from stickslip_ros.nodes.lifeline import start
+
+LOCKSTEP_ROUNDS = 9
+LOCKSTEP_TIME = 3.0
+"""About what a slice in lockstep takes, s."""
+REALTIME_ROUNDS = 6
+REALTIME_SAMPLES = 10_000
+FIRST_SAMPLES = 1_000
+
+NOBODY, UNSEEN, SEEN = "no dashboard", "a dashboard without a page", "a dashboard with its page"
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a slice gave."""
+
+    steps_per_second: float
+    missed_deadlines: int
+    late_forces: int
+    frames_per_second: float
+
+
+Frames = Callable[[], float]
+"""Tells how many frames were drawn so far."""
+
+
+@contextmanager
+def watched(scenario: str, by: str) -> Generator[Slice[Figures]]:
+    with ExitStack() as resources:
+        loop = resources.enter_context(closed_loop(ObservedPlant, scenario, composed=False))
+        watching = partial(nullcontext, lambda: 0.0)
+        if by != NOBODY:
+            watching = resources.enter_context(dashboard(with_page=by == SEEN))
+
+        def run(samples: int) -> Figures:
+            with watching() as frames:
+                started, before = time.monotonic(), frames()
+                loop.run(samples)
+                drawn = (frames() - before) / (time.monotonic() - started)
+            figures = loop.plant.diagnose()[2]
+            return Figures(
+                figures["steps_per_second"],
+                figures["missed_deadlines"],
+                figures["late_forces"],
+                drawn,
+            )
+
+        yield run
+
+
+@contextmanager
+def dashboard(*, with_page: bool) -> Generator[Callable[[], AbstractContextManager[Frames]]]:
+    """Start a dashboard, and a browser; yield what lets them work while it is entered."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    url = f"http://127.0.0.1:{port}"
+    command = [sys.executable, "-m", "stickslip_ros.app.main", "dashboard", "--port", str(port)]
+    with ExitStack() as resources:
+        process = start(command)
+        resources.callback(process.wait)
+        resources.callback(process.terminate)
+        resources.callback(process.send_signal, signal.SIGCONT)
+        page = None
+        if with_page:
+            playwright = resources.enter_context(sync_playwright())
+            browser = playwright.chromium.launch(executable_path=shutil.which("chromium"))
+            resources.callback(browser.close)
+            page = browser.new_page(viewport={"width": 1400, "height": 1060})
+        wait_for_page(url)
+        os.kill(process.pid, signal.SIGSTOP)
+
+        @contextmanager
+        def watching() -> Generator[Frames]:
+            os.kill(process.pid, signal.SIGCONT)
+            if page is not None:
+                page.goto(url)
+                page.wait_for_function("stickslip.frames > 5")
+            yield lambda: page.evaluate("stickslip.frames") if page is not None else 0.0
+            if page is not None:
+                page.goto("about:blank")
+            os.kill(process.pid, signal.SIGSTOP)
+
+        yield watching
+
+
+def wait_for_page(url: str) -> None:
+    deadline = time.monotonic() + READY_TIMEOUT
+    while True:
+        try:
+            urllib.request.urlopen(url).close()
+            return
+        except URLError as error:
+            if time.monotonic() > deadline:
+                raise SystemExit(f"{url} did not answer in {READY_TIMEOUT} s: {error}") from None
+            time.sleep(0.1)
+
+
+def measure() -> list[Row]:
+    if shutil.which("chromium") is None:
+        raise SystemExit("this needs chromium: sudo apt-get install chromium")
+    kinds = (SEEN, UNSEEN, NOBODY)
+    rows: list[Row] = []
+    with ExitStack() as resources:
+        runs = [resources.enter_context(party(watched, "paper", by)) for by in kinds]
+        slices = [
+            partial(run, round(LOCKSTEP_TIME * run(FIRST_SAMPLES).steps_per_second)) for run in runs
+        ]
+        seen, *others = by_turns(LOCKSTEP_ROUNDS, *slices)
+        for by, figures in zip(kinds[1:], others, strict=True):
+            rates = [[each.steps_per_second for each in slices] for slices in (seen, figures)]
+            rows.append(compare_rates("steps in lockstep, page open", rates[0], by, rates[1]))
+    with ExitStack() as resources:
+        runs = [resources.enter_context(party(watched, "feed_drive", by)) for by in kinds]
+        for run in runs:
+            run(FIRST_SAMPLES)
+        seen, *others = by_turns(REALTIME_ROUNDS, *(partial(run, REALTIME_SAMPLES) for run in runs))
+        count = REALTIME_ROUNDS * REALTIME_SAMPLES
+        for by, figures in zip(kinds[1:], others, strict=True):
+            for what in ("missed_deadlines", "late_forces"):
+                ours, peer = (
+                    float(sum(getattr(each, what) for each in slices)) for slices in (seen, figures)
+                )
+                name = f"{what.replace('_', ' ')} of {count} at 1 kHz, page open"
+                rows.append(Row(name, "", ours, by, peer, peer / max(ours, 1.0)))
+    drawn = median(each.frames_per_second for each in seen)
+    return [*rows, Row("frames drawn at 1 kHz", "1/s", drawn)]
+
+
+if __name__ == "__main__":
+    show(__doc__, measure)
