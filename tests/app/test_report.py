@@ -1,9 +1,15 @@
 import json
+from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
 from stickslip_ros.app.main import main
-from tests.bags.runs import STAMPS, record
+from stickslip_ros.bags.messages import pack_joint_state
+from stickslip_ros.bags.recorder import QosProfile, Recorder
+from tests.bags.runs import STAMPS, STATES, motion, record
+
+REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
 
 
 @pytest.fixture
@@ -27,7 +33,7 @@ def test_two_runs_are_set_side_by_side(command, tmp_path, monkeypatch):
     assert status == 0
     assert out.index("first") < out.index("second")
     row = next(line for line in out.splitlines() if "samples" in line)
-    assert [cell.strip() for cell in row.split("│")[2:4]] == ["1000", "500"]
+    assert row.split()[-2:] == ["1000", "500"]
     status, out, _ = command("report", *bags, "--json", "--from", "1", "--to", "4")
     reports = json.loads(out)["reports"]
     assert [report["bag"] for report in reports] == ["first", "second"]
@@ -61,9 +67,71 @@ def test_a_damaged_bag_is_repaired(command, tmp_path):
     assert json.loads(out)["missing"] == []
 
 
+def texts(picture):
+    return [element.text for element in ElementTree.parse(picture).iter() if element.text]
+
+
+def test_a_picture_changes_nothing_of_the_report(command, tmp_path):
+    plain = json.loads(command("report", REFERENCE, "--json")[1])
+    picture = tmp_path / "run.svg"
+    status, out, error = command("report", REFERENCE, "--plot", picture, "--json")
+    assert (status, error) == (0, "")
+    assert json.loads(out) == plain
+    shown = texts(picture)
+    assert "displacement (µm)" in shown
+    assert any("sticks and slips, amplitude 325.8 µm" in text for text in shown)
+    for bag_lacks in ("the drive is not known", "no cycle was completed"):
+        assert bag_lacks not in shown
+
+
+def test_a_picture_is_of_the_part_that_is_measured(command, tmp_path):
+    picture = tmp_path / "run.svg"
+    part = ("--from", "1", "--to", "1.02")
+    command("report", REFERENCE, *part, "--plot", picture)
+    assert "no cycle was completed" in texts(picture)
+    assert "1.01" in texts(picture)
+
+
+def test_a_picture_says_what_a_bag_lacks(command, tmp_path):
+    record(tmp_path / "bag")
+    (tmp_path / "bag" / "metadata.yaml").unlink()
+    picture = tmp_path / "run.svg"
+    assert command("report", tmp_path / "bag", "--plot", picture)[0] == 0
+    shown = texts(picture)
+    assert any(text.startswith("metadata.yaml is missing") for text in shown)
+    assert "the bag does not say what drive it was: no equilibrium, no friction law" in shown
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {},
+        {"mass": "100.0"},
+        {"mass": "[" * 100_000},
+        {"mass": '"heavy"', "friction.law": '"none"'},
+        {"mass": "-1", "belt_speed": "NaN"},
+    ],
+)
+def test_parameters_that_are_none_are_no_drive(command, tmp_path, parameters):
+    with Recorder(tmp_path / "bag") as recorder:
+        channel = recorder.add_topic(STATES, "sensor_msgs/msg/JointState", QosProfile(depth=10))
+        recorder.add_metadata("stickslip_ros/plant", parameters)
+        for stamp in STAMPS[:100]:
+            position, velocity = motion(stamp / 1e9)
+            values = (position, 0.0), (velocity, 20.0), (0.0, 0.0)
+            recorder.write(channel, pack_joint_state(stamp, *values), stamp)
+    picture = tmp_path / "run.svg"
+    assert command("report", tmp_path / "bag", "--plot", picture)[0] == 0
+    assert "the drive is not known" in texts(picture)
+
+
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
+        (["report", "bag", "bag", "--plot", "out.png"], "draws one bag, and 2 were given"),
+        (["report", "bag", "--plot", "out.gif"], "must end in one of .png, .svg, .pdf"),
+        (["report", "bag", "--plot", "none/out.png"], "there is no directory none"),
+        (["report", "empty", "--plot", "out.png"], "holds no .mcap file"),
         (["report", "nothing"], "the bag nothing does not exist"),
         (["report", "bag", "--namespace", "/other"], "no joint_states and no control_force in"),
         (["report", "bag", "--from", "50"], "from 50.0 s to inf s of bag holds no samples"),
@@ -86,4 +154,4 @@ def test_what_cannot_be_is_refused_in_a_line(command, tmp_path, monkeypatch, arg
     status, out, error = command(*arguments)
     assert (status, out) == (2, "")
     assert complaint in error.splitlines()[-1]
-    assert not (tmp_path / "out").exists()
+    assert not list(tmp_path.glob("out*"))

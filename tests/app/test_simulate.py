@@ -41,6 +41,39 @@ def test_continuous_and_sampled_control_quench_the_feed_drive(stickslip: Run) ->
         assert json.loads(done.stdout)["regime"] == "equilibrium"
 
 
+@pytest.mark.parametrize("control", ["--no-control", "--continuous-control"])
+def test_a_picture_is_of_the_motion_that_is_measured(
+    stickslip: Run, tmp_path: Path, control: str
+) -> None:
+    call = ("simulate", "paper", control, "--duration", "100", "--json")
+    plain = json.loads(stickslip(*call).stdout)
+    done = stickslip(*call, "--plot", "run.svg")
+    assert (done.returncode, done.stderr) == (0, "")
+    found = json.loads(done.stdout)
+    assert found["regime"] == plain["regime"]
+    assert found["amplitude"] == pytest.approx(plain["amplitude"], rel=1e-6, abs=1e-9)
+    if control == "--no-control":
+        assert found == plain
+    picture = (tmp_path / "run.svg").read_text(encoding="utf-8")
+    for text in ("displacement (dimensionless)", "control force<", "each cycle"):
+        assert text in picture
+
+
+def test_a_picture_of_a_disturbed_run_says_so(stickslip: Run, tmp_path: Path) -> None:
+    disturbed = ("-p", "plant.disturbance.kind=step", "-p", "plant.disturbance.amplitude=0.1")
+    done = stickslip(
+        "simulate", "paper", *disturbed, "-p", "plant.force_delay=0.015", "--plot", "run.svg"
+    )
+    assert done.returncode == 0, done.stderr
+    assert "control force and disturbance<" in (tmp_path / "run.svg").read_text(encoding="utf-8")
+
+
+def test_a_picture_that_cannot_be_is_refused_before_anything_runs(stickslip: Run) -> None:
+    done = stickslip("simulate", "paper", "--duration", "1e9", "--plot", "run.jpg")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "--plot run.jpg: must end in one of .png, .svg, .pdf" in done.stderr
+
+
 def test_json_is_all_there_is_on_standard_output_at_rest_too(stickslip: Run) -> None:
     speed = ("-p", "plant.belt_speed=0.7")
     done = stickslip("simulate", "paper", "--no-control", *speed, "--duration", "3000", "--json")

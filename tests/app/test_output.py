@@ -1,0 +1,115 @@
+"""Tables: framed on a terminal of any width, plain text into a pipe."""
+
+import fcntl
+import os
+import pty
+import re
+import struct
+import subprocess
+import sys
+import termios
+from pathlib import Path
+
+import pytest
+
+from stickslip_ros.app.output import print_figures, print_table
+from tests.nodes.graph import PATIENCE
+
+REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
+REPORT = [sys.executable, "-m", "stickslip_ros.app.main", "report"]
+LONG = "bags/" + 20 * "long_"
+
+
+def on_terminal(command: list[str], columns: int, **environment: str) -> list[str]:
+    """Run a command on a terminal of that width; return the lines that it shows."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+    inherited = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in {"COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE"}
+    }
+    with subprocess.Popen(
+        command, stdout=theirs, env={**inherited, "TERM": "xterm", **environment}
+    ) as process:
+        os.close(theirs)
+        shown = b""
+        try:
+            while block := os.read(ours, 65536):
+                shown += block
+        except OSError:  # how Linux tells that the other side is closed
+            pass
+        os.close(ours)
+        assert process.wait(timeout=PATIENCE) == 0
+    return shown.decode().splitlines()
+
+
+def test_a_person_gets_a_frame_and_a_colour() -> None:
+    lines = on_terminal([*REPORT, str(REFERENCE)], 80)
+    (regime,) = (line for line in lines if "stick_slip" in line)
+    assert regime.count("│") == 3
+    assert "\x1b[" in regime
+
+
+@pytest.mark.parametrize("environment", [{"NO_COLOR": "1"}, {"TERM": "dumb"}])
+def test_colours_are_left_out_where_they_are_not_wanted(environment: dict[str, str]) -> None:
+    lines = on_terminal([*REPORT, str(REFERENCE)], 80, **environment)
+    (regime,) = (line for line in lines if "stick_slip" in line)
+    assert re.search(r"\x1b\[[0-9;]*3[0-9]m", regime) is None
+
+
+@pytest.mark.parametrize("columns", [80, 40, 30])
+def test_nothing_is_lost_on_a_narrow_terminal(columns: int, tmp_path: Path) -> None:
+    """Headings and labels may be broken over lines, figures may not."""
+    other = tmp_path / "the other one"
+    other.symlink_to(REFERENCE)
+    shown = on_terminal([*REPORT, str(REFERENCE), str(other)], columns)
+    lines = [re.sub(r"\x1b\[[0-9;]*m", "", line) for line in shown]
+    assert max(map(len, lines)) <= columns
+    text = "\n".join(lines)
+    assert "…" not in text
+    for figure in ("stick_slip", "325.8 µm", "30.77 mm/s", "114.9 N"):
+        assert text.count(figure) == 2
+
+
+def test_a_pipe_gets_plain_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    print_table(
+        "drives [bold]", ["", "first", "second"], [["regime", "stick_slip", LONG], ["bag", "-", ""]]
+    )
+    assert capsys.readouterr().out.splitlines() == [
+        "drives [bold]",
+        "        first       second",
+        f"regime  stick_slip  {LONG}",
+        "bag     -",
+    ]
+
+
+def test_one_column_has_no_heading(capsys: pytest.CaptureFixture[str]) -> None:
+    print_figures("run", {"": {"amplitude": 434e-6, "bag": "bags/机床"}})
+    assert capsys.readouterr().out == "run\namplitude  434 µm\nbag        bags/机床\n"
+
+
+def test_a_table_without_rows_is_its_headings(capsys: pytest.CaptureFixture[str]) -> None:
+    print_table("empty", ["topic", "messages"], [])
+    assert capsys.readouterr().out == "empty\ntopic  messages\n"
+
+
+def test_what_would_steer_a_terminal_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    print_table("a\x1b[2J", ["", ""], [["b\n", "\x07"]])
+    assert capsys.readouterr().out == "a\\x1b[2J\nb\\n  \\x07\n"
+
+
+def test_colours_forced_on_a_pipe_change_nothing() -> None:
+    plain, forced = (
+        subprocess.run(
+            [*REPORT, str(REFERENCE)],
+            env={**os.environ, "FORCE_COLOR": force},
+            stdout=subprocess.PIPE,
+            text=True,
+            check=True,
+            timeout=PATIENCE,
+        ).stdout
+        for force in ("", "1")
+    )
+    assert "stick_slip" in plain
+    assert forced == plain
