@@ -1,6 +1,7 @@
 """`stickslip`: the entry script; every command has its own file."""
 
 import argparse
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -42,6 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         given, further = given[:end], given[end + 1 :]
     if sys.stdout is None:  # closed by who called
         sys.stdout = _nowhere()
+    if isinstance(sys.stdout, io.TextIOWrapper):  # µ is not in every encoding
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         chosen = _parser(given).parse_args(given, argparse.Namespace(further=further))
         status: int = chosen.run(chosen)

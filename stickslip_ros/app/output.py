@@ -6,11 +6,13 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from rich.cells import cell_len, set_cell_size
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
+from stickslip_ros.physics.measures import Regime
 from stickslip_ros.prefixes import prefix_for
 from stickslip_ros.printable import printable
 
@@ -35,6 +37,17 @@ _LABELS: dict[str, tuple[str, str]] = {
     "complete": ("bag complete", ""),
     "bag": ("bag", ""),
 }
+
+_STYLES: dict[str, str] = {
+    Regime.EQUILIBRIUM: "green",
+    Regime.STICK_SLIP: "yellow",
+    Regime.PURE_SLIP: "yellow",
+    Regime.UNBOUNDED: "red",
+}
+"""Of what stands out on a terminal."""
+
+_FRAME = 3
+"""Characters that the frame of a column takes, beside one for the whole table."""
 
 
 def print_json(values: Mapping[str, Any]) -> None:
@@ -64,13 +77,15 @@ def print_figures(title: str, columns: Mapping[str, Mapping[str, Any]]) -> None:
 
 
 def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table of which the first column stands to the left and the others to the right."""
-    table = Table(title=_shown(title), title_justify="left")
-    for number, heading in enumerate(headings):
-        table.add_column(_shown(heading), justify="right" if number else "left")
-    for row in rows:
-        table.add_row(*map(_shown, row))
-    _Console(soft_wrap=True).print(table)
+    """Print a table: framed where a person looks, aligned plain text into a pipe or a file.
+
+    In plain text each row is one line whatever its length, the columns two spaces or more apart.
+    """
+    shown = [[printable(cell) for cell in row] for row in (headings, *rows)]
+    if sys.stdout.isatty():
+        _print_framed(Console(), printable(title), shown[0], shown[1:])
+    else:
+        _print_plain(printable(title), shown[0], shown[1:])
 
 
 def quantities(values: Sequence[Any], unit: str, digits: int = 4) -> list[str]:
@@ -97,16 +112,43 @@ def progress_bar(label: str, total: float | None) -> Generator[Callable[[float],
         yield lambda done: bar.update(task, completed=done)
 
 
-class _Console(Console):
-    """Leaves it to the command to end where nobody reads on."""
+def _print_plain(title: str, headings: list[str], rows: list[list[str]]) -> None:
+    lines = [headings, *rows] if any(headings) else rows
+    widths = [max(map(cell_len, column)) for column in zip(*lines, strict=True)]
+    if title:
+        print(title)
+    for line in lines:
+        padded = map(set_cell_size, line[:-1], widths)
+        print("  ".join([*padded, line[-1]]).rstrip())
 
-    def on_broken_pipe(self) -> None:
-        raise BrokenPipeError
 
+def _print_framed(console: Console, title: str, headings: list[str], rows: list[list[str]]) -> None:
+    """Print a table with its first column to the left and the others to the right.
 
-def _shown(text: str) -> str:
-    """Return a text that rich shows as it is."""
-    return escape(printable(text))
+    Where figures side by side would not fit, each row becomes a table of its own.
+    """
+    if title:
+        console.print(Text(title, "table.title"), soft_wrap=True)
+    labels, *columns = zip(headings, *rows, strict=True)
+    side_by_side = len(columns) > 1
+    share = max(1, console.width // len(headings) - _FRAME)
+    table = Table(show_header=any(headings))
+    table.add_column(Text(headings[0]), overflow="fold")
+    least = max(map(cell_len, " ".join(labels).split()), default=0) + _FRAME + 1
+    for heading, *cells in columns:
+        width = max(map(cell_len, cells), default=0)
+        lines = Text(heading).wrap(console, max(width, share), overflow="fold")
+        least += max(width, *(line.cell_len for line in lines), 0) + _FRAME
+        header = Text("\n").join(lines)
+        table.add_column(header, justify="right", overflow="fold", no_wrap=side_by_side)
+    if side_by_side and least > console.width:
+        for label, *cells in rows:
+            fields = [list(field) for field in zip(headings[1:], cells, strict=True)]
+            _print_framed(console, f"{headings[0]} {label}".strip(), ["", ""], fields)
+        return
+    for row in rows:
+        table.add_row(*(Text(cell, _STYLES.get(cell, "")) for cell in row))
+    console.print(table)
 
 
 def _text(value: Any, scale: float, unit: str, digits: int) -> str:

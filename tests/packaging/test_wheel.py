@@ -58,7 +58,7 @@ def test_holds_what_ros_looks_for(content, stem, checkout, executables):
 
 def test_names_its_extras(content, stem):
     metadata = Parser().parsestr(content.read(f"{stem}.dist-info/METADATA").decode())
-    assert set(metadata.get_all("Provides-Extra")) == {"ros", "dask", "test", "dev"}
+    assert set(metadata.get_all("Provides-Extra")) == {"dashboard", "ros", "dask", "test", "dev"}
     assert metadata["Requires-Python"] == ">=3.11"
 
 
