@@ -100,12 +100,12 @@ class Friction(_Model):
     @model_validator(mode="after")
     def _static_is_largest(self) -> Self:
         """Refuse a kinetic coefficient of the law in use that is above the static one."""
-        lower = {"stribeck": "minimum", "exponential": "kinetic"}.get(self.law)
-        if lower is not None and getattr(self, lower) > self.static:
-            raise ValueError(
-                f"friction.{lower} = {getattr(self, lower)} must not exceed "
-                f"friction.static = {self.static}"
-            )
+        for lower in ("minimum", "kinetic"):
+            if lower in LAWS[self.law].constants() and getattr(self, lower) > self.static:
+                raise ValueError(
+                    f"friction.{lower} = {getattr(self, lower)} must not exceed "
+                    f"friction.static = {self.static}"
+                )
         return self
 
     def as_law(self) -> FrictionLaw:

@@ -1,0 +1,182 @@
+"""What the pages take from the code: parameters, topics, numbers of the theory, the reference.
+
+Fills in what stands between `<!-- generated: NAME -->` and `<!-- end: NAME -->` on the pages beside
+this file.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from math import isinf
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from api import PUBLIC, reference
+
+from stickslip_ros.app.stability import stability
+from stickslip_ros.nodes.topics import TOPICS
+from stickslip_ros.physics.theory.closed_forms import CubicLoop
+from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.scenario.parameters import (
+    NODE_PARAMETERS,
+    Fixed,
+    NodeParameters,
+    Parameter,
+    ReplayParameters,
+    parameters_of,
+)
+
+HERE = Path(__file__).parent
+PAGES = ("parameters.md", "topics.md", "theory.md", "reference.md")
+
+_FROM_ANYWHERE = {"at least -1e+30", "at most 1e+30"}
+"""Bounds of every number, which the page tells once."""
+_CHANGES = {
+    Fixed.NEVER: "at any time",
+    Fixed.ACTIVE: "while inactive",
+    Fixed.CONFIGURED: "before configured",
+}
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def parameters() -> Iterator[str]:
+    """Yield a table for what every node has, and one for each node."""
+    common = {parameter.name for parameter in parameters_of(NodeParameters)}
+    models = {"every node": NodeParameters, **NODE_PARAMETERS, "replay": ReplayParameters}
+    for node, model in models.items():
+        own = [p for p in parameters_of(model) if model is NodeParameters or p.name not in common]
+        yield f"## {node}\n"
+        yield table(
+            ["parameter", "unit", "default", "allowed", "can be changed", "meaning"],
+            [_parameter_row(parameter) for parameter in own],
+        )
+
+
+def _parameter_row(parameter: Parameter) -> list[str]:
+    default = parameter.default
+    if parameter.kind is bool:
+        default = str(default).lower()
+    elif parameter.kind is float:
+        default = "inf" if isinf(default) else repr(default)
+    limits = [part for part in parameter.bounds.split(" and ") if part not in _FROM_ANYWHERE]
+    allowed = " and ".join(limits) + ("" if parameter.finite else ", or inf" if limits else "inf")
+    return [
+        f"`{parameter.name}`",
+        parameter.unit or "",
+        f"`{default}`" if default not in ("", []) else "empty",
+        allowed,
+        _CHANGES[parameter.fixed],
+        parameter.meaning.removesuffix("."),
+    ]
+
+
+def topics() -> Iterator[str]:
+    """Yield the table of topics; who writes and reads them is what the policy for SROS2 allows."""
+    policy = ElementTree.parse(HERE.parent / "config" / "sros2_policy.xml")
+    uses: dict[tuple[str, str], list[str]] = {}
+    for profile in policy.iter("profile"):
+        for rules in profile.iter("topics"):
+            (rule,) = rules.attrib
+            for topic in rules:
+                users = uses.setdefault((rule, topic.text or ""), [])
+                if profile.attrib["node"] in NODE_PARAMETERS:
+                    users.append(profile.attrib["node"])
+    yield table(
+        ["topic", "type", "from", "to", "depth", "meaning"],
+        [
+            [
+                f"`{topic.name}`",
+                topic.type_name.replace("/msg/", "/"),
+                ", ".join(uses.get(("publish", topic.name), [])),
+                ", ".join(uses.get(("subscribe", topic.name), [])),
+                f"{topic.depth}",
+                topic.meaning.removesuffix("."),
+            ]
+            for topic in TOPICS
+        ],
+    )
+
+
+def numbers() -> Iterator[str]:
+    """Yield what `stickslip stability paper` finds, with the symbols of the page."""
+    scenario = load_scenario("paper")
+    found, _ = stability(scenario)
+    cubic = CubicLoop.of(scenario.plant.as_drive())
+    assert cubic is not None
+    opened, closed, sampled = (found[f"{loop}_loop"] for loop in ("open", "closed", "sampled"))
+    (cycle,) = opened["limit_cycles"]
+    rows: dict[str, Any] = {
+        "$a$, $b$": (cubic.slope, cubic.cubic),
+        "equilibrium $X_0$, eq. 6": found["equilibrium_position"],
+        "trace $p$, eq. 8": cubic.trace,
+        "eigenvalues of the open loop": _complex(opened["eigenvalues"]),
+        "Hopf speed $v_{b1}$": opened["hopf_speeds"],
+        "crossing speed there, eq. 11": opened["crossing_speeds"],
+        "first Lyapunov coefficient $\\sigma$, eq. 15": opened["first_lyapunov_coefficients"],
+        "onset of sticking $v_{b0}$, by averaging": found["sticking"]["onset_speed_approximate"],
+        "the same, exactly": found["sticking"]["onset_speed"],
+        "limit cycle: amplitude, period": (cycle["amplitude"], cycle["period"]),
+        "its stick fraction, and Floquet multiplier": (
+            cycle["stick_fraction"],
+            cycle["multipliers"][0][0],
+        ),
+        "eigenvalues with control, eq. 20": _complex(closed["eigenvalues"]),
+        "critical linear gain $k_1^{\\ast}$, eq. 21": closed["critical_linear_gain"],
+        "$\\sigma$ there, with $k_2 = -1$": closed["first_lyapunov_coefficient"],
+        "critical cubic gain": closed["critical_cubic_gain"],
+        "sampled at 100 Hz: spectral radius": sampled["spectral_radius"],
+        "its stable linear gains": sampled["stable_linear_gains"][0],
+    }
+    yield table(["quantity", "value"], [[name, _figures(value)] for name, value in rows.items()])
+
+
+def _complex(pairs: Sequence[Sequence[float]]) -> str:
+    """Return eigenvalues, of a conjugate pair one."""
+    return ", ".join(
+        f"{real:.5g}{f' ± {imaginary:.5g} i' if imaginary else ''}"
+        for real, imaginary in pairs
+        if imaginary >= 0.0
+    )
+
+
+def _figures(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    return ", ".join(f"{v:.5g}" for v in (value if isinstance(value, list | tuple) else [value]))
+
+
+BLOCKS: dict[str, Callable[[], Iterator[str]]] = {
+    "parameters": parameters,
+    "topics": topics,
+    "numbers": numbers,
+    **{section: partial(reference, section) for section in PUBLIC},
+}
+
+
+def filled(page: str) -> str:
+    """Return the text of a page with all of its blocks made anew."""
+
+    def block(match: re.Match[str]) -> str:
+        name = match[1]
+        text = "\n".join(BLOCKS[name]())
+        return f"<!-- generated: {name} -->\n\n{text}\n<!-- end: {name} -->"
+
+    pattern = r"<!-- generated: (\w+) -->.*?<!-- end: \1 -->"
+    return re.sub(pattern, block, page, flags=re.DOTALL)
+
+
+def main() -> None:
+    """Fill in all pages."""
+    for page in PAGES:
+        path = HERE / page
+        path.write_text(filled(path.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
