@@ -160,13 +160,18 @@ def test_a_page_that_comes_and_goes_changes_nothing(
     command = ("run", "paper", "--pace", "lockstep", "--duration", "100")
     alone = start_stickslip(*command, "--bag", "alone")
     assert alone.wait(PATIENCE) == 0
-    served = Served(start_stickslip(*command, "--bag", "watched", "--dashboard"))
-    for _ in range(2):
-        page = browser.new_page()
-        page.goto(served.url)
-        page.wait_for_function("stickslip.frames > 3 && stickslip.motion")
-        page.close()
-    assert served.process.wait(PATIENCE) == 0
+    served = Served(start_stickslip("dashboard"))
+    first = browser.new_page()
+    first.goto(served.url)
+    watched = start_stickslip(*command, "--bag", "watched")
+    first.wait_for_function("stickslip.motion?.end > 1")
+    first.close()
+    second = browser.new_page()
+    second.goto(served.url)
+    assert watched.wait(PATIENCE) == 0
+    second.wait_for_function("stickslip.motion?.end > 99")
+    second.close()
+    assert served.end() == 130
     with Recording(tmp_path / "alone") as one, Recording(tmp_path / "watched") as other:
         for kind in ("joint_states", "control_forces"):
             columns, others = getattr(one, kind), getattr(other, kind)
