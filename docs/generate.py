@@ -20,7 +20,6 @@ from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.scenario.files import load_scenario
 from stickslip_ros.scenario.parameters import (
     NODE_PARAMETERS,
-    Fixed,
     NodeParameters,
     Parameter,
     ReplayParameters,
@@ -32,11 +31,6 @@ PAGES = ("parameters.md", "topics.md", "theory.md", "reference.md")
 
 _FROM_ANYWHERE = {"at least -1e+30", "at most 1e+30"}
 """Bounds of every number, which the page tells once."""
-_CHANGES = {
-    Fixed.NEVER: "at any time",
-    Fixed.ACTIVE: "while inactive",
-    Fixed.CONFIGURED: "before configured",
-}
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -71,7 +65,7 @@ def _parameter_row(parameter: Parameter) -> list[str]:
         parameter.unit or "",
         f"`{default}`" if default not in ("", []) else "empty",
         allowed,
-        _CHANGES[parameter.fixed],
+        parameter.fixed.changes,
         parameter.meaning.removesuffix("."),
     ]
 

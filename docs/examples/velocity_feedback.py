@@ -1,7 +1,10 @@
 """PD-style velocity feedback: a force against the slide's displacement and its velocity."""
 
+from contextlib import suppress
+
 import rclpy
 from geometry_msgs.msg import WrenchStamped
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
@@ -26,5 +29,6 @@ class VelocityFeedback(Node):
 
 
 if __name__ == "__main__":
-    rclpy.init()
-    rclpy.spin(VelocityFeedback())
+    with suppress(KeyboardInterrupt, ExternalShutdownException):  # Ctrl-C, and SIGTERM
+        rclpy.init()
+        rclpy.spin(VelocityFeedback())

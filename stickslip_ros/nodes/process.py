@@ -192,7 +192,8 @@ def _parameter_help(model: type[NodeParameters]) -> str:
     for parameter in parameters_of(model):
         unit = f" {parameter.unit}" if parameter.unit else ""
         bounds = f"; {parameter.bounds}" if parameter.bounds else ""
-        lines.append(f"  {parameter.name}  (default {parameter.default}{unit}{bounds})")
+        when = f"; set {parameter.fixed.changes}" if parameter.fixed else ""
+        lines.append(f"  {parameter.name}  (default {parameter.default}{unit}{bounds}{when})")
         lines.append(f"      {parameter.meaning}")
     return "\n".join(lines)
 

@@ -36,6 +36,13 @@ class Fixed(StrEnum):
     ACTIVE = "active"
     CONFIGURED = "configured"
 
+    @property
+    def changes(self) -> str:
+        """When it can be changed, in words."""
+        return {"": "at any time", "active": "while inactive", "configured": "before configured"}[
+            self
+        ]
+
 
 _SMALLEST, _LARGEST = 1e-30, 1e30
 """Magnitudes, in SI units, between which no product or power in the physics overflows."""
