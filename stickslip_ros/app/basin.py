@@ -3,6 +3,7 @@
 import argparse
 import sys
 from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,6 +32,9 @@ from stickslip_ros.studies.basin import (
 from stickslip_ros.studies.columns import Columns, Further, write_json
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Grid, Plan, Sample
+
+if TYPE_CHECKING:
+    from stickslip_ros.plots.units import Units
 
 HELP = "find which motion each start leads to, and the share of starts that each motion gets"
 
@@ -142,8 +146,11 @@ def _name(attractor: Attractor) -> str:
 def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> None:
     # Half as long again to import as everything else.
     from stickslip_ros.plots.basin_picture import draw_basin
+    from stickslip_ros.plots.units import Units
 
-    plan, drive = journal.study.plan, journal.study.scenario.plant.as_drive()
+    plan, scenario = journal.study.plan, journal.study.scenario
+    drive = scenario.plant.as_drive()
+    units = Units.of(drive)
     columns = Columns.of(journal)
     with writing("--plot", arguments.plot):
         draw_basin(
@@ -152,22 +159,24 @@ def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> No
             velocity=columns.values[VELOCITY],
             attractor=np.array([basins.place(point) for point in journal.points()]),
             regimes=[attractor.regime for attractor in basins.attractors],
-            labels=[_label(attractor) for attractor in basins.attractors],
+            labels=[_label(attractor, units) for attractor in basins.attractors],
             grid_shape=plan.shape if isinstance(plan, Grid) else None,
             belt_speed=drive.belt_speed,
             equilibrium_position=drive.equilibrium_position,
+            units=units,
+            title=" ".join([scenario.name, *scenario.overrides]),
         )
 
 
-def _label(attractor: Attractor) -> str:
+def _label(attractor: Attractor, units: "Units") -> str:
     """Return what a legend says of an attractor."""
     from stickslip_ros.plots.regimes import REGIMES
 
     amplitude = ""
     if attractor.amplitude is not None:
-        amplitude = f", amplitude {quantities([attractor.amplitude], 'm', 3)[0]}"
+        amplitude = f", amplitude {units.text(attractor.amplitude, 'm')}"
     share, error = 100.0 * attractor.share, 100.0 * attractor.standard_error
-    name = REGIMES[attractor.regime][1]
+    name = REGIMES[attractor.regime].label
     if not attractor.steady and attractor.regime is not None:
         name += ", not steady"
     return f"{name}{amplitude}: {share:.1f} % \N{PLUS-MINUS SIGN} {error:.1f} %"

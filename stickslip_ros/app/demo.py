@@ -3,8 +3,9 @@
 import sys
 from pathlib import Path
 
+from stickslip_ros.app.optional import ros_nodes
 from stickslip_ros.app.output import print_figures
-from stickslip_ros.app.run import default_bag, record, ros_nodes
+from stickslip_ros.app.run import default_bag, record
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import StickslipError

@@ -1,13 +1,25 @@
 """`stickslip report`: the measures of recorded runs."""
 
 import argparse
+import json
+from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.arguments import add_json, seconds
+from stickslip_ros.app.arguments import add_json, add_plot, check_picture, seconds, writing
 from stickslip_ros.app.output import print_figures, print_json
+from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.measures import Measures
 from stickslip_ros.printable import printable
+from stickslip_ros.scenario.parameters import PlantParameters, known_parameters
 from stickslip_ros.versions import versions
+
+if TYPE_CHECKING:
+    from stickslip_ros.plots.run_history import RunHistory
 
 HELP = "measure a recorded run, or set several side by side"
 
@@ -43,17 +55,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NS",
         help="ROS namespace of the drive, where a bag holds several",
     )
+    add_plot(parser, "motion, force, cycles and friction law of the one bag")
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    plot: Path | None = arguments.plot
+    history = None if plot is None else _history_to_draw(plot, arguments.bags)
     reports = {
         str(bag): report_of_bag(
-            bag, start=arguments.start, end=arguments.end, namespace=arguments.namespace
+            bag,
+            start=arguments.start,
+            end=arguments.end,
+            namespace=arguments.namespace,
+            spectator=history,
         )
         for bag in arguments.bags
     }
+    if plot is not None and history is not None:
+        _draw(plot, arguments.bags[0], history, reports[str(arguments.bags[0])])
     if arguments.json:
         results = [{**report, "bag": bag} for bag, report in reports.items()]
         result = results[0] if len(results) == 1 else {"reports": results}
@@ -68,3 +89,45 @@ def run(arguments: argparse.Namespace) -> int:
         for sentence in [*report["missing"], *report["notes"]]:
             print(printable(f"{bag}: {sentence}") if several else sentence)
     return 0
+
+
+def _history_to_draw(path: Path, bags: Sequence[Path]) -> "RunHistory":
+    # Half as long again to import as everything else.
+    from stickslip_ros.plots.run_history import RunHistory
+
+    check_picture(path)
+    if len(bags) > 1:
+        raise InvalidInputError(f"--plot {path}: draws one bag, and {len(bags)} were given")
+    return RunHistory()
+
+
+def _draw(path: Path, bag: Path, history: "RunHistory", report: dict[str, Any]) -> None:
+    from stickslip_ros.plots.run_figure import run_figure
+    from stickslip_ros.plots.style import save
+
+    drive = _drive_of(bag)
+    notes = [*report["missing"], *report["notes"]]
+    if drive is None:
+        notes.append("the bag does not say what drive it was: no equilibrium, no friction law")
+    measures = Measures(**{field.name: report[field.name] for field in fields(Measures)})
+    with writing("--plot", path):
+        save(run_figure(history, measures, drive, title=str(bag), notes=notes), path)
+
+
+def _drive_of(bag: Path) -> Drive | None:
+    """Return the drive whose parameters were recorded, None where they are not or not all."""
+    with Recording(bag) as recording:
+        texts = recording.metadata("stickslip_ros/plant") or {}
+    try:
+        values = {
+            name: json.loads(text)
+            for name, text in texts.items()
+            if name in known_parameters(PlantParameters)
+        }
+        plant = PlantParameters.validated(values, str(bag))
+    except (ValueError, RecursionError, InvalidInputError):
+        return None
+    drive = plant.as_drive()
+    needed = {field.name for field in fields(drive)} - {"friction"}
+    needed |= {f"friction.{name}" for name in ("law", *drive.friction.constants())}
+    return drive if needed <= values.keys() else None

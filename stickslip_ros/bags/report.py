@@ -1,12 +1,16 @@
 """A recorded run from its bag: a report of its measures and counts."""
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
+
+import numpy as np
 
 from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.physics.knots import BoolArray
+from stickslip_ros.physics.knots import BoolArray, FloatArray
+from stickslip_ros.physics.measures import Cycle
 from stickslip_ros.physics.samples import NANOSECONDS, IntArray, RunMeter
 
 _DEFAULT_WINDOW = 20
@@ -18,6 +22,29 @@ _MOST_EARLY = 1_000_000
 """Forces that are kept until there is a joint state."""
 _MEASURED_AT_ONCE = 20_000
 """Messages; to measure each chunk by itself would take twice as long."""
+_WATCHED_SHARE = 500
+"""Part of the samples so far within which it is told where a cycle ended, for who watches."""
+_LEAST_WATCHED = 16
+
+
+class Spectator(Protocol):
+    """Sees what is measured go by; times in s from the first joint state, all else in SI units."""
+
+    def take_samples(
+        self,
+        time: FloatArray,
+        position: FloatArray,
+        velocity: FloatArray,
+        belt_velocity: FloatArray,
+        friction: FloatArray,
+        cycles: Sequence[Cycle],
+    ) -> None:
+        """Take the joint states that follow, and the cycles completed by them."""
+        ...
+
+    def take_control(self, time: FloatArray, force: FloatArray) -> None:
+        """Take the control forces that follow."""
+        ...
 
 
 def report_of_bag(
@@ -27,6 +54,7 @@ def report_of_bag(
     end: float = float("inf"),
     window: int | None = None,
     namespace: str | None = None,
+    spectator: Spectator | None = None,
 ) -> dict[str, Any]:
     """Return measures, counts and completeness of the recording at `path`, ready for JSON.
 
@@ -34,7 +62,8 @@ def report_of_bag(
     is none, the first force; a start of 0 leaves nothing out) is measured, over the last `window`
     whole cycles of it (None: as many as the analyzer did). The drive is that in the ROS
     `namespace`, None where there is only one. `complete` says whether `missing`, sentences on what
-    the bag lacks, is empty; `notes` are sentences on what makes the measures doubtful.
+    the bag lacks, is empty; `notes` are sentences on what makes the measures doubtful. A
+    `spectator` sees all of the part.
 
     Raises BagError for what is no bag or holds neither joint states nor control forces, and
     InvalidInputError for an empty part.
@@ -42,7 +71,8 @@ def report_of_bag(
     if not start < end:
         raise InvalidInputError(f"the part from {start} s to {end} s is empty")
     with Recording(path, namespace) as recording:
-        run = _RunReader(RunMeter(window or _window_at_recording(recording)), start, end)
+        meter = RunMeter(window or _window_at_recording(recording))
+        run = _RunReader(meter, start, end, spectator)
         for block in recording.blocks(least=_MEASURED_AT_ONCE):
             run.feed(block.joint_states, block.control_forces)
         run.finish()
@@ -67,8 +97,11 @@ def report_of_bag(
 class _RunReader:
     """Feeds a meter with the part of a run that lies between two instants."""
 
-    def __init__(self, meter: RunMeter, start: float, end: float) -> None:
+    def __init__(
+        self, meter: RunMeter, start: float, end: float, spectator: Spectator | None
+    ) -> None:
         self.meter = meter
+        self._spectator = spectator
         self.first: int | None = None
         """Stamp from which the instants count, ns, once there is one."""
         self.has_states = False
@@ -86,12 +119,8 @@ class _RunReader:
             first = self._begin(int(states.stamp[0])) if self.first is None else self.first
             rows = self._part(states.stamp, first)
             self.measured += int(rows.sum())
-            self.meter.motion.feed(
-                states.stamp[rows],
-                states.position[rows],
-                states.velocity[rows],
-                states.belt_velocity[rows],
-            )
+            for piece in self._pieces(np.flatnonzero(rows)):
+                self._feed_states(states, piece, first)
         if self.first is None:
             self._early.append(forces)
             if sum(len(forces.stamp) for forces in self._early) > _MOST_EARLY:
@@ -112,10 +141,30 @@ class _RunReader:
         self._early.clear()
         return first
 
+    def _pieces(self, rows: IntArray) -> Iterator[IntArray]:
+        """Yield the rows to be measured at once: so few that it is seen where a cycle ended."""
+        while self._spectator is not None and len(rows) > 0:
+            most = max(_LEAST_WATCHED, self.meter.motion.samples // _WATCHED_SHARE)
+            yield rows[:most]
+            rows = rows[most:]
+        if self._spectator is None:
+            yield rows
+
+    def _feed_states(self, states: JointStateColumns, rows: IntArray, first: int) -> None:
+        stamp = states.stamp[rows]
+        motion = states.position[rows], states.velocity[rows], states.belt_velocity[rows]
+        cycles = self.meter.motion.feed(stamp, *motion)
+        if self._spectator is not None:
+            time = (stamp - first) / NANOSECONDS
+            self._spectator.take_samples(time, *motion, states.effort[rows], cycles)
+
     def _feed_forces(self, forces: WrenchColumns, first: int) -> None:
         rows = self._part(forces.stamp, first)
         self.measured += int(rows.sum())
-        self.meter.force.feed(forces.stamp[rows], forces.force[rows])
+        stamp, force = forces.stamp[rows], forces.force[rows]
+        self.meter.force.feed(stamp, force)
+        if self._spectator is not None:
+            self._spectator.take_control((stamp - first) / NANOSECONDS, force)
 
     def _part(self, stamp: IntArray, first: int) -> BoolArray:
         since = stamp - first

@@ -2,32 +2,38 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import cycle
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.physics.measures import Regime
-from stickslip_ros.plots.regimes import REGIMES
-from stickslip_ros.plots.style import LIGHT_GREY, PURPLE, SKY_BLUE, YELLOW
+from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
+from stickslip_ros.plots.style import (
+    AMBER,
+    MANY,
+    PURPLE,
+    SKY_BLUE,
+    YELLOW,
+    drawing,
+    set_title,
+    styled,
+)
+from stickslip_ros.plots.units import Units
 
-_MORE_COLOURS = (SKY_BLUE, YELLOW, PURPLE)
-"""Of attractors whose regime another one has too."""
+_SI = Units()
 
-_UNKNOWN = -1
+_MORE_COLOURS = (SKY_BLUE, YELLOW, PURPLE, AMBER)
+_MORE_HATCHES = ("+++", "", "ooo", "|||", "---")
+_MORE_MARKERS = ("v", "*", "P", "<", ">")
+"""Of attractors whose regime another one has too; together they repeat after twenty."""
 
-_MANY = 5000
-"""Starts from which on a drawing of lines and curves has them as an image within."""
 
-
-def draw_basin(
-    path: Path,
+@styled
+def basin_figure(
     *,
     position: FloatArray,
     velocity: FloatArray,
@@ -37,49 +43,63 @@ def draw_basin(
     grid_shape: tuple[int, ...] | None,
     belt_speed: float,
     equilibrium_position: float,
-) -> None:
-    """Write which attractor each of n starts leads to, to `path`; the format follows the ending.
+    units: Units = _SI,
+    title: str = "",
+) -> Figure:
+    """Return the picture of which attractor each of n starts leads to.
 
     `position` (m) and `velocity` (m/s) are those of the starts, `attractor` says for each which of
-    the `regimes` and `labels` it has, or -1 where that is not known; arrays of n. The starts are a
-    row-major grid of `grid_shape`, or anywhere if that is None. Marked are the `belt_speed` (m/s)
-    and the equilibrium at `equilibrium_position` (m).
+    the `regimes` and `labels` it has; arrays of n. The starts are a row-major grid of `grid_shape`,
+    or anywhere if that is None. Marked are the `belt_speed` (m/s) and the equilibrium at
+    `equilibrium_position` (m). The `title` is that of what was computed.
     """
-    figure = Figure(figsize=(7.5, 6.8), layout="constrained")
+    figure = Figure(figsize=(7.5, 6.8))
+    what = f"Which motion each of {len(attractor)} starts leads to"
+    set_title(figure, f"{what}: {title}" if title else what)
     axes = figure.subplots()
-    colours = list(_colours(regimes))
-    handles: list[Any] = [
-        Patch(color=colour, label=label) for colour, label in zip(colours, labels, strict=True)
-    ]
-    if np.any(attractor == _UNKNOWN):
-        handles.append(Patch(color=LIGHT_GREY, label="not known"))
-    look: Any = {
-        "cmap": ListedColormap([LIGHT_GREY, *colours]),
-        "norm": BoundaryNorm(np.arange(len(labels) + 2) - 1.5, len(labels) + 1),
-        "rasterized": len(attractor) > _MANY,
-    }
-    if grid_shape is not None:
-        columns = (column.reshape(grid_shape) for column in (position, velocity, attractor))
-        axes.pcolormesh(*columns, shading="nearest", **look)
-    else:
-        area = float(np.clip(2e5 / len(attractor), 2.0, 30.0))
-        axes.scatter(position, velocity, c=attractor, s=area, lw=0.0, **look)
+    axes.grid(visible=False)
+    (length, x_label), (speed, y_label) = (
+        units.axis("displacement at the start", "m", position),
+        units.axis("velocity at the start", "m/s", velocity, belt_speed),
+    )
+    x, y = position / length, velocity / speed
+    handles: list[Any] = []
+    rasterized = len(attractor) > MANY
+    area = float(np.clip(2e5 / max(len(attractor), 1), 4.0, 30.0))
+    for number, (look, label) in enumerate(zip(_looks(regimes), labels, strict=True)):
+        of_it = attractor == number
+        if grid_shape is not None:
+            middles = x.reshape(grid_shape), y.reshape(grid_shape)
+            draw_cells(axes, *middles, of_it.reshape(grid_shape), look, shading="nearest")
+            handles.append(patch(look, label))
+        else:
+            points: Any = {"color": look.colour, "marker": look.marker, "label": label}
+            axes.scatter(x[of_it], y[of_it], s=area, lw=0.0, rasterized=rasterized, **points)
+            handles.append(Line2D([], [], ls="", **points))
     # White below black is to be seen on any colour.
-    axes.axhline(belt_speed, color="white", lw=3.0)
-    axes.axhline(belt_speed, color="black", lw=1.2, ls="--")
-    axes.plot(equilibrium_position, 0.0, "o", color="white", mec="black", mew=1.5, ms=8.0)
+    axes.axhline(belt_speed / speed, color="white", lw=3.0)
+    axes.axhline(belt_speed / speed, color="black", lw=1.2, ls="--")
+    axes.plot(equilibrium_position / length, 0.0, "o", color="white", mec="black", mew=1.5, ms=8.0)
     handles += [
         Line2D([], [], color="black", lw=1.2, ls="--", label="belt speed"),
         Line2D([], [], color="white", mec="black", mew=1.5, marker="o", ls="", label="equilibrium"),
     ]
-    axes.set_xlabel("displacement at the start (m)")
-    axes.set_ylabel("velocity at the start (m/s)")
-    figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=8)
-    figure.savefig(path, dpi=130)
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    return figure
 
 
-def _colours(regimes: Sequence[Regime | None]) -> Iterator[str]:
-    """Yield the colour of each attractor: that of its regime, or another if that is taken."""
-    more = cycle(_MORE_COLOURS)
+draw_basin = drawing(basin_figure)
+"""Write the picture of basins to a path."""
+
+
+def _looks(regimes: Sequence[Regime | None]) -> Iterator[Look]:
+    """Yield the look of each attractor: that of its regime, or another if that is taken."""
+    more = zip(cycle(_MORE_COLOURS), cycle(_MORE_MARKERS), cycle(_MORE_HATCHES), strict=False)
     for number, regime in enumerate(regimes):
-        yield next(more) if regime in regimes[:number] else REGIMES[regime][0]
+        look = REGIMES[regime]
+        if regime in regimes[:number]:
+            colour, marker, hatch = next(more)
+            look = look._replace(colour=colour, marker=marker, hatch=hatch)
+        yield look

@@ -1,7 +1,6 @@
 """The pictures of the paper's figures: bifurcation diagrams and phase portraits."""
 
 from collections.abc import Mapping
-from io import BytesIO
 from itertools import cycle
 from math import ceil
 from pathlib import Path
@@ -10,11 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
-from PIL import Image
 
 from stickslip_ros.physics.knots import FloatArray, Knots
 from stickslip_ros.plots.regimes import REGIMES
-from stickslip_ros.plots.style import BLUE, GREEN, ORANGE
+from stickslip_ros.plots.style import BLUE, DASHES, GREEN, ORANGE, save, styled
 from stickslip_ros.studies.paper.figures import (
     BifurcationFigure,
     Panel,
@@ -23,13 +21,11 @@ from stickslip_ros.studies.paper.figures import (
 )
 from stickslip_ros.studies.paper.portraits import LAST_CYCLES, Portrait
 
-_DPI, _COLOURS = 110, 128
+_COLOURS = 128
+"""Of a PNG: these pictures are kept with the sources."""
 
 _MOST_COLUMNS, _COLUMNS = 5, 4
 """Portraits in a row at most, and where a panel has more of them."""
-
-_DASHES = ("--", ":", "-.")
-"""Of the marks, one after the other."""
 
 _FIRST, _LATER, _BELT = "#888888", "#DDDDDD", "black"
 
@@ -52,36 +48,25 @@ def draw_paper_figure(
         drawn = _bifurcation(figure, marks or {})
     else:
         drawn = _portraits(figure)
-    if path.suffix.lower() == ".png":
-        _save_with_few_colours(drawn, path)
-    else:
-        drawn.savefig(path)
+    save(drawn, path, colours=_COLOURS)
 
 
-def _save_with_few_colours(drawn: Figure, path: Path) -> None:
-    """Write a PNG a third as large: these pictures are kept with the sources."""
-    buffer = BytesIO()
-    drawn.savefig(buffer, format="png", dpi=_DPI)
-    with Image.open(buffer) as image:
-        # This method, unlike the usual one, keeps colours that few points have.
-        few = image.convert("RGB").quantize(_COLOURS, Image.Quantize.MAXCOVERAGE)
-    few.save(path, optimize=True)
-
-
+@styled
 def _bifurcation(figure: BifurcationFigure, marks: Mapping[str, float]) -> Figure:
-    drawn = Figure(figsize=(8.0, 5.5), layout="constrained")
+    drawn = Figure(figsize=(8.0, 5.5))
     drawn.suptitle(figure.title, fontsize=11)
     above, below = drawn.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
     diagram = figure.diagram
     regimes = [measures.regime for measures in diagram.measures]
-    for regime, (colour, label) in REGIMES.items():
+    for regime, look in REGIMES.items():
         of_regime = np.array([found is regime for found in regimes])
         rows = of_regime[diagram.row]
         if rows.any():
             values = figure.values[diagram.row[rows]]
             above.plot(
-                values, diagram.position[rows], "o", color=colour, ms=1.6, mew=0.0, label=label
-            )
+                values, diagram.position[rows], look.marker, color=look.colour, ms=1.8, mew=0.0,
+                label=look.label,
+            )  # fmt: skip
     above.set_ylabel("turning points of X")
     stick = [np.nan if m.stick_fraction is None else m.stick_fraction for m in diagram.measures]
     below.plot(figure.values, stick, color=ORANGE, lw=1.5)
@@ -89,19 +74,20 @@ def _bifurcation(figure: BifurcationFigure, marks: Mapping[str, float]) -> Figur
     below.set_ylim(bottom=0.0)
     below.set_xlabel(figure.parameter)
     below.margins(x=0.01)
-    for (name, value), dashes in zip(marks.items(), cycle(_DASHES)):
+    for (name, value), dashes in zip(marks.items(), cycle(DASHES)):
         for axes in (above, below):
             axes.axvline(value, color="black", lw=1.0, ls=dashes, label=f"{name} {value:.5g}")
     above.legend(fontsize=8, markerscale=4.0)
     return drawn
 
 
+@styled
 def _portraits(figure: PortraitFigure) -> Figure:
     largest = max(len(panel.portraits) for panel in figure.panels)
     columns = largest if largest <= _MOST_COLUMNS else _COLUMNS
     rows = [ceil(len(panel.portraits) / columns) for panel in figure.panels]
     heights = [*(2.5 * count + 0.3 for count in rows), 0.3]
-    drawn = Figure(figsize=(2.5 * columns, sum(heights) + 0.3), layout="constrained")
+    drawn = Figure(figsize=(2.5 * columns, sum(heights) + 0.3))
     drawn.suptitle(figure.title, fontsize=12)
     parts = drawn.add_gridspec(len(heights), 1, height_ratios=heights)
     for number, (panel, count) in enumerate(zip(figure.panels, rows, strict=True)):
@@ -169,7 +155,7 @@ def _framed(portrait: Portrait) -> Knots:
 
 def _outcome(portrait: Portrait) -> str:
     measures = portrait.measures
-    _, outcome = REGIMES[measures.regime]
+    outcome = REGIMES[measures.regime].label
     if portrait.runs_away:
         return f"{outcome}: {_FRAME:g} v0 at τ = {_framed(portrait).time[-1]:.1f}"
     if measures.period is None or measures.amplitude is None:

@@ -1,16 +1,66 @@
 """What each regime looks like, and is called, in every picture."""
 
 from collections.abc import Mapping
+from typing import Any, NamedTuple
 
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
+
+from stickslip_ros.physics.knots import BoolArray, FloatArray
 from stickslip_ros.physics.measures import Regime
-from stickslip_ros.plots.style import BLUE, GREEN, GREY, LIGHT_GREY, ORANGE
+from stickslip_ros.plots.style import BLUE, GREEN, GREY, LIGHT_GREY, MANY, ORANGE
 
-REGIMES: Mapping[Regime | None, tuple[str, str]] = {
-    Regime.STICK_SLIP: (ORANGE, "sticks and slips"),
-    Regime.PURE_SLIP: (BLUE, "slips only"),
-    Regime.EQUILIBRIUM: (GREEN, "comes to rest"),
-    Regime.STUCK: (GREY, "rests with the belt"),
-    Regime.UNBOUNDED: ("black", "runs away"),
-    None: (LIGHT_GREY, "completes no cycle"),
+INK = "#333333"
+"""Of hatches, to be seen on every colour but black."""
+
+
+class Look(NamedTuple):
+    """Colour, name, and what tells a regime apart without colour."""
+
+    colour: str
+    label: str
+    marker: str
+    hatch: str
+    """In `INK`."""
+
+
+REGIMES: Mapping[Regime | None, Look] = {
+    Regime.STICK_SLIP: Look(ORANGE, "sticks and slips", "o", ""),
+    Regime.PURE_SLIP: Look(BLUE, "slips only", "^", "..."),
+    Regime.EQUILIBRIUM: Look(GREEN, "comes to rest", "s", "///"),
+    Regime.STUCK: Look(GREY, "rests with the belt", "D", "xxx"),
+    Regime.UNBOUNDED: Look("black", "runs away", "X", ""),
+    None: Look(LIGHT_GREY, "completes no cycle", "P", "\\\\\\"),
 }
-"""Colour and name of each regime."""
+"""Of each regime; None is for a motion that has none."""
+
+
+def draw_cells(
+    axes: Axes, x: FloatArray, y: FloatArray, shown: BoolArray, look: Look, **more: Any
+) -> None:
+    """Fill the cells of a grid that are `shown`, in the colour and with the hatch of a look."""
+    if not shown.any():
+        return
+    rasterized = shown.size > MANY
+    filling = ListedColormap([look.colour])
+    cells = np.where(shown, 0.0, np.nan)
+    mesh: Any = axes.pcolormesh(x, y, cells, cmap=filling, rasterized=rasterized, **more)
+    if not look.hatch:
+        return
+    # One outline of all: to hatch cell after cell would take a hundred times as long.
+    corners = mesh.get_coordinates()
+    around = corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]
+    outlines = np.stack([corner[shown] for corner in (*around, around[0])], axis=1)
+    codes = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY]
+    outline: Any = Path(outlines.reshape(-1, 2), np.tile(codes, len(outlines)))
+    hatched: Any = PathPatch(outline, lw=0.0, rasterized=rasterized, hatch=look.hatch)
+    hatched.set(facecolor="none", edgecolor=INK)
+    axes.add_patch(hatched)
+
+
+def patch(look: Look, label: str) -> Patch:
+    """Return what stands for such cells in a legend."""
+    return Patch(facecolor=look.colour, hatch=look.hatch, edgecolor=INK, lw=0.0, label=label)

@@ -1,6 +1,6 @@
 """The picture of where a sampled loop is stable, and how fast it comes to rest there."""
 
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,36 +9,46 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
-from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
+from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE, drawing, styled
+from stickslip_ros.plots.units import Units
 
 _LEVELS = 9
 _UNSTABLE = "#eeeeee"
-_COLOURS = (BLUE, ORANGE, GREEN, SKY_BLUE, "black")
+_LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": BLUE, "ls": "-"},
+    {"color": ORANGE, "ls": "--"},
+    {"color": GREEN, "ls": "-."},
+    {"color": SKY_BLUE, "ls": ":"},
+    {"color": "black", "ls": (0, (5, 1, 1, 1, 1, 1))},
+)
+"""Of the curves, one for each rate."""
 
 
-def draw_stability_map(
-    path: Path, found: StabilityMap, critical: CriticalGainCurves | None
-) -> None:
-    """Write the map, and beside it the critical gain over the delay if given, to `path`.
-
-    The format follows the ending.
-    """
+@styled
+def stability_figure(found: StabilityMap, critical: CriticalGainCurves | None) -> Figure:
+    """Return the map, and beside it the critical gain over the delay if given."""
     width = 6.4 if critical is None else 12.0
-    figure = Figure(figsize=(width, 5.2), layout="constrained")
+    figure = Figure(figsize=(width, 5.2))
     axes = figure.subplots(1, 1 if critical is None else 2, squeeze=False)[0]
     _draw_map(figure, axes[0], found)
     if critical is not None:
         _draw_critical_gains(axes[1], critical, found)
-    figure.savefig(path, dpi=130)
+    return figure
+
+
+draw_stability_map = drawing(stability_figure)
+"""Write the map to a path."""
 
 
 def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> None:
     corners, gains, rates = found.corner_frequencies, found.linear_gains, found.decay_rates.T
+    units = Units.of(found.loop.drive)
+    axes.grid(visible=False)
     fastest = float(rates.max())
     if fastest > 0.0:
         levels = np.linspace(0.0, fastest, _LEVELS)
         filled = axes.contourf(corners, gains, rates, levels=levels, cmap="viridis")
-        figure.colorbar(filled, ax=axes, label="decay rate (1/s)", format="%.3g")
+        figure.colorbar(filled, ax=axes, label=units.label("decay rate", "1/s"), format="%.3g")
         axes.contour(corners, gains, rates, levels=[0.0], colors=[ORANGE], linewidths=2.0)
     axes.plot(corners, found.continuous, color="black", ls="--", lw=1.2)
     axes.plot(
@@ -49,11 +59,13 @@ def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> None:
     axes.set_xscale("log")
     axes.set_xlim(corners[0], corners[-1])
     axes.set_ylim(gains[0], gains[-1])
-    axes.set_xlabel("corner frequency d (rad/s)")
-    axes.set_ylabel("linear gain k1 (N s/m)")
+    axes.set_xlabel(units.label("corner frequency d", "rad/s"))
+    axes.set_ylabel(units.label("linear gain k1", "N s/m"))
     loop = found.loop
-    delay = f", force {loop.force_delay:g} s late" if loop.force_delay > 0.0 else ""
-    axes.set_title(f"belt {loop.drive.belt_speed:.4g} m/s, {loop.rate:g} Hz{delay}", fontsize=10)
+    late = units.text(loop.force_delay, "s")
+    delay = f", force {late} late" if loop.force_delay > 0.0 else ""
+    belt, rate = units.text(loop.drive.belt_speed, "m/s"), units.text(loop.rate, "Hz")
+    axes.set_title(f"belt speed {belt}, sample rate {rate}{delay}")
     axes.legend(
         handles=[
             Line2D([], [], color=ORANGE, lw=2.0, label="limit of stability, sampled"),
@@ -62,22 +74,25 @@ def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> None:
             Patch(facecolor=_UNSTABLE, edgecolor=GREY, label="unstable"),
         ],
         loc="lower left",
-        fontsize=8,
     )
 
 
 def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, found: StabilityMap) -> None:
+    units = Units.of(found.loop.drive)
+    late, label = units.axis("delay of the force", "s", critical.force_delays)
+    axes.set_xlabel(label)
     for index, (rate, gains) in enumerate(zip(critical.rates, critical.linear_gains, strict=True)):
-        colour = _COLOURS[index % len(_COLOURS)]
+        look = _LOOKS[index % len(_LOOKS)]
         # Where it changes sign it jumps from one interval of gains to another.
         jumps = np.flatnonzero(gains[:-1] * gains[1:] < 0.0) + 1
         delays = np.insert(critical.force_delays, jumps, np.nan)
-        axes.plot(
-            delays, np.insert(gains, jumps, np.nan), color=colour, lw=1.6, label=f"{rate:g} Hz"
-        )
+        label = units.text(float(rate), "Hz")
+        axes.plot(delays / late, np.insert(gains, jumps, np.nan), **look, lw=1.6, label=label)
     axes.axhline(0.0, color=GREY, lw=0.8)
-    axes.plot(found.loop.force_delay, found.gains.linear, "*", color="white", mec="black", ms=14)
-    axes.set_xlabel("delay of the force (s)")
-    axes.set_ylabel("critical linear gain k1 (N s/m)")
-    axes.set_title(f"corner frequency {found.gains.corner_frequency:.3g} rad/s", fontsize=10)
-    axes.legend(fontsize=8)
+    axes.plot(
+        found.loop.force_delay / late, found.gains.linear, "*", color="white", mec="black", ms=14
+    )
+    axes.set_ylabel(units.label("critical linear gain k1", "N s/m"))
+    corner = found.gains.corner_frequency
+    axes.set_title(f"corner frequency {corner:.3g}{'' if units.dimensionless else ' rad/s'}")
+    axes.legend(title="sample rate")

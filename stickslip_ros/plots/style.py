@@ -1,10 +1,121 @@
-"""What the pictures have in common."""
+"""What the pictures have in common: lines, letters and colours, and how they are written."""
+
+from collections.abc import Callable
+from functools import wraps
+from io import BytesIO
+from pathlib import Path
+from textwrap import fill
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+import matplotlib as mpl
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from PIL import Image
+
+from stickslip_ros.printable import printable
 
 BLUE, ORANGE, GREEN, SKY_BLUE, GREY = "#0072B2", "#D55E00", "#009E73", "#56B4E9", "#999999"
 """Of Okabe and Ito's palette, which the colour-blind can tell apart, and a grey."""
 
-YELLOW, PURPLE = "#F0E442", "#CC79A7"
-"""Two more of that palette."""
+YELLOW, PURPLE, AMBER = "#F0E442", "#CC79A7", "#E69F00"
+"""Three more of that palette."""
 
 LIGHT_GREY = "#CCCCCC"
 """For what there is nothing to say of."""
+
+DASHES = ("--", ":", "-.")
+"""Of lines that mark something, one after the other: colour alone tells nothing apart."""
+
+MANY = 5000
+"""Points or cells from which on a drawing of lines and curves has them as an image within."""
+
+_DPI, _SMALL_DPI = 130, 110
+
+_LETTERS_PER_INCH = 10.0
+"""Of a title, on average."""
+
+_LOOK: dict[str, Any] = {
+    "font.size": 9.0,
+    "axes.labelsize": 9.0,
+    "axes.titlesize": 10.0,
+    "figure.titlesize": 10.0,
+    "legend.fontsize": 8.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "lines.linewidth": 1.2,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "grid.color": "#E5E5E5",
+    "grid.linewidth": 0.6,
+    "hatch.linewidth": 0.6,
+    "figure.constrained_layout.use": True,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "stickslip_ros",
+    "pdf.fonttype": 42,
+}
+
+_REPRODUCIBLE: dict[str, dict[str, None]] = {
+    ".svg": {"Date": None},
+    ".pdf": {"CreationDate": None},
+}
+"""What a file of each kind leaves out, so that the same picture is the same file."""
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+def styled(draw: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Let a function draw in the style of all pictures, whatever the user's own settings are."""
+
+    @wraps(draw)
+    def drawn(*arguments: _P.args, **options: _P.kwargs) -> _R:
+        with rc_context():
+            _use_style()
+            return draw(*arguments, **options)
+
+    return drawn
+
+
+def set_title(figure: Figure, *lines: str) -> None:
+    """Put lines above a figure as they are, each broken where it is too long and cut if need be."""
+    letters = round(_LETTERS_PER_INCH * float(figure.get_figwidth()))
+    broken = (fill(printable(line), letters, max_lines=3, placeholder=" ...") for line in lines)
+    figure.suptitle("\n".join(broken), parse_math=False)
+
+
+def save(figure: Figure, path: Path, *, colours: int | None = None) -> None:
+    """Write a figure to `path`; the format follows the ending: .png, .svg or .pdf.
+
+    In drawings text stays text. So many `colours` make a PNG a third as large, for one that is kept
+    with the sources. Raises OSError if the file cannot be written.
+    """
+    ending = path.suffix.lower()
+    with rc_context():
+        _use_style()
+        if ending == ".png" and colours is not None:
+            buffer = BytesIO()
+            figure.savefig(buffer, format="png", dpi=_SMALL_DPI)
+            with Image.open(buffer) as image:
+                # This method, unlike the usual one, keeps colours that few points have.
+                few = image.convert("RGB").quantize(colours, Image.Quantize.MAXCOVERAGE)
+            few.save(path, optimize=True)
+        else:
+            figure.savefig(path, dpi=_DPI, metadata=_REPRODUCIBLE.get(ending))
+
+
+def drawing(figure: Callable[_P, Figure]) -> Callable[Concatenate[Path, _P], None]:
+    """Return what writes the figure to a path, its first argument; the format follows the ending.
+
+    The other arguments are those of `figure`. Raises OSError if the file cannot be written.
+    """
+
+    def draw(path: Path, *arguments: _P.args, **options: _P.kwargs) -> None:
+        save(figure(*arguments, **options), path)
+
+    return draw
+
+
+def _use_style() -> None:
+    mpl.rcdefaults()
+    settings: Any = mpl.rcParams
+    settings.update(_LOOK)

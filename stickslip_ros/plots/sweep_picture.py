@@ -3,23 +3,22 @@
 from collections.abc import Iterator, Sequence
 from itertools import chain, cycle
 from math import prod
-from pathlib import Path
-from textwrap import fill
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm, ListedColormap, to_rgb
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.physics.measures import Regime
-from stickslip_ros.plots.regimes import REGIMES
-from stickslip_ros.plots.style import GREY, LIGHT_GREY
+from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
+from stickslip_ros.plots.style import DASHES, GREY, LIGHT_GREY, MANY, drawing, set_title, styled
+from stickslip_ros.plots.units import Units
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.study import Study
@@ -29,14 +28,8 @@ _FULL: Any = {"mew": 0.0}
 _HOLLOW: Any = {"mfc": "white", "mew": 0.8}
 """Markers of motions that are steady, and of those that are not yet."""
 
-_DASHES = ("--", ":", "-.")
-"""Of the transitions, one after the other."""
-
 _MOST_SHOWN = 3
 """Values of one transition in the legend."""
-
-_MANY = 5000
-"""Points from which on a drawing of lines and curves has them as an image within."""
 
 _DIFFERENT = 0.02
 """Share of the largest amplitude by which up and down differ where there is hysteresis."""
@@ -46,45 +39,51 @@ _HYSTERESIS = "#FBF6C9"
 _HATCH: Any = {"facecolor": "white", "edgecolor": GREY, "hatch": "////"}
 """Of where there is no result."""
 
-_AWAY = LIGHT_GREY
-"""Colour of what runs away, next to a colour bar, which begins with what is nearly black."""
+_AWAY = REGIMES[Regime.UNBOUNDED]._replace(colour=LIGHT_GREY, hatch="...")
+"""Look of what runs away, next to a colour bar, which begins with what is nearly black."""
 
-_COLOUR_BARS = {"amplitude": "amplitude (m)", "stick_fraction": "stick fraction"}
+_MEASURES = {"amplitude": ("amplitude", "m"), "stick_fraction": ("stick fraction", "")}
+"""What is drawn beside the regimes: name and unit."""
 
-_CODED = [regime for regime in REGIMES if regime is not None]
-"""The regimes by their numbers in a map."""
-
-_TITLE_WIDTH = 100
-"""Letters in each of its lines, three at most."""
+_UNIT_DRIVE = ("plant.mass", "plant.stiffness", "plant.normal_force")
+"""Parameters that make a drive dimensionless."""
 
 
-def draw_diagram(path: Path, columns: Columns, study: Study) -> None:
-    """Write the bifurcation diagram of a sweep over one parameter to `path`.
+@styled
+def diagram_figure(columns: Columns, study: Study) -> Figure:
+    """Return the bifurcation diagram of a sweep over one parameter.
 
     Turning points by regime, amplitude and stick fraction, and where theory has the transitions.
     Hollow are the turning points of motions that are not steady yet.
-    Carried both ways, what was found upward is narrow and dark, downward wide and pale. The format
-    follows the ending.
+    Carried both ways, what was found upward is narrow and dark, downward wide and pale.
     """
     grid = _grid(study)
     (axis,) = grid.axes
     both = grid.carry is Carry.BOTH
-    figure = Figure(figsize=(8.5, 8.0), layout="constrained")
-    figure.suptitle(_title(study), fontsize=10, parse_math=False)
+    units = _units(study)
+    figure = Figure(figsize=(8.5, 8.0))
+    set_title(figure, _title(study))
     panels: list[Axes] = list(figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.0, 1.0)))
     section, *lines = panels
-    section.set_ylabel("turning points of x (m)")
+    every = np.fromiter(chain.from_iterable(columns.turning_points), dtype=float)
+    length, label = units.axis("turning points of x", "m", every)
+    section.set_ylabel(label)
+    scaled = {
+        name: units.axis(title, unit, getattr(columns, name))
+        for name, (title, unit) in _MEASURES.items()
+    }
     # The wide ones below the narrow ones.
     for rows, direction in reversed(list(_passes(grid))):
         wide = both and direction is Carry.DOWN
-        _draw_section(section, columns, axis, rows, wide=wide)
+        _draw_section(section, columns, axis, rows, length, wide=wide)
         look: Any = {"color": LIGHT_GREY, "lw": 5.0} if wide else {"color": "black", "lw": 1.2}
-        for axes, (name, label) in zip(lines, _COLOUR_BARS.items(), strict=True):
-            axes.plot(columns.values[axis.parameter][rows], getattr(columns, name)[rows], **look)
+        for axes, (name, (scale, label)) in zip(lines, scaled.items(), strict=True):
+            values: FloatArray = getattr(columns, name)[rows]
+            axes.plot(columns.values[axis.parameter][rows], values / scale, **look)
             axes.set_ylabel(label)
     handles: list[Artist] = [
-        Line2D([], [], color=colour, marker="o", ms=5.0, ls="", label=label)
-        for _, colour, label in _present(columns)
+        Line2D([], [], color=look.colour, marker=look.marker, ms=5.0, ls="", label=look.label)
+        for _, look in _present(columns)
     ]
     if np.any(~columns.steady & ~_are(columns.regime, None)):
         handles.append(
@@ -98,41 +97,49 @@ def draw_diagram(path: Path, columns: Columns, study: Study) -> None:
             Line2D([], [], color=LIGHT_GREY, marker="o", ms=7.0, lw=5.0, label="carried down"),
             *_shade_hysteresis(panels, columns, axis),
         ]
-    handles += _mark_transitions(panels, study, axis)
+    handles += _mark_transitions(panels, study, axis, units)
     for axes in lines:
         axes.set_ylim(bottom=0.0)
-    lines[-1].set_xlabel(_label(axis))
+    lines[-1].set_xlabel(units.label(axis.parameter, axis.unit))
     ends = _edges(axis)[[0, -1]]
     lines[-1].set_xlim(float(ends.min()), float(ends.max()))
     lines[-1].set_xscale(**_scale(axis))
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8)
-    figure.savefig(path, dpi=130)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
 
 
-def draw_map(
-    path: Path,
+@styled
+def map_figure(
     columns: Columns,
     study: Study,
     colour: Literal["regime", "amplitude", "stick_fraction"] = "regime",
-) -> None:
-    """Write the map of a sweep over two parameters to `path`, the first one from left to right.
+) -> Figure:
+    """Return the map of a sweep over two parameters, the first one from left to right.
 
     Coloured by regime, amplitude or stick fraction, with the curves on which theory has the
-    transitions; hatched where there is no result. Carried both ways, there are two panels. The
-    format follows the ending.
+    transitions; hatched where there is no result. Carried both ways, there are two panels.
     """
     grid = _grid(study)
     first, second = grid.axes
     count = len(grid.directions)
-    figure = Figure(figsize=(1.0 + 6.0 * count, 6.2), layout="constrained")
-    figure.suptitle(_title(study), fontsize=10, parse_math=False)
+    units = _units(study)
+    figure = Figure(figsize=(1.0 + 6.0 * count, 6.2))
+    set_title(figure, _title(study))
     panels: list[Axes] = list(figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0])
     found = transition_map(study, (first, second))
     mesh: Any = None
+    scale, bar = 1.0, ""
+    if colour != "regime":
+        scale, bar = units.axis(*_MEASURES[colour], getattr(columns, colour))
     for axes, (rows, direction) in zip(panels, _passes(grid), strict=True):
         axes.set_xscale(**_scale(first))
         axes.set_yscale(**_scale(second))
-        mesh = _draw_cells(axes, columns, grid, rows, colour)
+        axes.grid(visible=False)
+        axes.patch.set(**_HATCH)
+        if colour == "regime":
+            _draw_regimes(axes, columns, grid, rows)
+        else:
+            mesh = _draw_values(axes, columns, grid, rows, getattr(columns, colour) / scale)
         for _, margins, dashes in _curves(found):
             # White below black is to be seen on any colour.
             for black, width, style in ((False, 3.5, "-"), (True, 1.5, dashes)):
@@ -140,25 +147,36 @@ def draw_map(
                     found.first, found.second, margins, levels=[0.0],
                     colors="black" if black else "white", linewidths=width, linestyles=style,
                 )  # fmt: skip
-        axes.set_xlabel(_label(first))
+        axes.set_xlabel(units.label(first.parameter, first.unit))
         if direction is not None:
-            axes.set_title(f"carried {direction} along {second.parameter}", fontsize=10)
-    panels[0].set_ylabel(_label(second))
-    if colour in _COLOUR_BARS:
-        figure.colorbar(mesh, ax=panels, label=_COLOUR_BARS[colour])
+            axes.set_title(f"carried {direction} along {second.parameter}")
+    panels[0].set_ylabel(units.label(second.parameter, second.unit))
+    if mesh is not None:
+        figure.colorbar(mesh, ax=panels, label=bar)
     handles: list[Artist] = []
-    for regime, filling, label in _present(columns):
+    for regime, look in _present(columns):
         if regime is not None and colour == "regime":
-            handles.append(Patch(color=filling, label=label))
+            handles.append(patch(look, look.label))
         elif regime is Regime.UNBOUNDED:
-            handles.append(Patch(color=_AWAY, label=label))
+            handles.append(patch(_AWAY, look.label))
     if _are(columns.regime, None).any():
         handles.append(Patch(**_HATCH, label="no result"))
     handles += [
         Line2D([], [], color="black", ls=dashes, label=name) for name, _, dashes in _curves(found)
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=8)
-    figure.savefig(path, dpi=130)
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    return figure
+
+
+draw_diagram, draw_map = drawing(diagram_figure), drawing(map_figure)
+"""Write the picture of a sweep over one parameter, or over two, to a path."""
+
+
+def _units(study: Study) -> Units:
+    """Return the units of a study; one that varies what makes a drive dimensionless is in SI."""
+    if any(axis.parameter in _UNIT_DRIVE for axis in _grid(study).axes):
+        return Units()
+    return Units.of(study.scenario.plant.as_drive())
 
 
 def _grid(study: Study) -> Grid:
@@ -173,29 +191,31 @@ def _passes(grid: Grid) -> Iterator[tuple[slice, Carry | None]]:
         yield slice(number * count, (number + 1) * count), direction
 
 
-def _present(columns: Columns) -> Iterator[tuple[Regime | None, str, str]]:
-    """Yield the regimes that there are, with colour and name."""
-    for regime, (colour, label) in REGIMES.items():
+def _present(columns: Columns) -> Iterator[tuple[Regime | None, Look]]:
+    """Yield the regimes that there are, with their looks."""
+    for regime, look in REGIMES.items():
         if _are(columns.regime, regime).any():
-            yield regime, colour, label if regime is not None else "no result"
+            yield regime, look if regime is not None else look._replace(label="no result")
 
 
-def _draw_section(axes: Axes, columns: Columns, axis: Axis, rows: slice, *, wide: bool) -> None:
+def _draw_section(
+    axes: Axes, columns: Columns, axis: Axis, rows: slice, length: float, *, wide: bool
+) -> None:
     """Draw turning points, and strokes at the lower edge for points that have none."""
     values, regimes = columns.values[axis.parameter][rows], columns.regime[rows]
     points = columns.turning_points[rows]
     counts = np.array([len(found) for found in points])
     positions = np.fromiter(chain.from_iterable(points), dtype=float, count=int(counts.sum()))
     size = float(np.clip(800.0 / axis.count, 1.8, 3.0)) + 5.0 * wide
-    rasterized = len(positions) > _MANY
-    for regime, (colour, _) in REGIMES.items():
+    rasterized = len(positions) > MANY
+    for regime, (colour, _, marker, _) in REGIMES.items():
         shown = _are(regimes, regime)
         look: Any = {"color": _pale(colour) if wide else colour, "ls": "", "rasterized": rasterized}
         for steady, filled in ((True, _FULL), (False, _HOLLOW)):
             some = shown & (columns.steady[rows] == steady)
             places = np.repeat(values[some], counts[some])
-            heights = positions[np.repeat(some, counts)]
-            axes.plot(places, heights, marker="o", ms=size, **look, **filled)
+            heights = positions[np.repeat(some, counts)] / length
+            axes.plot(places, heights, marker=marker, ms=size, **look, **filled)
         without = values[shown & (counts == 0)]
         height = np.full(len(without), 0.06 if wide else 0.02)
         axes.plot(without, height, marker="|", ms=9.0, transform=axes.get_xaxis_transform(), **look)
@@ -218,47 +238,48 @@ def _shade_hysteresis(panels: Sequence[Axes], columns: Columns, axis: Axis) -> l
     return [Patch(color=_HYSTERESIS, label="up and down differ (hysteresis)")]
 
 
-def _mark_transitions(panels: Sequence[Axes], study: Study, axis: Axis) -> list[Artist]:
+def _mark_transitions(
+    panels: Sequence[Axes], study: Study, axis: Axis, units: Units
+) -> list[Artist]:
     """Draw lines at the transitions; return what the legend has of them."""
     handles: list[Artist] = []
-    for (name, values), dashes in zip(transitions(study, axis).items(), cycle(_DASHES)):
+    for (name, values), dashes in zip(transitions(study, axis).items(), cycle(DASHES)):
         look: Any = {"color": "black", "lw": 1.2, "ls": dashes}
         for axes in panels:
             for value in values:
                 axes.axvline(value, **look)
         more = [] if len(values) <= _MOST_SHOWN else ["..."]
         shown = ", ".join([f"{value:.5g}" for value in values[:_MOST_SHOWN]] + more)
-        handles.append(Line2D([], [], **look, label=f"{name} {shown} {axis.unit}".rstrip()))
+        unit = "" if units.dimensionless else axis.unit
+        handles.append(Line2D([], [], **look, label=f"{name} {shown} {unit}".rstrip()))
     return handles
 
 
-def _draw_cells(axes: Axes, columns: Columns, grid: Grid, rows: slice, colour: str) -> Any:
-    """Draw the cells of a map; return what a colour bar is made of."""
+def _draw_regimes(axes: Axes, columns: Columns, grid: Grid, rows: slice) -> None:
+    """Draw the cells of a map by regime."""
     x, y = (_edges(axis) for axis in grid.axes)
+    for regime, look in _present(columns):
+        if regime is not None:
+            of_it = _are(columns.regime[rows], regime).reshape(grid.shape).T
+            draw_cells(axes, x, y, of_it, look)
 
-    def draw(values: FloatArray, **look: Any) -> Any:
-        cells = np.ma.masked_invalid(values.reshape(grid.shape).T)
-        return axes.pcolormesh(x, y, cells, rasterized=len(values) > _MANY, **look)
 
-    axes.patch.set(**_HATCH)
-    regimes = columns.regime[rows]
-    if colour == "regime":
-        codes = np.full(len(regimes), np.nan)
-        for code, regime in enumerate(_CODED):
-            codes[_are(regimes, regime)] = code
-        fillings = ListedColormap([REGIMES[regime][0] for regime in _CODED])
-        edges = np.arange(len(_CODED) + 1) - 0.5
-        return draw(codes, cmap=fillings, norm=BoundaryNorm(edges, len(_CODED)))
-    away = np.where(_are(regimes, Regime.UNBOUNDED), 0.0, np.nan)
-    draw(away, cmap=ListedColormap([_AWAY]))
-    values: FloatArray = getattr(columns, colour)
+def _draw_values(axes: Axes, columns: Columns, grid: Grid, rows: slice, values: FloatArray) -> Any:
+    """Draw the cells of a map by a measure; return what a colour bar is made of."""
+    x, y = (_edges(axis) for axis in grid.axes)
+    away = _are(columns.regime[rows], Regime.UNBOUNDED).reshape(grid.shape).T
+    draw_cells(axes, x, y, away, _AWAY)
+    cells = np.ma.masked_invalid(values[rows].reshape(grid.shape).T)
     largest = float(np.nanmax(values, initial=0.0)) or 1.0
-    return draw(values[rows], cmap="viridis", vmin=0.0, vmax=largest)
+    rasterized = cells.size > MANY
+    return axes.pcolormesh(
+        x, y, cells, cmap="viridis", vmin=0.0, vmax=largest, rasterized=rasterized
+    )
 
 
 def _curves(found: TransitionMap) -> Iterator[tuple[str, npt.NDArray[Any], str]]:
     """Yield the transitions that are within the map: name, margins by row, and dashes."""
-    for (name, margins), dashes in zip(found.margins.items(), cycle(_DASHES)):
+    for (name, margins), dashes in zip(found.margins.items(), cycle(DASHES)):
         if np.nanmin(margins) < 0.0 < np.nanmax(margins):
             yield name, np.ma.masked_invalid(margins.T), dashes
 
@@ -288,15 +309,10 @@ def _scale(axis: Axis) -> dict[str, Any]:
     return {"value": "symlog", "linthresh": min(abs(axis.first), abs(axis.last))}
 
 
-def _label(axis: Axis) -> str:
-    return f"{axis.parameter} ({axis.unit})" if axis.unit else axis.parameter
-
-
 def _title(study: Study) -> str:
     scenario = study.scenario
     changed = f", {' '.join(scenario.overrides)}" if scenario.overrides else ""
-    text = f"What {scenario.name} settles on{changed}"
-    return fill(text, _TITLE_WIDTH, max_lines=3, placeholder=" ...")
+    return f"What {scenario.name} settles on{changed}"
 
 
 def _pale(colour: str) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from stickslip_ros.physics.equations import WashoutGains
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.sampled import LinearSampledLoop
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
-from stickslip_ros.plots.stability_map import draw_stability_map
+from stickslip_ros.plots.stability_map import draw_stability_map, stability_figure
 from tests.physics.drives import FEED_DRIVE, PAPER
 
 GAINS = WashoutGains(20.0, -3000.0, 0.0)
@@ -90,7 +90,28 @@ def test_axes_have_units(tmp_path: Path) -> None:
     picture = path.read_text(encoding="utf-8")
     for label in ("corner frequency d (rad/s)", "linear gain k1 (N s/m)", "decay rate (1/s)"):
         assert label in picture
-    assert "0.04 m/s, 1000 Hz, force 0.0025 s late" in picture
+    assert "belt speed 40 mm/s, sample rate 1 kHz, force 2.5 ms late" in picture
+
+
+def test_curves_are_told_apart_without_colour() -> None:
+    rates, delays = np.array([100.0, 300.0, 1000.0]), np.linspace(0.0, 0.006, 4)
+    critical = CriticalGainCurves.over(FEED_DRIVE, 20.0, rates, delays)
+    _, axes, _ = stability_figure(map_of(), critical).axes
+    assert axes.get_xlabel() == "delay of the force (ms)"
+    curves = axes.lines[:3]
+    assert [curve.get_label() for curve in curves] == ["100 Hz", "300 Hz", "1 kHz"]
+    assert len({curve.get_linestyle() for curve in curves}) == 3
+    assert curves[0].get_xdata().max() == pytest.approx(6.0)
+
+
+def test_for_the_unit_drive_it_is_dimensionless() -> None:
+    loop = LinearSampledLoop.of(PAPER, 100.0, 0.0)
+    assert loop is not None
+    found = StabilityMap.around(loop, WashoutGains(2.0, -1.0, -1.0), points=11)
+    axes, bar = stability_figure(found, None).axes
+    assert axes.get_xlabel() == "corner frequency d (dimensionless)"
+    assert bar.get_ylabel() == "decay rate (dimensionless)"
+    assert axes.get_title() == "belt speed 0.4, sample rate 100"
 
 
 def test_where_nothing_is_stable_there_is_a_picture_all_the_same(tmp_path: Path) -> None:

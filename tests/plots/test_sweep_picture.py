@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from stickslip_ros.plots.style import BLUE, GREEN, LIGHT_GREY, ORANGE
-from stickslip_ros.plots.sweep_picture import draw_diagram, draw_map
+from stickslip_ros.plots.sweep_picture import diagram_figure, draw_diagram, draw_map
 from stickslip_ros.scenario.files import load_scenario
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.journal import Journal
@@ -85,19 +85,33 @@ def test_the_format_follows_the_ending(
 
 def test_a_diagram_names_axes_regimes_and_transitions(tmp_path: Path, over_speed: Swept) -> None:
     picture = diagram(tmp_path / "diagram.svg", over_speed)
-    for text in ("plant.belt_speed (m/s)", "turning points of x (m)", "amplitude (m)"):
-        assert text in picture
+    for name in ("plant.belt_speed", "turning points of x", "amplitude"):
+        assert f"{name} (dimensionless)" in picture
     for text in ("sticks and slips", "comes to rest", "stick fraction", FREE):
         assert text in picture
-    for text in ("Hopf point 0.48876 m/s", "onset of sticking 0.43947 m/s"):
+    for text in ("Hopf point 0.48876", "onset of sticking 0.43947"):
         assert text in picture
     for text in ("runs away", "no result", "carried", "hysteresis"):
         assert text not in picture
 
 
+def test_a_study_that_varies_the_scales_is_in_si() -> None:
+    figure = diagram_figure(*swept("plant.stiffness=1e4:4e4:3", overrides=(FREE, "plant.mass=1")))
+    section, amplitude, _ = figure.axes
+    assert section.get_ylabel() == "turning points of x (µm)"
+    assert amplitude.get_ylabel() == "amplitude (µm)"
+    assert figure.axes[-1].get_xlabel() == "plant.stiffness (N/m)"
+
+
+def test_regimes_of_a_diagram_have_markers_of_their_own(over_speed: Swept) -> None:
+    section, *_ = diagram_figure(*over_speed).axes
+    shown = {line.get_color(): line.get_marker() for line in section.lines if len(line.get_xdata())}
+    assert {shown[ORANGE], shown[BLUE], shown[GREEN]} == {"o", "^", "s"}
+
+
 def test_where_up_and_down_differ_a_diagram_is_shaded(tmp_path: Path, both_ways: Swept) -> None:
     picture = diagram(tmp_path / "diagram.svg", both_ways)
-    for text in ("carried up", "carried down", "hysteresis", "Hopf point 1.1513 m/s"):
+    for text in ("carried up", "carried down", "hysteresis", "Hopf point 1.1513"):
         assert text in picture
     path = tmp_path / "diagram.png"
     draw_diagram(path, *both_ways)
@@ -127,14 +141,14 @@ def test_a_logarithmic_axis_is_drawn_so(tmp_path: Path, ends: str) -> None:
 
 def test_an_axis_may_be_logarithmic_below_zero(tmp_path: Path) -> None:
     found = swept("plant.belt_speed=-0.01:-1.0:7:log")
-    assert "Hopf point -0.48876 m/s" in diagram(tmp_path / "diagram.svg", found)
+    assert "Hopf point -0.48876" in diagram(tmp_path / "diagram.svg", found)
 
 
 @pytest.mark.parametrize(
     ("colour", "label"),
     [
         ("regime", "sticks and slips"),
-        ("amplitude", "amplitude (m)"),
+        ("amplitude", "amplitude (dimensionless)"),
         ("stick_fraction", "fraction"),
     ],
 )
@@ -154,7 +168,7 @@ def test_a_map_has_each_point_where_it_is(tmp_path: Path, over_two: Swept) -> No
     draw_map(path, *over_two)
     found = pixels(path)
     inside = found[100:-150, 150:-100]
-    assert inside[0, -1].tolist() == [0x00, 0x9E, 0x73]
+    assert [0x00, 0x9E, 0x73] in inside[:20, -1].tolist()
     assert inside[-1, -1].tolist() == [0xD5, 0x5E, 0x00]
     assert share(path, GREEN) > 0.1
     assert share(path, ORANGE) > 0.1

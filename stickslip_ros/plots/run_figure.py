@@ -1,0 +1,336 @@
+"""The picture of a run: motion, force, phase portrait, cycles and friction law."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap, to_rgba
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpecFromSubplotSpec
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.physics.measures import Measures
+from stickslip_ros.plots.decimation import intervals, peaks
+from stickslip_ros.plots.regimes import REGIMES
+from stickslip_ros.plots.run_history import Rows, RunHistory
+from stickslip_ros.plots.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    LIGHT_GREY,
+    MANY,
+    ORANGE,
+    SKY_BLUE,
+    set_title,
+    styled,
+)
+from stickslip_ros.plots.units import Units
+
+LAST_CYCLES = 5
+"""Cycles that are enlarged, and are in the phase portrait."""
+
+_PIXELS = 1000
+"""Intervals of time in the width of a panel, of about a pixel each."""
+
+_PART = 0.05
+"""Of the run, that is enlarged where nothing is known of a period."""
+
+_MOTION: Any = {"color": BLUE, "lw": 1.0}
+_BELT: Any = {"color": "black", "lw": 1.0, "ls": "--", "zorder": 2.5}
+_REST: Any = {"color": GREEN, "lw": 1.2, "ls": ":", "zorder": 2.5}
+_POINT: Any = {"color": GREEN, "marker": "o", "ms": 6.0, "ls": "", "mec": "white"}
+_CONTROL: Any = {"color": ORANGE, "lw": 1.6, "drawstyle": "steps-post"}
+_FRICTION: Any = {"color": SKY_BLUE, "lw": 0.7}
+_EARLIER: Any = {"color": LIGHT_GREY, "lw": 0.7}
+_STICKS: Any = {"color": GREY, "lw": 5.0, "solid_capstyle": "butt", "zorder": 1.9}
+_SHADE = LinearSegmentedColormap.from_list("stick", [to_rgba(GREY, 0.0), to_rgba(GREY, 0.6)])
+
+
+class _Pane(NamedTuple):
+    """A part of the run over time."""
+
+    title: str
+    rows: Rows
+    start: float
+    end: float
+
+    @classmethod
+    def of(cls, title: str, rows: Rows, *other: FloatArray) -> Self:
+        """Return one as long as the rows and other times last."""
+        times = [time for time in (rows.time, *other) if len(time)]
+        if not times:
+            return cls(title, rows, 0.0, 1.0)
+        start, end = min(float(t[0]) for t in times), max(float(t[-1]) for t in times)
+        return cls(title, rows, start, end if end > start else start + 1.0)
+
+
+@styled
+def run_figure(
+    history: RunHistory,
+    measures: Measures,
+    drive: Drive | None,
+    *,
+    title: str,
+    notes: Sequence[str] = (),
+    force: str = "control force",
+) -> Figure:
+    """Return the picture of a run.
+
+    The whole run and its last `LAST_CYCLES` cycles over time, shaded by the share of time that the
+    slide sticks; the phase portrait of these cycles and of the beginning; amplitude and stick
+    fraction of each cycle; the friction law with the relative speeds that there were. Without a
+    `drive` there is no equilibrium and no friction law, with a belt at rest no one equilibrium; the
+    belt speed is that at the end of the run. `notes` stand below the title, `force` is what the
+    force is called.
+    """
+    motion = history.motion
+    if drive is not None and len(motion.time):
+        drive = replace(drive, belt_speed=float(motion.belt_velocity[-1]))
+    last = history.end(_shown(motion, measures, drive))
+    picture = _Picture(history, drive, last if len(last.time) > 1 else history.end(float("inf")))
+    figure = Figure(figsize=(12.0, 10.0))
+    if history.left_out:
+        notes = [*notes, f"not drawn: {history.left_out} samples that are no later than one before"]
+    set_title(figure, title, _found(measures, picture.units), *notes)
+    above, below = figure.add_gridspec(2, 1, height_ratios=(3.0, 1.9))
+    picture.over_time(figure, above.subgridspec(3, 2, width_ratios=(2.0, 1.0)))
+    left, middle, right = below.subgridspec(1, 3)
+    picture.portrait(figure.add_subplot(left))
+    upper, lower = middle.subgridspec(2, 1)
+    amplitude = figure.add_subplot(upper)
+    picture.cycles(amplitude, figure.add_subplot(lower, sharex=amplitude))
+    picture.law(figure.add_subplot(right))
+    handles: list[Any] = [
+        Line2D([], [], **_MOTION, label="slide"),
+        Line2D([], [], **_BELT, label="belt speed"),
+        Patch(color=GREY, alpha=0.6, lw=0.0, label="sticks (paler: part of the time)"),
+        Line2D([], [], **_CONTROL, label=force),
+        Line2D([], [], **_FRICTION, label="friction force"),
+        Line2D([], [], **_EARLIER | {"lw": 4.0}, label="earlier"),
+    ]
+    if drive is not None:
+        handles.insert(2, Line2D([], [], **_POINT | _REST, label="equilibrium"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return figure
+
+
+class _Picture:
+    """What the panels have in common, and each of them."""
+
+    def __init__(self, history: RunHistory, drive: Drive | None, last: Rows) -> None:
+        self.units = units = Units.of(drive)
+        self._history, self._drive, self._last = history, drive, last
+        motion = history.motion
+        self._run = _Pane.of("the whole run", motion, history.control.columns()[0])
+        self._length = units.axis("displacement", "m", motion.position)
+        self._speed = units.axis("velocity", "m/s", motion.velocity, motion.belt_velocity)
+
+    def over_time(self, figure: Figure, parts: GridSpecFromSubplotSpec) -> None:
+        """Draw displacement, velocity and force, the whole run to the left and its end enlarged."""
+        history = self._history
+        others = () if len(self._last.time) else (history.control.columns()[0],)
+        end = _Pane.of("its end, enlarged", self._last, *others)
+        whole = history.friction.columns(), history.control.columns()
+        ending = history.friction.since(end.start), history.control.since(end.start)
+        newton, label = self.units.axis("force", "N", whole[0][1], whole[1][1])
+        panels: Any = parts.subplots(sharex="col", sharey="row")
+        for column, pane, (friction, control) in zip(
+            panels.T, (self._run, end), (whole, ending), strict=True
+        ):
+            position, velocity, force = column
+            position.set_title(pane.title)
+            self._draw_motion(position, velocity, pane)
+            _draw_line(force, pane, friction[0], friction[1], newton, history.gap, **_FRICTION)
+            gap = history.control_gap
+            _draw_line(force, pane, control[0], control[1], newton, gap, **_CONTROL)
+            self._label_time(force, pane)
+        labels = self._length[1], self._speed[1], label
+        for row, of_row in zip(panels, labels, strict=True):
+            row[0].set_ylabel(of_row)
+            for axes, pane in zip(row, (self._run, end), strict=True):
+                _shade(axes, pane)
+
+    def _label_time(self, axes: Axes, pane: _Pane) -> None:
+        scale, label = self.units.axis("time", "s", pane.start, pane.end)
+        axes.set_xlabel(label)
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value / scale:.10g}")
+        axes.set_xlim(pane.start, pane.end)
+
+    def _draw_motion(self, position: Axes, velocity: Axes, pane: _Pane) -> None:
+        rows, gap = pane.rows, self._history.gap
+        if self._drive is not None:
+            # On a belt at rest any place within the static friction is one.
+            belt = np.where(rows.belt_velocity == 0.0, np.nan, rows.belt_velocity)
+            rest = self._drive.friction.at_rest(belt) * self._drive.length_scale
+            _draw_line(position, pane, rows.time, rest, self._length[0], gap, **_REST)
+        _draw_line(position, pane, rows.time, rows.position, self._length[0], gap, **_MOTION)
+        _draw_line(velocity, pane, rows.time, rows.belt_velocity, self._speed[0], gap, **_BELT)
+        _draw_line(velocity, pane, rows.time, rows.velocity, self._speed[0], gap, **_MOTION)
+
+    def portrait(self, axes: Axes) -> None:
+        """Draw the phase portrait of the last cycles, above that of the beginning."""
+        (length, label), (speed, speed_label) = self._length, self._speed
+        axes.set_title("phase portrait")
+        axes.set_xlabel(label)
+        axes.set_ylabel(speed_label)
+        if not len(self._last.time):
+            _say(axes, "no motion is known")
+            return
+        for rows, look in ((self._history.beginning, _EARLIER), (self._last, _MOTION)):
+            time, position, velocity, belt, stick_time = _broken(
+                self._history.gap, rows.time, *rows[1:]
+            )
+            many = len(time) > MANY
+            axes.plot(position / length, velocity / speed, rasterized=many, **look)
+            stuck = np.diff(stick_time, prepend=np.nan) > 0.5 * np.diff(time, prepend=np.nan)
+            stuck |= np.append(stuck[1:], False)
+            axes.plot(np.where(stuck, position, np.nan) / length, belt / speed, **_STICKS)
+        belt_speed = float(self._last.belt_velocity[-1])
+        axes.axhline(belt_speed / speed, **_BELT)
+        if self._drive is not None and belt_speed != 0.0:
+            axes.plot(self._drive.equilibrium_position / length, 0.0, zorder=3.0, **_POINT)
+
+    def cycles(self, amplitude: Axes, stick_fraction: Axes) -> None:
+        """Draw amplitude and stick fraction of each cycle over time."""
+        time, *columns = self._history.cycles
+        amplitude.set_title("each cycle")
+        amplitude.tick_params(labelbottom=False)
+        scale, label = self.units.axis("amplitude", "m", columns[0])
+        if not len(time):
+            _say(amplitude, "no cycle was completed")
+        rows = peaks(intervals(time, _pixel(time)), *columns)
+        for axes, values in ((amplitude, columns[0] / scale), (stick_fraction, columns[1])):
+            marker = "." if len(time) < _PIXELS else ""
+            axes.plot(time[rows], values[rows], marker=marker, ms=3.0, **_MOTION | {"lw": 0.5})
+            axes.set_ylim(0.0, 1.1 * values.max(initial=0.0) or 1.0)
+        amplitude.set_ylabel(label)
+        stick_fraction.set_ylabel("stick fraction")
+        self._label_time(stick_fraction, self._run)
+
+    def law(self, axes: Axes) -> None:
+        """Draw the friction law, and which relative speeds there were."""
+        axes.set_title("friction law, with the range of this run")
+        drive, reached = self._drive, self._history.relative_speeds
+        if drive is None:
+            _say(axes, "the drive is not known")
+            return
+        at_rest = -drive.belt_speed
+        least, largest = reached or (min(at_rest, 0.0), max(at_rest, 0.0))
+        ends = min(least, at_rest, 0.0), max(largest, at_rest, 0.0)
+        room = 0.1 * (ends[1] - ends[0]) or drive.speed_scale
+        ends = ends[0] - room, ends[1] + room
+        scale, label = self.units.axis("velocity relative to the belt", "m/s", ends)
+        axes.set_xlabel(label)
+        axes.set_ylabel("friction coefficient")
+        self._law_between(axes, *ends, scale, color="black", lw=0.8, ls="-.")
+        if reached is not None:
+            axes.axvspan(least / scale, largest / scale, color=LIGHT_GREY, alpha=0.4, lw=0.0)
+        if len(self._last.time):
+            relative = self._last.velocity - self._last.belt_velocity
+            span = float(relative.min()), float(relative.max())
+            self._law_between(axes, *span, scale, **_MOTION | {"lw": 3.0})
+        if at_rest != 0.0:
+            rest = float(drive.friction.at_rest(drive.belt_speed))
+            axes.plot(at_rest / scale, rest, zorder=3.0, **_POINT)
+        axes.axvline(at_rest / scale, **_BELT)
+        axes.set_xlim(ends[0] / scale, ends[1] / scale)
+        handles = [
+            Line2D([], [], color="black", lw=0.8, ls="-.", label="friction law"),
+            Line2D([], [], **_MOTION | {"lw": 3.0}, label="range of the end"),
+            Patch(color=LIGHT_GREY, alpha=0.4, lw=0.0, label="range of the whole run"),
+            Line2D([], [], **_BELT, label="a slide at rest"),
+        ]
+        axes.legend(handles=handles, loc="best")
+
+    def _law_between(
+        self, axes: Axes, least: float, largest: float, scale: float, **look: Any
+    ) -> None:
+        assert self._drive is not None
+        law = self._drive.friction
+        for sign, start, end in ((-1.0, least, min(largest, 0.0)), (1.0, max(least, 0.0), largest)):
+            if start < end:
+                # Close together where the law may be steep.
+                steps = np.r_[0.0, np.geomspace(1e-6, 1.0, 400)]
+                speeds = start + (end - start) * steps
+                if sign < 0.0:
+                    speeds = end - (end - start) * steps
+                axes.plot(speeds / scale, law.coefficient(speeds, sign), **look)
+        if least <= 0.0 <= largest:
+            limit = float(law.static)
+            axes.plot([0.0, 0.0], [-limit, limit], **look)
+
+
+def _found(measures: Measures, units: Units) -> str:
+    """Return what the measures say, in a few words."""
+    found = [REGIMES[measures.regime].label]
+    for name, value, unit in (
+        ("amplitude", measures.amplitude, "m"),
+        ("frequency", measures.frequency, "Hz"),
+        ("stick fraction", measures.stick_fraction, ""),
+    ):
+        if value is not None and measures.period is not None:
+            found.append(f"{name} {units.text(value, unit)}")
+    return ", ".join(found)
+
+
+def _shown(motion: Rows, measures: Measures, drive: Drive | None) -> float:
+    """Return how much of the end is enlarged, s."""
+    span = float(motion.time[-1] - motion.time[0]) if len(motion.time) else 0.0
+    period = measures.period or (drive.natural_period if drive is not None else 0.0)
+    return min(LAST_CYCLES * period, span) or _PART * span
+
+
+def _pixel(time: FloatArray) -> float:
+    """Return the time in the width of a pixel of a panel."""
+    return float(time[-1] - time[0]) / _PIXELS or 1.0 if len(time) else 1.0
+
+
+def _draw_line(
+    axes: Axes,
+    pane: _Pane,
+    time: FloatArray,
+    values: FloatArray,
+    scale: float,
+    gap: float,
+    **look: Any,
+) -> None:
+    """Draw values over time, within a pane and a little beyond, with every peak."""
+    first, end = np.searchsorted(time, (pane.start, pane.end), "right")
+    rows = slice(max(int(first) - 1, 0), int(end) + 1)
+    time, values = time[rows], values[rows]
+    length = (pane.end - pane.start) / _PIXELS
+    drawn = peaks(intervals(time, length), values)
+    # Between rows of neighbouring intervals nothing is missing.
+    time, values = _broken(max(gap, 2.0 * length), time[drawn], values[drawn])
+    axes.plot(time, values / scale, **look)
+
+
+def _broken(gap: float, time: FloatArray, *columns: FloatArray) -> list[FloatArray]:
+    """Return the columns with a row that is no number where times are further apart than `gap`."""
+    behind = np.flatnonzero(np.diff(time) > gap) + 1
+    return [np.insert(column, behind, np.nan) for column in (time, *columns)]
+
+
+def _shade(axes: Axes, pane: _Pane) -> None:
+    """Shade each pixel's width of a pane by the share of it in which the slide sticks."""
+    bottom, top = axes.get_ylim()
+    if len(pane.rows.time):
+        edges = np.linspace(pane.start, pane.end, _PIXELS + 1)
+        stick_time = np.interp(edges, pane.rows.time, pane.rows.stick_time)
+        share = np.diff(stick_time) / np.diff(edges)
+        axes.imshow(
+            share[np.newaxis], cmap=_SHADE, vmin=0.0, vmax=1.0, aspect="auto", zorder=0.0,
+            extent=(pane.start, pane.end, bottom, top), interpolation="nearest",
+        )  # fmt: skip
+        axes.set_xlim(pane.start, pane.end)
+        axes.set_ylim(bottom, top)
+
+
+def _say(axes: Axes, why: str) -> None:
+    """Say in a panel why there is nothing in it."""
+    axes.text(0.5, 0.5, why, ha="center", va="center", transform=axes.transAxes)

@@ -1,0 +1,117 @@
+"""Fewer points, and no peak lost."""
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from stickslip_ros.plots.decimation import Trace, intervals, peaks
+
+FloatArray = npt.NDArray[np.float64]
+
+COLUMN = st.integers(0, 60).flatmap(
+    lambda length: st.tuples(
+        arrays(np.int64, length, elements=st.integers(-3, 8)).map(np.sort),
+        arrays(np.float64, length, elements=st.floats(-9.0, 9.0) | st.just(np.nan)),
+        arrays(np.float64, length, elements=st.integers(-2, 2).map(float)),
+    )
+)
+
+
+def naively(bucket: npt.NDArray[np.int64], *columns: FloatArray) -> list[int]:
+    """Look at one bucket after the other; of equal extremes take the first."""
+    kept: set[int] = set()
+    for number in set(bucket.tolist()):
+        rows = [row for row in range(len(bucket)) if bucket[row] == number]
+        kept |= {rows[0], rows[-1]}
+        for column in columns:
+            known = [row for row in rows if not np.isnan(column[row])]
+            if known:
+                kept |= {min(known, key=lambda row: column[row])}
+                kept |= {max(known, key=lambda row: column[row])}
+    return sorted(kept)
+
+
+@given(COLUMN)
+def test_it_keeps_what_a_plain_loop_would(
+    found: tuple[npt.NDArray[np.int64], FloatArray, FloatArray],
+) -> None:
+    assert peaks(*found).tolist() == naively(*found)
+
+
+@given(COLUMN)
+def test_rows_ascend_and_no_peak_is_lost(
+    found: tuple[npt.NDArray[np.int64], FloatArray, FloatArray],
+) -> None:
+    bucket, *columns = found
+    rows = peaks(bucket, *columns)
+    assert np.all(np.diff(rows) > 0)
+    for number in set(bucket.tolist()):
+        before, after = bucket == number, bucket[rows] == number
+        for column in columns:
+            for extreme in (np.fmin, np.fmax):
+                lost = extreme.reduce(column[before]), extreme.reduce(column[rows][after])
+                assert lost[0] == lost[1] or np.isnan(lost).all()
+
+
+def test_many_rows_become_few() -> None:
+    time = np.arange(100_000) * 1e-3
+    assert len(peaks(intervals(time, 1.0), np.sin(time), np.cos(time))) <= 6 * 100
+
+
+def noise(length: int) -> list[FloatArray]:
+    random = np.random.default_rng(1)
+    return [np.arange(length) * 1e-3, random.normal(size=length), random.normal(size=length)]
+
+
+@pytest.mark.parametrize("block", [999, 70_000])
+def test_a_trace_of_any_length_is_short_and_has_every_peak(block: int) -> None:
+    time, *columns = noise(1_000_000)
+    trace = Trace(2)
+    for start in range(0, len(time), block):
+        rows = slice(start, start + block)
+        trace.add(time[rows], *(column[rows] for column in columns))
+    found, *kept = trace.columns()
+    assert len(found) < 300_000
+    assert np.all(np.diff(found) > 0.0)
+    assert (found[0], found[-1]) == (time[0], time[-1])
+    rows = np.searchsorted(time, found)
+    for column, of_it in zip(columns, kept, strict=True):
+        assert np.array_equal(of_it, column[rows])
+    # Each of 1000 pixels has its peaks, at most a tenth of a pixel away.
+    for pixel in range(1000):
+        all_rows = slice(*np.searchsorted(time, (pixel, pixel + 1.0)))
+        few = slice(*np.searchsorted(found, (pixel - 0.1, pixel + 1.1)))
+        for column, of_it in zip(columns, kept, strict=True):
+            assert of_it[few].min() <= column[all_rows].min()
+            assert of_it[few].max() >= column[all_rows].max()
+
+
+def test_the_end_of_a_trace_is_not_thinned() -> None:
+    time, *columns = noise(450_000)
+    trace = Trace(2)
+    for start in range(0, len(time), 3000):
+        trace.add(*(column[start : start + 3000] for column in (time, *columns)))
+    for found, whole in zip(trace.since(time[-40_000]), (time, *columns), strict=True):
+        assert np.array_equal(found, whole[-40_000:])
+    assert 50_000 <= len(trace.since(0.0)[0]) <= 100_000
+
+
+def test_a_short_trace_is_left_as_it_is() -> None:
+    columns = noise(1000)
+    trace = Trace(2)
+    trace.add(*(column[:400] for column in columns))
+    trace.add(*(column[400:] for column in columns))
+    for found, given_ in zip(trace.columns(), columns, strict=True):
+        assert np.array_equal(found, given_)
+
+
+def test_rows_of_one_instant_are_thinned_too() -> None:
+    trace = Trace(1)
+    for _ in range(3):
+        trace.add(np.ones(150_000), np.arange(150_000.0))
+    time, values = trace.columns()
+    assert len(time) <= 200_000
+    assert (values.min(), values.max()) == (0.0, 149_999.0)

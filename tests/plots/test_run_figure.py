@@ -1,0 +1,328 @@
+"""The picture of a run, and what is kept of one to draw it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from stickslip_ros.bags import Recording
+from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.measures import Cycle, CycleMeter, Measures
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.samples import SampleMeter
+from stickslip_ros.plots.run_figure import LAST_CYCLES, run_figure
+from stickslip_ros.plots.run_history import RunHistory
+from stickslip_ros.plots.style import save
+from tests.physics.drives import FEED_DRIVE, PAPER
+
+pytestmark = pytest.mark.filterwarnings("error")
+
+FloatArray = npt.NDArray[np.float64]
+
+REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
+MEASURES = Measures.__dataclass_fields__
+
+POSITION, POSITION_END, VELOCITY, VELOCITY_END, FORCE, FORCE_END = range(6)
+PORTRAIT, AMPLITUDE, STICK_FRACTION, LAW = range(6, 10)
+"""The panels in the order in which they are made."""
+
+
+class Drawn(NamedTuple):
+    history: RunHistory
+    measures: Measures
+    drive: Drive
+    figure: Figure
+    cycles: list[Cycle]
+
+    def panel(self, number: int) -> Axes:
+        return self.figure.axes[number]
+
+    def line(self, panel: int, number: int) -> FloatArray:
+        """Return x and y of a line as drawn."""
+        return np.asarray(self.panel(panel).lines[number].get_xydata(), dtype=float).T
+
+
+def moving(drive: Drive, duration: float) -> Drawn:
+    """Draw a motion from rest, sampled at 64 points in a natural period."""
+    history, meter, cycles = RunHistory(), CycleMeter(20), list[Cycle]()
+    motion = Motion(drive, 0.0, 0.0, record=True)
+    step = drive.natural_period / 64.0
+    for _ in range(round(duration / step)):
+        motion.advance(step)
+        knots = motion.take_knots()
+        done = meter.feed(knots, drive.belt_speed)
+        history.take_knots(knots, drive.belt_speed, done)
+        cycles += done
+    measures = meter.measures()
+    return Drawn(history, measures, drive, run_figure(history, measures, drive, title="it"), cycles)
+
+
+def recorded() -> Drawn:
+    history = RunHistory()
+    report = report_of_bag(REFERENCE, spectator=history)
+    measures = Measures(**{name: report[name] for name in MEASURES})
+    figure = run_figure(history, measures, FEED_DRIVE, title="it")
+    return Drawn(history, measures, FEED_DRIVE, figure, [])
+
+
+@pytest.fixture(scope="module")
+def limit_cycle() -> Drawn:
+    return moving(PAPER, 100.0)
+
+
+@pytest.fixture(scope="module")
+def reference() -> Drawn:
+    return recorded()
+
+
+def labels(figure: Figure) -> set[str]:
+    return {label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel())}
+
+
+def test_axes_are_in_si_with_prefixes(reference: Drawn) -> None:
+    assert labels(reference.figure) == {
+        "", "time (s)", "displacement (µm)", "velocity (mm/s)", "force (N)", "amplitude (µm)",
+        "stick fraction", "velocity relative to the belt (mm/s)", "friction coefficient",
+    }  # fmt: skip
+
+
+def test_axes_of_the_unit_drive_are_dimensionless(limit_cycle: Drawn) -> None:
+    of_numbers = {"", "stick fraction", "friction coefficient"}
+    assert all(
+        label.endswith("(dimensionless)") for label in labels(limit_cycle.figure) - of_numbers
+    )
+
+
+def test_lines_have_every_extreme_of_the_bag(reference: Drawn) -> None:
+    with Recording(REFERENCE) as recording:
+        states, forces = recording.joint_states, recording.control_forces
+    time, position = reference.line(POSITION, 1)
+    assert (time[0], time[-1]) == (0.0, 3.0)
+    # Between samples it turns, so that the extremes lie a little beyond theirs.
+    for drawn, sampled in ((position.max(), states.position.max()), (position.min(), -1.08e-4)):
+        assert drawn * 1e-6 == pytest.approx(sampled, rel=5e-3)
+    assert position.max() * 1e-6 >= states.position.max()
+    _, velocity = reference.line(VELOCITY, 1)
+    assert velocity.max() * 1e-3 == pytest.approx(states.velocity.max(), rel=1e-12)
+    assert velocity.min() * 1e-3 == pytest.approx(states.velocity.min(), rel=1e-12)
+    _, force = reference.line(FORCE, 1)
+    assert (force.min(), force.max()) == (forces.force.min(), forces.force.max())
+
+
+def test_the_shade_is_the_share_of_time_that_it_sticks(limit_cycle: Drawn) -> None:
+    for panel in (POSITION_END, VELOCITY_END, FORCE_END):
+        (shade,) = limit_cycle.panel(panel).images
+        share = float(np.mean(shade.get_array()))
+        # Of five periods, but for a step.
+        assert share == pytest.approx(limit_cycle.measures.stick_fraction, abs=0.1 / 32.0)
+    (whole,) = limit_cycle.panel(VELOCITY).images
+    assert np.mean(whole.get_array()) * 100.0 == pytest.approx(
+        sum(cycle.stick_fraction * cycle.period for cycle in limit_cycle.cycles), abs=1.0
+    )
+
+
+def test_the_shade_of_samples_is_that_of_the_measures(reference: Drawn) -> None:
+    history = RunHistory()
+    report = report_of_bag(REFERENCE, start=1.0, end=1.0 + 20.5 * 0.0639, spectator=history)
+    motion = history.motion
+    time = motion.time[-1] - 20 * report["period"]
+    stick_time = motion.stick_time[-1] - np.interp(time, motion.time, motion.stick_time)
+    share = stick_time / (20 * report["period"])
+    assert share == pytest.approx(report["stick_fraction"], rel=0.02)
+
+
+def test_the_end_is_the_last_cycles(limit_cycle: Drawn) -> None:
+    start, end = limit_cycle.panel(POSITION_END).get_xlim()
+    assert limit_cycle.measures.period is not None
+    assert end - start == pytest.approx(LAST_CYCLES * limit_cycle.measures.period, rel=0.01)
+    assert end == pytest.approx(100.0, abs=0.1)
+
+
+def test_each_cycle_is_a_point(limit_cycle: Drawn) -> None:
+    time, amplitude = limit_cycle.line(AMPLITUDE, 0)
+    _, stick_fraction = limit_cycle.line(STICK_FRACTION, 0)
+    assert amplitude.tolist() == [cycle.amplitude for cycle in limit_cycle.cycles]
+    assert stick_fraction.tolist() == [cycle.stick_fraction for cycle in limit_cycle.cycles]
+    assert np.diff(time)[1:] == pytest.approx(limit_cycle.measures.period, abs=0.11)
+
+
+def test_a_bags_cycles_are_those_of_the_report(reference: Drawn) -> None:
+    with Recording(REFERENCE) as recording:
+        states = recording.joint_states
+    motion = states.stamp, states.position, states.velocity, states.belt_velocity
+    cycles = SampleMeter(20).feed(*motion)
+    _, amplitude = reference.line(AMPLITUDE, 0)
+    assert amplitude * 1e-6 == pytest.approx([cycle.amplitude for cycle in cycles], rel=1e-9)
+
+
+def test_the_portrait_has_belt_speed_and_equilibrium(reference: Drawn) -> None:
+    *_, belt, equilibrium = reference.panel(PORTRAIT).lines
+    assert set(belt.get_ydata()) == {40.0}
+    ((x, y),) = equilibrium.get_xydata()
+    assert x == pytest.approx(FEED_DRIVE.equilibrium_position * 1e6, rel=1e-12)
+    assert y == 0.0
+    _, rest = reference.line(POSITION, 0)
+    assert rest == pytest.approx(x, rel=1e-12)
+
+
+def test_a_belt_that_changes_its_speed_moves_the_equilibrium() -> None:
+    history = RunHistory()
+    time = np.arange(0.0, 10.0, 0.01)
+    belt = np.where(time < 5.0, 0.4, 0.2)
+    none = np.full(len(time), np.nan)
+    history.take_samples(time, np.sin(time), 0.1 * np.cos(time), belt, none, [])
+    figure = run_figure(history, CycleMeter(20).measures(), PAPER, title="it")
+    slow = replace(PAPER, belt_speed=0.2)
+    *_, belt_line, equilibrium = figure.axes[PORTRAIT].lines
+    assert equilibrium.get_xdata()[0] == slow.equilibrium_position
+    assert set(belt_line.get_ydata()) == {0.2}
+    rest = figure.axes[POSITION].lines[0].get_ydata()
+    assert (rest[0], rest[-1]) == (PAPER.equilibrium_position, slow.equilibrium_position)
+    assert set(figure.axes[VELOCITY].lines[0].get_ydata()) == {0.4, 0.2}
+
+
+def test_on_a_belt_at_rest_no_place_is_the_equilibrium() -> None:
+    drawn = moving(replace(PAPER, belt_speed=0.0), 20.0)
+    marked = [line.get_marker() for panel in (PORTRAIT, LAW) for line in drawn.panel(panel).lines]
+    assert "o" not in marked
+    _, rest = drawn.line(POSITION, 0)
+    assert np.isnan(rest).all()
+
+
+def test_the_friction_law_is_drawn_over_the_range_of_the_run(limit_cycle: Drawn) -> None:
+    law = limit_cycle.panel(LAW)
+    curve = np.array(law.lines[0].get_xydata()).T
+    assert curve[1] == pytest.approx(PAPER.friction.coefficient(curve[0], -1.0), rel=1e-12)
+    (span,) = law.patches
+    motion = limit_cycle.history.motion
+    extremes = np.array([motion.velocity.min(), motion.velocity.max()]) - 0.4
+    assert [span.get_x(), span.get_x() + span.get_width()] == pytest.approx(extremes.tolist())
+    ((x, y),) = law.lines[-2].get_xydata()
+    assert (x, y) == (-0.4, PAPER.equilibrium_position)
+
+
+def test_without_a_drive_it_says_so() -> None:
+    history = RunHistory()
+    time = np.arange(0.0, 10.0, 0.01)
+    motion = time, np.sin(time), np.cos(time), np.full(len(time), 2.0)
+    history.take_samples(*motion, np.full(len(time), np.nan), [])
+    figure = run_figure(history, CycleMeter(20).measures(), None, title="it", notes=["a $note"])
+    assert [text.get_text() for text in figure.axes[LAW].texts] == ["the drive is not known"]
+    assert len(figure.axes[PORTRAIT].lines) == 5
+    title = figure.get_suptitle()
+    assert title == "it\ncompletes no cycle\na $note"
+    legend = {text.get_text() for text in figure.legends[0].get_texts()}
+    assert "equilibrium" not in legend
+
+
+def test_a_line_breaks_where_samples_are_missing() -> None:
+    history = RunHistory()
+    time = np.r_[np.arange(0.0, 3.0, 0.01), np.arange(6.0, 9.0, 0.01)]
+    ones = np.ones(len(time))
+    # Sticking on both sides of the gap is not known to be sticking within.
+    history.take_samples(time, 0.1 * time, 0.4 * ones, 0.4 * ones, ones, [])
+    figure = run_figure(history, CycleMeter(20).measures(), PAPER, title="it")
+    for panel, number in ((POSITION, 1), (VELOCITY, 1), (FORCE, 0)):
+        x, y = np.array(figure.axes[panel].lines[number].get_xydata()).T
+        (missing,) = np.flatnonzero(np.isnan(y))
+        assert (x[missing - 1], x[missing + 1]) == pytest.approx((2.99, 6.0))
+    (shade,) = figure.axes[POSITION].images
+    assert np.mean(shade.get_array()) == pytest.approx(5.98 / 8.99, rel=1e-3)
+
+
+def test_what_goes_back_in_time_is_left_out_and_said() -> None:
+    history = RunHistory()
+    time = np.arange(0.0, 3.0, 0.01)
+    ones = np.ones(len(time))
+    for _ in range(2):
+        history.take_samples(time, time, ones, ones, ones, [])
+        history.take_control(time, ones)
+    assert np.all(np.diff(history.motion.time) > 0.0)
+    assert np.all(np.diff(history.control.columns()[0]) > 0.0)
+    figure = run_figure(history, CycleMeter(20).measures(), None, title="it")
+    assert "not drawn: 300 samples" in figure.get_suptitle()
+
+
+@pytest.mark.parametrize(
+    ("samples", "forces", "drive"),
+    [(0, 0, None), (0, 0, PAPER), (0, 2, None), (1, 0, PAPER), (1, 1, None), (2, 1, PAPER)],
+)
+def test_very_little_makes_a_picture_too(
+    tmp_path: Path, samples: int, forces: int, drive: Drive | None
+) -> None:
+    history = RunHistory()
+    column = np.arange(float(samples))
+    history.take_samples(column, column, column, column, column, [])
+    history.take_control(np.arange(float(forces)), np.zeros(forces))
+    figure = run_figure(history, CycleMeter(20).measures(), drive, title="it")
+    save(figure, tmp_path / "picture.png")
+
+
+def test_what_is_not_to_be_believed_is_left_out() -> None:
+    history = RunHistory()
+    time = np.arange(0.0, 1.0, 0.01)
+    position = np.where(np.arange(100) % 10 == 3, np.nan, 1e99)
+    velocity = np.where(np.arange(100) % 10 == 5, np.inf, 1e101 * (time > 0.9))
+    history.take_samples(time, position, velocity, np.ones(100), np.full(100, np.inf), [])
+    history.take_control(time, np.full(100, np.nan))
+    assert len(history.motion.time) < 90
+    assert np.isfinite(history.motion).all()
+    for trace in (history.friction, history.control):
+        assert len(trace.columns()[0]) == 0
+    run_figure(history, CycleMeter(20).measures(), PAPER, title="it")
+
+
+def hour_of(blocks: Sequence[int]) -> RunHistory:
+    """Return an hour at 1 kHz, with one peak in it."""
+    history, start = RunHistory(), 0
+    for length in blocks:
+        number = np.arange(start, start + length)
+        start += length
+        time = number * 1e-3
+        position = np.sin(100.0 * time) + 5.0 * (number == 1_234_567)
+        velocity = np.minimum(100.0 * np.cos(100.0 * time), 80.0)
+        cycle = Cycle(1.0, 1.0, 0.0, 0.0628, 16.0, 0.2)
+        belt = np.full(length, 80.0)
+        history.take_samples(time, position, velocity, belt, velocity, [cycle] * 300)
+        history.take_control(time, position)
+    return history
+
+
+def test_an_hour_is_few_points_with_its_peak_and_its_shade(tmp_path: Path) -> None:
+    history = hour_of([20_000] * 180)
+    figure = run_figure(history, CycleMeter(20).measures(), FEED_DRIVE, title="an hour")
+    for axes in figure.axes[:PORTRAIT]:
+        assert all(len(line.get_xdata()) < 5_000 for line in axes.lines)
+    time, position = np.array(figure.axes[POSITION].lines[1].get_xydata()).T
+    assert position.max() == pytest.approx(5.0 + np.sin(123_456.7))
+    assert time[np.argmax(position)] == pytest.approx(1234.567)
+    assert not np.isnan(position).any()
+    # The end is not thinned, its forces neither.
+    for panel, number in ((POSITION_END, 1), (FORCE_END, 0), (FORCE_END, 1)):
+        steps = np.diff(figure.axes[panel].lines[number].get_xdata())
+        assert steps.max() == pytest.approx(1e-3)
+    (shade,) = figure.axes[POSITION].images
+    assert np.mean(shade.get_array()) == pytest.approx(np.arccos(0.8) / np.pi, rel=0.03)
+    save(figure, tmp_path / "hour.svg")
+    assert (tmp_path / "hour.svg").stat().st_size < 1_000_000
+
+
+def test_a_motion_that_runs_away_is_drawn(tmp_path: Path) -> None:
+    history = RunHistory()
+    time = np.arange(0.0, 400.0, 0.1)
+    growing = np.exp(0.5 * time)
+    history.take_samples(
+        time, growing * np.sin(time), growing, np.full(len(time), 0.4), growing, []
+    )
+    meter = CycleMeter(20)
+    meter.report_run_away()
+    figure = run_figure(history, meter.measures(), PAPER, title="it")
+    assert figure.get_suptitle() == "it\nruns away"
+    save(figure, tmp_path / "away.png")

@@ -1,0 +1,74 @@
+"""How pictures are written."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import matplotlib as mpl
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+
+from stickslip_ros.plots.style import drawing, save, set_title, styled
+
+ENDINGS = (".png", ".svg", ".pdf", ".PNG")
+
+
+@styled
+def small_figure(label: str = "displacement (µm)") -> Figure:
+    figure = Figure(figsize=(3.0, 2.0))
+    axes = figure.subplots()
+    axes.plot([0.0, 1.0], [0.0, 2.0])
+    axes.set_xlabel(label)
+    return figure
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_the_ending_says_what_it_is(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"picture{ending}"
+    drawing(small_figure)(path)
+    match ending.lower():
+        case ".png":
+            with Image.open(path) as image:
+                assert (image.format, image.size) == ("PNG", (390, 260))
+        case ".svg":
+            texts = [text.text for text in ElementTree.parse(path).iter() if text.text]
+            assert "displacement (µm)" in texts
+        case _:
+            assert path.read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_the_same_picture_is_the_same_file(tmp_path: Path, ending: str) -> None:
+    paths = tmp_path / f"one{ending}", tmp_path / f"other{ending}"
+    for path in paths:
+        save(small_figure(), path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def test_few_colours_make_a_small_picture(tmp_path: Path) -> None:
+    save(small_figure(), tmp_path / "full.png")
+    save(small_figure(), tmp_path / "small.png", colours=16)
+    assert 2 * (tmp_path / "small.png").stat().st_size < (tmp_path / "full.png").stat().st_size
+    with Image.open(tmp_path / "small.png") as image:
+        assert len(image.convert("RGB").getcolors() or []) <= 16
+
+
+def test_a_users_own_settings_neither_matter_nor_change(tmp_path: Path) -> None:
+    save(small_figure(), tmp_path / "one.svg")
+    with mpl.rc_context({"font.size": 30.0, "axes.facecolor": "red", "svg.fonttype": "path"}):
+        save(small_figure(), tmp_path / "other.svg")
+        assert mpl.rcParams["font.size"] == 30.0
+    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "other.svg").read_bytes()
+
+
+def test_a_title_is_shown_as_it_is_within_the_picture() -> None:
+    figure = Figure(figsize=(8.0, 2.0))
+    set_title(figure, "a $name$ with \x1b[31m" + " and more" * 40, "a second line")
+    title, *more = figure.get_suptitle().split("\n")
+    assert title.startswith("a $name$ with ")
+    assert "\x1b" not in title
+    assert more[-2].endswith(" ...")
+    assert more[-1] == "a second line"
+    figure.draw_without_rendering()
+    box = next(text for text in figure.texts).get_window_extent()
+    assert 0.0 < box.x0 < box.x1 < figure.bbox.x1

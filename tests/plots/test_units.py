@@ -1,0 +1,44 @@
+"""What axes are labelled with."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip_ros.plots.units import Units
+from tests.physics.drives import FEED_DRIVE, PAPER
+
+SI = Units.of(FEED_DRIVE)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "largest", "scale", "label"),
+    [
+        ("displacement", "m", 4.3e-4, 1e-6, "displacement (µm)"),
+        ("velocity", "m/s", 0.04, 1e-3, "velocity (mm/s)"),
+        ("force", "N", 1200.0, 1e3, "force (kN)"),
+        ("force", "N", 0.0, 1.0, "force (N)"),
+        ("time", "s", 3600.0, 1.0, "time (s)"),
+        ("time", "s", 0.02, 1e-3, "time (ms)"),
+    ],
+)
+def test_si_has_the_prefix_that_suits(
+    name: str, unit: str, largest: float, scale: float, label: str
+) -> None:
+    values = np.array([0.0, np.nan, -largest])
+    assert SI.axis(name, unit, values, np.empty(0)) == (scale, label)
+
+
+def test_the_unit_drive_is_dimensionless() -> None:
+    units = Units.of(PAPER)
+    for name, unit, largest in (("displacement", "m", 1e-5), ("time", "s", 1e-3)):
+        assert units.axis(name, unit, [largest]) == (1.0, f"{name} (dimensionless)")
+    assert units.axis("stick fraction", "", [0.1])[1] == "stick fraction"
+    assert units.text(0.43408, "m") == "0.4341"
+    assert SI.text(4.3408e-4, "m") == "434.1 µm"
+
+
+@pytest.mark.parametrize("other", ["mass", "stiffness", "normal_force"])
+def test_a_drive_that_differs_in_one_scale_is_not(other: str) -> None:
+    assert not Units.of(replace(PAPER, **{other: 2.0})).dimensionless
+    assert not Units.of(None).dimensionless
