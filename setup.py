@@ -87,6 +87,7 @@ setup(
             *DASHBOARD,
             "distributed",
             "hypothesis",
+            "markdown-it-py",  # finds the blocks of code in the docs
             "playwright",  # drives the browser of the system: no download of its own
             "pytest",
             "pytest-timeout",

@@ -183,6 +183,7 @@ class ObserverNode(Collecting):
             self._take()
             self._disturbance.publish(pack_wrench(self._newest, force))
             self._tap_end = self._newest + round(duration * NANOSECONDS)
+            self.events.append((time.time(), f"pushed with {force:g} N for {duration:g} s"))
             if self._tap_timer is None:
                 self._tap_timer = self._every(_TAP_PERIOD, self._take)
             answer.set_result("")
@@ -261,6 +262,7 @@ class ObserverNode(Collecting):
 
     def _end_tap(self) -> None:
         self._disturbance.publish(pack_wrench(self._newest, 0.0))
+        self.events.append((time.time(), "the push has ended"))
         if self._tap_timer is not None:
             self.destroy_timer(self._tap_timer)
             self._tap_timer = None

@@ -15,6 +15,7 @@ KEYS = {
     "heyoka": set(),
     "hypothesis": {"python3-hypothesis"},
     "lz4": set(),
+    "markdown-it-py": set(),
     "matplotlib": {"python3-matplotlib"},
     "mcap": set(),
     "nicegui": set(),

@@ -203,7 +203,8 @@ def test_the_friction_law_is_drawn_over_the_range_of_the_run(limit_cycle: Drawn)
     (span,) = law.patches
     motion = limit_cycle.history.motion
     extremes = np.array([motion.velocity.min(), motion.velocity.max()]) - 0.4
-    assert [span.get_x(), span.get_x() + span.get_width()] == pytest.approx(extremes.tolist())
+    drawn = span.get_path().get_extents(span.get_patch_transform())
+    assert drawn.intervalx == pytest.approx(extremes)
     ((x, y),) = law.lines[-2].get_xydata()
     assert (x, y) == (-0.4, PAPER.equilibrium_position)
 

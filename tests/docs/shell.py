@@ -1,0 +1,279 @@
+"""A reader's shell in a copy of the checkout, and the other terminals beside it."""
+
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import sysconfig
+import time
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+from lifecycle_msgs.msg import State
+from lifecycle_msgs.srv import GetState
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import JointState
+
+from stickslip_ros.app import INTERRUPTED
+from stickslip_ros.nodes.process import this_machine_only
+from tests.docs.page import CHECKOUT
+from tests.nodes.graph import PATIENCE, Graph, wait_for
+
+# What ties a process to the installation that the tests themselves run in.
+_OURS = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH")
+# What the make, the pytest and the fixtures around a test hand on.
+_CALLERS = (
+    *this_machine_only(),
+    "MAKEFLAGS",
+    "MAKELEVEL",
+    "MFLAGS",
+    "PYTEST_ADDOPTS",
+    "VENV",
+    "VIRTUAL_ENV",
+)
+
+_INTERRUPTED = {"stickslip": {INTERRUPTED}, "ros2 topic": {signal.SIGINT}}
+_OTHERS_INTERRUPTED = {0, -signal.SIGINT}
+"""With which status a program ends by Ctrl-C."""
+
+_SIGNS = {
+    "ros2 topic": "\n",
+    "dask scheduler": "Scheduler at:",
+    "dask worker": "Registered to:",
+}
+"""What programs say when they are up, if that is not seen by their nodes."""
+
+_ROS_SETUP = f"""
+export AMENT_PREFIX_PATH={sys.prefix}
+export LD_LIBRARY_PATH={os.environ.get("LD_LIBRARY_PATH", "")}
+export PYTHONPATH={sysconfig.get_path("purelib")}
+"""
+"""Of an installed ROS: makes that of the tests one that other environments see."""
+
+_TO_END = 10.0
+"""How long, s, what a page has left running may take when its terminal is closed."""
+
+_NEVER = Event()
+
+_TRACEBACK = "Traceback (most recent call last)"
+
+
+def copy_checkout(to: Path) -> None:
+    """Copy what git has or would take, so that nothing touches the original."""
+    listing = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    names = subprocess.check_output(listing, cwd=CHECKOUT, text=True).split("\0")
+    for name in filter(None, names):
+        if (CHECKOUT / name).is_file():
+            (to / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(CHECKOUT / name, to / name)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Shell:
+    """Runs what a page says, in a directory and an environment that carry over."""
+
+    def __init__(self, scratch: Path, domain: int) -> None:
+        self.checkout = scratch / "stickslip_ros"
+        copy_checkout(self.checkout)
+        self._scratch = scratch
+        self._domain = domain
+        self._beside: frozenset[str] = frozenset()  # nodes of the other terminals
+        self._common = {k: v for k, v in os.environ.items() if k not in _CALLERS}
+        self._common |= {
+            "ROS_DOMAIN_ID": str(domain),
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            "ROS_LOG_DIR": str(scratch / "log"),
+            "PORT": str(free_port()),
+            "ROS_SETUP": str(scratch / "setup.bash"),
+        }
+        self._directory = self.checkout
+        self._fill_environment()
+        stand_in = scratch / "bin" / "ros2"
+        stand_in.parent.mkdir()
+        stand_in.write_text(
+            f'#!/bin/sh\nexec {sys.executable} {CHECKOUT}/tests/docs/ros2.py "$@"\n'
+        )
+        stand_in.chmod(0o755)
+        (scratch / "setup.bash").write_text(_ROS_SETUP)
+        self._path = [str(stand_in.parent), self._common["PATH"]]
+        self._environment = self._common | {
+            "PATH": os.pathsep.join([str(Path(sys.executable).parent), *self._path]),
+            "AMENT_PREFIX_PATH": sys.prefix,
+            "PYTHONPATH": str(self.checkout),  # what a page changes in its copy acts
+            "PIP_NO_INDEX": "1",  # `.venv` is not a copy
+        }
+
+    def _fill_environment(self) -> None:
+        """Make a `.venv` as `make` does: that of the tests, up to date."""
+        environment = self.checkout / ".venv"
+        environment.mkdir()
+        for entry in Path(sys.prefix).iterdir():
+            if entry.name != ".ready":
+                (environment / entry.name).symlink_to(entry)
+        (environment / ".ready").touch()
+
+    def renew(self) -> None:
+        """Forget the environment, as a shell does that has not heard of it."""
+        self._environment = {k: v for k, v in self._common.items() if k not in _OURS} | {
+            "PATH": os.pathsep.join([f"{sys.base_prefix}/bin", *self._path])
+        }
+        environment = self.checkout / ".venv"
+        if (environment / "bin").is_symlink():
+            shutil.rmtree(environment)
+        self._directory = self.checkout
+
+    def path(self, name: str) -> Path:
+        """The file of that name for those who are where the reader is."""
+        return self._directory / name
+
+    def run(self, script: str, timeout: float) -> tuple[int, str]:
+        """Run a script to its end; return exit status and output."""
+        state = self._scratch / "state"
+        state.unlink(missing_ok=True)
+        process, output = self._start(["-e", "-c", f'{script}\nenv -0 >"{state}"'])
+        try:
+            status = process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            raise AssertionError(f"not done after {timeout} s:\n{output.read_text()}") from None
+        finally:
+            _end(process)
+        if state.exists():
+            pairs = (entry.split("=", 1) for entry in state.read_text().split("\0") if entry)
+            self._environment = dict(pairs)
+            self._directory = Path(self._environment["PWD"])
+        return status, output.read_text()
+
+    @contextmanager
+    def beside(self, command: str) -> Generator[None]:
+        """Run a command while others are run; it is up, and in the end takes Ctrl-C well."""
+        process, output = self._start(["-c", command])
+
+        def said() -> str:
+            return f"{command}:\n{output.read_text()}"
+
+        def is_up() -> bool:
+            assert process.poll() is None, f"has ended: {said()}"
+            if sign := _of(command, _SIGNS, ""):
+                return sign in output.read_text()
+            return watch.active(self._beside) and (
+                "stickslip run" not in command or watch.hears_a_joint_state()
+            )
+
+        before = self._beside
+        try:
+            with watching(self._domain) as watch:
+                wait_for(is_up, f"up: {command}")
+                self._beside = before | watch.nodes()
+            yield
+            assert process.poll() is None, f"has ended: {said()}"
+            os.killpg(process.pid, signal.SIGINT)
+            status = process.wait(PATIENCE)
+        finally:
+            self._beside = before
+            _end(process)
+        assert status in _of(command, _INTERRUPTED, _OTHERS_INTERRUPTED), (
+            f"ended with status {status}: {said()}"
+        )
+        assert _TRACEBACK not in said(), said()
+
+    def _start(self, arguments: list[str]) -> tuple[subprocess.Popen[bytes], Path]:
+        count = len(list(self._scratch.glob("*.output")))
+        output = self._scratch / f"{count}.output"
+        with output.open("wb") as opened:
+            process = subprocess.Popen(
+                ["bash", *arguments],
+                cwd=self._directory,
+                env=self._environment,
+                stdin=subprocess.DEVNULL,
+                stdout=opened,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+        return process, output
+
+
+class Watch:
+    """Sees which nodes of a domain are up; a new one each time knows none that are gone."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self._listening: dict[str, Any] = {}
+        self._heard: list[JointState] = []
+
+    def nodes(self) -> frozenset[str]:
+        found = self._graph.observer.get_node_names_and_namespaces()
+        names = {f"{space.rstrip('/')}/{name}" for name, space in found if name[0] != "_"}
+        return frozenset(names - {self._graph.observer.get_fully_qualified_name()})
+
+    def active(self, others: frozenset[str]) -> bool:
+        """Whether there are nodes besides others, and the managed ones among them are active."""
+        nodes = self.nodes() - others
+        services = {name for name, _ in self._graph.observer.get_service_names_and_types()}
+        managed = {name for name in nodes if f"{name}/get_state" in services}
+        return bool(nodes) and all(
+            self._state(name) == State.PRIMARY_STATE_ACTIVE for name in managed
+        )
+
+    def hears_a_joint_state(self) -> bool:
+        observer = self._graph.observer
+        for name, kinds in observer.get_topic_names_and_types():
+            if kinds == ["sensor_msgs/msg/JointState"] and name not in self._listening:
+                self._listening[name] = observer.create_subscription(
+                    JointState, name, self._heard.append, qos_profile_sensor_data
+                )
+        self._graph.run_for(0.1)
+        return bool(self._heard)
+
+    def _state(self, node: str) -> Any:
+        answer = self._graph.call(GetState, f"{node}/get_state", GetState.Request())
+        return answer.current_state.id
+
+
+@contextmanager
+def watching(domain: int) -> Generator[Watch]:
+    graph = Graph(domain)
+    try:
+        yield Watch(graph)
+    finally:
+        graph.close()
+
+
+def _of(command: str, by_program: Mapping[str, Any], otherwise: Any) -> Any:
+    """What holds for the program of a command, variables of its environment before it or not."""
+    bare = re.sub(r"^(\w+=\S* )+", "", command)
+    return next((v for program, v in by_program.items() if bare.startswith(program)), otherwise)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End a process and all that it has left behind in its session, as closing a terminal does."""
+    for number in (signal.SIGHUP, signal.SIGKILL):
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, number)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(_TO_END)
+        deadline = time.monotonic() + _TO_END
+        while _has_members(process.pid):
+            if time.monotonic() > deadline:
+                break
+            _NEVER.wait(0.02)
+        else:
+            return
+
+
+def _has_members(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True

@@ -1,0 +1,230 @@
+"""Every block of README and docs does what it says: see page.py for how it is run."""
+
+import re
+from collections.abc import Generator
+from contextlib import ExitStack
+from itertools import groupby
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+
+from stickslip_ros.nodes.process import this_machine_only
+from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.testing.domain import own_domain
+from tests.docs.page import CHECKOUT, Block, blocks, pages
+from tests.docs.shell import Shell
+
+BLOCKS = {page: blocks(page) for page in pages()}
+
+SHORT, LONG = 120.0, 1200.0
+"""What a block may take, s."""
+
+# Each of their blocks is as if marked long: they start nodes for most of what they show.
+LONG_PAGES = {
+    "docs/dashboard.md",
+    "docs/how-to/colcon.md",
+    "docs/how-to/two-machines.md",
+    "docs/tools.md",
+    "docs/topics.md",
+    "docs/tutorial.md",
+}
+
+# What cannot be run here, by page and beginning: a longer list is a decision, not an accident.
+NOT_RUN = [
+    ("docs/dashboard.md", "ssh -L 8642:127.0.0.1:8642 machine-of-the-drive"),
+    ("docs/security.md", "sudo apt install ros-jazzy-sros2"),
+    ("docs/studies.md", "from dask_jobqueue import SLURMCluster"),
+    ("docs/studies.md", "from dask_kubernetes.operator import KubeCluster"),
+    ("docs/tools.md", "sudo apt install ros-jazzy-rqt-plot"),
+    ("docs/tools.md", "sudo apt install ros-jazzy-plotjuggler-ros"),
+    ("docs/tools.md", "sudo apt install ros-jazzy-foxglove-bridge"),
+    ("docs/tools.md", "sudo apt install ros-jazzy-robot-state-publisher"),
+]
+
+# Said on standard error with status 0, by `ros2` as by its stand-in.
+REFUSALS = ("Setting parameter failed", "Transitioning failed")
+
+
+@pytest.fixture
+def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Generator[Shell]:
+    for name, value in this_machine_only().items():
+        monkeypatch.setenv(name, value)
+    with own_domain() as domain:
+        yield Shell(tmp_path, domain)
+
+
+def is_long(block: Block) -> bool:
+    return "long" in block.directives or block.page in LONG_PAGES
+
+
+def has_to_run(page: str, *, long: bool) -> bool:
+    """Whether the page has a block to run that is long, or one that is not."""
+    return any(
+        block.language != "text"
+        and "not because" not in block.directives
+        and is_long(block) == long
+        for block in BLOCKS[page]
+    )
+
+
+@pytest.mark.timeout(5 * SHORT)
+@pytest.mark.parametrize("page", [page for page in BLOCKS if has_to_run(page, long=False)])
+def test_the_quick_blocks_of_a_page_run(page: str, shell: Shell) -> None:
+    run([block for block in BLOCKS[page] if not is_long(block)], shell)
+
+
+@pytest.mark.long
+@pytest.mark.timeout(2 * LONG)
+@pytest.mark.parametrize("page", [page for page in BLOCKS if has_to_run(page, long=True)])
+def test_all_blocks_of_a_page_run(page: str, shell: Shell) -> None:
+    run(BLOCKS[page], shell)
+
+
+def test_the_long_pages_exist() -> None:
+    assert BLOCKS.keys() >= LONG_PAGES
+
+
+def test_the_blocks_that_nobody_runs_are_known() -> None:
+    found = [
+        (page, block.text)
+        for page, its_blocks in BLOCKS.items()
+        for block in its_blocks
+        if "not because" in block.directives
+    ]
+    assert [page for page, _ in found] == [page for page, _ in NOT_RUN]
+    for (page, text), (_, beginning) in zip(found, NOT_RUN, strict=True):
+        assert text.startswith(beginning), page
+
+
+def run(page: list[Block], shell: Shell) -> None:
+    """Run blocks one after another, those in a row that need the same beside them together."""
+    said: list[str] = []
+    for needed, group in in_a_row(page):
+        with ExitStack() as terminals:
+            try:
+                for command in needed:
+                    terminals.enter_context(shell.beside(command))
+            except AssertionError as error:
+                raise AssertionError(f"beside {group[0].place}: {error}") from error
+            for block in group:
+                run_block(block, page, shell, said)
+
+
+def in_a_row(page: list[Block]) -> list[tuple[list[str], list[Block]]]:
+    """The blocks in groups that need the same beside them; a `text` needs what was there."""
+    groups: list[tuple[list[str], list[Block]]] = []
+    for block in page:
+        needed = block.directives.get("beside", [])
+        if groups and (block.language == "text" or needed == groups[-1][0]):
+            groups[-1][1].append(block)
+        else:
+            groups.append((needed, [block]))
+    return groups
+
+
+def run_block(block: Block, page: list[Block], shell: Shell, said: list[str]) -> None:
+    """Run one block; `said` is the output of the one before, and of this one afterwards."""
+    if "not because" in block.directives:
+        return
+    if "file" in block.directives:
+        save(block, page, shell)
+    try:
+        if block.language == "text":
+            if "output" in block.directives:
+                check_output(block.text, said[0])
+            return
+        later = page[page.index(block) + 1 :]
+        if any(name in each.text for name in block.directives.get("file", []) for each in later):
+            return
+        said[:] = [RUNNERS[block.language](block, shell)]
+        if not any("output" in each.directives for each in later[:1]):
+            assert not any(refusal in said[0] for refusal in REFUSALS), said[0]
+    except Exception as error:
+        raise AssertionError(f"{block.place}: {error}\n{block.text}") from error
+
+
+def save(block: Block, page: list[Block], shell: Shell) -> None:
+    (name,) = block.directives["file"]
+    stem = Path(name).stem
+    later = page[page.index(block) + 1 :]
+    is_test = block.language == "python" and "def test_" in block.text
+    used = is_test or any(
+        stem in "\n".join([b.to_run, *b.directives.get("after", [])]) for b in later
+    )
+    assert used, f"{block.place}: {name} is saved, and nobody uses it"
+    for kept in (CHECKOUT / name, CHECKOUT / "docs/examples" / name):
+        if kept.is_file():
+            assert kept.read_text(encoding="utf-8") == block.text, f"{block.place}: not {kept}"
+    shell.path(name).parent.mkdir(parents=True, exist_ok=True)
+    shell.path(name).write_text(block.to_run, encoding="utf-8")
+
+
+def check_output(expected: str, said: str) -> None:
+    lines = [line.rstrip() for line in said.splitlines()]
+    pattern = re.escape(expected.rstrip()).replace("…", ".*")
+    assert re.search(f"(?m:^){pattern}(?m:$)", "\n".join(lines), re.DOTALL), f"not in:\n{said}"
+
+
+def run_sh(block: Block, shell: Shell) -> str:
+    if "new shell" in block.directives:
+        shell.renew()
+    if "in terminals" in block.directives:
+        with ExitStack() as terminals:
+            for line in commands(block):
+                terminals.enter_context(shell.beside(line))
+        return ""
+    prefixes = block.directives.get("until Ctrl-C", [])
+    said = ""
+    for endless, lines in groupby(
+        commands(block) if prefixes else [block.to_run],
+        key=lambda line: any(line.startswith(prefix) for prefix in prefixes),
+    ):
+        if endless:
+            for line in lines:
+                with shell.beside(line):
+                    pass
+        else:
+            said += run_script("\n".join(lines), block, shell)
+    return said
+
+
+def run_script(script: str, block: Block, shell: Shell) -> str:
+    status, said = shell.run(script, LONG if is_long(block) else SHORT)
+    assert status == 0, f"ended with status {status}:\n{said}"
+    return said
+
+
+def commands(block: Block) -> list[str]:
+    """The commands of an `sh` block, without comments."""
+    lines = re.sub(r"\\\n\s*", "", block.to_run).splitlines()
+    return [line for line in (re.sub(r"(^|\s)#.*", "", line).strip() for line in lines) if line]
+
+
+def run_python(block: Block, shell: Shell) -> str:
+    is_test = "def test_" in block.text
+    if "file" in block.directives and not is_test:
+        return ""
+    name = block.directives.get("file", [f"{'test_' if is_test else ''}line_{block.line}.py"])[0]
+    code = "\n".join([*block.directives.get("after", []), block.to_run])
+    shell.path(name).write_text(code, encoding="utf-8")
+    how = "-m pytest -q -c /dev/null" if is_test else ""
+    return run_script(f"python {how} {name}", block, shell)
+
+
+def run_yaml(block: Block, shell: Shell) -> str:
+    yaml.safe_load(block.to_run)
+    if "ros__parameters" in block.text:
+        name = block.directives.get("file", [f"line_{block.line}.yaml"])[0]
+        shell.path(name).write_text(block.to_run, encoding="utf-8")
+        load_scenario(str(shell.path(name)))
+    return ""
+
+
+def run_xml(block: Block, _: Shell) -> str:
+    ElementTree.fromstring(block.to_run)
+    return ""
+
+
+RUNNERS = {"sh": run_sh, "python": run_python, "yaml": run_yaml, "xml": run_xml}
