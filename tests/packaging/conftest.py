@@ -1,11 +1,12 @@
 import os
-import shutil
 import subprocess
 from importlib import metadata
 from pathlib import Path
 
 import ament_index_python
 import pytest
+
+from tests.docs.shell import copy_checkout
 
 PACKAGE = "stickslip_ros"
 SOURCE = Path(__file__).parents[2]
@@ -29,13 +30,8 @@ def environment():
 @pytest.fixture(scope="session")
 def checkout(tmp_path_factory):
     """A copy of what git has or would take, so that no build touches the original."""
-    listing = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-    names = subprocess.check_output(listing, cwd=SOURCE, text=True).split("\0")
     copy = tmp_path_factory.mktemp("workspace") / PACKAGE
-    for name in names:
-        if (SOURCE / name).is_file():
-            (copy / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(SOURCE / name, copy / name)
+    copy_checkout(copy)
     return copy
 
 
