@@ -25,7 +25,7 @@ from stickslip_ros.studies.design import OWN_SPEED_RANGE, Design, Task, design
 HELP = "propose corner frequency and gains that damp the vibration within a force limit"
 
 _DESCRIPTION = f"""{HELP}. The drive, rate and force_delay are the scenario's, the force limit is
-washout_controller.force_limit (-p washout_controller.force_limit=100). Its gains do not matter.
+washout_controller.force_limit (-p washout_controller.force_limit=200). Its gains do not matter.
 What is proposed was simulated: the vibration is caught at several belt speeds and phases."""
 
 _NO_JITTER = "force_jitter is left out: the delay of the force is constant here"

@@ -10,6 +10,7 @@ from typing import TextIO
 
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.errors import InvalidInputError, StickslipError
+from stickslip_ros.versions import versions
 
 _COMMANDS = (
     "run",
@@ -46,7 +47,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):  # µ is not in every encoding
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        chosen = _parser(given).parse_args(given, argparse.Namespace(further=further))
+        chosen, unknown = _parser(given).parse_known_args(
+            given, argparse.Namespace(further=further)
+        )
+        if unknown:
+            chosen.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
         status: int = chosen.run(chosen)
         sys.stdout.flush()
     except InvalidInputError as error:
@@ -73,18 +78,24 @@ def _nowhere() -> TextIO:
     return open(os.devnull, "w")
 
 
+def _version() -> str:
+    """Return the versions of the package and of what its results depend on."""
+    return ", ".join(f"{name} {version}" for name, version in versions().items())
+
+
 def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     """Return the parser of the command that was given, or of all if none was."""
     parser = argparse.ArgumentParser(
         prog="stickslip",
         description="Stick-slip vibration of a feed drive: run, simulate and measure it.",
     )
+    parser.add_argument("--version", action="version", version=_version())
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in [name for name in _COMMANDS if name in given[:1]] or _COMMANDS:
         command = import_module(f"stickslip_ros.app.{name}")
         subparser = commands.add_parser(name, help=command.HELP, description=command.HELP)
         command.add_arguments(subparser)
-        subparser.set_defaults(run=command.run)
+        subparser.set_defaults(run=command.run, parser=subparser)
     return parser
 
 

@@ -27,7 +27,7 @@ _LABELS: dict[str, tuple[str, str]] = {
     "cycles": ("cycles measured", ""),
     "multipliers": ("Floquet multipliers", ""),
     "peak_force": ("peak control force", "N"),
-    "resting_force": ("control force at rest", "N"),
+    "resting_force": ("control force at the end", "N"),
     "samples": ("samples", ""),
     "lost_samples": ("lost samples", ""),
     "late_forces": ("late forces", ""),

@@ -2,6 +2,7 @@
 
 import argparse
 import shlex
+import subprocess
 import sys
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
@@ -30,6 +31,9 @@ from stickslip_ros.installed import find_executable
 from stickslip_ros.printable import printable
 from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario
 from stickslip_ros.scenario.parameters import Pace
+
+_PAGE_TIMEOUT = 5.0
+"""Time, s, that a dashboard has to end."""
 
 HELP = "run a scenario as ROS 2 nodes, record it and report"
 
@@ -170,6 +174,9 @@ def _dashboard(namespace: str) -> Generator[None]:
         yield
     finally:
         process.terminate()
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(_PAGE_TIMEOUT)
+        process.kill()
         process.wait()
 
 

@@ -243,9 +243,8 @@ def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Sect
     cycles = _closed_loop_cycles(drive, gains)
     if not cycles:
         notes["closed_loop.limit_cycles"] = (
-            "none was reached from rest at zero displacement, and none from the Hopf point at the "
-            "critical linear gain, or the loop is too stiff to be followed; others are not looked "
-            "for"
+            "none found from rest at zero displacement, nor from the Hopf point at the critical "
+            "linear gain; others are not looked for, and a very stiff loop is not followed"
         )
     return {
         **_eigenvalues(drive, expansion),

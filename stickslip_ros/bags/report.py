@@ -88,7 +88,8 @@ def report_of_bag(
                 + "".join(f"; {sentence}" for sentence in missing)
             )
     if run.measured == 0:
-        raise InvalidInputError(f"the part from {start} s to {end} s of {path} holds no samples")
+        before = "" if end == float("inf") else f" and before {end:g} s"
+        raise InvalidInputError(f"{path} holds no samples from {start:g} s on{before}")
     if not run.has_states:
         missing.append("the bag holds no joint states: nothing is known of the motion")
     return {**run.meter.report(), "complete": not missing, "missing": missing}

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from functools import partial
+from math import isfinite
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -30,6 +31,7 @@ from stickslip_ros.bags.messages import (
     wrench_columns,
 )
 from stickslip_ros.nodes.collecting import Collecting, take_waiting
+from stickslip_ros.nodes.controllers import DASHBOARD
 from stickslip_ros.nodes.inquiry import PATIENCE, Inquiry, ask_parameters
 from stickslip_ros.nodes.managed import STATE
 from stickslip_ros.nodes.topics import (
@@ -45,9 +47,6 @@ from stickslip_ros.nodes.topics import (
 from stickslip_ros.physics.samples import NANOSECONDS
 from stickslip_ros.scenario.parameters import NODE_PARAMETERS, known_parameters
 
-NODE_NAME = "dashboard"
-"""Of the observer, which reads joint_states and yet is no controller."""
-
 SILENCE = 2.5
 """Time, s, without diagnostics, which come each second, after which a node counts as silent."""
 
@@ -55,6 +54,9 @@ SILENT = "silent"
 """State of a node that was heard of before."""
 ABSENT = "not there"
 """State of one that was not."""
+
+LONGEST_TAP = 1e6
+"""Simulated time, s, that a push may last."""
 
 _TAKE_PERIOD = 0.02
 _TAP_PERIOD = 0.002
@@ -64,6 +66,8 @@ _TRANSITION_PATIENCE = 80
 """Times, ten a second, that a transition is pursued before it is asked for again."""
 _CYCLES_KEPT = 200
 _EVENTS_KEPT = 200
+_MOST_NODES = 50
+"""That health is kept of: anybody may publish diagnostics of any name."""
 
 _TRANSITIONS = {
     True: Transition.TRANSITION_ACTIVATE,
@@ -103,7 +107,7 @@ class ObserverNode(Collecting):
         context: Context | None = None,
     ) -> None:
         """Listen in a namespace; states and forces are passed on in blocks, to `show`."""
-        super().__init__(NODE_NAME, namespace=namespace, context=context)
+        super().__init__(DASHBOARD, namespace=namespace, context=context)
         self._show = show
         self.health: Mapping[str, Health] = {node: Health() for node in NODE_PARAMETERS}
         """Health by the node's name relative to the namespace."""
@@ -117,6 +121,7 @@ class ObserverNode(Collecting):
         """When, in s since the epoch, and what happened to the nodes, the newest last."""
         self._steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._inquiries: list[tuple[Inquiry, float, Callable[[], None]]] = []
+        self._asked_parameters: dict[str, Inquiry] = {}
         self._newest = 0
         self._tap_end = 0
         self._tap_timer: Timer | None = None
@@ -175,6 +180,11 @@ class ObserverNode(Collecting):
     def tap(self, force: float, duration: float) -> Answer:
         """Push the slide with a force (N) for a simulated time (s), then no more."""
         answer = Answer()
+        if not (isfinite(force) and 0.0 < duration <= LONGEST_TAP):
+            answer.set_result(
+                f"a tap needs a finite force and a time above 0, at most {LONGEST_TAP:g} s"
+            )
+            return answer
 
         def push() -> None:
             if not self._disturbance.get_subscription_count():
@@ -214,8 +224,14 @@ class ObserverNode(Collecting):
         return self.create_timer(period, callback, clock=self._steady_clock)
 
     def _call_soon(self, callback: Callable[[], None]) -> None:
+        def call() -> None:
+            try:
+                callback()
+            except Exception as error:  # the executor would end the process without a word
+                self.get_logger().error(f"{type(error).__name__}: {error}")
+
         if self.executor is not None:
-            self.executor.create_task(callback)
+            self.executor.create_task(call)
 
     def _request(
         self,
@@ -277,6 +293,8 @@ class ObserverNode(Collecting):
                 give_up()
                 inquiry.close()
                 self._inquiries.remove(entry)
+        for inquiry in self._asked_parameters.values():
+            inquiry.pursue()
         for node, health in self.health.items():
             if health.heard and health.state != SILENT and now - health.heard > SILENCE:
                 self._update(node, Health(SILENT, 2, "", health.figures, health.heard))
@@ -291,9 +309,15 @@ class ObserverNode(Collecting):
         figures = {entry.key: entry.value for entry in status.values}
         state = figures.pop(STATE, "")
         message = status.message if status.message != state else ""
-        before = self.health.get(node, Health())
+        before = self.health.get(node)
+        if before is None and len(self.health) >= _MOST_NODES:
+            return
+        before = before or Health()
+        anew = state == before.state and _began_anew(before.figures, figures)
+        if anew:
+            self.events.append((time.time(), f"{node} was started again"))
         self._update(node, Health(state, status.level[0], message, figures, time.monotonic()))
-        if state != before.state and node in NODE_PARAMETERS:
+        if node in NODE_PARAMETERS and (anew or state != before.state):
             self._ask_parameters(node)  # it may be another one of the same name
 
     def _update(self, node: str, health: Health) -> None:
@@ -307,8 +331,9 @@ class ObserverNode(Collecting):
 
     def _ask_parameters(self, node: str) -> None:
         names = list(known_parameters(NODE_PARAMETERS[node]))
-        inquiry = ask_parameters(self, node, names, partial(self._know, node))
-        self._inquiries.append((inquiry, float("inf"), lambda: None))
+        if node in self._asked_parameters:
+            self._asked_parameters[node].close()
+        self._asked_parameters[node] = ask_parameters(self, node, names, partial(self._know, node))
 
     def _know(self, node: str, values: Mapping[str, Any]) -> None:
         self.parameters = {**self.parameters, node: {**self.parameters[node], **values}}
@@ -317,10 +342,22 @@ class ObserverNode(Collecting):
         here = f"{self.get_namespace().rstrip('/')}/"
         node = event.node.removeprefix(here)
         if event.node.startswith(here) and node in self.parameters:
-            changed = [*event.new_parameters, *event.changed_parameters]
-            self._know(node, {p.name: parameter_value_to_python(p.value) for p in changed})
+            known = known_parameters(NODE_PARAMETERS[node])
+            changed = (*event.new_parameters, *event.changed_parameters)
+            values = {p.name: parameter_value_to_python(p.value) for p in changed}
+            self._know(node, {name: value for name, value in values.items() if name in known})
 
     def _on_cycle(self, topic: Topic, message: Float64) -> None:
         self.cycles[topic].append(message.data)
         if topic is AMPLITUDE:
             self.cycle_count += 1
+
+
+def _began_anew(before: Mapping[str, str], figures: Mapping[str, str]) -> bool:
+    """Return whether a node that counts has begun to count again."""
+    return any(
+        figures.get(count, "").isdecimal()
+        and before.get(count, "").isdecimal()
+        and int(figures[count]) < int(before[count])
+        for count in ("samples", "answered")
+    )

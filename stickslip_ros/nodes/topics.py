@@ -84,7 +84,7 @@ AMPLITUDE = Topic(
     "limit_cycle/amplitude",
     Float64,
     "std_msgs/msg/Float64",
-    meaning="Half the peak-to-peak displacement of each cycle as it is completed, m.",
+    meaning="Half the peak-to-peak displacement of each cycle, m; none while the slide rests.",
 )
 STICK_FRACTION = Topic(
     "limit_cycle/stick_fraction",

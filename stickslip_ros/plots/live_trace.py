@@ -1,6 +1,7 @@
 """The last of a motion that is still going on, as few points as a picture of it needs."""
 
 from collections.abc import Sequence
+from dataclasses import fields
 from threading import Lock
 from typing import NamedTuple
 
@@ -58,6 +59,10 @@ class LiveTrace:
         """Take in what has come; blocks that are empty are welcome."""
         longest = round(self.longest * NANOSECONDS)
         with self._lock:
+            descents = np.flatnonzero(np.diff(states.stamp) <= 0)
+            if len(descents):
+                self._begin()
+                states = _rows(states, slice(int(descents[-1]) + 1, None))
             if len(states.stamp):
                 if states.stamp[0] <= self._states.newest:
                     self._begin()
@@ -68,6 +73,8 @@ class LiveTrace:
             if len(forces.stamp):
                 # A controller started again may answer for the past: the picture goes by stamps.
                 later = forces.stamp > self._forces.newest
+                # One for the far future would hide all others.
+                later &= forces.stamp < max(self._states.newest, 0) + NANOSECONDS
                 self._forces.add(forces.stamp[later], [forces.force[later]], longest)
 
     def frame(self, window: float, orbit: float, buckets: int) -> Frame | None:
@@ -87,13 +94,15 @@ class LiveTrace:
             turning = round(orbit * NANOSECONDS)
             orbit_stamp, (x, v, _) = self._states.since(end - turning)
             rows = peaks(orbit_stamp // max(turning // _ORBIT_BUCKETS, 1), x, v)
-            position, velocity, belt = (_line(stamp, c, end, width) for c in columns)
+            position, velocity, belt = (
+                _line(stamp, column, end, width, self._states.step) for column in columns
+            )
             return Frame(
                 (end - self._first) / NANOSECONDS,
                 position,
                 velocity,
                 belt,
-                _line(force_stamp, force, end, width),
+                _line(force_stamp, force, end, width, self._forces.step),
                 Line(x[rows], v[rows]),
             )
 
@@ -108,6 +117,8 @@ class _Rolling:
 
     def __init__(self, columns: int) -> None:
         self._size = 0
+        self.step = 0
+        """Longest step, ns, from row to row that is due to rows having been thinned out."""
         self._stamp: IntArray = np.empty(0, dtype=np.int64)
         self._columns = [np.empty(0) for _ in range(columns)]
         self.newest = -1
@@ -133,7 +144,8 @@ class _Rolling:
     def _make_room(self, number: int, longest: int) -> None:
         stamp, columns = self.since(self.newest - longest)
         if len(stamp) + number > _MOST_ROWS:
-            rows = peaks(stamp // max(longest // _FINE_BUCKETS, 1), *columns)
+            self.step = max(longest // _FINE_BUCKETS, self.step, 1)
+            rows = peaks(stamp // self.step, *columns)
             stamp, columns = stamp[rows], [column[rows] for column in columns]
         self._size = len(stamp)
         room = self._size + 2 * number + 1024
@@ -141,12 +153,21 @@ class _Rolling:
         self._columns = [np.concatenate([column, np.empty(room)]) for column in columns]
 
 
-def _line(stamp: IntArray, column: FloatArray, end: int, width: int) -> Line:
-    """Return the points of a line that is broken, by NaN, where samples are missing."""
+def _line(stamp: IntArray, column: FloatArray, end: int, width: int, step: int) -> Line:
+    """Return the points of a line that is broken, by NaN, where samples are missing.
+
+    Steps of up to `step` (ns) are not for that reason.
+    """
     rows = peaks(stamp // width, column)
     x, y = (stamp[rows] - end) / NANOSECONDS, column[rows]
     if len(stamp) > 1:
-        usual = max(float(np.median(np.diff(stamp))), width)
-        gaps = np.flatnonzero(np.diff(stamp[rows]) > _LONGEST_GAP * usual) + 1
-        x, y = np.insert(x, gaps, x[gaps]), np.insert(y, gaps, np.nan)
+        steps = np.diff(stamp)
+        behind = np.flatnonzero(steps > _LONGEST_GAP * max(float(np.median(steps)), step)) + 1
+        gaps = np.searchsorted(rows, behind)
+        x = np.insert(x, gaps, (stamp[behind] - end) / NANOSECONDS)
+        y = np.insert(y, gaps, np.nan)
     return Line(x, y)
+
+
+def _rows(states: JointStateColumns, rows: slice) -> JointStateColumns:
+    return JointStateColumns(*(getattr(states, field.name)[rows] for field in fields(states)))

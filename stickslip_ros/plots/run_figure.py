@@ -111,7 +111,7 @@ def run_figure(
         Patch(color=GREY, alpha=0.6, lw=0.0, label="sticks (paler: part of the time)"),
         Line2D([], [], **_CONTROL, label=force),
         Line2D([], [], **_FRICTION, label="friction force"),
-        Line2D([], [], **_EARLIER | {"lw": 4.0}, label="earlier"),
+        Line2D([], [], **_EARLIER | {"lw": 4.0}, label="beginning"),
     ]
     if drive is not None:
         handles.insert(2, Line2D([], [], **_POINT | _REST, label="equilibrium"))

@@ -159,7 +159,7 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
 def test_a_page_that_comes_and_goes_changes_nothing(
     start_stickslip: Start, browser: Browser, tmp_path: Path
 ) -> None:
-    command = ("run", "paper", "--pace", "lockstep", "--duration", "100")
+    command = ("run", "paper", "--pace", "lockstep", "--duration", "50")
     alone = start_stickslip(*command, "--bag", "alone")
     assert alone.wait(PATIENCE) == 0
     served = Served(start_stickslip("dashboard"))
@@ -171,7 +171,7 @@ def test_a_page_that_comes_and_goes_changes_nothing(
     second = browser.new_page()
     second.goto(served.url)
     assert watched.wait(PATIENCE) == 0
-    second.wait_for_function("stickslip.motion?.end > 99")
+    second.wait_for_function("stickslip.motion?.end > 49")
     second.close()
     assert served.end() == 130
     with Recording(tmp_path / "alone") as one, Recording(tmp_path / "watched") as other:
@@ -208,6 +208,11 @@ def test_only_pages_of_this_machine_by_its_own_names_are_answered(start_sticksli
     wait_for(lambda: _status(served.url) == 200, "the page")
     assert _status(served.url, Host="evil.example") == 400
     assert _status(f"{served.url}/frame?periods=7") == 422
+    with urllib.request.urlopen(served.url) as response:
+        assert response.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
+    socket_io = f"{served.url}/_nicegui_ws/socket.io/?EIO=4&transport=polling"
+    assert _status(socket_io, Origin=served.url) == 200
+    assert _status(socket_io, Origin="http://evil.example") == 400
     others = {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
     for other in others - {address[0]}:
         with socket.socket() as stranger:

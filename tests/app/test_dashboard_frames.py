@@ -12,7 +12,6 @@ import pytest
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
 from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
 from stickslip_ros.nodes.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
-from stickslip_ros.plots.live_trace import LiveTrace
 from stickslip_ros.scenario.files import load_scenario
 
 
@@ -40,19 +39,19 @@ def observed(parameters: dict[str, Any]) -> Any:
     return SimpleNamespace(parameters={"plant": parameters}, cycles=cycles, cycle_count=7)
 
 
-def fed(seconds: float, rate: float) -> LiveTrace:
-    trace = LiveTrace(1e3)
+def fed(parameters: dict[str, Any], seconds: float, rate: float) -> Frames:
+    frames = Frames(observed(parameters))
     time = np.arange(round(seconds * rate)) / rate
     stamp = 1_000_000_000 + np.rint(time * 1e9).astype(np.int64)
     x = 4e-4 * np.sin(100.0 * time)
     belt = np.full_like(x, 0.04)
     states = JointStateColumns(stamp, x, 100.0 * x, x, belt, belt)
-    trace.feed(states, WrenchColumns(stamp, 1e5 * x))
-    return trace
+    frames.feed(states, WrenchColumns(stamp, 1e5 * x))
+    return frames
 
 
 def test_before_the_first_sample_there_are_only_cycles() -> None:
-    body, lines = decoded(Frames(observed({}), LiveTrace(1.0)).frame(50))
+    body, lines = decoded(Frames(observed({})).frame(50))
     assert body["motion"] is None
     assert not lines
     assert body["cycles"]["count"] == 7
@@ -77,7 +76,7 @@ def test_values_are_in_the_units_of_their_axes(
     scenario: str, labels: list[str], scales: tuple[float, float, float]
 ) -> None:
     plant = load_scenario(scenario).plant
-    body, lines = decoded(Frames(observed(plant.flat()), fed(5.0, 1000.0)).frame(50))
+    body, lines = decoded(fed(plant.flat(), 5.0, 1000.0).frame(50))
     motion, drive = body["motion"], plant.as_drive()
     length, speed, force = scales
     assert motion["labels"] == labels
@@ -100,7 +99,7 @@ def test_values_are_in_the_units_of_their_axes(
 
 @pytest.mark.parametrize("parameters", [{}, {"mass": 1.0, "of another version": 2.0}])
 def test_a_drive_that_is_not_known_is_shown_by_its_own_frequency(parameters: Any) -> None:
-    body, _ = decoded(Frames(observed(parameters), fed(5.0, 1000.0)).frame(PERIODS[0]))
+    body, _ = decoded(fed(parameters, 5.0, 1000.0).frame(PERIODS[0]))
     assert body["motion"]["window"] == pytest.approx(PERIODS[0] / 8.0)
     assert body["motion"]["equilibrium"] is None
     assert body["motion"]["labels"][0] == "displacement (m)"
@@ -108,12 +107,20 @@ def test_a_drive_that_is_not_known_is_shown_by_its_own_frequency(parameters: Any
 
 def test_on_a_belt_at_rest_no_place_is_the_equilibrium() -> None:
     plant = load_scenario("feed_drive", ["plant.belt_speed=0"]).plant
-    body, _ = decoded(Frames(observed(plant.flat()), fed(1.0, 1000.0)).frame(PERIODS[0]))
+    body, _ = decoded(fed(plant.flat(), 1.0, 1000.0).frame(PERIODS[0]))
     assert body["motion"]["equilibrium"] is None
 
 
 def test_a_frame_stays_small_whatever_the_rate() -> None:
     plant = load_scenario("feed_drive").plant
     for rate in (100.0, 1_000.0, 20_000.0):
-        frame = Frames(observed(plant.flat()), fed(13.0, rate)).frame(PERIODS[-1])
+        frame = fed(plant.flat(), 13.0, rate).frame(PERIODS[-1])
         assert len(frame) < 100_000
+
+
+@pytest.mark.parametrize("frequency", [0.0, 1e-300, 1e300, float("inf"), float("nan"), -1.0])
+def test_no_frequency_that_somebody_publishes_does_harm(frequency: float) -> None:
+    frames = fed({}, 5.0, 1000.0)
+    frames._observer.cycles[FREQUENCY].append(frequency)
+    body, _ = decoded(frames.frame(PERIODS[0]))
+    assert body["motion"]["window"] == PERIODS[0]

@@ -139,6 +139,32 @@ def test_a_tap_that_nobody_feels_is_said(graph: Graph, observer: ObserverNode) -
     assert outcome(graph, observer.tap(1.0, 0.1)) == "nobody listens to /test/disturbance_force"
 
 
+@pytest.mark.parametrize(
+    ("force", "duration"), [(float("nan"), 1.0), (float("inf"), 1.0), (1.0, 0.0), (1.0, 1e300)]
+)
+def test_an_impossible_tap_is_refused(
+    graph: Graph, observer: ObserverNode, force: float, duration: float
+) -> None:
+    refusal = outcome(graph, observer.tap(force, duration))
+    assert refusal.startswith("a tap needs a finite force and a time above 0, at most")
+
+
+def test_a_node_that_was_started_again_at_once_is_asked_again(
+    graph: Graph, observer: ObserverNode
+) -> None:
+    first = graph.add(PlantNode, pace="realtime", expects_control=False, damping=0.1)
+    graph.wait_until(
+        lambda: int(observer.health["plant"].figures.get("samples", 0)) > 150, "samples"
+    )
+    graph.executor.remove_node(first)
+    first.destroy_node()
+    graph.add(PlantNode, pace="realtime", expects_control=False, damping=0.3)
+    graph.wait_until(
+        lambda: observer.parameters["plant"].get("damping") == 0.3, "the parameters of the other"
+    )
+    assert SILENT not in {what.split()[-1] for _, what in observer.events}
+
+
 def test_a_push_ends_with_the_observer(graph: Graph, observer: ObserverNode) -> None:
     applied = graph.listen(APPLIED_DISTURBANCE)
     run_loop(graph, observer)

@@ -128,3 +128,27 @@ def test_a_line_is_broken_where_samples_are_missing() -> None:
         (gap,) = np.flatnonzero(np.isnan(line.y))
         assert line.x[gap - 1] == pytest.approx(-2.0)
         assert line.x[gap] == line.x[gap + 1] == pytest.approx(-0.999)
+
+
+def test_stamps_that_descend_within_a_block_begin_it_anew() -> None:
+    trace = LiveTrace(1e3)
+    block = states(range(SECOND, 2 * SECOND, 1_000_000), np.ones(1000))
+    block.stamp[500:] -= SECOND
+    trace.feed(block, NO_FORCES)
+    frame = trace.frame(1e3, 1e3, 100)
+    assert frame is not None
+    assert frame.end == pytest.approx(0.499)
+    assert frame.position.x[0] == pytest.approx(-0.499)
+
+
+def test_a_force_for_the_far_future_does_not_hide_the_others() -> None:
+    trace = LiveTrace(1e3)
+    trace.feed(
+        states(range(SECOND, 2 * SECOND, 1_000_000), np.ones(1000)),
+        forces(range(10**17, 10**17 + 1), np.ones(1)),
+    )
+    trace.feed(states(range(0), np.empty(0)), forces(range(SECOND, SECOND + 5), np.ones(5)))
+    frame = trace.frame(1e3, 1e3, 100)
+    assert frame is not None
+    assert len(frame.force.x) > 0
+    assert frame.force.x.max() < 0.0

@@ -4,8 +4,10 @@ import struct
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import orjson
 
+from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.observer import ObserverNode
 from stickslip_ros.nodes.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
@@ -27,9 +29,9 @@ _UNKNOWN_PERIOD = 1.0
 class Frames:
     """Makes frames of what an observer has heard."""
 
-    def __init__(self, observer: ObserverNode, trace: LiveTrace) -> None:
+    def __init__(self, observer: ObserverNode) -> None:
         self._observer = observer
-        self._trace = trace
+        self._trace = LiveTrace(PERIODS[-1] * _UNKNOWN_PERIOD)
         self._drive_of: tuple[Mapping[str, Any], Drive | None] = ({}, None)
 
     @property
@@ -49,8 +51,13 @@ class Frames:
         """Natural period, s, or that of the last cycle where the drive is not known."""
         if self.drive is not None:
             return self.drive.natural_period
-        frequencies = self._observer.cycles[FREQUENCY]
-        return 1.0 / frequencies[-1] if frequencies and frequencies[-1] > 0 else _UNKNOWN_PERIOD
+        frequencies = list(self._observer.cycles[FREQUENCY])[-1:]
+        return next((1.0 / f for f in frequencies if 1e-9 < f < 1e9), _UNKNOWN_PERIOD)
+
+    def feed(self, states: JointStateColumns, forces: WrenchColumns) -> None:
+        """Take in what was heard."""
+        self._trace.longest = PERIODS[-1] * self.period
+        self._trace.feed(states, forces)
 
     def frame(self, periods: int) -> bytes:
         """Return what to draw: the last `periods` natural periods, and the last cycles.
@@ -60,7 +67,6 @@ class Frames:
         each has stands in the JSON.
         """
         period, drive = self.period, self.drive
-        self._trace.longest = PERIODS[-1] * period
         frame = self._trace.frame(periods * period, _ORBIT_PERIODS * period, _BUCKETS)
         body: dict[str, Any] = {"motion": None, "cycles": self._cycles(drive)}
         lines: dict[str, list[FloatArray]] = {}
@@ -86,7 +92,8 @@ class Frames:
         text = orjson.dumps(body)
         text += b" " * (-len(text) % 4)
         columns = [column for line in lines.values() for column in line]
-        floats = (column.astype("<f4").tobytes() for column in columns)
+        with np.errstate(over="ignore"):  # what is too large for the page is off it
+            floats = [column.astype("<f4").tobytes() for column in columns]
         return b"".join([struct.pack("<I", len(text)), text, *floats])
 
     def _cycles(self, drive: Drive | None) -> dict[str, Any]:

@@ -8,7 +8,7 @@ const MARGIN = 1.08;
 const page = window.stickslip;
 const limits = {};
 const shown = {};
-let cyclesDrawn = { count: -1, at: -Infinity };
+let cyclesDrawn = { at: -Infinity };
 
 const chartOf = (name) => window.getElement(page[name])?.chart;
 
@@ -82,7 +82,10 @@ function drawLine(context, scale, { x, y }, colour, { dashed = false, stepped = 
   context.stroke();
 }
 
-function drawMotion({ lines, labels, window: width, equilibrium, belt_speed }) {
+function drawMotion({ lines, labels, window: width, end, equilibrium, belt_speed }) {
+  const last = page.motion;
+  const another = last && (String(last.labels) !== String(labels) || end < last.end);
+  if (another) page.fit(); // other units, or another run
   const { position, velocity, belt, force, orbit } = lines;
   const [displacement, speed, push] = labels;
   const speeds = range("velocity", [velocity, belt]);
@@ -121,8 +124,9 @@ function drawMotion({ lines, labels, window: width, equilibrium, belt_speed }) {
 
 function drawCycles({ count, amplitude, stick_fraction, label }) {
   const now = performance.now();
-  if (count === cyclesDrawn.count || now - cyclesDrawn.at < CYCLES_INTERVAL) return;
-  cyclesDrawn = { count, at: now };
+  const news = count !== cyclesDrawn.count || label !== cyclesDrawn.label;
+  if (!news || now - cyclesDrawn.at < CYCLES_INTERVAL) return;
+  cyclesDrawn = { count, label, at: now };
   const numbered = (values) => values.map((value, index) => [count - values.length + index + 1, value]);
   chartOf("cycles").setOption({
     yAxis: [{ name: label }, {}],

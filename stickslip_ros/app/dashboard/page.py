@@ -17,7 +17,6 @@ from stickslip_ros.app.output import quantities
 from stickslip_ros.nodes.observer import ABSENT, SILENT, Answer, Health, ObserverNode
 from stickslip_ros.nodes.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.physics.measures import Regime
-from stickslip_ros.plots.live_trace import LiveTrace
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.style import BLUE, GREY, ORANGE
 from stickslip_ros.scenario.parameters import NODE_PARAMETERS, Fixed, known_parameters
@@ -39,9 +38,8 @@ _LEVELS = ("well", "warning", "error", "stale")
 _STATE_TIMEOUT = 3.0
 
 
-def add_page(app: FastAPI, observer: ObserverNode, trace: LiveTrace) -> None:
+def add_page(app: FastAPI, observer: ObserverNode, frames: Frames) -> None:
     """Add the page, and the frames of its charts."""
-    frames = Frames(observer, trace)
     script = Path(__file__).with_name("page.js").read_text(encoding="utf-8")
 
     @app.get("/frame")
@@ -64,6 +62,7 @@ class _Page:
         self._frames = frames
         self._busy = False
         self._told = 0.0
+        self._tap_scales: tuple[float, float] | None = None
         with ui.row().classes("w-full items-center"):
             ui.label(observer.get_namespace()).classes("text-2xl font-bold")
             self._regime = ui.badge("").classes("text-base")
@@ -75,19 +74,19 @@ class _Page:
                 on_change=self._show_window,
             )
             ui.button("Fit", on_click=lambda: ui.run_javascript("stickslip.fit()"))
-        with ui.row().classes("w-full no-wrap items-start"):
-            with ui.column().classes("w-2/3"):
+        with ui.row().classes("w-full items-start lg:flex-nowrap"):
+            with ui.column().classes("w-full lg:w-2/3"):
                 trace = ui.echart(TRACE).classes("relative w-full h-[27rem]")
-                with ui.row().classes("w-full no-wrap"):
-                    portrait = ui.echart(PORTRAIT).classes("relative w-1/2 h-80")
-                    cycles = ui.echart(CYCLES).classes("w-1/2 h-80")
+                with ui.row().classes("w-full sm:flex-nowrap"):
+                    portrait = ui.echart(PORTRAIT).classes("relative w-full sm:w-1/2 h-80")
+                    cycles = ui.echart(CYCLES).classes("w-full sm:w-1/2 h-80")
                 self._add_health()
-            with ui.column().classes("w-1/3"):
+            with ui.column().classes("w-full lg:w-1/3"):
                 self._add_measures()
                 self._add_control()
                 self._add_parameters()
                 with _card("Events"):
-                    self._events = ui.log(max_lines=100).classes("w-full h-40")
+                    self._events = ui.log(max_lines=100).classes("w-full h-40 whitespace-pre-wrap")
         start = {
             "trace": trace.id,
             "portrait": portrait.id,
@@ -117,9 +116,10 @@ class _Page:
 
     def _add_control(self) -> None:
         with _card("Act"):
-            self._switch = ui.switch("washout controller", on_change=self._switch_control)
+            self._switch = ui.switch("washout controller")
+            self._switch.on("update:model-value", self._switch_control)  # by a person only
             self._switch_refusal = _refusal()
-            with ui.row().classes("items-end no-wrap"):
+            with ui.row().classes("items-end"):
                 self._tap_force = ui.number("force (N)", value=None, format="%g").classes("w-24")
                 self._tap_time = ui.number("for (s)", value=None, format="%g").classes("w-24")
                 ui.button("Tap", on_click=self._tap)
@@ -160,9 +160,11 @@ class _Page:
             label.set_text(quantities([values[-1]], unit)[0] if values else "-")
         self._show_regime(observer.health["analyzer"])
         self._trouble.set_text(", ".join(self._missing()))
-        if drive is not None and self._tap_force.value is None:
-            self._tap_force.value = float(f"{_TAP_PART * drive.normal_force:.2g}")
-            self._tap_time.value = float(f"{_TAP_PART * drive.natural_period:.2g}")
+        scales = (drive.normal_force, drive.natural_period) if drive is not None else None
+        if scales is not None and scales != self._tap_scales:
+            self._tap_scales = scales
+            for field, scale in zip((self._tap_force, self._tap_time), scales, strict=True):
+                field.value = float(f"{_TAP_PART * scale:.2g}")
         for field in self._fields:
             field.refresh()
         self._show_control(observer.health[_CONTROLLER])
@@ -176,11 +178,10 @@ class _Page:
 
     def _missing(self) -> list[str]:
         """Say which nodes of the loop are not heard."""
-        expects_control = self._observer.parameters["plant"].get("expects_control", True)
         return [
             f"{node} {health.state}"
             for node, health in self._observer.health.items()
-            if health.state in (ABSENT, SILENT) and (expects_control or node != _CONTROLLER)
+            if health.state == SILENT or (health.state == ABSENT and node != _CONTROLLER)
         ]
 
     def _show_regime(self, analyzer: Health) -> None:
@@ -196,8 +197,8 @@ class _Page:
         if not self._busy:
             self._switch.set_value(health.state == "active")
 
-    async def _switch_control(self, event: Any) -> None:
-        active = bool(event.value)
+    async def _switch_control(self) -> None:
+        active = bool(self._switch.value)
         observer = self._observer
         if self._busy or active == (observer.health[_CONTROLLER].state == "active"):
             return
@@ -214,8 +215,8 @@ class _Page:
 
     async def _tap(self) -> None:
         force, duration = self._tap_force.value, self._tap_time.value
-        if force is None or duration is None or not duration > 0.0:
-            self._act_refusal.set_text("a tap needs a force and a time above 0")
+        if force is None or duration is None:
+            self._act_refusal.set_text("a tap needs a force and a time")
             return
         await _report(self._observer.tap(force, duration), self._act_refusal)
 
@@ -270,7 +271,8 @@ class _ParameterField:
         node, _, name = full_name.partition(".")
         value = self._observer.parameters[node].get(name)
         unit = known_parameters(NODE_PARAMETERS[node])[name].unit or ""
-        return "not known" if value is None else f"now {value:g} {unit}"
+        number = f"{value:g}" if isinstance(value, float) else value
+        return "not known" if value is None else f"now {number} {unit}"
 
 
 async def _report(answer: Answer, refusal: ui.label) -> None:

@@ -4,28 +4,26 @@ import signal
 import socket
 import sys
 import threading
-from collections.abc import Generator
+from collections.abc import Awaitable, Callable, Generator
 from contextlib import contextmanager
 from itertools import count
 
 import rclpy
 import uvicorn
-from fastapi import FastAPI
+from fastapi import FastAPI, Request, Response
 from fastapi.middleware.trustedhost import TrustedHostMiddleware
-from nicegui import ui
+from nicegui import core, ui
 from rclpy.experimental import EventsExecutor
 from rclpy.task import Future
 
 from stickslip_ros.app.dashboard import DEFAULT_PORT
+from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.page import add_page
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.observer import ObserverNode
 from stickslip_ros.nodes.process import initialise, spin
-from stickslip_ros.plots.live_trace import LiveTrace
 
 _HOST = "127.0.0.1"
-_AT_FIRST = 60.0
-"""Simulated time, s, that is kept while the drive is not known."""
 
 
 def serve(namespace: str, port: int | None, reach: str) -> None:
@@ -35,14 +33,16 @@ def serve(namespace: str, port: int | None, reach: str) -> None:
     """
     listening = _listen(port)
     signal.signal(signal.SIGTERM, _exit)  # uvicorn passes it on at its end
-    trace = LiveTrace(_AT_FIRST)
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        signal.signal(signal.SIGHUP, _exit)
     initialise()
     try:
-        with _running(ObserverNode(namespace, trace.feed)) as observer:
-            app = FastAPI()
-            # A page of somebody else's, whose name leads here, may not act on the drive.
-            app.add_middleware(TrustedHostMiddleware, allowed_hosts=[_HOST, "localhost"])
-            add_page(app, observer, trace)
+        observer = ObserverNode(namespace, lambda states, forces: frames.feed(states, forces))
+        frames = Frames(observer)
+        with _running(observer):
+            app = FastAPI(openapi_url=None)
+            _keep_others_out(app)
+            add_page(app, observer, frames)
             ui.run_with(app, title=f"stickslip {namespace}", show_welcome_message=False)
             host, port = listening.getsockname()
             print(f"dashboard of {namespace}, {reach}: http://{host}:{port}", file=sys.stderr)
@@ -50,6 +50,20 @@ def serve(namespace: str, port: int | None, reach: str) -> None:
             uvicorn.Server(config).run(sockets=[listening])
     finally:
         rclpy.try_shutdown()
+
+
+def _keep_others_out(app: FastAPI) -> None:
+    """Let no page of somebody else's act on the drive: by its name, from within, or in a frame."""
+    app.add_middleware(TrustedHostMiddleware, allowed_hosts=[_HOST, "localhost"])
+    core.sio.eio.cors_allowed_origins = None  # none but the page's own
+
+    @app.middleware("http")
+    async def refuse_frames(  # pyright: ignore[reportUnusedFunction]
+        request: Request, answer: Callable[[Request], Awaitable[Response]]
+    ) -> Response:
+        response = await answer(request)
+        response.headers["Content-Security-Policy"] = "frame-ancestors 'none'"
+        return response
 
 
 def _exit(*_: object) -> None:
