@@ -202,12 +202,17 @@ def test_a_node_that_dies_and_returns_is_shown_as_that(
     assert "Traceback" not in "".join(served.said)
 
 
-def test_only_pages_of_this_machine_by_its_own_names_are_answered(start_stickslip: Start) -> None:
+def test_only_pages_of_this_machine_by_its_own_names_are_answered(
+    start_stickslip: Start, page: Page
+) -> None:
     served = Served(start_stickslip("dashboard", "--namespace", "/test"))
     address = served.url.removeprefix("http://").split(":")
     wait_for(lambda: _status(served.url) == 200, "the page")
     assert _status(served.url, Host="evil.example") == 400
-    assert _status(f"{served.url}/frame?periods=7") == 422
+    frames = served.url.replace("http", "ws") + "/frames"
+    assert _websocket_opens(page, frames) is False
+    page.goto(served.url)
+    assert _websocket_opens(page, frames) is True
     with urllib.request.urlopen(served.url) as response:
         assert response.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
     socket_io = f"{served.url}/_nicegui_ws/socket.io/?EIO=4&transport=polling"
@@ -222,6 +227,17 @@ def test_only_pages_of_this_machine_by_its_own_names_are_answered(start_sticksli
     assert taken.returncode == 2
     assert f"--port {address[1]}: Address already in use" in said
     assert "Traceback" not in said
+
+
+def _websocket_opens(page: Page, url: str) -> bool:
+    return page.evaluate(
+        """url => new Promise((resolve) => {
+            const socket = new WebSocket(url);
+            socket.onopen = () => resolve(true);
+            socket.onerror = () => resolve(false);
+        })""",
+        url,
+    )
 
 
 def _status(url: str, **headers: str) -> int:

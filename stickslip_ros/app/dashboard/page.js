@@ -16,9 +16,9 @@ const chartOf = (name) => window.getElement(page[name])?.chart;
 function range(name, lines) {
   let [low, high] = limits[name] ?? [Infinity, -Infinity];
   for (const { y } of lines) {
-    for (const value of y) {
-      if (value < low) low = value * (value < 0 ? MARGIN : 1 / MARGIN);
-      if (value > high) high = value * (value > 0 ? MARGIN : 1 / MARGIN);
+    for (let i = 0; i < y.length; i += 1) {
+      if (y[i] < low) low = y[i] * (y[i] < 0 ? MARGIN : 1 / MARGIN);
+      if (y[i] > high) high = y[i] * (y[i] > 0 ? MARGIN : 1 / MARGIN);
     }
   }
   limits[name] = [low, high];
@@ -51,7 +51,7 @@ function canvasOn(chart) {
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   context.clearRect(0, 0, width, height);
   context.lineWidth = 1.3;
-  context.lineJoin = "round";
+  context.lineJoin = "bevel";
   return context;
 }
 
@@ -59,7 +59,7 @@ function canvasOn(chart) {
 function scaleOf(chart, gridIndex) {
   const [x0, y0] = chart.convertToPixel({ gridIndex }, [0, 0]);
   const [x1, y1] = chart.convertToPixel({ gridIndex }, [1, 1]);
-  return { x: (value) => x0 + value * (x1 - x0), y: (value) => y0 + value * (y1 - y0) };
+  return { x0, y0, x1: x1 - x0, y1: y1 - y0 };
 }
 
 function drawLine(context, scale, { x, y }, colour, { dashed = false, stepped = false } = {}) {
@@ -68,11 +68,12 @@ function drawLine(context, scale, { x, y }, colour, { dashed = false, stepped = 
   context.beginPath();
   let down = false;
   for (let i = 0; i < x.length; i += 1) {
-    const [px, py] = [scale.x(x[i]), scale.y(y[i])];
+    const px = scale.x0 + x[i] * scale.x1;
+    const py = scale.y0 + y[i] * scale.y1;
     if (Number.isNaN(py)) {
       down = false; // samples are missing
     } else if (down) {
-      if (stepped) context.lineTo(px, scale.y(y[i - 1]));
+      if (stepped) context.lineTo(px, scale.y0 + y[i - 1] * scale.y1);
       context.lineTo(px, py);
     } else {
       context.moveTo(px, py);
@@ -118,7 +119,8 @@ function drawMotion({ lines, labels, window: width, end, equilibrium, belt_speed
   const scale = scaleOf(portrait, 0);
   drawLine(plane, scale, orbit, BLUE);
   plane.beginPath();
-  plane.arc(scale.x(orbit.x.at(-1)), scale.y(orbit.y.at(-1)), 4, 0, 2 * Math.PI);
+  const [x, y] = [orbit.x.at(-1), orbit.y.at(-1)];
+  plane.arc(scale.x0 + x * scale.x1, scale.y0 + y * scale.y1, 4, 0, 2 * Math.PI);
   plane.fill();
 }
 
@@ -135,10 +137,7 @@ function drawCycles({ count, amplitude, stick_fraction, label }) {
 }
 
 // A frame is the length of some JSON, that JSON, and behind it the x and y of the lines it names.
-async function fetchFrame() {
-  const response = await fetch(`frame?periods=${page.periods}`);
-  if (!response.ok) return null;
-  const bytes = await response.arrayBuffer();
+function read(bytes) {
   const [size] = new Uint32Array(bytes, 0, 1);
   const frame = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, size)));
   if (frame.motion) {
@@ -162,22 +161,27 @@ function draw({ motion, cycles }) {
   page.motion = motion;
 }
 
-// While one frame is drawn, the next one is on its way.
-async function loop(coming) {
-  const started = performance.now();
-  const visible = !document.hidden && chartOf("trace") && chartOf("portrait") && chartOf("cycles");
-  let next = null;
-  try {
-    const frame = await coming;
-    next = visible ? fetchFrame() : null;
-    next?.catch(() => {}); // the server has gone; NiceGUI says so on the page
-    if (frame && visible) draw(frame);
-  } catch (error) {
-    console.debug(error);
-  }
-  setTimeout(() => loop(next), Math.max(INTERVAL - (performance.now() - started), 0));
+function follow() {
+  const socket = new WebSocket(`ws://${location.host}/frames`);
+  socket.binaryType = "arraybuffer";
+  let asked = 0;
+  const ask = () => {
+    if (socket.readyState !== WebSocket.OPEN) return;
+    if (document.hidden || !(chartOf("trace") && chartOf("portrait") && chartOf("cycles"))) {
+      setTimeout(ask, 100);
+      return;
+    }
+    asked = performance.now();
+    socket.send(String(page.periods));
+  };
+  socket.onopen = ask;
+  socket.onmessage = ({ data }) => {
+    draw(read(data));
+    setTimeout(ask, Math.max(asked + INTERVAL - performance.now(), 0));
+  };
+  socket.onclose = () => setTimeout(follow, 1000);
 }
 
 page.fit = () => Object.keys(limits).forEach((name) => delete limits[name]);
 page.frames = 0;
-page.start = () => loop(null);
+page.start = follow;

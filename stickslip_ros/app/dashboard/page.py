@@ -4,11 +4,11 @@ import asyncio
 import json
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from fastapi import FastAPI, HTTPException
-from fastapi.responses import Response
+from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 from nicegui import ui
 
 from stickslip_ros.app.dashboard.charts import CYCLES, PORTRAIT, TRACE
@@ -29,8 +29,6 @@ _FIRST = (
     f"{_CONTROLLER}.corner_frequency",
 )
 """Parameters with a field of their own; the others are chosen from a list."""
-_UNCOMPRESSED = {"Content-Encoding": "identity"}
-"""To compress a frame takes longer than the loopback does."""
 _REFRESH = 0.25
 _TAP_PART = 0.25
 """Of the normal force, and of the natural period: what a tap is at first."""
@@ -42,12 +40,17 @@ def add_page(app: FastAPI, observer: ObserverNode, frames: Frames) -> None:
     """Add the page, and the frames of its charts."""
     script = Path(__file__).with_name("page.js").read_text(encoding="utf-8")
 
-    @app.get("/frame")
-    async def frame(periods: int) -> Response:
-        if periods not in PERIODS:
-            raise HTTPException(422, f"periods={periods}: must be one of {PERIODS}")
-        body = frames.frame(periods)
-        return Response(body, headers=_UNCOMPRESSED, media_type="application/octet-stream")
+    @app.websocket("/frames")
+    async def send_frames(socket: WebSocket) -> None:
+        """Answer each request, for so many periods, with a frame."""
+        if socket.headers.get("origin") != f"http://{socket.headers.get('host')}":
+            await socket.close()  # a page of somebody else's
+            return
+        await socket.accept()
+        with suppress(WebSocketDisconnect):
+            while (periods := await socket.receive_text()) in map(str, PERIODS):
+                await socket.send_bytes(frames.frame(int(periods)))
+            await socket.close()
 
     @ui.page("/")
     def page() -> None:

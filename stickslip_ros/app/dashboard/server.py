@@ -46,7 +46,12 @@ def serve(namespace: str, port: int | None, reach: str) -> None:
             ui.run_with(app, title=f"stickslip {namespace}", show_welcome_message=False)
             host, port = listening.getsockname()
             print(f"dashboard of {namespace}, {reach}: http://{host}:{port}", file=sys.stderr)
-            config = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=1)
+            config = uvicorn.Config(
+                app,
+                log_level="warning",
+                timeout_graceful_shutdown=1,
+                ws_per_message_deflate=False,  # it would take longer than the loopback
+            )
             uvicorn.Server(config).run(sockets=[listening])
     finally:
         rclpy.try_shutdown()
