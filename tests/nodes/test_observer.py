@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.parameter import Parameter
 
 from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
@@ -9,7 +10,13 @@ from stickslip_ros.nodes import observer as observer_module
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.observer import ABSENT, SILENT, Answer, ObserverNode
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.topics import AMPLITUDE, APPLIED_DISTURBANCE, FREQUENCY, STICK_FRACTION
+from stickslip_ros.nodes.topics import (
+    AMPLITUDE,
+    APPLIED_DISTURBANCE,
+    DIAGNOSTICS,
+    FREQUENCY,
+    STICK_FRACTION,
+)
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
 
@@ -163,6 +170,22 @@ def test_a_node_that_was_started_again_at_once_is_asked_again(
         lambda: observer.parameters["plant"].get("damping") == 0.3, "the parameters of the other"
     )
     assert SILENT not in {what.split()[-1] for _, what in observer.events}
+
+
+def test_health_is_kept_of_few_whatever_somebody_publishes(
+    graph: Graph, observer: ObserverNode
+) -> None:
+    publisher = graph.observer.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, 100)
+    statuses = [DiagnosticStatus(name=f"/test/<b>{number}</b>") for number in range(200)]
+    message = DiagnosticArray(status=[*statuses, DiagnosticStatus(name="/test/plant")])
+    message.status[-1].message = "the last of them"
+
+    def heard() -> bool:
+        publisher.publish(message)
+        return observer.health["plant"].message == "the last of them"
+
+    graph.wait_until(heard, "the diagnostics")
+    assert len(observer.health) == 50
 
 
 def test_a_push_ends_with_the_observer(graph: Graph, observer: ObserverNode) -> None:
