@@ -7,8 +7,9 @@ import pytest
 
 IMPORT_ALL = """
 import importlib, pkgutil, stickslip_ros
+LEFT_OUT = {left_out}
 for module in pkgutil.walk_packages(stickslip_ros.__path__, "stickslip_ros."):
-    if module.name != "stickslip_ros.pytest_plugin":
+    if not module.name.startswith(LEFT_OUT):
         importlib.import_module(module.name)
 """
 
@@ -72,9 +73,17 @@ def test_runs_in_a_new_environment(
     python = prefix / "bin" / "python"
     pip = [python, "-m", "pip", "install", "--quiet"]
     subprocess.run([*pip, f"{wheel}[ros]"], env=environment, check=True)
-    subprocess.run([python, "-c", IMPORT_ALL], cwd=tmp_path, env=environment, check=True)
+
+    def import_all_but(*left_out):
+        program = IMPORT_ALL.format(left_out=("stickslip_ros.pytest_plugin", *left_out))
+        subprocess.run([python, "-c", program], cwd=tmp_path, env=environment, check=True)
+
+    import_all_but("stickslip_ros.app.dashboard.")
 
     found = find_executables(prefix)
     assert found.keys() == executables
     for executable in found.values():
         check_executable(executable, environment | {"AMENT_PREFIX_PATH": str(prefix)})
+
+    subprocess.run([*pip, f"{wheel}[ros,dashboard]"], env=environment, check=True)
+    import_all_but()
