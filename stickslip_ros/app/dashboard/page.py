@@ -90,7 +90,6 @@ class _Page:
                 self._add_parameters()
                 with _card("Events"):
                     self._events = ui.log(max_lines=100).classes("w-full h-40")
-                    self._events.style("white-space: pre-wrap")
         start = {
             "trace": trace.id,
             "portrait": portrait.id,
