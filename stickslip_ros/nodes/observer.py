@@ -95,8 +95,8 @@ class Health:
 class ObserverNode(Collecting):
     """Listens to joint_states, control_force, limit_cycle/* and /diagnostics of a namespace.
 
-    What it has heard may be read from any thread: each value is replaced as a whole. So may the
-    requests be made.
+    What it has heard may be read from any thread: mappings are replaced as a whole, deques to be
+    copied. So may the requests be made.
     """
 
     def __init__(
@@ -188,7 +188,7 @@ class ObserverNode(Collecting):
 
         def push() -> None:
             if not self._disturbance.get_subscription_count():
-                answer.set_result(f"nobody listens to {self._disturbance.topic_name}")
+                _settle(answer, f"nobody listens to {self._disturbance.topic_name}")
                 return
             self._take()
             self._disturbance.publish(pack_wrench(self._newest, force))
@@ -196,7 +196,7 @@ class ObserverNode(Collecting):
             self.events.append((time.time(), f"pushed with {force:g} N for {duration:g} s"))
             if self._tap_timer is None:
                 self._tap_timer = self._every(_TAP_PERIOD, self._take)
-            answer.set_result("")
+            _settle(answer, "")
 
         self._call_soon(push)
         return answer
@@ -245,21 +245,17 @@ class ObserverNode(Collecting):
         """Call a service of a node; `outcome` says of its response what came of it."""
         answer = Answer()
 
-        def settle(result: str) -> None:
-            if not answer.done():
-                answer.set_result(result)
-
         def ask() -> None:
             inquiry = Inquiry(
                 self,
                 kind,
                 f"{node}/{service}",
                 request,
-                lambda response: settle(outcome(response)),
+                lambda response: _settle(answer, outcome(response)),
                 patience,
             )
             inquiry.pursue()
-            give_up = partial(settle, f"{node} does not answer")
+            give_up = partial(_settle, answer, f"{node} does not answer")
             self._inquiries.append((inquiry, time.monotonic() + _ANSWER_TIMEOUT, give_up))
 
         self._call_soon(ask)
@@ -351,6 +347,12 @@ class ObserverNode(Collecting):
         self.cycles[topic].append(message.data)
         if topic is AMPLITUDE:
             self.cycle_count += 1
+
+
+def _settle(answer: Answer, result: str) -> None:
+    """Give the answer, unless it was given or nobody waits for it any more."""
+    if not answer.done():
+        answer.set_result(result)
 
 
 def _began_anew(before: Mapping[str, str], figures: Mapping[str, str]) -> bool:

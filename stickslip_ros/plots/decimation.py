@@ -5,6 +5,9 @@ import numpy as np
 from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.physics.samples import IntArray
 
+LONGEST_GAP = 10.0
+"""Usual steps beyond which nothing is known of what was between two samples."""
+
 
 def peaks(bucket: IntArray, *columns: FloatArray) -> IntArray:
     """Return the rows to draw: of each bucket the first, the last, and each column's extremes.

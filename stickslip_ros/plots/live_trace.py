@@ -10,11 +10,9 @@ import numpy as np
 from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
 from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.physics.samples import NANOSECONDS, IntArray
-from stickslip_ros.plots.decimation import peaks
+from stickslip_ros.plots.decimation import LONGEST_GAP, peaks
 
 _MOST_ROWS = 200_000
-_LONGEST_GAP = 10
-"""Usual steps from one sample to the next that a line may bridge."""
 _ORBIT_BUCKETS = 1_000
 _FINE_BUCKETS = 10_000
 """Of what is kept, once there are too many rows: many more than a picture has pixels."""
@@ -162,7 +160,7 @@ def _line(stamp: IntArray, column: FloatArray, end: int, width: int, step: int) 
     x, y = (stamp[rows] - end) / NANOSECONDS, column[rows]
     if len(stamp) > 1:
         steps = np.diff(stamp)
-        behind = np.flatnonzero(steps > _LONGEST_GAP * max(float(np.median(steps)), step)) + 1
+        behind = np.flatnonzero(steps > LONGEST_GAP * max(float(np.median(steps)), step)) + 1
         gaps = np.searchsorted(rows, behind)
         x = np.insert(x, gaps, (stamp[behind] - end) / NANOSECONDS)
         y = np.insert(y, gaps, np.nan)

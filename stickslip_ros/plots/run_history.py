@@ -8,13 +8,10 @@ import numpy as np
 from stickslip_ros.physics.knots import FloatArray, Knots, knots_from_samples
 from stickslip_ros.physics.measures import Cycle
 from stickslip_ros.physics.samples import LARGEST
-from stickslip_ros.plots.decimation import Trace
+from stickslip_ros.plots.decimation import LONGEST_GAP, Trace
 
 _FIRST_ROWS = 20_000
 """Rows of the beginning that are kept as they are, for a phase portrait."""
-
-_GAP = 10.0
-"""Usual steps beyond which nothing is known of what was between two samples."""
 
 
 class Rows(NamedTuple):
@@ -203,4 +200,4 @@ class RunHistory:
 
 
 def _gap(time: FloatArray) -> float:
-    return _GAP * float(np.median(np.diff(time)))
+    return LONGEST_GAP * float(np.median(np.diff(time)))

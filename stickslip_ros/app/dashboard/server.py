@@ -87,7 +87,7 @@ def _listen(port: int | None) -> socket.socket:
 
 
 @contextmanager
-def _running(node: ObserverNode) -> Generator[ObserverNode]:
+def _running(node: ObserverNode) -> Generator[None]:
     """Run a node in a thread of its own."""
     executor = EventsExecutor()
     executor.add_node(node)
@@ -95,7 +95,7 @@ def _running(node: ObserverNode) -> Generator[ObserverNode]:
     thread = threading.Thread(target=spin, args=(executor, stop), name="ros", daemon=True)
     thread.start()
     try:
-        yield node
+        yield
     finally:
         stop.set_result(None)
         executor.wake()
