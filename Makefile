@@ -11,11 +11,14 @@ PYTHON ?= $(shell for python in python3.12 python3.13 python3.11 python3; do \
 # Python 3.11 comes with a pip that takes twice as long: it is replaced first.
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
-# A test that hangs fails by itself, with its name. Two at a time: half of it is waiting.
-# What was left out is told at the end, and why.
-PYTEST := $(BIN)/python -m pytest --timeout=300 --numprocesses=2 --dist=loadscope -rs
+# A test that hangs fails by itself, with its name. What was skipped is listed at the end, and why.
+# Three at a time on two cores: some of it is waiting.
+PYTEST := $(BIN)/python -m pytest --timeout=300 --numprocesses=3 --dist=worksteal -rs
 
-.PHONY: setup demo test test-long test-all lint bench screenshot clean
+# What Python compiles is kept, even if the environment says not to: the tests start hundreds.
+export PYTHONDONTWRITEBYTECODE :=
+
+.PHONY: setup demo check test-quick test test-all lint bench screenshot clean
 
 setup: $(READY)
 
@@ -48,14 +51,20 @@ $(READY): setup.py setup.cfg pyproject.toml package.xml Makefile
 demo: setup
 	$(BIN)/python -m stickslip_ros.app.demo
 
+# The loop for those who change something: linters, types, and the tests that start no process.
+check: setup
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target lint test-quick
+
+test-quick: setup
+	$(PYTEST) -m 'not process and not long' $(PYTEST_OPTIONS)
+
+# What a fresh machine should pass.
 test: setup
-	$(PYTEST) -m 'not long'
+	$(PYTEST) -m 'not long' $(PYTEST_OPTIONS)
 
-test-long: setup
-	$(PYTEST) -m long
-
+# Besides, what takes long, and what needs a browser, a network of its own or new environments.
 test-all: setup
-	$(PYTEST)
+	$(PYTEST) --hypothesis-profile=thorough $(PYTEST_OPTIONS)
 
 lint: setup
 	$(BIN)/ruff check

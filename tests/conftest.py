@@ -1,10 +1,80 @@
-import os
+"""How many examples hypothesis tries, and in which tier a test is.
 
+A test that takes a fixture which starts a process is marked `process` by that; one that starts a
+process in another way has to say so, and fails where it does not.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from multiprocessing.process import BaseProcess
+
+import pytest
 from hypothesis import settings
 
 # How long an example takes says more of the machine than of the code. Where nobody looks on,
 # the examples are the same every time, so that what fails is the change at hand.
+THOROUGH = "thorough"
 settings.register_profile(
-    "stickslip_ros", deadline=None, derandomize=bool(os.environ.get("CI")), print_blob=True
+    "quick",
+    deadline=None,
+    derandomize=bool(os.environ.get("CI")),
+    max_examples=20,
+    print_blob=True,
 )
-settings.load_profile("stickslip_ros")
+settings.register_profile(THOROUGH, settings.get_profile("quick"), max_examples=100)
+settings.load_profile("quick")
+
+# What a shell starts in the background ignores SIGINT, and what the tests start would, too.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+STARTING_FIXTURES = {"cluster", "processes", "recorded", "start", "start_stickslip"}
+
+_STARTS = {"os.fork", "os.forkpty", "os.posix_spawn", "os.system", "subprocess.Popen"}
+_FOUND_BY_LIBRARIES = {"fc-list", "ldconfig", "/sbin/ldconfig"}
+"""Programs that libraries ask about the machine, once."""
+
+_started: list[str] = []
+
+
+def _note_start(event: str, arguments: tuple[object, ...]) -> None:
+    if event in _STARTS and (not arguments or arguments[0] not in _FOUND_BY_LIBRARIES):
+        _started.append(f"{event} {arguments[:2]}")
+
+
+sys.addaudithook(_note_start)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests whose fixtures start processes."""
+    for item in items:
+        if STARTING_FIXTURES.intersection(getattr(item, "fixturenames", ())):
+            item.add_marker("process")
+
+
+def pytest_runtest_setup() -> None:
+    """Begin before the fixtures of a module or of the session are made."""
+    _started.clear()
+
+
+@pytest.fixture(autouse=True)
+def _no_process_unless_marked(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[None]:
+    start = BaseProcess.start
+
+    def note_and_start(process: BaseProcess) -> None:
+        _started.append(f"multiprocessing {process.name}")
+        start(process)
+
+    monkeypatch.setattr(BaseProcess, "start", note_and_start)
+    yield
+    if _started and not {"long", "process"}.intersection(request.keywords):
+        pytest.fail(f"starts a process and is not marked `process`: {_started[0]}")
+
+
+@pytest.fixture
+def coarse_maps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compute the transitions of a map at fewer places than its picture would want."""
+    monkeypatch.setattr("stickslip_ros.studies.transitions._MAPPED", 20)

@@ -1,11 +1,15 @@
+import os
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import chdir
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
+from stickslip_ros.app.main import main
 from tests.nodes.conftest import domain, process_environment  # noqa: F401 - fixtures used here
 from tests.nodes.graph import PATIENCE
 
@@ -13,18 +17,22 @@ Run = Callable[..., subprocess.CompletedProcess[str]]
 
 
 @pytest.fixture
-def stickslip(process_environment: dict[str, str], tmp_path: Path) -> Run:  # noqa: F811
-    """Run a command of the entry script in an empty directory, and return what it came to."""
+def stickslip(
+    process_environment: dict[str, str],  # noqa: F811
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+) -> Run:
+    """Run a command of the entry script in an empty directory, and return what it came to.
+
+    It runs in this process; the nodes that it starts are processes all the same, and what they
+    print belongs to its output.
+    """
 
     def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-m", "stickslip_ros.app.main", *arguments],
-            cwd=tmp_path,
-            env=process_environment,
-            capture_output=True,
-            text=True,
-            timeout=3 * PATIENCE,
-        )
+        environment = mock.patch.dict(os.environ, process_environment, clear=True)
+        with environment, chdir(tmp_path), pytest.raises(SystemExit) as ended:
+            main(arguments)
+        return subprocess.CompletedProcess(arguments, ended.value.code, *capfd.readouterr())
 
     return run
 

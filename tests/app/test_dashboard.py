@@ -20,6 +20,8 @@ from tests.nodes.conftest import processes  # noqa: F401 - a fixture used here
 from tests.nodes.graph import PATIENCE, wait_for
 from tests.nodes.processes import Processes
 
+pytestmark = pytest.mark.long
+
 Start = Callable[..., subprocess.Popen[str]]
 
 SCREENSHOT = Path(__file__).parents[2] / "build" / "dashboard.png"

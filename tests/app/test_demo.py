@@ -4,8 +4,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from stickslip_ros.bags.report import report_of_bag
 from tests.nodes.graph import PATIENCE
+
+pytestmark = pytest.mark.process
 
 
 def test_before_and_after_a_bag_and_a_picture(

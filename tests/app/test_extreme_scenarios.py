@@ -6,13 +6,14 @@ from math import isfinite
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from stickslip_ros.app.simulate import simulate
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.scenario.files import Scenario, load_scenario
 from stickslip_ros.scenario.parameters import NODE_PARAMETERS, parameters_of
+from tests.examples import examples
 from tests.scenario.values import good_values
 
 PAPER = load_scenario("paper")
@@ -66,17 +67,8 @@ def _little_patience() -> Iterator[None]:
 
 
 @given(**arguments)
-@settings(max_examples=20, suppress_health_check=[HealthCheck.too_slow])
+@examples(quick=20, thorough=200, suppress_health_check=[HealthCheck.too_slow])
 def test_any_scenario_ends(
-    plant: dict[str, Any], controller: dict[str, Any], continuous: bool
-) -> None:
-    simulated(plant, controller, continuous)
-
-
-@pytest.mark.long
-@given(**arguments)
-@settings(max_examples=200, suppress_health_check=[HealthCheck.too_slow])
-def test_many_scenarios_end(
     plant: dict[str, Any], controller: dict[str, Any], continuous: bool
 ) -> None:
     simulated(plant, controller, continuous)

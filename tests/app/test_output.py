@@ -44,6 +44,7 @@ def on_terminal(command: list[str], columns: int, **environment: str) -> list[st
     return shown.decode().splitlines()
 
 
+@pytest.mark.process
 def test_a_person_gets_a_frame_and_a_colour() -> None:
     lines = on_terminal([*REPORT, str(REFERENCE)], 80)
     (regime,) = (line for line in lines if "stick_slip" in line)
@@ -51,6 +52,7 @@ def test_a_person_gets_a_frame_and_a_colour() -> None:
     assert "\x1b[" in regime
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("environment", [{"NO_COLOR": "1"}, {"TERM": "dumb"}])
 def test_colours_are_left_out_where_they_are_not_wanted(environment: dict[str, str]) -> None:
     lines = on_terminal([*REPORT, str(REFERENCE)], 80, **environment)
@@ -58,6 +60,7 @@ def test_colours_are_left_out_where_they_are_not_wanted(environment: dict[str, s
     assert re.search(r"\x1b\[[0-9;]*3[0-9]m", regime) is None
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("columns", [80, 40, 30])
 def test_nothing_is_lost_on_a_narrow_terminal(columns: int, tmp_path: Path) -> None:
     """Headings and labels may be broken over lines, figures may not."""
@@ -99,6 +102,7 @@ def test_what_would_steer_a_terminal_is_shown(capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().out == "a\\x1b[2J\nb\\n  \\x07\n"
 
 
+@pytest.mark.process
 def test_colours_forced_on_a_pipe_change_nothing() -> None:
     plain, forced = (
         subprocess.run(

@@ -105,10 +105,10 @@ def test_a_picture_says_what_a_bag_lacks(command, tmp_path):
 @pytest.mark.parametrize(
     "parameters",
     [
-        {},
-        {"mass": "100.0"},
+        pytest.param({}, marks=pytest.mark.long),
+        pytest.param({"mass": "100.0"}, marks=pytest.mark.long),
         {"mass": "[" * 100_000},
-        {"mass": '"heavy"', "friction.law": '"none"'},
+        pytest.param({"mass": '"heavy"', "friction.law": '"none"'}, marks=pytest.mark.long),
         {"mass": "-1", "belt_speed": "NaN"},
     ],
 )

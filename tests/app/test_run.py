@@ -25,7 +25,10 @@ REFERENCE = {
 }
 
 
-@pytest.mark.parametrize("belt_speed", REFERENCE)
+@pytest.mark.parametrize(
+    "belt_speed",
+    [0.2, *(pytest.param(speed, marks=pytest.mark.long) for speed in (0.3, 0.4, 0.46))],
+)
 def test_figures_from_samples_are_those_of_the_limit_cycle(
     stickslip: Run, belt_speed: float
 ) -> None:
@@ -46,6 +49,7 @@ def test_figures_from_samples_are_those_of_the_limit_cycle(
     assert figures["report"]["complete"]
 
 
+@pytest.mark.process
 def test_processes_and_composed_give_the_same_bytes(stickslip: Run, tmp_path: Path) -> None:
     payloads: dict[str, list[bytes]] = {}
     for how in ("processes", "composed"):

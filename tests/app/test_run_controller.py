@@ -16,6 +16,8 @@ from tests.app.conftest import Run
 from tests.app.test_run import children, command, is_running, wait_for_samples
 from tests.nodes.graph import PATIENCE, Graph, wait_for
 
+pytestmark = pytest.mark.process
+
 Install = Callable[..., str]
 Start = Callable[..., subprocess.Popen[str]]
 

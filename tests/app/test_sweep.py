@@ -69,6 +69,7 @@ def test_carried_both_ways_the_table_has_a_direction(stickslip: Run, tmp_path: P
     ]
 
 
+@pytest.mark.usefixtures("coarse_maps")
 def test_a_map_is_drawn_in_each_colour(stickslip: Run, tmp_path: Path) -> None:
     over = ("--over", "plant.damping=0.01:0.1:4", "--over", "plant.belt_speed=0.2:0.6:5")
     for colour in ("regime", "amplitude", "stick_fraction"):
@@ -141,7 +142,7 @@ def test_an_existing_table_is_left_alone(stickslip: Run, tmp_path: Path) -> None
 def test_interrupted_it_keeps_what_is_done_and_goes_on_from_there(
     start_stickslip: Callable[..., Popen[str]], stickslip: Run, tmp_path: Path, workers: str
 ) -> None:
-    speeds = ("--over", "plant.belt_speed=0.1:0.5:3000")
+    speeds = ("--over", "plant.belt_speed=0.1:0.5:1200")
     process = start_stickslip(*FREE, *speeds, "--workers", workers, "--out", "table.csv")
     part = tmp_path / "table.csv.part"
     deadline = time.monotonic() + PATIENCE
@@ -152,7 +153,7 @@ def test_interrupted_it_keeps_what_is_done_and_goes_on_from_there(
     process.send_signal(signal.SIGINT)
     _, messages = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
-    assert "of 3000 points are done; what is done stays in table.csv.part" in messages
+    assert "of 1200 points are done; what is done stays in table.csv.part" in messages
     assert "Traceback" not in messages
     assert not (tmp_path / "table.csv").exists()
     kept = part.read_bytes()

@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+pytestmark = pytest.mark.process
+
 WITHOUT = (
     "import sys; sys.modules[sys.argv.pop(1)] = None; sys.argv[0] = 'stickslip'; "
     "from stickslip_ros.app.main import main; main()"

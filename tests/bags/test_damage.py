@@ -8,7 +8,7 @@ from itertools import pairwise
 from operator import add
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mcap.opcode import Opcode
 
@@ -17,6 +17,7 @@ from stickslip_ros.bags.messages import pack_joint_state, pack_wrench
 from stickslip_ros.bags.recorder import QosProfile, Recorder
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import StickslipError
+from tests.examples import examples
 
 STATES = "/feed_drive/joint_states"
 FORCES = "/feed_drive/control_force"
@@ -178,14 +179,7 @@ def check(content, file, path):
     assert not (understood and set(expected) - set(read)), f"intact chunks {intact} are lost"
 
 
-@settings(max_examples=200)
+@examples(quick=50, thorough=2000)
 @given(st.data())
 def test_damage_is_survived(sound, scratch, data):
-    check(damaged(sound.content, data.draw(edits(sound))), sound, scratch)
-
-
-@pytest.mark.long
-@settings(max_examples=2000)
-@given(st.data())
-def test_damage_is_survived_two_thousand_times(sound, scratch, data):
     check(damaged(sound.content, data.draw(edits(sound))), sound, scratch)

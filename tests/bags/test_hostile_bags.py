@@ -230,6 +230,7 @@ def check_bounded(make: Callable[[Path], Path], directory: Path) -> None:
         assert used < MUCH_MEMORY
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("make", [attachment_of_a_gigabyte, endless_description])
 def test_memory_is_bounded(tmp_path: Path, make: Callable[[Path], Path]) -> None:
     check_bounded(make, tmp_path)

@@ -11,6 +11,8 @@ import pytest
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import Compression, QosProfile, Recorder
 
+pytestmark = pytest.mark.process
+
 TOPICS = ("/a", "/b")
 COMPRESSIONS: tuple[Compression, ...] = ("lz4", "zstd", "none")
 LONGEST_LIFE = 0.3

@@ -11,9 +11,6 @@ Every fenced block of a page is run, in the order of the page, in one copy of th
 
 What needs more says so in HTML comments right above it, each on a line of its own:
 
-`<!-- test: long -->`
-    Takes more than a few seconds: left out by `make test`. What needs it is long as well.
-    test_pages.py has a list of pages that are long as a whole.
 `<!-- test: with NEW for OLD -->`
     Run with NEW wherever OLD stands in it: a smaller count, or a name that the reader has to
     replace. NEW may be `$(ls -d bags/feed_drive-*Z)`. Several are allowed; OLD must be there.
@@ -37,8 +34,8 @@ What needs more says so in HTML comments right above it, each on a line of its o
     anything.
 `<!-- test: new shell -->`
     For `sh`: in a shell that knows nothing of this environment, with an index for pip. Stays in
-    force to the end of the page; use it with `long`. `$ROS_SETUP` stands in for the set-up
-    script of an installed ROS.
+    force to the end of the page. `$ROS_SETUP` stands in for the set-up script of an installed
+    ROS.
 `<!-- test: not because REASON -->`
     Nothing runs it. test_pages.py has the list of these.
 """
@@ -57,7 +54,6 @@ LANGUAGES = {"sh", "python", "yaml", "xml", "text"}
 _MARKDOWN = MarkdownIt().enable("table")
 
 _DIRECTIVES = {
-    "long": r"",
     "with": r".+ for .+",
     "beside": r".+",
     "until Ctrl-C": r".*",

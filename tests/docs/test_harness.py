@@ -21,8 +21,8 @@ from tests.docs.test_pages import check_output, in_a_row
         ("<!-- test: lnog -->\n```sh\nls\n```\n", "no directive 'lnog'"),
         ("<!-- test: file -->\n```sh\nls\n```\n", "'file' lacks something"),
         ("<!-- test: not because -->\n```sh\nls\n```\n", "'not because' lacks something"),
-        ("<!-- test: long -->\nText.\n\n```sh\nls\n```\n", "a directive without a block"),
-        ("```sh\nls\n```\n\n<!-- test: long -->\n", "a directive without a block at the end"),
+        ("<!-- test: output -->\nText.\n\n```sh\nls\n```\n", "a directive without a block"),
+        ("```sh\nls\n```\n\n<!-- test: output -->\n", "a directive without a block at the end"),
     ],
 )
 def test_what_nobody_would_run_is_refused(text: str, said: str) -> None:
@@ -31,9 +31,9 @@ def test_what_nobody_would_run_is_refused(text: str, said: str) -> None:
 
 
 def test_directives_go_with_the_block_below_them_in_a_list_too() -> None:
-    lines = ["<!-- test: with 1 for 2 -->", "<!-- test: long -->", "```sh", "echo 2", "```"]
+    lines = ["<!-- test: with 1 for 2 -->", "<!-- test: output -->", "```sh", "echo 2", "```"]
     (block,) = parse("page.md", "\n  ".join(["- Item:\n", *lines]))
-    assert block == Block("page.md", 5, "sh", "echo 2\n", {"with": ["1 for 2"], "long": [""]})
+    assert block == Block("page.md", 5, "sh", "echo 2\n", {"with": ["1 for 2"], "output": [""]})
     assert block.to_run == "echo 1\n"
 
 
@@ -54,6 +54,7 @@ def test_what_is_not_said_is_noticed(expected: str) -> None:
         check_output(expected, "one\ntwo\nthree\n")
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -18,18 +18,8 @@ from tests.docs.shell import Shell
 
 BLOCKS = {page: blocks(page) for page in pages()}
 
-SHORT, LONG = 120.0, 1200.0
+PATIENCE = 1200.0
 """What a block may take, s."""
-
-# Each of their blocks is as if marked long: they start nodes for most of what they show.
-LONG_PAGES = {
-    "docs/dashboard.md",
-    "docs/how-to/colcon.md",
-    "docs/how-to/two-machines.md",
-    "docs/tools.md",
-    "docs/topics.md",
-    "docs/tutorial.md",
-}
 
 # What cannot be run here, by page and beginning: a longer list is a decision, not an accident.
 NOT_RUN = [
@@ -55,35 +45,15 @@ def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Generator[Shell]:
         yield Shell(tmp_path, domain)
 
 
-def is_long(block: Block) -> bool:
-    return "long" in block.directives or block.page in LONG_PAGES
-
-
-def has_to_run(page: str, *, long: bool) -> bool:
-    """Whether the page has a block to run that is long, or one that is not."""
-    return any(
-        block.language != "text"
-        and "not because" not in block.directives
-        and is_long(block) == long
-        for block in BLOCKS[page]
-    )
-
-
-@pytest.mark.timeout(5 * SHORT)
-@pytest.mark.parametrize("page", [page for page in BLOCKS if has_to_run(page, long=False)])
-def test_the_quick_blocks_of_a_page_run(page: str, shell: Shell) -> None:
-    run([block for block in BLOCKS[page] if not is_long(block)], shell)
+def has_to_run(block: Block) -> bool:
+    return block.language != "text" and "not because" not in block.directives
 
 
 @pytest.mark.long
-@pytest.mark.timeout(2 * LONG)
-@pytest.mark.parametrize("page", [page for page in BLOCKS if has_to_run(page, long=True)])
-def test_all_blocks_of_a_page_run(page: str, shell: Shell) -> None:
+@pytest.mark.timeout(2 * PATIENCE)
+@pytest.mark.parametrize("page", [page for page in BLOCKS if any(map(has_to_run, BLOCKS[page]))])
+def test_the_blocks_of_a_page_run(page: str, shell: Shell) -> None:
     run(BLOCKS[page], shell)
-
-
-def test_the_long_pages_exist() -> None:
-    assert BLOCKS.keys() >= LONG_PAGES
 
 
 def test_the_blocks_that_nobody_runs_are_known() -> None:
@@ -186,12 +156,12 @@ def run_sh(block: Block, shell: Shell) -> str:
                 with shell.beside(line):
                     pass
         else:
-            said += run_script("\n".join(lines), block, shell)
+            said += run_script("\n".join(lines), shell)
     return said
 
 
-def run_script(script: str, block: Block, shell: Shell) -> str:
-    status, said = shell.run(script, LONG if is_long(block) else SHORT)
+def run_script(script: str, shell: Shell) -> str:
+    status, said = shell.run(script, PATIENCE)
     assert status == 0, f"ended with status {status}:\n{said}"
     return said
 
@@ -210,7 +180,7 @@ def run_python(block: Block, shell: Shell) -> str:
     code = "\n".join([*block.directives.get("after", []), block.to_run])
     shell.path(name).write_text(code, encoding="utf-8")
     how = "-m pytest -q -c /dev/null" if is_test else ""
-    return run_script(f"python {how} {name}", block, shell)
+    return run_script(f"python {how} {name}", shell)
 
 
 def run_yaml(block: Block, shell: Shell) -> str:

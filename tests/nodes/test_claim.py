@@ -31,6 +31,7 @@ def test_a_sandbox_that_refuses_to_bind_does_not_hinder_a_run(
         pass
 
 
+@pytest.mark.process
 def test_a_namespace_is_free_as_soon_as_its_holder_is_killed() -> None:
     # All who test on this machine share these names.
     namespace = f"/test/claimed_{os.getpid()}"

@@ -307,6 +307,7 @@ def test_a_run_that_is_open_to_the_network_is_seen_by_strangers(
         assert readers > 0
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("call", "environment"),
     [

@@ -117,6 +117,7 @@ def test_bad_parameters_end_the_process_with_one_line(
         assert text in lines[0]
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("node", ["plant", "washout_controller", "analyzer", "replay"])
 def test_help_names_every_parameter(node: str) -> None:
     shown = subprocess.run(

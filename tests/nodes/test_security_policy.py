@@ -73,6 +73,7 @@ def run(
     run.wait()
 
 
+@pytest.mark.process
 def test_each_node_is_allowed_what_it_uses_and_no_more(
     graph: Graph, run: subprocess.Popen[bytes]
 ) -> None:

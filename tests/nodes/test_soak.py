@@ -1,4 +1,4 @@
-"""Two minutes at 1 kHz beside a busy processor; `python -m benchmarks.soak` runs for longer."""
+"""A minute at 1 kHz beside a busy processor; `python -m benchmarks.soak` runs for longer."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ import pytest
 from benchmarks.soak import lines, soak
 from stickslip_ros.nodes.topics import JOINT_STATES
 
-MINUTES = 2
+MINUTES = 1
 GROWTH = 2e6
 MESSAGE = 1e3
 """Bytes, at most, that a message takes which waits for a reader."""

@@ -5,8 +5,11 @@ from email.parser import Parser
 
 import pytest
 
+pytestmark = pytest.mark.long
+
 IMPORT_ALL = """
 import importlib, pkgutil, stickslip_ros
+
 LEFT_OUT = {left_out}
 for module in pkgutil.walk_packages(stickslip_ros.__path__, "stickslip_ros."):
     if not module.name.startswith(LEFT_OUT):
@@ -63,7 +66,6 @@ def test_names_its_extras(content, stem):
     assert metadata["Requires-Python"] == ">=3.11"
 
 
-@pytest.mark.long
 def test_runs_in_a_new_environment(
     wheel, tmp_path, environment, executables, find_executables, check_executable
 ):

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.knots import Knots
 from stickslip_ros.physics.measures import Cycle, CycleMeter, Measures, Regime
 from stickslip_ros.physics.motion import Motion
+from tests.examples import examples
 from tests.physics.drives import PAPER
 
 ABOVE_HOPF = replace(PAPER, belt_speed=0.6)
@@ -217,7 +218,7 @@ def fed_one_by_one(*motion: Any) -> tuple[list[Cycle], Measures]:
 
 @pytest.mark.parametrize("motion", MOTIONS.values(), ids=MOTIONS.keys())
 @given(data=st.data())
-@settings(max_examples=30)
+@examples(quick=10, thorough=30)
 def test_the_size_of_the_blocks_does_not_matter(
     motion: tuple[Drive, float, float, float], data: st.DataObject
 ) -> None:

@@ -4,11 +4,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.friction import Exponential, Stribeck
+from tests.examples import examples
 from tests.physics.courses import Course, courses
 
 # Gauss-Legendre quadrature: eight nodes are exact to rounding for what changes by a factor of e, or
@@ -100,20 +101,13 @@ def check_energy(course: Course) -> None:
 
 
 @given(courses())
-@settings(max_examples=30)
+@examples(quick=15, thorough=1000)
 def test_energy_gained_is_the_work_done(course: Course) -> None:
     check_energy(course)
 
 
-@pytest.mark.long
 @given(courses())
-@settings(max_examples=1000)
-def test_energy_gained_is_the_work_done_in_many_motions(course: Course) -> None:
-    check_energy(course)
-
-
-@given(courses())
-@settings(max_examples=30)
+@examples(quick=15, thorough=100)
 def test_friction_holds_no_more_than_its_limit(course: Course) -> None:
     works = measured_works(course)
     limit = course.drive.friction.static * course.drive.normal_force
@@ -160,15 +154,8 @@ SUDDEN = Course(
 
 @given(courses(), cuts)
 @example(course=SUDDEN, cuts=[])
-@settings(max_examples=40)
+@examples(quick=15, thorough=1000)
 def test_cutting_into_steps_changes_nothing(course: Course, cuts: list[float]) -> None:
-    check_cutting(course, cuts)
-
-
-@pytest.mark.long
-@given(courses(), cuts)
-@settings(max_examples=1000)
-def test_cutting_many_motions_into_steps_changes_nothing(course: Course, cuts: list[float]) -> None:
     check_cutting(course, cuts)
 
 
@@ -184,7 +171,7 @@ ROUNDED = Course(
 
 @given(courses(), cuts)
 @example(course=ROUNDED, cuts=[0.71875, 2.2250738585e-313])
-@settings(max_examples=50)
+@examples(quick=15, thorough=100)
 def test_knots_never_run_back(course: Course, cuts: list[float]) -> None:
     motion = course.motion()
     times: list[float] = []
@@ -200,7 +187,7 @@ def test_knots_never_run_back(course: Course, cuts: list[float]) -> None:
 
 
 @given(courses())
-@settings(max_examples=50)
+@examples(quick=15, thorough=100)
 def test_si_units_give_the_dimensionless_motion(course: Course) -> None:
     outcome = course.run()
     assume(outcome is not None)

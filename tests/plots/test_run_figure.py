@@ -253,7 +253,14 @@ def test_what_goes_back_in_time_is_left_out_and_said() -> None:
 
 @pytest.mark.parametrize(
     ("samples", "forces", "drive"),
-    [(0, 0, None), (0, 0, PAPER), (0, 2, None), (1, 0, PAPER), (1, 1, None), (2, 1, PAPER)],
+    [
+        (0, 0, None),
+        pytest.param(0, 0, PAPER, marks=pytest.mark.long),
+        pytest.param(0, 2, None, marks=pytest.mark.long),
+        (1, 0, PAPER),
+        pytest.param(1, 1, None, marks=pytest.mark.long),
+        (2, 1, PAPER),
+    ],
 )
 def test_very_little_makes_a_picture_too(
     tmp_path: Path, samples: int, forces: int, drive: Drive | None
@@ -296,6 +303,7 @@ def hour_of(blocks: Sequence[int]) -> RunHistory:
     return history
 
 
+@pytest.mark.long
 def test_an_hour_is_few_points_with_its_peak_and_its_shade(tmp_path: Path) -> None:
     history = hour_of([20_000] * 180)
     figure = run_figure(history, CycleMeter(20).measures(), FEED_DRIVE, title="an hour")

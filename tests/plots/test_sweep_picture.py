@@ -17,6 +17,8 @@ from stickslip_ros.studies.runner import run
 from stickslip_ros.studies.settled import Course
 from stickslip_ros.studies.study import Study
 
+pytestmark = pytest.mark.usefixtures("coarse_maps")
+
 FREE = "plant.expects_control=false"
 LINEAR = "plant.friction.law=linear"
 HYSTERESIS = (

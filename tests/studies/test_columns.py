@@ -209,6 +209,7 @@ def _peak(count: int, tmp_path: Path) -> tuple[int, int]:
     return peaks[0], peaks[1]
 
 
+@pytest.mark.long
 def test_the_memory_of_writing_a_table_is_for_one_piece_of_it(tmp_path: Path) -> None:
     # Buffers of files fill up; a column of numbers would be a megabyte.
     few, many = _peak(1_000, tmp_path), _peak(16_000, tmp_path)

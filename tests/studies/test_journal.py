@@ -98,6 +98,7 @@ with Journal(speeds(10_000, carry=carry), Path(sys.argv[1])) as journal:
 """
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("carry", [None, Carry.UP])
 def test_killed_it_goes_on_from_what_is_in_the_file(path: Path, carry: Carry | None) -> None:
     study = speeds(10_000, carry=carry)
@@ -127,7 +128,10 @@ def test_killed_it_goes_on_from_what_is_in_the_file(path: Path, carry: Carry | N
     assert expected[: len(found)] == found[: len(expected)]
 
 
-def test_cut_off_at_any_byte_it_goes_on(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("step", [19, pytest.param(1, marks=pytest.mark.long)])
+def test_cut_off_at_any_byte_it_goes_on(
+    path: Path, monkeypatch: pytest.MonkeyPatch, step: int
+) -> None:
     study = STUDIES["one chain"]
     pieces_of(monkeypatch, 2)
     expected = resumed(study, path)[1]
@@ -136,7 +140,7 @@ def test_cut_off_at_any_byte_it_goes_on(path: Path, monkeypatch: pytest.MonkeyPa
     opening, *_, third_last, second_last, last = ends
     assert last == len(whole)
     counts = {end: min(2 * lines, 9) for lines, end in enumerate(ends)}
-    for length in range(last, third_last, -1):
+    for length in range(last, third_last, -step):
         path.write_bytes(whole[:length])
         with Journal(study, path) as journal:
             assert journal.count == counts[max(end for end in ends if end <= length)]
@@ -310,8 +314,8 @@ def test_a_discarded_journal_is_gone(path: Path) -> None:
 @pytest.mark.parametrize(
     ("carry", "count", "piece", "most"),
     [
-        (None, 100_000, 100, 3.0),
-        (Carry.UP, 20_000, 100, 6.0),
+        pytest.param(None, 100_000, 100, 3.0, marks=pytest.mark.long),
+        pytest.param(Carry.UP, 20_000, 100, 6.0, marks=pytest.mark.long),
         (None, 5_000, 1, 200.0),
         (Carry.UP, 5_000, 1, 500.0),
     ],

@@ -192,7 +192,7 @@ def test_points_are_begun_before_all_are_looked_at(monkeypatch: pytest.MonkeyPat
             return super().is_done(index)
 
     monkeypatch.setattr(runner, "_SCANNED", 50)
-    with Seen(speeds(1000)) as journal:
+    with Seen(speeds(300)) as journal:
         with pytest.raises(KeyboardInterrupt):
             run(journal, progress=stop_at(1))
         assert len(looked_at) <= 50
@@ -257,6 +257,7 @@ def test_what_was_finished_when_it_is_interrupted_is_kept() -> None:
         assert [point.number for point in journal.points()] == [1, 2]
 
 
+@pytest.mark.process
 def test_interrupted_processes_end_and_what_is_done_is_kept(tmp_path: Path) -> None:
     study = speeds(60)
     path = tmp_path / "study.part"
@@ -273,6 +274,7 @@ def test_interrupted_processes_end_and_what_is_done_is_kept(tmp_path: Path) -> N
         assert list(journal.points()) == at_once(study)
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("carry", [None, Carry.BOTH])
 def test_a_worker_that_is_killed_costs_no_point(carry: Carry | None) -> None:
     study = Study(free(), Grid((MINIMUM, SPEED), carry), SHORT)
@@ -302,6 +304,7 @@ class Deadly(Grid):
         return super().values(index)
 
 
+@pytest.mark.process
 def test_workers_that_keep_dying_end_the_run_and_what_is_done_is_kept(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -337,6 +340,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.process
 def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
     script = tmp_path / "begin.py"
     script.write_text(_BEGIN)

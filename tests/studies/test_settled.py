@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.app.simulate import simulate
@@ -23,6 +23,7 @@ from stickslip_ros.studies.settled import (
     State,
     check_continuous,
 )
+from tests.examples import examples
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, LimitCycle
 from tests.studies.studies import EXPONENTIAL, paper
 
@@ -142,7 +143,7 @@ def alone() -> list[object]:
 
 
 @given(order=st.permutations(range(len(MIXED))))
-@settings(max_examples=4)
+@examples(quick=2, thorough=4)
 def test_what_was_followed_before_changes_no_bit(alone: list[object], order: list[int]) -> None:
     settler = Settler()
     with pytest.MonkeyPatch.context() as patch:

@@ -148,6 +148,7 @@ def test_what_a_release_does_was_not_changed_by_the_drives_before() -> None:
     ]
 
 
+@pytest.mark.usefixtures("coarse_maps")
 def test_a_map_has_the_sides_of_the_transitions() -> None:
     axes = Axis.parse("plant.belt_speed=0.1:0.6:2"), Axis.parse("plant.damping=0.01:0.4:2")
     study = Study(load_scenario("paper", [FREE]), Grid(axes))
@@ -162,6 +163,7 @@ def test_a_map_has_the_sides_of_the_transitions() -> None:
     assert np.array_equal(over.margins[STICKING_ONSET] > 0.0, speed < onsets)
 
 
+@pytest.mark.usefixtures("coarse_maps")
 def test_a_map_of_a_sampled_loop_with_a_long_delay_has_the_sides_of_its_limit() -> None:
     axes = (
         Axis.parse("plant.force_delay=0.3:0.6:2"),

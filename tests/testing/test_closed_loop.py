@@ -404,6 +404,7 @@ def test_nothing_is_left_behind(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.process
 def test_no_process_is_left_behind(tmp_path: Path) -> None:
     """Not even where it was started by a shell, and does not care for SIGINT."""
     ignoring = "import signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); "

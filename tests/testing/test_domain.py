@@ -49,6 +49,7 @@ def test_a_loop_meets_its_controller_whatever_ros_was_used_for_before(
     assert (int(finished.stdout) > 0) == shared_memory
 
 
+@pytest.mark.process
 def test_nobody_else_gets_the_same_domain() -> None:
     with own_domain() as first, own_domain() as second:
         assert first != second

@@ -178,7 +178,7 @@ LAWS = st.one_of(
 
 
 @pytest.mark.long
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(LAWS, st.floats(0.005, 1.0), st.floats(0.05, 1.5), st.sampled_from([1.0, -1.0]))
 def test_cycles_close_and_are_stable_in_turns(
     law: FrictionLaw, damping: float, speed: float, direction: float

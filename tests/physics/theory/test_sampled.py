@@ -5,7 +5,7 @@ from math import log, pi
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.drive import Drive
@@ -21,6 +21,7 @@ from stickslip_ros.physics.theory.sampled import (
     why_no_linear_loop,
 )
 from stickslip_ros.physics.washout import Washout, WashoutParameters
+from tests.examples import examples
 from tests.physics.drives import FEED_DRIVE, PAPER
 
 
@@ -139,7 +140,7 @@ in_step = st.fractions("1/5", 8, max_denominator=5).map(lambda share: float(shar
 
 
 @given(drives, st.one_of(rates, in_step), st.floats(0.0, 12.0), corners)
-@settings(max_examples=70)
+@examples(quick=15, thorough=70)
 @example(NEUTRAL[0], 0.2354, 0.2354 * 4.2438, 2.0)
 @example(NEUTRAL[0], 4.0 / (2.0 * pi), 0.0, 1.0)
 @example(NEUTRAL[1], 2.0 / (2.0 * pi), 2.64, 0.2)
@@ -161,7 +162,7 @@ def test_the_stable_gains_are_those_with_a_spectral_radius_below_one(
 
 
 @given(speeds, rates, st.floats(0.0, 4.0), corners)
-@settings(max_examples=40)
+@examples(quick=15, thorough=40)
 def test_at_an_end_a_multiplier_is_on_the_unit_circle(
     belt_speed: float, rate: float, periods: float, corner_frequency: float
 ) -> None:
@@ -189,7 +190,7 @@ def test_critical_gains_of_the_continuous_loop(corner_frequency: float, critical
 
 
 @given(speeds, corners)
-@settings(max_examples=25)
+@examples(quick=10, thorough=25)
 def test_the_critical_gain_tends_to_that_of_the_continuous_loop(
     belt_speed: float, corner_frequency: float
 ) -> None:
@@ -211,7 +212,7 @@ def test_the_critical_gain_tends_to_that_of_the_continuous_loop(
 
 
 @given(st.floats(0.5, 50.0), st.floats(0.0, 3.0), corners, st.floats(-1.0, 1.0))
-@settings(max_examples=30)
+@examples(quick=10, thorough=30)
 def test_a_delay_of_whole_periods_hardly_differs_from_almost_as_much(
     rate: float, periods: float, corner_frequency: float, gain: float
 ) -> None:

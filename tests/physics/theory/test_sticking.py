@@ -150,7 +150,7 @@ def test_the_speeds_in_a_sentence_are_si() -> None:
 
 
 @pytest.mark.long
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     st.one_of(
         st.builds(Stribeck, st.just(0.4), st.floats(0.1, 0.39), st.floats(0.05, 2.0)),

@@ -1,0 +1,131 @@
+"""Which changes to the physics does the suite not notice?
+
+Each mutant is a copy of the checkout with one change below `stickslip_ros/physics`: another sign,
+operator, comparison, number or condition. Which ones is drawn by the seed. Against each the tests
+that start no process are run, those of the physics first, until one fails. A mutant that survives
+is printed as it stands; some are equivalent, up to rounding, to what was there.
+"""
+
+import argparse
+import ast
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Generator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
+from pathlib import Path
+from typing import NamedTuple
+
+CHECKOUT = Path(__file__).parents[1]
+PHYSICS = Path("stickslip_ros/physics")
+TIERS = (("tests/physics",), ("tests/studies", "tests/testing", "tests/nodes", "tests/app"))
+TIMEOUT = 600.0
+
+OPERATORS = {"+": "-", "-": "+", "*": "/", "/": "*", "<": ">=", ">": "<=", "<=": ">", ">=": "<"}
+OPERATORS |= {"is": "is not", "is not": "is", "==": "!=", "!=": "==", "and": "or", "or": "and"}
+
+
+class Mutant(NamedTuple):
+    """A change of one file: what stood from `start` to `end`, bytes, and what stands there now."""
+
+    file: Path
+    line: int
+    start: int
+    end: int
+    before: str
+    after: str
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}: {self.before} -> {self.after}"
+
+
+def main() -> int:
+    """Try the mutants; return 0 whatever becomes of them."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.mutants", description=__doc__)
+    parser.add_argument("--count", type=int, default=44, help="how many (default: 44)")
+    parser.add_argument("--seed", type=int, default=0, help="which ones (default: 0)")
+    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="at a time")
+    arguments = parser.parse_args()
+    everything = list(chain.from_iterable(map(mutants_of, sorted(PHYSICS.rglob("*.py")))))
+    chosen = random.Random(arguments.seed).sample(everything, arguments.count)
+    with ThreadPoolExecutor(arguments.workers) as pool:
+        caught = list(pool.map(is_caught, chosen))
+    for mutant, noticed in zip(chosen, caught, strict=True):
+        print(f"{'caught  ' if noticed else 'SURVIVES'} {mutant}")
+    print(f"{sum(caught)} of {len(caught)} caught")
+    return 0
+
+
+def mutants_of(file: Path) -> Generator[Mutant]:
+    """Return every mutant of a file."""
+    source = (CHECKOUT / file).read_text(encoding="utf-8")
+    starts = [0]
+    for line in source.encode().splitlines(keepends=True):
+        starts.append(starts[-1] + len(line))
+
+    def place(line: int, column: int) -> int:
+        return starts[line - 1] + column
+
+    def between(one: ast.expr, other: ast.expr) -> Generator[Mutant]:
+        start = place(one.end_lineno or 0, one.end_col_offset or 0)
+        end = place(other.lineno, other.col_offset)
+        text = source.encode()[start:end].decode()
+        if (operator := text.strip("() \n")) in OPERATORS:
+            after = text.replace(operator, OPERATORS[operator])
+            yield Mutant(file, one.end_lineno or 0, start, end, operator, after)
+
+    for node in ast.walk(ast.parse(source)):
+        match node:
+            case ast.BinOp(left=left, right=right):
+                yield from between(left, right)
+            case ast.Compare(left=left, comparators=[right]):
+                yield from between(left, right)
+            case ast.BoolOp(values=[left, right, *_]):
+                yield from between(left, right)
+            case ast.UnaryOp(op=ast.USub() | ast.Not(), operand=operand):
+                start = place(node.lineno, node.col_offset)
+                end = place(operand.lineno, operand.col_offset)
+                before = source.encode()[start:end].decode()
+                yield Mutant(file, node.lineno, start, end, before, "")
+            case ast.Constant(value=float(value)) if value not in (0.0, float("inf")):
+                start = place(node.lineno, node.col_offset)
+                end = place(node.end_lineno or 0, node.end_col_offset or 0)
+                yield Mutant(file, node.lineno, start, end, str(value), repr(1.01 * value))
+            case _:
+                pass
+
+
+def is_caught(mutant: Mutant) -> bool:
+    """Return whether a test fails for the mutant."""
+    with tempfile.TemporaryDirectory() as directory:
+        copy = Path(directory) / "checkout"
+        listing = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+        for name in subprocess.check_output(listing, cwd=CHECKOUT, text=True).split("\0"):
+            if (CHECKOUT / name).is_file():
+                (copy / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(CHECKOUT / name, copy / name)
+        text = (copy / mutant.file).read_bytes()
+        changed = text[: mutant.start] + mutant.after.encode() + text[mutant.end :]
+        (copy / mutant.file).write_bytes(changed)
+        return any(fails(copy, tests) for tests in TIERS)
+
+
+def fails(copy: Path, tests: Sequence[str]) -> bool:
+    """Return whether the tests of a copy fail, or do not end."""
+    pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-m", "not process and not long"]
+    environment = os.environ | {"PYTHONPATH": str(copy), "CI": "true"}
+    try:
+        done = subprocess.run(
+            [*pytest, *tests], cwd=copy, env=environment, timeout=TIMEOUT, capture_output=True
+        )
+    except subprocess.TimeoutExpired:
+        return True
+    return done.returncode != 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
