@@ -47,7 +47,8 @@ sys.addaudithook(_note_start)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests whose fixtures start processes."""
+    """Mark the tests whose fixtures start processes, and begin with those that take minutes."""
+    items.sort(key=lambda item: ("test_pages" not in item.nodeid, "long" not in item.keywords))
     for item in items:
         if STARTING_FIXTURES.intersection(getattr(item, "fixturenames", ())):
             item.add_marker("process")

@@ -232,10 +232,13 @@ def test_a_controller_that_does_not_start(
 
 
 @pytest.mark.long
-def test_a_controller_that_never_closes_the_loop(stickslip: Run, install: Install) -> None:
+def test_a_controller_that_never_closes_the_loop(
+    stickslip: Run, install: Install, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stickslip_ros.nodes.bringup._READY_TIMEOUT", 10.0)
     done = stickslip("run", "paper", "--controller", install(damper("ForceOnly")))
     assert done.returncode == 1
-    assert "my_controllers/damper was not ready within 30 s" in done.stderr
+    assert "my_controllers/damper was not ready within 10 s" in done.stderr
     lacking = "publishes /feed_drive/control_force but does not read /feed_drive/joint_states"
     assert f"/feed_drive/damper {lacking}" in done.stderr.splitlines()[-1]
 

@@ -179,7 +179,7 @@ def check(content, file, path):
     assert not (understood and set(expected) - set(read)), f"intact chunks {intact} are lost"
 
 
-@examples(quick=50, thorough=2000)
+@examples(quick=50, thorough=500)
 @given(st.data())
 def test_damage_is_survived(sound, scratch, data):
     check(damaged(sound.content, data.draw(edits(sound))), sound, scratch)

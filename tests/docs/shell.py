@@ -49,6 +49,9 @@ _SIGNS = {
 }
 """What programs say when they are up, if that is not seen by their nodes."""
 
+_MANAGED = re.compile(r"_node\b|nodes\.|stickslip run")
+"""Commands that start nodes which have a life cycle."""
+
 _ROS_SETUP = f"""
 export AMENT_PREFIX_PATH={sys.prefix}
 export LD_LIBRARY_PATH={os.environ.get("LD_LIBRARY_PATH", "")}
@@ -166,7 +169,7 @@ class Shell:
             assert process.poll() is None, f"has ended: {said()}"
             if sign := _of(command, _SIGNS, ""):
                 return sign in output.read_text()
-            return watch.active(self._beside) and (
+            return watch.active(self._beside, managed=bool(_MANAGED.search(command))) and (
                 "stickslip run" not in command or watch.hears_a_joint_state()
             )
 
@@ -216,13 +219,16 @@ class Watch:
         names = {f"{space.rstrip('/')}/{name}" for name, space in found if name[0] != "_"}
         return frozenset(names - {self._graph.observer.get_fully_qualified_name()})
 
-    def active(self, others: frozenset[str]) -> bool:
-        """Whether there are nodes besides others, and the managed ones among them are active."""
+    def active(self, others: frozenset[str], *, managed: bool) -> bool:
+        """Whether there are nodes besides others, and the managed ones among them are active.
+
+        A node is seen before the services of its life cycle: `managed` says that it will have some.
+        """
         nodes = self.nodes() - others
         services = {name for name, _ in self._graph.observer.get_service_names_and_types()}
-        managed = {name for name in nodes if f"{name}/get_state" in services}
-        return bool(nodes) and all(
-            self._state(name) == State.PRIMARY_STATE_ACTIVE for name in managed
+        having_states = {name for name in nodes if f"{name}/get_state" in services}
+        return bool(having_states or (nodes and not managed)) and all(
+            self._state(name) == State.PRIMARY_STATE_ACTIVE for name in having_states
         )
 
     def hears_a_joint_state(self) -> bool:

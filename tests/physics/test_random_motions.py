@@ -101,7 +101,7 @@ def check_energy(course: Course) -> None:
 
 
 @given(courses())
-@examples(quick=15, thorough=1000)
+@examples(quick=15, thorough=300)
 def test_energy_gained_is_the_work_done(course: Course) -> None:
     check_energy(course)
 
@@ -154,7 +154,7 @@ SUDDEN = Course(
 
 @given(courses(), cuts)
 @example(course=SUDDEN, cuts=[])
-@examples(quick=15, thorough=1000)
+@examples(quick=15, thorough=300)
 def test_cutting_into_steps_changes_nothing(course: Course, cuts: list[float]) -> None:
     check_cutting(course, cuts)
 
