@@ -97,6 +97,7 @@ class Shell:
             "ROS_DOMAIN_ID": str(domain),
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             "ROS_LOG_DIR": str(scratch / "log"),
+            "PIP_COMPILE": "0",
             "PORT": str(free_port()),
             "ROS_SETUP": str(scratch / "setup.bash"),
         }
