@@ -118,8 +118,8 @@ def _square_root_law() -> Observation:
         exponent < 0.1,
         remark=f"Amplitudes of the limit cycles at v0 = {listed(_FIG_12_SPEEDS)}; with the damping "
         f"of eq. 8 {listed(taken)}. They go to zero without a jump: amplitude squared over the "
-        f"distance to v_b1 is {listed(squares)} at distances {listed(distances)}, which is power "
-        f"{exponent:.3f} of it. A root is steep there.",
+        f"distance to v_b1 is {listed(squares)} at distances {listed(distances)}, and at the "
+        f"last the amplitude goes with power {exponent:.3f} of it. A root is steep there.",
     )
 
 
@@ -300,8 +300,8 @@ def _(evidence: Evidence) -> Observation:
         listed(sizes),
         falling(sizes) and all(map(falling, left.values())),
         falling(sizes) and falling(left[0.4, 2.0]),
-        "Not with every belt speed and corner frequency. "
-        f"At v0 = 0.4, d = 2, k1 = 0, k2 = {listed(gains)}: it takes k2 = {gains[-1]:g} to "
+        "Only where the filter passes the vibration and sticking does not hold its size. At "
+        f"v0 = 0.4, d = 2, k1 = 0, k2 = {listed(gains)}: it takes k2 = {gains[-1]:g} to "
         f"lower the amplitude by {1.0 - sizes[-1] / sizes[0]:.0%}. What k2 = {listed(strong[1:])} "
         f"leave of it: {'; '.join(shares)}.",
     )
