@@ -31,6 +31,11 @@ class Knots:
     def __len__(self) -> int:
         return len(self.time)
 
+    @property
+    def stuck(self) -> BoolArray:
+        """Whether the slide stuck at the knot: since the one before, or from there to the next."""
+        return self.sticking | np.append(self.sticking[1:], False)[: len(self)]
+
     def __getitem__(self, rows: slice | BoolArray) -> Self:
         return type(self)(
             self.time[rows], self.position[rows], self.velocity[rows], self.sticking[rows]

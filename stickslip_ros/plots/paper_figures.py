@@ -136,8 +136,7 @@ def _portrait(axes: Axes, portrait: Portrait) -> None:
     axes.axhline(belt_speed, color=_BELT, lw=0.8, ls="--")
     if measures.period is not None:
         axes.plot(last.position, last.velocity, color=BLUE, lw=1.6)
-        sticking = last.sticking | np.append(last.sticking[1:], False)
-        stuck = np.where(sticking, last.position, np.nan)
+        stuck = np.where(last.stuck, last.position, np.nan)
         axes.plot(stuck, np.full(len(last), belt_speed), color=ORANGE, lw=3.0)
     axes.plot(portrait.drive.equilibrium_position, 0.0, "o", color=GREEN, ms=4.0)
     axes.set_title(f"{portrait.case.label}\n{_outcome(portrait)}", fontsize=8)
@@ -157,7 +156,8 @@ def _outcome(portrait: Portrait) -> str:
     measures = portrait.measures
     outcome = REGIMES[measures.regime].label
     if portrait.runs_away:
-        return f"{outcome}: {_FRAME:g} v0 at τ = {_framed(portrait).time[-1]:.1f}"
+        time = portrait.time_beyond(_FRAME * abs(portrait.drive.belt_speed))
+        return f"{outcome}: {_FRAME:g} v0 at τ = {time:.1f}"
     if measures.period is None or measures.amplitude is None:
         return outcome
     if measures.stick_fraction:

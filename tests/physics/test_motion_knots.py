@@ -76,3 +76,18 @@ def test_a_motion_that_does_not_record_has_none() -> None:
     motion = Motion(PAPER, 0.0, 0.0)
     motion.advance(10.0)
     assert len(motion.take_knots()) == len(Knots.empty())
+
+
+def test_a_stick_begins_at_the_landing() -> None:
+    motion = Motion(PAPER, 0.0, 0.0, record=True)
+    for _ in range(1000):
+        motion.advance(0.1)
+    knots = motion.take_knots()
+    starts = np.flatnonzero(knots.stuck[1:] & ~knots.stuck[:-1]) + 1
+    assert len(starts) > 10
+    assert not knots.sticking[starts].any()
+    assert knots.velocity[knots.stuck] == pytest.approx(PAPER.belt_speed, rel=1e-12)
+    lengths = np.diff(knots.time)[knots.sticking[1:]].sum()
+    ridden = np.diff(knots.position)[knots.sticking[1:]].sum()
+    assert ridden == pytest.approx(PAPER.belt_speed * lengths)
+    assert len(Knots.empty().stuck) == 0

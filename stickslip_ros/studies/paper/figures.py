@@ -266,6 +266,7 @@ _PORTRAITS = {
         "Motion from rest with several stiffnesses",
         {
             "v0 = 0.2, β = 0.01": _stiffnesses((0.5, 1.0, 2.0, 4.0, 10.0, 50.0), 0.2),
+            "v0 = 0.2, β = 0.01: stiffer": _stiffnesses((100.0, 400.0, 1000.0), 0.2),
             "v0 = 0.439, β = 0.01": _stiffnesses((1.0, 2.0), 0.439),
         },
     ),

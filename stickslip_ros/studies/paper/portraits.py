@@ -75,6 +75,15 @@ class Portrait:
             return None
         return float(np.abs(self.last_cycles.velocity - self.drive.belt_speed).min())
 
+    def time_beyond(self, speed: float) -> float | None:
+        """Return when (s) |X'| first exceeds `speed` (m/s), None if it does not."""
+        speeds = np.abs(self.trajectory.velocity)
+        beyond = np.flatnonzero(speeds > speed)
+        if len(beyond) == 0:
+            return None
+        samples = slice(max(int(beyond[0]) - 1, 0), int(beyond[0]) + 1)
+        return float(np.interp(speed, speeds[samples], self.trajectory.time[samples]))
+
 
 def portraits(cases: Iterable[Case]) -> Iterator[Portrait]:
     """Yield the portraits of the cases, one after the other.

@@ -10,7 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stickslip_ros.physics.friction import Linear
+from stickslip_ros.physics.measures import Regime
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
+from stickslip_ros.physics.theory.limit_cycles import limit_cycles
+from stickslip_ros.studies.bifurcation import bifurcation_diagram
 from stickslip_ros.studies.paper.claims import CHAPTERS, CLAIMS, Claim, Evidence, Finding, Verdict
 from stickslip_ros.studies.paper.claims.claim import (
     Chapter,
@@ -21,8 +25,19 @@ from stickslip_ros.studies.paper.claims.claim import (
     agrees,
 )
 from stickslip_ros.studies.paper.claims.normal_form import Nonlinearity, samples
-from stickslip_ros.studies.paper.claims.reference import FILTER, expansion, hopf_point
-from stickslip_ros.studies.paper.figures import NUMBERS, PaperFigure
+from stickslip_ros.studies.paper.claims.reference import FILTER, arrivals, expansion, hopf_point
+from stickslip_ros.studies.paper.figures import (
+    NUMBERS,
+    PRINTED_SLOPE,
+    STRIBECK,
+    BifurcationFigure,
+    Panel,
+    PaperFigure,
+    PortraitFigure,
+    bifurcation_drive,
+    unit_drive,
+)
+from stickslip_ros.studies.paper.portraits import Case, portraits
 
 HOLDS, CORRECTED, FAILS = Verdict.HOLDS, Verdict.CORRECTED, Verdict.FAILS
 
@@ -39,7 +54,6 @@ KNOWN_SLIPS = {
     "fig-9-vibration": CORRECTED,
     "fig-12-subcritical": FAILS,
     "jump-subcritical": FAILS,
-    "fig-10-end": FAILS,
 }
 """What is known of the paper's slips, and what therefore must come out."""
 
@@ -245,3 +259,79 @@ def test_the_nonlinearity_of_the_closed_loop(cubic: float) -> None:
     assert sigma_of_coefficients(q) == pytest.approx(
         first_lyapunov_coefficient(at_critical_gain), rel=1e-9
     )
+
+
+def verdict(identifier: str, figure: PaperFigure | None = None) -> Finding:
+    (claim,) = (claim for claim in CLAIMS if claim.identifier == identifier)
+    return claim.check(Evidence(lambda number: figure or no_figure(number)))
+
+
+def test_enough_stiffness_ends_the_sticking(without_figures: dict[str, Finding]) -> None:
+    finding = without_figures["fig-10-end"]
+    assert finding.verdict is HOLDS
+    overruns, never = 43.12, 839.0
+    assert f"Above stiffness {overruns:g} " in finding.remark
+    assert finding.computed == f"from stiffness {never:g} on"
+    # From rest, without shooting: what the slide does on either side of these stiffnesses.
+    stiffnesses = (overruns - 0.1, overruns + 0.1, never - 1.0, never + 1.0)
+    ends = list(portraits(Case("", unit_drive(0.2, stiffness=k)) for k in stiffnesses))
+    fastest = [float(end.last_cycles.velocity.max()) for end in ends]
+    assert fastest[0] == pytest.approx(0.2, rel=1e-12)
+    assert all(speed > 0.2 * (1.0 + 1e-9) for speed in fastest[1:])
+    assert [end.measures.regime for end in ends] == [Regime.STICK_SLIP] * 3 + [Regime.PURE_SLIP]
+
+
+def test_the_friction_of_a_stick_is_that_from_the_landing_on() -> None:
+    only = PortraitFigure(6, "", (Panel("", tuple(portraits([Case("", unit_drive(0.2))]))),))
+    finding = verdict("eq-5-stick", only)
+    # A stick ends at mu_s = 0.4. It takes 0.285506954 of a period of 7.06772953, at the speed 0.2.
+    landing = 0.4 - 0.2 * 0.285506954 * 7.06772953
+    assert finding.computed == f"{landing:.4g} to 0.4 instead of 0"
+
+
+def test_a_slide_that_overruns_the_belt_sticks_less_with_a_larger_gap() -> None:
+    minima = (0.03, 0.02, 0.01, 0.001)
+    drives = [unit_drive(0.15, friction=replace(STRIBECK, minimum=m)) for m in minima]
+    fractions = [limit_cycles(drive)[0].measures.stick_fraction for drive in drives]
+    assert fractions == pytest.approx([0.53172, 0.53729, 0.52423, 0.50925], abs=1e-5)
+    assert [len(arrivals(drive)) for drive in drives] == [1, 1, 2, 2]
+
+
+def test_under_the_printed_slope_the_stick_fraction_rises_with_the_damping_and_falls() -> None:
+    law = Linear(STRIBECK.static, PRINTED_SLOPE)
+    betas = (0.12, 0.15, 0.17, 0.18, 0.2, 0.3)
+    drives = [unit_drive(0.2, damping=2.0 * beta, friction=law) for beta in betas]
+    ends = [portrait.measures.stick_fraction for portrait in portraits(Case("", d) for d in drives)]
+    assert ends == sorted(ends[:4]) + sorted(ends[4:], reverse=True)
+    assert [len(arrivals(drive)) for drive in drives] == [2, 2, 2, 1, 1, 1]
+
+
+def _diagram(number: int, values: Sequence[float]) -> BifurcationFigure:
+    drives = [bifurcation_drive(number, value) for value in values]
+    return BifurcationFigure(number, "", "", np.array(values), bifurcation_diagram(drives))
+
+
+def test_verdicts_survive_ten_times_the_range() -> None:
+    speeds = _diagram(2, [0.02, 0.05, 0.2, 0.34, 0.6, 1.0, 3.0, 10.0])
+    assert verdict("rest-at-high-speed", speeds).verdict is HOLDS
+    assert verdict("eq-3-range", speeds).verdict is CORRECTED
+    stiffnesses = _diagram(4, [0.02, 0.2, 1.0, 5.0, 50.0])
+    assert verdict("fig-4-influence", stiffnesses).verdict is CORRECTED
+    minima = (0.001, 0.01, 0.1, 0.25, 0.37, 0.39, 0.399)
+    drives = [unit_drive(0.4, friction=replace(STRIBECK, minimum=m)) for m in minima]
+    gaps = tuple(portraits(Case("", drive) for drive in drives))
+    figure = PortraitFigure(11, "", (Panel("", gaps),))
+    assert verdict("fig-11-amplitude", figure).verdict is HOLDS
+    wide = {
+        2: speeds,
+        3: _diagram(3, [0.0, 0.01, 0.05, 0.5]),
+        5: _diagram(5, [1.0, 1.1, 2.0, 11.0]),
+    }
+    (claim,) = (claim for claim in CLAIMS if claim.identifier == "what-inhibits")
+    assert claim.check(Evidence(wide.__getitem__)).verdict is HOLDS
+
+
+def test_the_amplitude_goes_to_zero_as_a_root(without_figures: dict[str, Finding]) -> None:
+    for identifier in ("fig-12-sudden", "jump"):
+        assert without_figures[identifier].verdict is FAILS
+        assert "power 0.500 " in without_figures[identifier].remark

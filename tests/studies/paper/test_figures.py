@@ -141,9 +141,10 @@ def test_what_the_other_portraits_show() -> None:
     assert falls(stick_fractions(tangent))
     assert printed[0].runs_away
     assert falls(stick_fractions(printed_slow))
-    stiffnesses, faster = portraits(10)
-    assert falls([p.measures.amplitude or 0.0 for p in stiffnesses])
-    assert all(fraction > 0.0 for fraction in stick_fractions(stiffnesses))
+    stiffnesses, stiffer, faster = portraits(10)
+    assert falls([p.measures.amplitude or 0.0 for p in [*stiffnesses, *stiffer]])
+    assert all(fraction > 0.0 for fraction in stick_fractions([*stiffnesses, *stiffer[:-1]]))
+    assert stiffer[-1].measures.regime is Regime.PURE_SLIP
     assert [p.measures.regime for p in faster] == [Regime.STICK_SLIP, Regime.PURE_SLIP]
     linear, cubic, low_corner = portraits(13)
     assert all(p.case.gains is not None for p in [*linear, *cubic, *low_corner])

@@ -9,6 +9,7 @@ import pytest
 from stickslip_ros.physics.equations import WashoutGains
 from stickslip_ros.physics.friction import Coulomb, Linear
 from stickslip_ros.physics.measures import Regime
+from stickslip_ros.physics.motion import Motion
 from stickslip_ros.studies.paper.portraits import SETTLED, Case, Portrait, portraits
 from tests.physics.drives import LIMIT_CYCLES, PAPER, LimitCycle
 
@@ -77,8 +78,12 @@ def test_what_runs_away_ends_there_and_leaves_the_others_alone() -> None:
     assert away.settling_time is None
     assert away.least_relative_speed is None
     # Computed with another integrator: the speed passes 10 at 14.6.
-    passes = np.flatnonzero(np.abs(away.trajectory.velocity) > 10.0)[0]
-    assert away.trajectory.time[passes] == pytest.approx(14.6, abs=0.15)
+    passes = away.time_beyond(10.0)
+    assert passes == pytest.approx(14.6, abs=0.05)
+    motion = Motion(RUNS_AWAY.drive, 0.0, 0.0)
+    motion.advance(passes)
+    assert abs(motion.velocity) == pytest.approx(10.0, rel=1e-3)
+    assert before.time_beyond(10.0) is None
     assert after.measures.stick_fraction == pytest.approx(before.measures.stick_fraction)
     assert after.trajectory.position.tolist() == before.trajectory.position.tolist()
 

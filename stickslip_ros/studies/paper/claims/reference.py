@@ -3,6 +3,7 @@
 Everything is dimensionless, on the unit drive of `figures`.
 """
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -13,9 +14,12 @@ from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.equations import Equations, W, WashoutGains, X, Y
 from stickslip_ros.physics.friction import FrictionLaw
 from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycles
 from stickslip_ros.physics.theory.linear import Expansion, expand
+from stickslip_ros.physics.theory.returns import follow, release_position
+from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.physics.theory.sticking import StickingOnset, sticking_onset
 from stickslip_ros.studies.paper.figures import unit_drive
 
@@ -37,8 +41,20 @@ STUDIED_SPEED = 0.49
 FILTER = WashoutGains(corner_frequency=2.0, linear=0.0, cubic=0.0)
 """A washout filter with the corner frequency that eq. 20 has; no gain."""
 
+_ROUNDING = 1e-12
+"""Share of the belt's speed within which a speed is that of the belt."""
+
+_LONG = 600.0
+"""Time in which a motion that is going to run away has done so."""
+
 BELT_SPEEDS = np.array([0.1, 0.25, 0.4, STUDIED_SPEED, 0.7, 1.0])
 """Where formulas in the belt speed are evaluated."""
+
+SLOWER = (0.02, 0.05, 0.1)
+"""Belt speeds down to a tenth of those of the figures."""
+
+FASTER = (1.0, 2.0, 5.0, 10.0)
+"""Belt speeds up to ten times those of the figures."""
 
 STATES: FloatArray = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 40))
 """Where formulas in the state X, Y, W are evaluated."""
@@ -65,6 +81,11 @@ def hopf_point(damping: float = DAMPING) -> HopfPoint:
     return point
 
 
+def overdamped_from() -> float:
+    """Return the belt speed from which on the eigenvalues are real, p = -2."""
+    return zero_between(lambda speed: trace(speed) + 2.0, hopf_point().belt_speed, 2.0)
+
+
 @cache
 def onset(damping: float = DAMPING, stiffness: float = 1.0) -> StickingOnset:
     """Return the belt speed below which the slide sticks."""
@@ -86,9 +107,40 @@ def approximate_onset(damping: float = DAMPING) -> float:
 
 
 @cache
-def cycles(belt_speed: float, damping: float = DAMPING) -> tuple[LimitCycle, ...]:
+def cycles(
+    belt_speed: float, damping: float = DAMPING, stiffness: float = 1.0
+) -> tuple[LimitCycle, ...]:
     """Return all limit cycles of the open loop, stable or not."""
-    return tuple(limit_cycles(unit_drive(belt_speed, damping=damping)))
+    return tuple(limit_cycles(unit_drive(belt_speed, damping=damping, stiffness=stiffness)))
+
+
+def only_rest_at(belt_speeds: Sequence[float]) -> bool:
+    """Return whether the equilibrium is stable at each of them, and there is no limit cycle."""
+    return all(expansion(speed).stable and not cycles(speed) for speed in belt_speeds)
+
+
+def arrivals(drive: Drive) -> list[float]:
+    """Return the reactions k x + c v0 with which a slide comes to the belt's speed.
+
+    That is after the belt let go of it, up to the first with which friction can hold it.
+    """
+    motion = _motion()
+    motion.begin(drive, release_position(drive), drive.belt_speed)
+    motion.take_knots()
+    *_, knots = follow(motion)
+    arrived = np.abs(knots.velocity - drive.belt_speed) <= _ROUNDING * drive.belt_speed
+    arrived &= np.logical_or.accumulate(knots.velocity < 0.0) & ~knots.sticking
+    reactions = drive.stiffness * knots.position[arrived] + drive.damping * drive.belt_speed
+    held = np.flatnonzero(np.abs(reactions) <= drive.normal_force * drive.friction.static)
+    return reactions[: int(held[0]) + 1 if len(held) > 0 else None].tolist()
+
+
+def stays(drive: Drive) -> bool:
+    """Return whether the motion from rest at X = 0 does not run away."""
+    motion = _motion()
+    motion.begin(drive, 0.0, 0.0)
+    motion.advance(_LONG)
+    return not motion.unbounded
 
 
 def amplitudes(belt_speed: float, damping: float = DAMPING) -> list[float]:
@@ -117,6 +169,11 @@ def time_dependent() -> bool:
     """Return whether anything in the equations changes with time but the state."""
     _, compiled = _compiled(type(unit_drive(1.0).friction), False)
     return bool(compiled.is_time_dependent)
+
+
+@cache
+def _motion() -> Motion:
+    return Motion(unit_drive(1.0), 0.0, 0.0, record=True)
 
 
 @cache

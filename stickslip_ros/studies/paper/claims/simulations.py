@@ -7,9 +7,11 @@ from math import sqrt
 
 import numpy as np
 
+from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.friction import Coulomb, Linear, Stribeck
 from stickslip_ros.physics.measures import Regime
 from stickslip_ros.physics.theory.hopf import hopf_points
+from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.studies.paper.claims.claim import (
@@ -22,16 +24,22 @@ from stickslip_ros.studies.paper.claims.claim import (
 )
 from stickslip_ros.studies.paper.claims.reference import (
     DAMPING,
+    FASTER,
     PRINTED_HOPF_SPEED,
+    SLOWER,
     STATES,
     TAKEN_DAMPING,
     TAKEN_FOR_DAMPING,
     approximate_onset,
+    arrivals,
     cycles,
     exact_onset,
     expansion,
     hopf_point,
+    only_rest_at,
+    overdamped_from,
     rates,
+    stays,
     trace,
 )
 from stickslip_ros.studies.paper.figures import (
@@ -55,12 +63,23 @@ _SAME_POINT = 1e-6
 _CLEAR_OF_HOPF = 0.98
 """Share of the Hopf speed beyond which a diagram looks at motions that are still on their way."""
 
+_SOFTEST, _STIFFEST = 1e-3, 1e5
+"""Stiffnesses beyond those of Fig. 4."""
+
 VIBRATING = (Regime.STICK_SLIP, Regime.PURE_SLIP)
 
 
 def falling(values: Sequence[float]) -> bool:
     """Return whether each value is below the one before."""
     return all(later < earlier for earlier, later in pairwise(values))
+
+
+def border(holds: Callable[[float], bool], low: float, high: float) -> float:
+    """Return up to where it holds, between `low`, where it does, and `high`, where it does not."""
+    while high - low > 1e-4:
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
 
 
 def listed(values: Sequence[float]) -> str:
@@ -282,12 +301,18 @@ def _(evidence: Evidence) -> Observation:
         for name in ("amplitude", "velocity_amplitude", "stick_fraction")
     )
     ratios = [max(values) / min(values) for values in (displacement, speed, stuck)]
+    softest, stiffest = (
+        cycles(0.2, stiffness=stiffness)[0].measures.velocity_amplitude or 0.0
+        for stiffness in (_SOFTEST, _STIFFEST)
+    )
     return Observation(
         f"amplitude changes by a factor of {ratios[0]:.3g}",
         max(ratios) < 1.5,
-        ratios[1] < 1.5,
-        f"Over a stiffness of {figure.values[0]:g} to {figure.values[-1]:g} the speed amplitude "
-        f"changes by a factor of {ratios[1]:.3g} only, but the stick fraction by {ratios[2]:.3g}.",
+        softest / stiffest < 2.5,
+        f"On the speed amplitude: over a stiffness of {figure.values[0]:g} to "
+        f"{figure.values[-1]:g} it changes by a factor of {ratios[1]:.3g}, and over one of "
+        f"{_SOFTEST:g} to {_STIFFEST:g} by {softest / stiffest:.3g}. The stick fraction changes by "
+        f"{ratios[2]:.3g}, and goes to zero (see Fig. 10).",
     )
 
 
@@ -321,11 +346,14 @@ def _(evidence: Evidence) -> Observation:
         return float(np.trace(found.jacobian))
 
     critical = zero_between(p, float(figure.values[0]), float(figure.values[-1]))
+    slippery = unit_drive(0.4, friction=replace(STRIBECK, minimum=STRIBECK.static / 1000.0))
     return Observation(
         f"from mu_s/mu_m = {critical:.4f} on",
         vibrating[-1] and not vibrating[0] and edges == 1,
         remark=f"By p = 0, at v0 = {figure.diagram.drives[0].belt_speed:g}; in the diagram from "
-        f"{figure.values[vibrating].min():.4f} on, where a vibration still dies out slowly.",
+        f"{figure.values[vibrating].min():.4f} on, where a vibration still dies out slowly. A "
+        f"ratio of 1000 too makes it vibrate below v0 = {hopf_points(slippery)[0].belt_speed:.4f} "
+        "only.",
     )
 
 
@@ -347,8 +375,9 @@ def _(evidence: Evidence) -> Observation:
     )
     return Observation(
         f"v0 = {listed([portrait.drive.belt_speed for portrait in above])}: at rest",
-        set(regimes(above)) == {Regime.EQUILIBRIUM} and off < 1e-3,
-        remark=f"The relative speed deviates from the belt's by {off:.3%} at most.",
+        set(regimes(above)) == {Regime.EQUILIBRIUM} and off < 1e-3 and only_rest_at(FASTER),
+        remark=f"The relative speed deviates from the belt's by {off:.3%} at most. At v0 = "
+        f"{listed(FASTER)} too the equilibrium is stable and shooting finds no limit cycle.",
     )
 
 
@@ -358,7 +387,7 @@ def _(evidence: Evidence) -> Observation:
 def _(evidence: Evidence) -> Observation:
     above = _of_speed(evidence, hopf_point().belt_speed, 9.0)
     times = [portrait.settling_time or 0.0 for portrait in above]
-    overdamped = zero_between(lambda speed: trace(speed) + 2.0, hopf_point().belt_speed, 2.0)
+    overdamped = overdamped_from()
     near, rates = (
         [-float(expansion(speed).eigenvalues[0].real) for speed in speeds.tolist()]
         for speeds in (
@@ -423,11 +452,14 @@ def _(_: Evidence) -> Observation:
 def _(evidence: Evidence) -> Observation:
     below = _of_speed(evidence, 0.0, exact_onset())
     fractions = stick_fractions(below)
+    slower = [cycles(speed)[0].measures.stick_fraction or 0.0 for speed in SLOWER]
     return Observation(
         f"stick fractions {listed(fractions)}",
         set(regimes(below)) == {Regime.STICK_SLIP}
-        and max(portrait.least_relative_speed or 0.0 for portrait in below) == 0.0,
-        remark=f"At v0 = {listed([portrait.drive.belt_speed for portrait in below])}.",
+        and max(portrait.least_relative_speed or 0.0 for portrait in below) == 0.0
+        and min(slower) > 0.0,
+        remark=f"At v0 = {listed([portrait.drive.belt_speed for portrait in below])}; by shooting "
+        f"{listed(slower)} at v0 = {listed(SLOWER)}.",
     )
 
 
@@ -571,11 +603,21 @@ def _(evidence: Evidence) -> Observation:
     damped = [portrait for portrait in portraits if portrait.drive.damping > 0.0]
     undamped = [portrait for portrait in portraits if portrait.drive.damping == 0.0]
     ranges = [(p.measures.amplitude or 0.0) / p.drive.belt_speed for p in undamped]
+    betas, speeds = (0.001, 1.0), (0.02, 0.2, 2.0)
+    found = [
+        cycle
+        for beta in betas
+        for speed in speeds
+        for cycle in limit_cycles(
+            unit_drive(speed, damping=2.0 * beta, friction=Coulomb(STRIBECK.static))
+        )
+    ]
     return Observation(
         f"{regimes(damped).count(Regime.EQUILIBRIUM)} of {len(damped)} dampings come to rest",
-        set(regimes(damped)) == {Regime.EQUILIBRIUM},
+        set(regimes(damped)) == {Regime.EQUILIBRIUM} and not found,
         remark="Without any damping what the start put in neither grows nor dies out: amplitude "
-        f"{listed(ranges)} belt speeds.",
+        f"{listed(ranges)} belt speeds. At v0 = {listed(speeds)} with beta = {listed(betas)} "
+        f"shooting finds {len(found)} limit cycles.",
     )
 
 
@@ -588,17 +630,23 @@ def _(evidence: Evidence) -> Observation:
     tangent, printed, slow = _slopes(evidence)
     least = [panel.portraits[0] for panel in (tangent, printed, slow)]
     vibrates = [portrait.measures.regime in VIBRATING for portrait in least]
-    trajectory = least[1].trajectory
-    fast = np.flatnonzero(np.abs(trajectory.velocity) > 10.0)
-    passes = f" The speed passes 10 at tau = {trajectory.time[fast[0]]:.1f}." if len(fast) else ""
+    fastest = [
+        border(
+            lambda v, slope=slope: stays(unit_drive(v, friction=Linear(STRIBECK.static, slope))),
+            0.01,
+            2.0,
+        )
+        for slope in (PRINTED_SLOPE, TANGENT_SLOPE)
+    ]
+    passes = least[1].time_beyond(10.0)
     return Observation(
         f"{least[1].measures.regime} with the printed slope",
         all(vibrates),
-        vibrates[0],
-        f"With half the slope, that of the Stribeck law: {least[0].measures.regime}. With the "
-        f"printed one at v0 = {least[1].drive.belt_speed:g} and {least[1].case.label} it is "
-        f"{least[1].measures.regime}, at v0 = {least[2].drive.belt_speed:g} "
-        f"{least[2].measures.regime}.{passes}",
+        vibrates[0] and vibrates[2],
+        f"On a slow belt: with the printed slope below v0 = {fastest[0]:.3f}, with half of it, "
+        f"that of the Stribeck law, below {fastest[1]:.3f}, at beta = 0.01 and from rest. On a "
+        f"faster one it runs away: at v0 = {least[1].drive.belt_speed:g} with the printed slope "
+        f"the speed passes 10 at tau = {passes or 0.0:.1f}.",
     )
 
 
@@ -610,14 +658,27 @@ def _(evidence: Evidence) -> Observation:
 def _(evidence: Evidence) -> Observation:
     panels = _slopes(evidence)
     tangent, printed, slow = (stick_fractions(panel.portraits) for panel in panels)
-    away = regimes(panels[1].portraits).count(Regime.UNBOUNDED)
+    belt_speed = panels[1].portraits[0].drive.belt_speed
+
+    def drive(beta: float) -> Drive:
+        law = Linear(STRIBECK.static, PRINTED_SLOPE)
+        return unit_drive(belt_speed, damping=2.0 * beta, friction=law)
+
+    gentle = zero_between(lambda beta: arrivals(drive(beta))[0] + STRIBECK.static, 0.1, 0.3)
+    bounded = border(lambda beta: not stays(drive(beta)), 0.0, gentle)
+    betas = np.linspace(0.1, gentle, 4).tolist()
+    runs = [limit_cycle_of_run(drive(beta), 0.0) for beta in betas]
+    overrunning = [run.measures.stick_fraction or 0.0 for run in runs if run is not None]
     return Observation(
         f"{listed(printed)} with the printed slope",
         all(_stick_falls(panel.portraits) for panel in panels),
-        _stick_falls(panels[0].portraits),
-        f"With half the slope, that of the Stribeck law: {listed(tangent)}. With the printed one "
-        f"{away} of {len(panels[1].portraits)} motions run away at the same belt speed; at v0 = "
-        f"{panels[2].portraits[0].drive.belt_speed:g} it is {listed(slow)}.",
+        all(_stick_falls(panel.portraits) for panel in (panels[0], panels[2])),
+        "Where the slide comes to the belt's speed gently enough to stick at once: with half the "
+        f"slope, that of the Stribeck law, {listed(tangent)}; with the printed one at v0 = "
+        f"{panels[2].portraits[0].drive.belt_speed:g} {listed(slow)}. At v0 = {belt_speed:g} that "
+        f"is so above beta = {gentle:.4f}; below, it overruns the belt before it sticks, and the "
+        f"stick fraction rises with the damping: {listed(overrunning)} at beta = {listed(betas)}. "
+        f"Up to beta = {bounded:.4f} the motion runs away.",
     )
 
 
@@ -657,11 +718,17 @@ def _(_: Evidence) -> Observation:
     )
 
 
+def _of_stiffnesses(evidence: Evidence) -> list[Portrait]:
+    """Return the motions of Fig. 10 at v0 = 0.2."""
+    usual, stiff, _ = evidence.portraits(10).panels
+    return [*usual.portraits, *stiff.portraits]
+
+
 @CHAPTER.statement(
     "fig-10-stick", "section 3.4, Fig. 10", "The stick fraction falls as the stiffness rises"
 )
 def _(evidence: Evidence) -> Observation:
-    portraits = evidence.portraits(10).panels[0].portraits
+    portraits = _of_stiffnesses(evidence)
     return Observation(
         listed(stick_fractions(portraits)),
         _stick_falls(portraits),
@@ -673,18 +740,28 @@ def _(evidence: Evidence) -> Observation:
 @CHAPTER.statement(
     "fig-10-end", "section 3.4, Fig. 10", "Enough stiffness ends the sticking at v0 = 0.2"
 )
-def _(evidence: Evidence) -> Observation:
-    at_02, at_onset = evidence.portraits(10).panels
-    stiffest = at_02.portraits[-1].drive.stiffness
+def _(_: Evidence) -> Observation:
+    def beyond_friction(stiffness: float, arrival: int) -> float:
+        """Return by how much friction cannot hold a slide that comes to the belt's speed."""
+        return abs(arrivals(unit_drive(0.2, stiffness=stiffness))[arrival]) - STRIBECK.static
+
+    overruns = zero_between(lambda stiffness: beyond_friction(stiffness, 0), 1.0, 100.0)
+    never = zero_between(lambda stiffness: beyond_friction(stiffness, 1), 100.0, 10_000.0)
+    stiffer = [never * factor for factor in (1.01, 10.0, 100.0)]
+    found = [cycle for stiffness in stiffer for cycle in cycles(0.2, stiffness=stiffness)]
+    less = [cycles(0.2, stiffness=never / factor)[0] for factor in (1.01, 10.0, 100.0)]
     return Observation(
-        f"{regimes(at_02.portraits).count(Regime.STICK_SLIP)} of {len(at_02.portraits)} stick",
-        Regime.PURE_SLIP in regimes(at_02.portraits),
-        remark=f"The onset of sticking moves from v0 = {exact_onset():.5f} at stiffness 1 to "
-        f"{exact_onset(stiffness=stiffest):.5f} at {stiffest:g}, towards {approximate_onset():.5f} "
-        "of averaging and no further: only between them stiffness ends sticking, as at v0 = "
-        f"{at_onset.portraits[0].drive.belt_speed:g}: "
-        + ", ".join(f"{p.case.label} {p.measures.regime}" for p in at_onset.portraits)
-        + ".",
+        f"from stiffness {never:.4g} on",
+        [cycle.measures.regime for cycle in found] == [Regime.PURE_SLIP] * len(stiffer)
+        and all(cycle.stable for cycle in found)
+        and all(cycle.measures.regime is Regime.STICK_SLIP for cycle in less),
+        remark=f"Above stiffness {overruns:.4g} the slide comes to the belt's speed with a "
+        "reaction that friction cannot hold, and overruns the belt; it sticks when it comes back "
+        f"to the belt's speed, until above {never:.4g} friction cannot hold it then either. "
+        "Shooting finds one stable cycle, which does not stick, at stiffness "
+        f"{listed(stiffer)}. Just below the onset of sticking less is enough, since that moves "
+        f"from v0 = {exact_onset():.5f} at stiffness 1 to {exact_onset(stiffness=2.0):.5f} at 2 "
+        f"and {exact_onset(stiffness=50.0):.5f} at 50.",
     )
 
 
@@ -692,7 +769,7 @@ def _(evidence: Evidence) -> Observation:
     "fig-10-size", "section 3.4, Fig. 10", "The limit cycle shrinks as the stiffness rises"
 )
 def _(evidence: Evidence) -> Observation:
-    portraits = evidence.portraits(10).panels[0].portraits
+    portraits = _of_stiffnesses(evidence)
     sizes = [amplitude(portrait) for portrait in portraits]
     speeds = [portrait.measures.velocity_amplitude or 0.0 for portrait in portraits]
     return Observation(
@@ -709,7 +786,12 @@ def _(evidence: Evidence) -> Observation:
 )
 def _(evidence: Evidence) -> Observation:
     sizes = [amplitude(portrait) for portrait in evidence.portraits(11).portraits]
-    return Observation(listed(sizes), falling(sizes), remark=_of_minima(evidence))
+    at_rest = sizes.count(0.0)
+    return Observation(
+        listed(sizes),
+        falling(sizes[: len(sizes) - at_rest]) and not any(sizes[len(sizes) - at_rest :]),
+        remark=_of_minima(evidence),
+    )
 
 
 @CHAPTER.statement(
@@ -719,8 +801,20 @@ def _(evidence: Evidence) -> Observation:
 )
 def _(evidence: Evidence) -> Observation:
     portraits = evidence.portraits(11).portraits
+    belt_speed, minima = 0.15, (0.1, 0.02, 0.001)
+
+    def drive(minimum: float) -> Drive:
+        return unit_drive(belt_speed, friction=replace(STRIBECK, minimum=minimum))
+
+    fractions = [limit_cycles(drive(m))[0].measures.stick_fraction or 0.0 for m in minima]
+    overruns = zero_between(lambda m: arrivals(drive(m))[0] + STRIBECK.static, 0.001, 0.1)
     return Observation(
-        listed(stick_fractions(portraits)), _stick_falls(portraits), remark=_of_minima(evidence)
+        listed(stick_fractions(portraits)),
+        _stick_falls(portraits) and falling(fractions[::-1]),
+        _stick_falls(portraits),
+        f"As long as the slide does not overrun the belt before it sticks. {_of_minima(evidence)} "
+        f"At v0 = {belt_speed:g}, where it does so below mu_m = {overruns:.4f}, it is "
+        f"{listed(fractions)} for mu_m = {listed(minima)}.",
     )
 
 

@@ -22,6 +22,7 @@ from stickslip_ros.studies.paper.claims.reference import (
     BELT_SPEEDS,
     DAMPING,
     PRINTED_HOPF_SPEED,
+    SLOWER,
     STATES,
     STUDIED_SPEED,
     TAKEN_DAMPING,
@@ -29,6 +30,7 @@ from stickslip_ros.studies.paper.claims.reference import (
     cycles,
     expansion,
     hopf_point,
+    overdamped_from,
     rates,
     trace,
 )
@@ -117,7 +119,8 @@ def _() -> Formula:
         at_rest - friction,
         [Correction("With the factor v0 in the last term", printed(3.0 * belt_speed))],
         "F2 is minus the change of the friction, so that -F stands in eq. 16; v_r is its value "
-        "-v0 at rest.",
+        "-v0 at rest. All this while the slide is slower than the belt: beyond, friction changes "
+        "sign.",
     )
 
 
@@ -318,11 +321,12 @@ def _() -> Formula:
                 TAKEN_FOR_DAMPING, printed_trace(BELT_SPEEDS) / 2.0 - _real_parts(TAKEN_DAMPING)
             )
         ],
+        f"From v0 = {overdamped_from():.4f} on, where both eigenvalues are real, it is their mean.",
     )
 
 
 def _real_parts(damping: float) -> FloatArray:
-    return np.array([expansion(speed, damping).eigenvalues[0].real for speed in BELT_SPEEDS])
+    return np.array([expansion(v, damping).eigenvalues.real.mean() for v in BELT_SPEEDS])
 
 
 @CHAPTER.formula(
@@ -344,7 +348,8 @@ def _() -> Formula:
             )
         ],
         f"p^2 - 4 is between {radicands.min():.4g} and {radicands.max():.4g} at the belt speeds "
-        "tried, so that the printed root is of a negative number.",
+        "tried, so that the printed root is of a negative number; from v0 = "
+        f"{overdamped_from():.4f} on it is not, and the two eigenvalues are real.",
     )
 
 
@@ -553,7 +558,7 @@ def _(_: Evidence) -> Number:
     "stable-below", "section 2", "Below v_b1 the limit cycle is stable and the equilibrium is not"
 )
 def _(_: Evidence) -> Observation:
-    speeds = (0.2, 0.4, 0.45, 0.48)
+    speeds = (*SLOWER, 0.2, 0.4, 0.45, 0.48)
     found = [cycles(speed) for speed in speeds]
     below = all(
         len(here) == 1 and here[0].stable and not expansion(speed).stable
