@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.measures import Measures
+from stickslip_ros.physics.measures import Measures, with_trend
 from stickslip_ros.plots.decimation import intervals, peaks
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.run_history import Rows, RunHistory
@@ -37,6 +37,9 @@ LAST_CYCLES = 5
 _PIXELS = 1000
 """Intervals of time in the width of a panel, of about a pixel each."""
 
+_LEAST_SPAN = 1e-6
+"""Of an axis, in the largest magnitude that is drawn on it: less is rounding."""
+
 _PART = 0.05
 """Of the run, that is enlarged where nothing is known of a period."""
 
@@ -45,6 +48,7 @@ _BELT: Any = {"color": "black", "lw": 1.0, "ls": "--", "zorder": 2.5}
 _REST: Any = {"color": GREEN, "lw": 1.2, "ls": ":", "zorder": 2.5}
 _POINT: Any = {"color": GREEN, "marker": "o", "ms": 6.0, "ls": "", "mec": "white"}
 _CONTROL: Any = {"color": ORANGE, "lw": 1.6, "drawstyle": "steps-post"}
+_HELD: Any = {"color": ORANGE, "lw": 1.2, "ls": ":", "drawstyle": "steps-post"}
 _FRICTION: Any = {"color": SKY_BLUE, "lw": 0.7}
 _EARLIER: Any = {"color": LIGHT_GREY, "lw": 0.7}
 _STICKS: Any = {"color": GREY, "lw": 5.0, "solid_capstyle": "butt", "zorder": 1.9}
@@ -115,6 +119,8 @@ def run_figure(
     ]
     if drive is not None:
         handles.insert(2, Line2D([], [], **_POINT | _REST, label="equilibrium"))
+    if picture.holds:
+        handles.append(Line2D([], [], **_HELD, label="none came, last one held"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
 
@@ -129,6 +135,12 @@ class _Picture:
         self._run = _Pane.of("the whole run", motion, history.control.columns()[0])
         self._length = units.axis("displacement", "m", motion.position)
         self._speed = units.axis("velocity", "m/s", motion.velocity, motion.belt_velocity)
+        self._holds = False
+
+    @property
+    def holds(self) -> bool:
+        """Whether no force came for a while, and what is drawn is the last one."""
+        return self._holds
 
     def over_time(self, figure: Figure, parts: GridSpecFromSubplotSpec) -> None:
         """Draw displacement, velocity and force, the whole run to the left and its end enlarged."""
@@ -147,11 +159,13 @@ class _Picture:
             self._draw_motion(position, velocity, pane)
             _draw_line(force, pane, friction[0], friction[1], newton, history.gap, **_FRICTION)
             gap = history.control_gap
+            self._holds |= _draw_held(force, pane, *control, newton, gap)
             _draw_line(force, pane, control[0], control[1], newton, gap, **_CONTROL)
             self._label_time(force, pane)
         labels = self._length[1], self._speed[1], label
         for row, of_row in zip(panels, labels, strict=True):
             row[0].set_ylabel(of_row)
+            _widen(row[0])
             for axes, pane in zip(row, (self._run, end), strict=True):
                 _shade(axes, pane)
 
@@ -267,7 +281,7 @@ class _Picture:
 
 def _found(measures: Measures, units: Units) -> str:
     """Return what the measures say, in a few words."""
-    found = [REGIMES[measures.regime].label]
+    found = [with_trend(REGIMES[measures.regime].label, measures.trend)]
     for name, value, unit in (
         ("amplitude", measures.amplitude, "m"),
         ("frequency", measures.frequency, "Hz"),
@@ -308,6 +322,28 @@ def _draw_line(
     # Between rows of neighbouring intervals nothing is missing.
     time, values = _broken(max(gap, 2.0 * length), time[drawn], values[drawn])
     axes.plot(time, values / scale, **look)
+
+
+def _draw_held(
+    axes: Axes, pane: _Pane, time: FloatArray, force: FloatArray, scale: float, gap: float
+) -> bool:
+    """Draw the forces behind which none came for a while, up to the next; return if there are."""
+    behind = np.flatnonzero(np.diff(time) > max(gap, 2.0 * (pane.end - pane.start) / _PIXELS))
+    behind = behind[(time[behind + 1] > pane.start) & (time[behind] < pane.end)]
+    rows = np.stack([behind, behind + 1, behind + 1], axis=1).ravel()
+    drawn = force[rows] / scale
+    drawn[2::3] = np.nan
+    axes.plot(time[rows], drawn, **_HELD)
+    return len(behind) > 0
+
+
+def _widen(axes: Axes) -> None:
+    """Let the upright axis span what is more than rounding of what it shows."""
+    bottom, top = axes.get_ylim()
+    least = _LEAST_SPAN * max(abs(bottom), abs(top))
+    if top - bottom < least:
+        middle = (bottom + top) / 2.0
+        axes.set_ylim(middle - least / 2.0, middle + least / 2.0)
 
 
 def _broken(gap: float, time: FloatArray, *columns: FloatArray) -> list[FloatArray]:
