@@ -150,7 +150,10 @@ class PlantNode(ManagedNode[PlantParameters]):
             complaints.append(NO_FORCE)
         complaints.append(
             self._punctuality.look(
-                loop.sample.number + 1, loop.late_forces, pacer.missed_deadlines, controlled=controlled
+                loop.sample.number + 1,
+                loop.late_forces,
+                pacer.missed_deadlines,
+                controlled=controlled,
             )
         )
         complaints += [self._dropped.complaint, *rivals(self, CONTROL_FORCE, DISTURBANCE_FORCE)]

@@ -24,7 +24,9 @@ class Punctuality:
         self._counts.clear()
         self._counts.append((0, 0, 0))
 
-    def look(self, samples: int, late_forces: int, missed_deadlines: int, *, controlled: bool) -> str:
+    def look(
+        self, samples: int, late_forces: int, missed_deadlines: int, *, controlled: bool
+    ) -> str:
         """Return what there is to complain of in the last looks, if anything.
 
         While there is no controller, be it that none is expected, no force can be late.

@@ -3,8 +3,8 @@
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import pairwise
 from enum import StrEnum
+from itertools import pairwise
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -95,9 +95,10 @@ class Measures:
     """How many cycles the means are over."""
     regime: Regime | None
     steady: bool | None = None
-    """Whether the motion has settled: the amplitudes of the cycles measured, three at least,
-    differ by no more than a thousandth; rest has lasted for the window, and small cycles around it do not grow. One that
-    runs away has settled, too. Null for fewer than three cycles, or a shorter rest."""
+    """Whether the motion has settled: the amplitudes of the cycles measured, three at least, differ
+    by no more than a thousandth; a rest has lasted for as many cycles as are measured at most, and
+    small ones around it do not grow. What runs away has settled, too. Null is too little to tell.
+    """
     trend: Trend | None = None
     """How the amplitude changes, null unless `steady` is false."""
 
@@ -240,9 +241,7 @@ class CycleMeter:
         if resting:
             return _without_cycles(mean, Regime.EQUILIBRIUM, count, steady=steady, trend=trend)
         regime = Regime.STICK_SLIP if mean.stick_fraction > 0.0 else Regime.PURE_SLIP
-        return Measures(
-            **mean._asdict(), cycles=count, regime=regime, steady=steady, trend=trend
-        )
+        return Measures(**mean._asdict(), cycles=count, regime=regime, steady=steady, trend=trend)
 
     def _lasts(self, rest: float) -> bool:
         """Return whether a rest of so long (s) has lasted for a window of the last cycles."""

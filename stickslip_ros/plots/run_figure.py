@@ -120,7 +120,7 @@ def run_figure(
     if drive is not None:
         handles.insert(2, Line2D([], [], **_POINT | _REST, label="equilibrium"))
     if picture.holds:
-        handles.append(Line2D([], [], **_HELD, label="none came, last one held"))
+        handles.append(Line2D([], [], **_HELD, label="none came: the last one"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
 
@@ -159,7 +159,7 @@ class _Picture:
             self._draw_motion(position, velocity, pane)
             _draw_line(force, pane, friction[0], friction[1], newton, history.gap, **_FRICTION)
             gap = history.control_gap
-            self._holds |= _draw_held(force, pane, *control, newton, gap)
+            self._holds |= _draw_held(force, pane, control[0], control[1], newton, gap)
             _draw_line(force, pane, control[0], control[1], newton, gap, **_CONTROL)
             self._label_time(force, pane)
         labels = self._length[1], self._speed[1], label

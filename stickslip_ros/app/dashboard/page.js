@@ -6,7 +6,7 @@ const INTERVAL = 1000 / 30;
 const CYCLES_INTERVAL = 500;
 const MARGIN = 1.08;
 const LEAST_SPAN = 1e-4; // of an axis, in its units: less is rounding
-const HELD = "dotted: none came, the last one is held";
+const HELD = "dotted: none came, the last one";
 const page = window.stickslip;
 const limits = {};
 const shown = {};
@@ -85,7 +85,7 @@ function drawLine(context, scale, { x, y }, colour, { dashed = false, stepped = 
   context.stroke();
 }
 
-// Where no force came the last one is dotted: the plant holds it.
+// Where no force came the last one is dotted: late ones leave no gap.
 function drawHeld(context, scale, { x, y }, colour) {
   context.strokeStyle = colour;
   context.setLineDash([1.5, 3]);

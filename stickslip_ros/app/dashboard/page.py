@@ -89,8 +89,12 @@ class _Page:
                 self._add_control()
                 self._add_parameters()
                 with _card("Events"):
-                    # Each line is an element of its own, which the log's style does not reach.
                     self._events = ui.log(max_lines=100).classes("w-full h-40")
+        # The area that scrolls within is as wide as its longest line unless it is told not to.
+        ui.add_css(
+            ".nicegui-log .q-scrollarea__content"
+            "{white-space: pre-wrap !important; overflow-wrap: anywhere; width: 100%}"
+        )
         start = {
             "trace": trace.id,
             "portrait": portrait.id,
@@ -162,7 +166,7 @@ class _Page:
             values = observer.cycles[topic]
             unit = {AMPLITUDE: "m", FREQUENCY: "Hz"}.get(topic, "")
             largest = max(values, default=0.0)
-            label.set_text(quantities(values[-1:], unit, largest=largest)[0] if values else "-")
+            label.set_text(quantities([values[-1]], unit, largest=largest)[0] if values else "-")
         self._show_regime(observer.health["analyzer"])
         self._trouble.set_text(", ".join(self._missing()))
         scales = (drive.normal_force, drive.natural_period) if drive is not None else None
