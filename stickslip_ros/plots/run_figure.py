@@ -165,7 +165,7 @@ class _Picture:
         labels = self._length[1], self._speed[1], label
         for row, of_row in zip(panels, labels, strict=True):
             row[0].set_ylabel(of_row)
-            _widen(row[0])
+            row[0].set_ylim(_widened(*row[0].get_ylim()))
             for axes, pane in zip(row, (self._run, end), strict=True):
                 _shade(axes, pane)
 
@@ -208,6 +208,8 @@ class _Picture:
         axes.axhline(belt_speed / speed, **_BELT)
         if self._drive is not None and belt_speed != 0.0:
             axes.plot(self._drive.equilibrium_position / length, 0.0, zorder=3.0, **_POINT)
+        axes.set_xlim(_widened(*axes.get_xlim()))
+        axes.set_ylim(_widened(*axes.get_ylim()))
 
     def cycles(self, amplitude: Axes, stick_fraction: Axes) -> None:
         """Draw amplitude and stick fraction of each cycle over time."""
@@ -218,10 +220,14 @@ class _Picture:
         if not len(time):
             _say(amplitude, "no cycle was completed")
         rows = peaks(intervals(time, _pixel(time)), *columns)
-        for axes, values in ((amplitude, columns[0] / scale), (stick_fraction, columns[1])):
+        farthest = float(np.abs(self._history.motion.position).max(initial=0.0)) / scale
+        for axes, values, least in (
+            (amplitude, columns[0] / scale, _LEAST_SPAN * farthest),
+            (stick_fraction, columns[1], 0.0),
+        ):
             marker = "." if len(time) < _PIXELS else ""
             axes.plot(time[rows], values[rows], marker=marker, ms=3.0, **_MOTION | {"lw": 0.5})
-            axes.set_ylim(0.0, 1.1 * values.max(initial=0.0) or 1.0)
+            axes.set_ylim(0.0, max(1.1 * float(values.max(initial=0.0)), least) or 1.0)
         amplitude.set_ylabel(label)
         stick_fraction.set_ylabel("stick fraction")
         self._label_time(stick_fraction, self._run)
@@ -337,13 +343,11 @@ def _draw_held(
     return len(behind) > 0
 
 
-def _widen(axes: Axes) -> None:
-    """Let the upright axis span what is more than rounding of what it shows."""
-    bottom, top = axes.get_ylim()
-    least = _LEAST_SPAN * max(abs(bottom), abs(top))
-    if top - bottom < least:
-        middle = (bottom + top) / 2.0
-        axes.set_ylim(middle - least / 2.0, middle + least / 2.0)
+def _widened(low: float, high: float) -> tuple[float, float]:
+    """Return limits of an axis that span more than the rounding of what it shows."""
+    middle = (low + high) / 2.0
+    half = max(high - low, _LEAST_SPAN * max(abs(low), abs(high))) / 2.0
+    return (low, high) if half == (high - low) / 2.0 else (middle - half, middle + half)
 
 
 def _broken(gap: float, time: FloatArray, *columns: FloatArray) -> list[FloatArray]:
