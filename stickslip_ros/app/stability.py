@@ -219,12 +219,11 @@ def _sticking(drive: Drive, notes: Notes) -> Section:
         if reason is not None:
             notes[f"sticking.{name}"] = reason
     lowest, highest = onset.followed
-    if onset.ranges and onset.ranges[0][0] == lowest:
+    if len(onset.ranges) > 1:
         notes["sticking.speed_ranges"] = (
-            f"looked for from {lowest:.4g} to {highest:.4g} m/s; the first range goes on below"
+            f"between them the slide overtakes the belt; looked for from {lowest:.4g} to "
+            f"{highest:.4g} m/s"
         )
-    elif not onset.ranges:
-        notes["sticking.speed_ranges"] = f"none from {lowest:.4g} to {highest:.4g} m/s"
     return {
         "onset_speed_approximate": onset.approximate,
         "onset_speed": onset.exact,

@@ -135,12 +135,8 @@ class _Picture:
         self._run = _Pane.of("the whole run", motion, history.control.columns()[0])
         self._length = units.axis("displacement", "m", motion.position)
         self._speed = units.axis("velocity", "m/s", motion.velocity, motion.belt_velocity)
-        self._holds = False
-
-    @property
-    def holds(self) -> bool:
+        self.holds = False
         """Whether no force came for a while, and what is drawn is the last one."""
-        return self._holds
 
     def over_time(self, figure: Figure, parts: GridSpecFromSubplotSpec) -> None:
         """Draw displacement, velocity and force, the whole run to the left and its end enlarged."""
@@ -159,8 +155,8 @@ class _Picture:
             self._draw_motion(position, velocity, pane)
             _draw_line(force, pane, friction[0], friction[1], newton, history.gap, **_FRICTION)
             gap = history.control_gap
-            self._holds |= _draw_held(force, pane, control[0], control[1], newton, gap)
             _draw_line(force, pane, control[0], control[1], newton, gap, **_CONTROL)
+            self.holds |= _draw_held(force, pane, control[0], control[1], newton, gap)
             self._label_time(force, pane)
         labels = self._length[1], self._speed[1], label
         for row, of_row in zip(panels, labels, strict=True):
@@ -336,11 +332,13 @@ def _draw_held(
     """Draw the forces behind which none came for a while, up to the next; return if there are."""
     behind = np.flatnonzero(np.diff(time) > max(gap, 2.0 * (pane.end - pane.start) / _PIXELS))
     behind = behind[(time[behind + 1] > pane.start) & (time[behind] < pane.end)]
+    if len(behind) == 0:
+        return False
     rows = np.stack([behind, behind + 1, behind + 1], axis=1).ravel()
     drawn = force[rows] / scale
     drawn[2::3] = np.nan
     axes.plot(time[rows], drawn, **_HELD)
-    return len(behind) > 0
+    return True
 
 
 def _widened(low: float, high: float) -> tuple[float, float]:
