@@ -16,8 +16,15 @@ _SCENARIO = "feed_drive"
 _DURATION = 10.0
 _SHOWN_AROUND = (0.5, 1.0)
 _FIGURES = (
-    "amplitude", "stick_fraction", "frequency", "regime", "peak_force", "resting_force"
-)  # fmt: skip
+    "amplitude",
+    "midpoint",
+    "stick_fraction",
+    "frequency",
+    "regime",
+    "trend",
+    "peak_force",
+    "resting_force",
+)
 
 
 def main() -> None:

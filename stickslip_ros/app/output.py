@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table
 from rich.text import Text
 
-from stickslip_ros.physics.measures import Regime
+from stickslip_ros.physics.measures import Regime, with_trend
 from stickslip_ros.prefixes import prefix_for
 from stickslip_ros.printable import printable
 
@@ -46,6 +46,12 @@ _STYLES: dict[str, str] = {
 }
 """Of what stands out on a terminal."""
 
+_NOISE = 1e-9
+"""Share of the largest value below which a value is rounding, and is shown as 0."""
+
+_SAME_SCALE = {"amplitude": "midpoint", "midpoint": "amplitude", "resting_force": "peak_force"}
+"""Which other quantity tells how large one is that may be rounding."""
+
 _FRAME = 3
 """Characters that the frame of a column takes, beside one for the whole table."""
 
@@ -72,8 +78,27 @@ def print_figures(title: str, columns: Mapping[str, Mapping[str, Any]]) -> None:
     rows: list[list[str]] = []
     for name, (label, unit) in _LABELS.items():
         if any(name in figures for figures in columns.values()):
-            rows.append([label, *quantities([f.get(name) for f in columns.values()], unit)])
+            values = [_shown(name, figures) for figures in columns.values()]
+            others = [figures.get(_SAME_SCALE.get(name, "")) for figures in columns.values()]
+            largest = max((abs(value) for value in others if value is not None), default=0.0)
+            rows.append([label, *quantities(values, unit, largest=largest)])
     print_table(title, ["", *columns], rows)
+
+
+def _shown(name: str, figures: Mapping[str, Any]) -> Any:
+    """Return what is shown of a figure: of a regime also whether it is steady."""
+    value = figures.get(name)
+    if name == "regime" and value is not None:
+        return with_trend(value, figures.get("trend"))
+    if name == "velocity_amplitude" and value is not None and _at_rest(figures):
+        return 0.0
+    return value
+
+
+def _at_rest(figures: Mapping[str, Any]) -> bool:
+    """Return whether all that is left of the motion is rounding."""
+    amplitude, midpoint = (figures.get(name) or 0.0 for name in ("amplitude", "midpoint"))
+    return amplitude <= _NOISE * abs(midpoint)
 
 
 def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
@@ -88,13 +113,19 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
         _print_plain(printable(title), shown[0], shown[1:])
 
 
-def quantities(values: Sequence[Any], unit: str, digits: int = 4) -> list[str]:
+def quantities(
+    values: Sequence[Any], unit: str, digits: int = 4, *, largest: float = 0.0
+) -> list[str]:
     """Return values to show with their unit, all with the SI prefix that suits the largest.
 
-    A unit that begins with a number, such as 1/s, gets no prefix.
+    A unit that begins with a number, such as 1/s, gets no prefix. What is below a billionth of the
+    largest, or of a `largest` that is not among them, is shown as 0.
     """
-    largest = max((abs(value) for value in values if isinstance(value, float)), default=0.0)
-    scale, prefix = prefix_for(largest) if unit[:1].isalpha() else (1.0, "")
+    found = max((abs(value) for value in values if isinstance(value, float)), default=0.0)
+    least = _NOISE * max(found, largest)
+    values = [0.0 if isinstance(v, float) and abs(v) < least else v for v in values]
+    found = found if found >= least else 0.0
+    scale, prefix = prefix_for(found) if unit[:1].isalpha() else (1.0, "")
     return [_text(value, scale, f" {prefix}{unit}".rstrip(), digits) for value in values]
 
 
@@ -147,7 +178,7 @@ def _print_framed(console: Console, title: str, headings: list[str], rows: list[
             _print_framed(console, f"{headings[0]} {label}".strip(), ["", ""], fields)
         return
     for row in rows:
-        table.add_row(*(Text(cell, _STYLES.get(cell, "")) for cell in row))
+        table.add_row(*(Text(cell, _STYLES.get(cell.partition(",")[0], "")) for cell in row))
     console.print(table)
 
 

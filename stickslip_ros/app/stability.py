@@ -69,8 +69,9 @@ _LABELS: dict[str, dict[str, tuple[str, str]]] = {
         "first_lyapunov_coefficients": ("first Lyapunov coefficient", ""),
     },
     "sticking": {
-        "onset_speed_approximate": ("sticking begins below, by averaging", "m/s"),
-        "onset_speed": ("sticking begins below, exactly", "m/s"),
+        "onset_speed_approximate": ("onset of sticking, by averaging", "m/s"),
+        "onset_speed": ("onset of sticking, exactly", "m/s"),
+        "speed_ranges": ("belt speeds that stick", "m/s"),
     },
     "closed_loop": {
         "eigenvalues": ("eigenvalues", "1/s"),
@@ -217,7 +218,17 @@ def _sticking(drive: Drive, notes: Notes) -> Section:
     ):
         if reason is not None:
             notes[f"sticking.{name}"] = reason
-    return {"onset_speed_approximate": onset.approximate, "onset_speed": onset.exact}
+    lowest, highest = onset.followed
+    if len(onset.ranges) > 1:
+        notes["sticking.speed_ranges"] = (
+            f"between them the slide overtakes the belt; looked for from {lowest:.4g} to "
+            f"{highest:.4g} m/s"
+        )
+    return {
+        "onset_speed_approximate": onset.approximate,
+        "onset_speed": onset.exact,
+        "speed_ranges": [list(ends) for ends in onset.ranges],
+    }
 
 
 def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Section:
@@ -397,7 +408,7 @@ def _shown(name: str, value: Any, unit: str) -> str:
     items = cast(list[Any], value)
     if name == "eigenvalues":
         return _complex(items, unit)
-    if name == "stable_linear_gains":
+    if name in ("stable_linear_gains", "speed_ranges"):
         return "; ".join(" to ".join(quantities(ends, unit)) for ends in items) or "-"
     return ", ".join(quantities(items, unit)) or "-"
 

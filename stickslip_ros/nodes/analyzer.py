@@ -127,11 +127,12 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         }
 
     def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
-        """Return the regime, counts of samples, and what is wrong with the bag or messages."""
+        """Return regime and steadiness, counts of samples, and what is wrong with them."""
         if not self.active:
             return OK, "", {}
         report = self._meter.report()
-        counts = {name: report[name] for name in ("regime", "samples", "lost_samples")}
+        counts = {name: report[name] for name in ("regime", "steady", "samples", "lost_samples")}
+        counts["trend"] = report["trend"] or ""
         figures = {**counts, **self._dropped.figures, "notes": "; ".join(report["notes"])}
         if self._bag_failure:
             return ERROR, self._bag_failure, figures

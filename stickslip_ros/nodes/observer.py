@@ -1,5 +1,6 @@
 """What a dashboard needs of ROS: listens to a running loop like any other node, and acts on it."""
 
+import re
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -322,7 +323,7 @@ class ObserverNode(Collecting):
         if health.state != before.state:
             back = "is back, " if before.state == SILENT else ""
             self.events.append((time.time(), f"{node} {back}{health.state or 'heard'}"))
-        if health.message and health.message != before.message:
+        if health.message and _wording(health.message) != _wording(before.message):
             self.events.append((time.time(), f"{node}: {health.message}"))
 
     def _ask_parameters(self, node: str) -> None:
@@ -353,6 +354,11 @@ def _settle(answer: Answer, result: str) -> None:
     """Give the answer, unless it was given or nobody waits for it any more."""
     if not answer.done():
         answer.set_result(result)
+
+
+def _wording(message: str) -> str:
+    """Return a message without its figures, which change all the time."""
+    return re.sub(r"[\d.]+", "", message)
 
 
 def _began_anew(before: Mapping[str, str], figures: Mapping[str, str]) -> bool:

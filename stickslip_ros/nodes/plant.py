@@ -21,6 +21,7 @@ from stickslip_ros.nodes.dropped import Dropped
 from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer
 from stickslip_ros.nodes.process import run_node
+from stickslip_ros.nodes.punctuality import Punctuality
 from stickslip_ros.nodes.rivals import rivals
 from stickslip_ros.nodes.topics import (
     APPLIED_DISTURBANCE,
@@ -55,6 +56,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._disturbance = 0.0
         self._lock = threading.Lock()
         self._dropped = Dropped(self)
+        self._punctuality = Punctuality()
         self._connections.append(self._dropped)
         self._state = self.advertise(JOINT_STATES)
         self._applied = self.advertise(APPLIED_DISTURBANCE)
@@ -67,6 +69,7 @@ class PlantNode(ManagedNode[PlantParameters]):
     def start(self) -> None:
         """Begin a segment: sample 0 now, further ones as the pacer lets them come."""
         self._dropped.clear()
+        self._punctuality.clear()
         if self._disturbance:  # whoever records the new segment has not heard of it
             self._disturbance = nan
         parameters = self.parameters
@@ -142,8 +145,17 @@ class PlantNode(ManagedNode[PlantParameters]):
         if pacer.failure:
             return ERROR, pacer.failure, {**figures, FAILURE: pacer.failure}
         complaints = [pacer.complaint]
-        if self.parameters.expects_control and not loop.controller_present:
+        controlled = self.parameters.expects_control and loop.controller_present
+        if self.parameters.expects_control and not controlled:
             complaints.append(NO_FORCE)
+        complaints.append(
+            self._punctuality.look(
+                loop.sample.number + 1,
+                loop.late_forces,
+                pacer.missed_deadlines,
+                controlled=controlled,
+            )
+        )
         complaints += [self._dropped.complaint, *rivals(self, CONTROL_FORCE, DISTURBANCE_FORCE)]
         complaint = "; ".join(filter(None, complaints))
         return WARN if complaint else OK, complaint, figures

@@ -1,8 +1,10 @@
 """The cycle measures: amplitude, stick fraction, period and regime of a motion, from its knots."""
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
+from itertools import pairwise
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -14,6 +16,19 @@ EQUILIBRIUM_SPEED = 1e-3
 
 UNBOUNDED_BELT_SPEEDS = 1e3
 """Speed of the slide, in belt speeds, beyond which a sampled motion is said to run away."""
+
+STEADY = 1e-3
+"""Share by which the amplitudes of the cycles measured may differ in a motion that has settled."""
+
+LEAST_CYCLES = 3
+"""Cycles from which on it is told whether a motion is steady."""
+
+GRAZING = 1e-8
+"""Stick fraction up to which a cycle only touches the belt's speed, and slips all the time.
+
+The stick fraction grows with the root of the distance from grazing: this is what the rounding of
+the belt's speed makes of it.
+"""
 
 _NOISE = 1e-9
 """Share of the belt speed, or of the fastest motion seen, below which speeds are rounding."""
@@ -30,6 +45,19 @@ class Regime(StrEnum):
     EQUILIBRIUM = "equilibrium"
     STUCK = "stuck"
     UNBOUNDED = "unbounded"
+
+
+class Trend(StrEnum):
+    """How the amplitude changes in a motion that is not steady."""
+
+    DECAYING = "decaying"
+    GROWING = "growing"
+    VARYING = "varying"
+
+
+def with_trend(regime: str, trend: str | None) -> str:
+    """Return a regime as a person reads it: what is not steady says so."""
+    return f"{regime}, not steady: {trend}" if trend else regime
 
 
 class Cycle(NamedTuple):
@@ -66,6 +94,13 @@ class Measures:
     cycles: int
     """How many cycles the means are over."""
     regime: Regime | None
+    steady: bool | None = None
+    """Whether the motion has settled: the amplitudes of the cycles measured, three at least, differ
+    by no more than a thousandth; a rest has lasted for as many cycles as are measured at most, and
+    small ones around it do not grow. What runs away has settled, too. Null is too little to tell.
+    """
+    trend: Trend | None = None
+    """How the amplitude changes, null unless `steady` is false."""
 
     def as_dict(self) -> dict[str, float | int | str | None]:
         """Return the measures by their names, ready for JSON."""
@@ -113,13 +148,14 @@ class _Stretch:
         return self.end - self.start
 
     def as_cycle(self) -> Cycle:
+        stick_fraction = self.stick_time / self.duration
         return Cycle(
             amplitude=(self.highest - self.lowest) / 2.0,
             velocity_amplitude=(self.fastest - self.slowest) / 2.0,
             midpoint=(self.highest + self.lowest) / 2.0,
             period=self.duration,
             frequency=1.0 / self.duration,
-            stick_fraction=self.stick_time / self.duration,
+            stick_fraction=stick_fraction if stick_fraction > GRAZING else 0.0,
         )
 
 
@@ -129,6 +165,7 @@ class CycleMeter:
     def __init__(self, window: int) -> None:
         """Average over the last `window` cycles at most."""
         self._cycles: deque[Cycle] = deque(maxlen=window)
+        self._amplitudes: deque[float] = deque(maxlen=max(window, LEAST_CYCLES))
         self._belt_speed = 0.0
         self._fastest = 0.0
         self._unbounded = False
@@ -170,6 +207,7 @@ class CycleMeter:
             self._recent = []
             first = edge + 1
         self._cycles.extend(completed)
+        self._amplitudes.extend(cycle.amplitude for cycle in completed)
         self._open.extend(knots, first, len(knots) - 1)
         self._follow_recent(knots, first)
         self._follow_sticking(knots)
@@ -179,23 +217,36 @@ class CycleMeter:
     def measures(self) -> Measures:
         """Return the means over the last whole cycles."""
         if self._unbounded:
-            return _without_cycles(None, Regime.UNBOUNDED)
+            return _without_cycles(None, Regime.UNBOUNDED, steady=True)
         period = self._cycles[-1].period if self._cycles else 0.0
         now = self._open.end if self._open else 0.0
         since = self._sticking_since
         if self._belt_speed == 0.0 and since is not None and now - since >= period:
-            return _without_cycles(self._recent_motion(), Regime.STUCK)
+            steady = True if self._lasts(now - since) else None
+            return _without_cycles(self._recent_motion(), Regime.STUCK, steady=steady)
         since_turn = self._open.duration if self._open else 0.0
         if not self._cycles or since_turn > _STALE_PERIODS * period:
             recent = self._recent_motion()
             if recent is None or recent.velocity_amplitude >= self._equilibrium_speed:
                 return _without_cycles(None, None)
-            return _without_cycles(recent, Regime.EQUILIBRIUM)
+            if recent.stick_fraction > 0.0:  # it rides a slow belt
+                return _without_cycles(None, None)
+            steady = True if self._lasts(since_turn) else None
+            return _without_cycles(recent, Regime.EQUILIBRIUM, steady=steady)
         mean = Cycle(*np.mean(self._cycles, axis=0).tolist())
-        if mean.velocity_amplitude < self._equilibrium_speed:
-            return _without_cycles(mean, Regime.EQUILIBRIUM, len(self._cycles))
+        resting = mean.velocity_amplitude < self._equilibrium_speed
+        trend = _trend(self._amplitudes, resting)
+        steady = trend is None if len(self._amplitudes) >= LEAST_CYCLES else None
+        count = len(self._cycles)
+        if resting:
+            return _without_cycles(mean, Regime.EQUILIBRIUM, count, steady=steady, trend=trend)
         regime = Regime.STICK_SLIP if mean.stick_fraction > 0.0 else Regime.PURE_SLIP
-        return Measures(**mean._asdict(), cycles=len(self._cycles), regime=regime)
+        return Measures(**mean._asdict(), cycles=count, regime=regime, steady=steady, trend=trend)
+
+    def _lasts(self, rest: float) -> bool:
+        """Return whether a rest of so long (s) has lasted for a window of the last cycles."""
+        window = self._cycles.maxlen or 0
+        return not self._cycles or rest >= window * self._cycles[-1].period
 
     @property
     def _equilibrium_speed(self) -> float:
@@ -258,10 +309,38 @@ class CycleMeter:
             self._sticking_since = float(knots.time[row]) if len(knots) > 1 else None
 
 
-def _without_cycles(motion: Cycle | None, regime: Regime | None, cycles: int = 0) -> Measures:
+def _trend(amplitudes: Sequence[float], resting: bool) -> Trend | None:
+    """Return how the amplitude changes from cycle to cycle; None if it does not, or for few.
+
+    Around a slide that is `resting` only growth from each cycle to the next counts: else it comes
+    to rest still, or what is measured is noise.
+    """
+    if len(amplitudes) < LEAST_CYCLES:
+        return None
+    first, last = amplitudes[0], amplitudes[-1]
+    grows = last - first > STEADY * first
+    if resting:
+        monotone = all(before < after for before, after in pairwise(amplitudes))
+        return Trend.GROWING if grows and monotone else None
+    largest = max(amplitudes)
+    if largest - min(amplitudes) <= STEADY * largest:
+        return None
+    if grows:
+        return Trend.GROWING
+    return Trend.DECAYING if first - last > STEADY * first else Trend.VARYING
+
+
+def _without_cycles(
+    motion: Cycle | None,
+    regime: Regime | None,
+    cycles: int = 0,
+    *,
+    steady: bool | None = None,
+    trend: Trend | None = None,
+) -> Measures:
     """Return the measures of a motion that has no period."""
     if motion is None:
-        return Measures(None, None, None, None, None, None, cycles, regime)
+        return Measures(None, None, None, None, None, None, cycles, regime, steady)
     return Measures(
         amplitude=motion.amplitude,
         velocity_amplitude=motion.velocity_amplitude,
@@ -271,4 +350,6 @@ def _without_cycles(motion: Cycle | None, regime: Regime | None, cycles: int = 0
         stick_fraction=motion.stick_fraction,
         cycles=cycles,
         regime=regime,
+        steady=steady,
+        trend=trend,
     )

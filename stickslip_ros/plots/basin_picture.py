@@ -76,8 +76,8 @@ def basin_figure(
             points: Any = {"color": look.colour, "marker": look.marker, "label": label}
             axes.scatter(x[of_it], y[of_it], s=area, lw=0.0, rasterized=rasterized, **points)
             handles.append(Line2D([], [], ls="", **points))
-    # White below black is to be seen on any colour.
-    axes.axhline(belt_speed / speed, color="white", lw=3.0)
+    if grid_shape is not None:  # white below black is to be seen on any colour
+        axes.axhline(belt_speed / speed, color="white", lw=3.0)
     axes.axhline(belt_speed / speed, color="black", lw=1.2, ls="--")
     axes.plot(equilibrium_position / length, 0.0, "o", color="white", mec="black", mew=1.5, ms=8.0)
     handles += [

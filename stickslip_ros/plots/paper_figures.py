@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from itertools import cycle
 from math import ceil
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,6 +24,9 @@ from stickslip_ros.studies.paper.portraits import LAST_CYCLES, Portrait
 
 _COLOURS = 128
 """Of a PNG: these pictures are kept with the sources."""
+
+_TITLE_LETTERS = 95
+"""Of a bifurcation diagram's title in a line: more would be cut off."""
 
 _MOST_COLUMNS, _COLUMNS = 5, 4
 """Portraits in a row at most, and where a panel has more of them."""
@@ -54,7 +58,7 @@ def draw_paper_figure(
 @styled
 def _bifurcation(figure: BifurcationFigure, marks: Mapping[str, float]) -> Figure:
     drawn = Figure(figsize=(8.0, 5.5))
-    drawn.suptitle(figure.title, fontsize=11)
+    drawn.suptitle(fill(figure.title, _TITLE_LETTERS), fontsize=11)
     above, below = drawn.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
     diagram = figure.diagram
     regimes = [measures.regime for measures in diagram.measures]

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.measures import Measures
+from stickslip_ros.physics.measures import Measures, with_trend
 from stickslip_ros.plots.decimation import intervals, peaks
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.run_history import Rows, RunHistory
@@ -37,6 +37,9 @@ LAST_CYCLES = 5
 _PIXELS = 1000
 """Intervals of time in the width of a panel, of about a pixel each."""
 
+_LEAST_SPAN = 1e-6
+"""Of an axis, in the largest magnitude that is drawn on it: less is rounding."""
+
 _PART = 0.05
 """Of the run, that is enlarged where nothing is known of a period."""
 
@@ -45,6 +48,7 @@ _BELT: Any = {"color": "black", "lw": 1.0, "ls": "--", "zorder": 2.5}
 _REST: Any = {"color": GREEN, "lw": 1.2, "ls": ":", "zorder": 2.5}
 _POINT: Any = {"color": GREEN, "marker": "o", "ms": 6.0, "ls": "", "mec": "white"}
 _CONTROL: Any = {"color": ORANGE, "lw": 1.6, "drawstyle": "steps-post"}
+_HELD: Any = {"color": ORANGE, "lw": 1.2, "ls": ":", "drawstyle": "steps-post"}
 _FRICTION: Any = {"color": SKY_BLUE, "lw": 0.7}
 _EARLIER: Any = {"color": LIGHT_GREY, "lw": 0.7}
 _STICKS: Any = {"color": GREY, "lw": 5.0, "solid_capstyle": "butt", "zorder": 1.9}
@@ -115,6 +119,8 @@ def run_figure(
     ]
     if drive is not None:
         handles.insert(2, Line2D([], [], **_POINT | _REST, label="equilibrium"))
+    if picture.holds:
+        handles.append(Line2D([], [], **_HELD, label="none came: the last one"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
 
@@ -129,6 +135,8 @@ class _Picture:
         self._run = _Pane.of("the whole run", motion, history.control.columns()[0])
         self._length = units.axis("displacement", "m", motion.position)
         self._speed = units.axis("velocity", "m/s", motion.velocity, motion.belt_velocity)
+        self.holds = False
+        """Whether no force came for a while, and what is drawn is the last one."""
 
     def over_time(self, figure: Figure, parts: GridSpecFromSubplotSpec) -> None:
         """Draw displacement, velocity and force, the whole run to the left and its end enlarged."""
@@ -148,10 +156,12 @@ class _Picture:
             _draw_line(force, pane, friction[0], friction[1], newton, history.gap, **_FRICTION)
             gap = history.control_gap
             _draw_line(force, pane, control[0], control[1], newton, gap, **_CONTROL)
+            self.holds |= _draw_held(force, pane, control[0], control[1], newton, gap)
             self._label_time(force, pane)
         labels = self._length[1], self._speed[1], label
         for row, of_row in zip(panels, labels, strict=True):
             row[0].set_ylabel(of_row)
+            row[0].set_ylim(_widened(*row[0].get_ylim()))
             for axes, pane in zip(row, (self._run, end), strict=True):
                 _shade(axes, pane)
 
@@ -194,6 +204,8 @@ class _Picture:
         axes.axhline(belt_speed / speed, **_BELT)
         if self._drive is not None and belt_speed != 0.0:
             axes.plot(self._drive.equilibrium_position / length, 0.0, zorder=3.0, **_POINT)
+        axes.set_xlim(_widened(*axes.get_xlim()))
+        axes.set_ylim(_widened(*axes.get_ylim()))
 
     def cycles(self, amplitude: Axes, stick_fraction: Axes) -> None:
         """Draw amplitude and stick fraction of each cycle over time."""
@@ -204,10 +216,14 @@ class _Picture:
         if not len(time):
             _say(amplitude, "no cycle was completed")
         rows = peaks(intervals(time, _pixel(time)), *columns)
-        for axes, values in ((amplitude, columns[0] / scale), (stick_fraction, columns[1])):
+        farthest = float(np.abs(self._history.motion.position).max(initial=0.0)) / scale
+        for axes, values, least in (
+            (amplitude, columns[0] / scale, _LEAST_SPAN * farthest),
+            (stick_fraction, columns[1], 0.0),
+        ):
             marker = "." if len(time) < _PIXELS else ""
             axes.plot(time[rows], values[rows], marker=marker, ms=3.0, **_MOTION | {"lw": 0.5})
-            axes.set_ylim(0.0, 1.1 * values.max(initial=0.0) or 1.0)
+            axes.set_ylim(0.0, max(1.1 * float(values.max(initial=0.0)), least) or 1.0)
         amplitude.set_ylabel(label)
         stick_fraction.set_ylabel("stick fraction")
         self._label_time(stick_fraction, self._run)
@@ -267,7 +283,7 @@ class _Picture:
 
 def _found(measures: Measures, units: Units) -> str:
     """Return what the measures say, in a few words."""
-    found = [REGIMES[measures.regime].label]
+    found = [with_trend(REGIMES[measures.regime].label, measures.trend)]
     for name, value, unit in (
         ("amplitude", measures.amplitude, "m"),
         ("frequency", measures.frequency, "Hz"),
@@ -308,6 +324,28 @@ def _draw_line(
     # Between rows of neighbouring intervals nothing is missing.
     time, values = _broken(max(gap, 2.0 * length), time[drawn], values[drawn])
     axes.plot(time, values / scale, **look)
+
+
+def _draw_held(
+    axes: Axes, pane: _Pane, time: FloatArray, force: FloatArray, scale: float, gap: float
+) -> bool:
+    """Draw the forces behind which none came for a while, up to the next; return if there are."""
+    behind = np.flatnonzero(np.diff(time) > max(gap, 2.0 * (pane.end - pane.start) / _PIXELS))
+    behind = behind[(time[behind + 1] > pane.start) & (time[behind] < pane.end)]
+    if len(behind) == 0:
+        return False
+    rows = np.stack([behind, behind + 1, behind + 1], axis=1).ravel()
+    drawn = force[rows] / scale
+    drawn[2::3] = np.nan
+    axes.plot(time[rows], drawn, **_HELD)
+    return True
+
+
+def _widened(low: float, high: float) -> tuple[float, float]:
+    """Return limits of an axis that span more than the rounding of what it shows."""
+    middle = (low + high) / 2.0
+    half = max(high - low, _LEAST_SPAN * max(abs(low), abs(high))) / 2.0
+    return (low, high) if half == (high - low) / 2.0 else (middle - half, middle + half)
 
 
 def _broken(gap: float, time: FloatArray, *columns: FloatArray) -> list[FloatArray]:

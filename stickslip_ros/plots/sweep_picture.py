@@ -101,9 +101,8 @@ def diagram_figure(columns: Columns, study: Study) -> Figure:
     for axes in lines:
         axes.set_ylim(bottom=0.0)
     lines[-1].set_xlabel(units.label(axis.parameter, axis.unit))
-    ends = _edges(axis)[[0, -1]]
-    lines[-1].set_xlim(float(ends.min()), float(ends.max()))
     lines[-1].set_xscale(**_scale(axis))
+    lines[-1].margins(x=0.01)
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
@@ -289,14 +288,15 @@ def _are(regimes: npt.NDArray[np.object_], regime: Regime | None) -> npt.NDArray
 
 
 def _edges(axis: Axis) -> FloatArray:
-    """Return where the cells around the values of an axis end, one more than these."""
+    """Return where the cells around the values of an axis end, one more than these.
+
+    Nothing is known beyond the first and the last value: their cells are half as wide.
+    """
     values = axis.values()
     if axis.logarithmic:
         values = np.log(np.abs(values))
     middles = (values[:-1] + values[1:]) / 2.0
-    edges = np.concatenate(
-        [[2.0 * values[0] - middles[0]], middles, [2.0 * values[-1] - middles[-1]]]
-    )
+    edges = np.concatenate([values[:1], middles, values[-1:]])
     return np.copysign(np.exp(edges), axis.first) if axis.logarithmic else edges
 
 

@@ -31,10 +31,10 @@ class Units:
     def axis(self, name: str, unit: str, *values: npt.ArrayLike) -> tuple[float, str]:
         """Return what to divide values (SI) by that an axis shows, and its label.
 
-        Times have no prefix beyond the second.
+        Times have no prefix beyond the second, and numbers none at all.
         """
         largest = _largest(*values)
-        if self.dimensionless or (unit == "s" and largest >= 1.0):
+        if self.dimensionless or not unit or (unit == "s" and largest >= 1.0):
             return 1.0, self.label(name, unit)
         scale, prefix = prefix_for(largest)
         return scale, self.label(name, prefix + unit)

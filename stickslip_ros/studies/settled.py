@@ -8,7 +8,7 @@ import numpy as np
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.knots import FloatArray, Knots
-from stickslip_ros.physics.measures import Cycle, CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures import LEAST_CYCLES, Cycle, CycleMeter, Measures, Regime
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.simulation import simulate_sampled
@@ -20,8 +20,7 @@ from stickslip_ros.scenario.parameters import PlantParameters
 CYCLES = (Regime.STICK_SLIP, Regime.PURE_SLIP)
 """Regimes that have an amplitude to be steady."""
 
-STEADY = 1e-3
-"""Share by which the amplitudes of the cycles measured may differ in a motion that has settled."""
+_RESTS = (Regime.EQUILIBRIUM, Regime.STUCK)
 
 LONGEST = 1e6
 """Natural periods or cycles that a motion is followed for at most."""
@@ -140,11 +139,13 @@ class Settled(NamedTuple):
     turning_points: FloatArray
     """Displacements at which the velocity is zero, m: the Poincare section x' = 0. In equilibrium
     the one place of rest; none where the motion runs away."""
-    steady: bool
-    """Whether the amplitude no longer changed by more than a thousandth, or, near the equilibrium,
-    no longer grew."""
     end: State
     """Where the motion ended."""
+
+    @property
+    def steady(self) -> bool:
+        """Whether the motion has settled: its measures say so, or it rests behind its transient."""
+        return _is_settled(self.measures)
 
 
 class Settler:
@@ -173,7 +174,8 @@ class Settler:
             loading = min(loading, _LONGEST_LOADING * drive.natural_period)
             transient += loading
         # One cycle is under way when it begins, and one when it ends.
-        block = (course.cycles + 2) * drive.natural_period
+        cycles = max(course.cycles, LEAST_CYCLES) + 2
+        block = cycles * drive.natural_period
         law = loop = None
         if case.sampled is not None:
             loop = sampled_loop(case.sampled, motion)
@@ -202,7 +204,7 @@ class Settler:
                     motion.advance(left)
                     motion.advance(transient)
             motion.recording = True
-            longest = (course.cycles + 2) * (drive.natural_period + loading)
+            longest = cycles * (drive.natural_period + loading)
             done, step = 0.0, block
             while not motion.unbounded and done < longest and not (done and meter.done):
                 advance(step, meter)
@@ -215,7 +217,7 @@ class Settler:
         for _ in range(course.patience - 1):
             before, meter = meter, observe()
             measures = meter.measures()
-            if meter.is_steady(measures) and _alike(before.measures(), measures):
+            if _is_settled(measures) and _alike(before.measures(), measures):
                 break
         low_passed = motion.low_passed if continuous else None
         if law is not None and loop is not None:
@@ -243,6 +245,13 @@ def _begin_control(motion: Motion, washout: WashoutParameters, start: State) -> 
         motion.set_gains(washout.corner_frequency, *gains)
 
 
+def _is_settled(measures: Measures) -> bool:
+    """Return whether a motion is steady; one that rests behind a transient is."""
+    if measures.steady is None:
+        return measures.regime in _RESTS
+    return measures.steady
+
+
 def _alike(before: Measures, after: Measures) -> bool:
     """Return whether regime and amplitude are the same."""
     if before.regime is not after.regime or after.regime not in CYCLES:
@@ -253,34 +262,24 @@ def _alike(before: Measures, after: Measures) -> bool:
 
 
 class _SectionMeter(CycleMeter):
-    """Keeps the Poincare section, and the amplitudes of the cycles that are measured."""
+    """Keeps the Poincare section, and counts the cycles that are measured."""
 
     def __init__(self, cycles: int) -> None:
         super().__init__(cycles)
-        self._cycles_wanted = cycles
+        self._missing = max(cycles, LEAST_CYCLES)
         self._sections = [np.empty(0)]
-        self._amplitudes: list[float] = []
 
     def feed(self, knots: Knots, belt_speed: float) -> list[Cycle]:
         """Take the knots that follow, as any meter does."""
         self._sections.append(knots.position[knots.velocity == 0.0])
         cycles = super().feed(knots, belt_speed)
-        self._amplitudes += [cycle.amplitude for cycle in cycles]
+        self._missing -= len(cycles)
         return cycles
-
-    def measures(self) -> Measures:
-        """Return the means; what only rode a slow belt so far is not at rest, but not known."""
-        found = super().measures()
-        if found.regime is Regime.EQUILIBRIUM and found.stick_fraction:
-            return Measures(None, None, None, None, None, None, 0, None)
-        return found
 
     @property
     def done(self) -> bool:
         """Whether there are cycles enough, or no more will come."""
-        if len(self._amplitudes) >= self._cycles_wanted:
-            return True
-        return self.measures().regime in (Regime.EQUILIBRIUM, Regime.STUCK)
+        return self._missing <= 0 or self.measures().regime in _RESTS
 
     def settled(self, end: State) -> Settled:
         """Return what was found, the motion having come to `end`."""
@@ -290,14 +289,4 @@ class _SectionMeter(CycleMeter):
             section = np.empty(0)
         elif measures.regime is Regime.EQUILIBRIUM:
             section = np.array([measures.midpoint])
-        return Settled(measures, section, self.is_steady(measures), end)
-
-    def is_steady(self, measures: Measures) -> bool:
-        """Return whether the motion has settled, its `measures` being those of this meter."""
-        amplitudes = self._amplitudes
-        if measures.regime in (Regime.STUCK, Regime.UNBOUNDED):
-            return True
-        if measures.regime is Regime.EQUILIBRIUM:
-            return len(amplitudes) < 2 or not amplitudes[-1] > (1.0 + STEADY) * amplitudes[0]
-        largest = max(amplitudes, default=0.0)
-        return len(amplitudes) > 1 and largest - min(amplitudes) <= STEADY * largest
+        return Settled(measures, section, end)

@@ -11,8 +11,10 @@ from stickslip_ros.scenario.files import Scenario
 from stickslip_ros.studies.plan import Plan
 from stickslip_ros.studies.settled import Case, Course, Settled, Settler, State
 
-MEASURES = tuple(measure.name for measure in fields(Measures))
-"""Names of the measures of a point."""
+MEASURES = tuple(
+    measure.name for measure in fields(Measures) if measure.name not in ("steady", "trend")
+)
+"""Names of the measures of a point, which says itself whether it is steady."""
 
 _NUDGE = EQUILIBRIUM_SPEED / 2.0
 """Share of the belt speed by which a slide at rest is pushed before it is carried on: where the
@@ -162,7 +164,7 @@ def _compute_point(study: Study, index: int, start: State | None) -> tuple[Point
         return Point(index, nothing, False, (), " ".join(str(error).split())), None
     point = Point(
         index,
-        settled.measures,
+        replace(settled.measures, steady=None, trend=None),
         settled.steady,
         tuple(settled.turning_points.tolist()),
         _REASONS.get(settled.measures.regime),

@@ -204,6 +204,24 @@ def test_a_node_that_dies_and_returns_is_shown_as_that(
     assert "Traceback" not in "".join(served.said)
 
 
+def test_a_long_event_is_wrapped_within_its_box(
+    start_stickslip: Start,
+    page: Page,
+    processes: Processes,  # noqa: F811
+) -> None:
+    page.set_viewport_size({"width": 1030, "height": 800})
+    served = Served(start_stickslip("dashboard", "--namespace", "/test"))
+    page.goto(served.url)
+    processes.node("plant", pace="realtime", rate=200.0)
+    event = page.locator(".nicegui-log").get_by_text("no control force comes: going on without")
+    expect(event).to_be_visible()
+    box = page.locator(".nicegui-log .q-scrollarea__container")
+    widths = box.evaluate("box => [box.scrollWidth, box.clientWidth]")
+    assert widths[0] <= widths[1]
+    assert event.evaluate("line => line.getBoundingClientRect().height") > 30.0
+    assert served.end() == 130
+
+
 def test_only_pages_of_this_machine_by_its_own_names_are_answered(
     start_stickslip: Start, page: Page
 ) -> None:

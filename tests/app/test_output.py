@@ -117,3 +117,21 @@ def test_colours_forced_on_a_pipe_change_nothing() -> None:
     )
     assert "stick_slip" in plain
     assert forced == plain
+
+
+def test_rounding_reads_zero(capsys: pytest.CaptureFixture[str]) -> None:
+    before = {"regime": "stick_slip", "amplitude": 4e-4, "midpoint": 3e-4, "peak_force": 120.0}
+    resting = {"amplitude": 9e-17, "velocity_amplitude": 1e-15, "midpoint": 2.5e-4}
+    after = {"regime": "equilibrium", **resting, "peak_force": 7e-15, "resting_force": 7e-15}
+    print_figures("", {"before": before, "after": after})
+    shown = [line.split(maxsplit=1)[-1].strip() for line in capsys.readouterr().out.splitlines()]
+    assert re.search(r"400 µm +0 µm", shown[2])
+    assert re.search(r"- +0 m/s", shown[3])
+    assert re.search(r"300 µm +250 µm", shown[4])
+    assert re.search(r"120 N +0 N", shown[5])
+    assert re.search(r"- +0 N", shown[6])
+
+
+def test_a_transient_says_that_it_is_not_steady(capsys: pytest.CaptureFixture[str]) -> None:
+    print_figures("", {"": {"regime": "stick_slip", "steady": False, "trend": "decaying"}})
+    assert capsys.readouterr().out == "regime  stick_slip, not steady: decaying\n"

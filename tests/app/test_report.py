@@ -79,7 +79,9 @@ def test_a_picture_changes_nothing_of_the_report(command, tmp_path):
     assert json.loads(out) == plain
     shown = texts(picture)
     assert "displacement (µm)" in shown
-    assert any("sticks and slips, amplitude 325.8 µm" in text for text in shown)
+    assert any(
+        "sticks and slips, not steady: decaying, amplitude 325.8 µm" in text for text in shown
+    )
     for bag_lacks in ("the drive is not known", "no cycle was completed"):
         assert bag_lacks not in shown
 
@@ -155,3 +157,10 @@ def test_what_cannot_be_is_refused_in_a_line(command, tmp_path, monkeypatch, arg
     assert (status, out) == (2, "")
     assert complaint in error.splitlines()[-1]
     assert not list(tmp_path.glob("out*"))
+
+
+def test_a_run_that_has_come_to_rest_does_not_read_as_a_regime(command):
+    _, out, _ = command("report", REFERENCE)
+    assert "stick_slip, not steady: decaying\n" in out
+    found = json.loads(command("report", REFERENCE, "--json")[1])
+    assert (found["steady"], found["trend"]) == (False, "decaying")

@@ -101,3 +101,25 @@ def test_without_a_standard_output_there_is_no_traceback(tmp_path: Path) -> None
         text=True,
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "regime", "steady", "trend"),
+    [
+        (("feed_drive", "--no-control"), "stick_slip", True, None),
+        (("feed_drive", "--duration", "5.3"), "stick_slip", False, "decaying"),
+        (("feed_drive", "-p", "plant.rate=200"), "equilibrium", True, None),
+        (("paper", "-p", "plant.belt_speed=0", "--no-control"), "stuck", True, None),
+        (("paper", "--no-control", "--duration", "15"), "stick_slip", None, None),
+        (("paper", "--no-control", "--duration", "3"), None, None, None),
+    ],
+)
+def test_it_says_whether_the_motion_was_steady(
+    stickslip: Run,
+    arguments: tuple[str, ...],
+    regime: str | None,
+    steady: bool | None,
+    trend: str | None,
+) -> None:
+    found = json.loads(stickslip("simulate", *arguments, "--json").stdout)
+    assert (found["regime"], found["steady"], found["trend"]) == (regime, steady, trend)

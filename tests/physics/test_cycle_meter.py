@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.knots import Knots
-from stickslip_ros.physics.measures import Cycle, CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures import Cycle, CycleMeter, Measures, Regime, Trend
 from stickslip_ros.physics.motion import Motion
 from tests.examples import examples
 from tests.physics.drives import PAPER
@@ -236,3 +236,86 @@ def test_the_size_of_the_blocks_does_not_matter(
 def figures(measures: Cycle | Measures) -> list[float]:
     values = [getattr(measures, name) for name in Cycle._fields]
     return [nan if value is None else value for value in values]
+
+
+def course(*amplitudes: float) -> Knots:
+    """Knots of a vibration whose cycles, from the first whole one on, have these amplitudes."""
+    knots = vibration(len(amplitudes) + 1.25)
+    # From trough to trough: the one that begins a cycle and the one that ends it are as deep.
+    sizes = np.concatenate([np.repeat([amplitudes[0], *amplitudes], 4), [amplitudes[-1]] * 2])
+    return replace_size(knots, sizes[: len(knots)])
+
+
+def replace_size(knots: Knots, sizes: np.ndarray) -> Knots:
+    return Knots(knots.time, knots.position * sizes, knots.velocity * sizes, knots.sticking)
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "steady", "trend"),
+    [
+        ([1.0, 1.0], None, None),
+        ([1.0, 1.0, 1.0], True, None),
+        ([1.0, 1.0004, 1.0, 1.0004], True, None),
+        ([1.0, 0.8, 0.6, 0.4], False, Trend.DECAYING),
+        ([0.4, 0.6, 0.8], False, Trend.GROWING),
+        ([1.0, 0.8, 1.0, 0.8, 1.0], False, Trend.VARYING),
+    ],
+)
+def test_a_motion_is_steady_while_its_amplitude_stays(
+    amplitudes: list[float], steady: bool | None, trend: Trend | None
+) -> None:
+    measures = measured(course(*amplitudes), 1.0)
+    assert measures.regime is Regime.PURE_SLIP
+    assert (measures.steady, measures.trend) == (steady, trend)
+
+
+def test_only_growth_from_cycle_to_cycle_disturbs_a_rest() -> None:
+    noise = measured(course(1e-6, 3e-6, 2e-6, 5e-6, 4e-6), 1.0)
+    assert (noise.regime, noise.steady) == (Regime.EQUILIBRIUM, True)
+    leaving = measured(course(1e-6, 2e-6, 4e-6, 8e-6), 1.0)
+    assert (leaving.regime, leaving.trend) == (Regime.EQUILIBRIUM, Trend.GROWING)
+
+
+def test_a_rest_is_steady_once_it_has_lasted_for_a_window() -> None:
+    swinging = vibration(4.25)
+    for rest, steady in ((4.0, None), (21.0, True)):
+        end = float(swinging.time[-1])
+        time = end + np.linspace(0.0, rest * 2.0 * pi, 200)[1:]
+        still = Knots(time, np.zeros(199), np.full(199, 1e-15), np.zeros(199, dtype=bool))
+        meter = CycleMeter(window=20)
+        meter.feed(swinging, 1.0)
+        meter.feed(still, 1.0)
+        assert meter.measures().regime is Regime.EQUILIBRIUM
+        assert meter.measures().steady is steady
+
+
+def test_the_paper_s_drive_becomes_steady_and_one_that_is_damped_decays() -> None:
+    assert measured(recorded(PAPER, 0.0, 0.0, 300.0), 0.4).steady is True
+    dying = measured(recorded(ABOVE_HOPF, 0.0, 0.0, 60.0), 0.6)
+    assert (dying.steady, dying.trend) == (False, Trend.DECAYING)
+
+
+def test_a_cycle_that_only_touches_the_belts_speed_slips_all_the_time() -> None:
+    for stick, regime in ((1e-9, Regime.PURE_SLIP), (1e-7, Regime.STICK_SLIP)):
+        knots = vibration(5.25)
+        touching = knots.velocity == 1.0
+        behind = Knots(
+            knots.time[touching] + stick * 2.0 * pi,
+            knots.position[touching],
+            knots.velocity[touching],
+            np.ones(int(touching.sum()), dtype=bool),
+        )
+        joined = Knots.concatenate(knots, behind)
+        measures = measured(joined[np.argsort(joined.time, kind="stable")], 1.0)
+        assert measures.regime is regime
+        assert measures.stick_fraction == pytest.approx(stick if stick > 1e-8 else 0.0, rel=1e-6)
+
+
+def test_what_rides_a_slow_belt_is_not_at_rest() -> None:
+    riding = Knots(
+        np.linspace(0.0, 5.0, 50),
+        np.linspace(0.0, 0.5, 50),
+        np.full(50, 0.1),
+        np.ones(50, dtype=bool),
+    )
+    assert measured(riding, 0.1).regime is None

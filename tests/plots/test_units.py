@@ -18,6 +18,7 @@ SI = Units.of(FEED_DRIVE)
         ("velocity", "m/s", 0.04, 1e-3, "velocity (mm/s)"),
         ("force", "N", 1200.0, 1e3, "force (kN)"),
         ("force", "N", 0.0, 1.0, "force (N)"),
+        ("stick fraction", "", 0.3, 1.0, "stick fraction"),
         ("time", "s", 3600.0, 1.0, "time (s)"),
         ("time", "s", 0.02, 1e-3, "time (ms)"),
     ],

@@ -5,6 +5,8 @@
 const INTERVAL = 1000 / 30;
 const CYCLES_INTERVAL = 500;
 const MARGIN = 1.08;
+const LEAST_SPAN = 1e-4; // of an axis, in its units: less is rounding
+const HELD = "dotted: none came, the last one";
 const page = window.stickslip;
 const limits = {};
 const shown = {};
@@ -22,7 +24,7 @@ function range(name, lines) {
     }
   }
   limits[name] = [low, high];
-  if (low < high) return { min: low, max: high };
+  if (high - low >= LEAST_SPAN) return { min: low, max: high };
   return Number.isFinite(low) ? { min: low - 1, max: high + 1 } : { min: -1, max: 1 };
 }
 
@@ -83,6 +85,22 @@ function drawLine(context, scale, { x, y }, colour, { dashed = false, stepped = 
   context.stroke();
 }
 
+// Where no force came the last one is dotted: late ones leave no gap.
+function drawHeld(context, scale, { x, y }, colour) {
+  context.strokeStyle = colour;
+  context.setLineDash([1.5, 3]);
+  context.beginPath();
+  for (let i = 1; i + 1 < x.length; i += 1) {
+    if (Number.isNaN(y[i])) {
+      const [held, next] = [scale.y0 + y[i - 1] * scale.y1, scale.x0 + x[i + 1] * scale.x1];
+      context.moveTo(scale.x0 + x[i - 1] * scale.x1, held);
+      context.lineTo(next, held);
+      context.lineTo(next, scale.y0 + y[i + 1] * scale.y1);
+    }
+  }
+  context.stroke();
+}
+
 function drawMotion({ lines, labels, window: width, end, equilibrium, belt_speed }) {
   const last = page.motion;
   const another = last && (String(last.labels) !== String(labels) || end < last.end);
@@ -96,7 +114,7 @@ function drawMotion({ lines, labels, window: width, end, equilibrium, belt_speed
     yAxis: [
       { name: displacement, ...positions },
       { name: speed, ...speeds },
-      { name: push, ...range("force", [force]) },
+      { name: force.y.some(Number.isNaN) ? `${push}, ${HELD}` : push, ...range("force", [force]) },
     ],
   });
   setChanged("portrait", {
@@ -114,6 +132,7 @@ function drawMotion({ lines, labels, window: width, end, equilibrium, belt_speed
   drawLine(context, scaleOf(trace, 1), velocity, BLUE);
   drawLine(context, scaleOf(trace, 1), belt, GREY, { dashed: true });
   drawLine(context, scaleOf(trace, 2), force, ORANGE, { stepped: true });
+  drawHeld(context, scaleOf(trace, 2), force, ORANGE);
   const portrait = chartOf("portrait");
   const plane = canvasOn(portrait);
   const scale = scaleOf(portrait, 0);

@@ -90,6 +90,11 @@ class _Page:
                 self._add_parameters()
                 with _card("Events"):
                     self._events = ui.log(max_lines=100).classes("w-full h-40")
+        # The area that scrolls within is as wide as its longest line unless it is told not to.
+        ui.add_css(
+            ".nicegui-log .q-scrollarea__content"
+            "{white-space: pre-wrap !important; overflow-wrap: anywhere; width: 100%}"
+        )
         start = {
             "trace": trace.id,
             "portrait": portrait.id,
@@ -160,7 +165,8 @@ class _Page:
         for topic, label in self._measures.items():
             values = observer.cycles[topic]
             unit = {AMPLITUDE: "m", FREQUENCY: "Hz"}.get(topic, "")
-            label.set_text(quantities([values[-1]], unit)[0] if values else "-")
+            largest = max(values, default=0.0)
+            label.set_text(quantities([values[-1]], unit, largest=largest)[0] if values else "-")
         self._show_regime(observer.health["analyzer"])
         self._trouble.set_text(", ".join(self._missing()))
         scales = (drive.normal_force, drive.natural_period) if drive is not None else None
@@ -191,8 +197,13 @@ class _Page:
         regime = analyzer.figures.get("regime") if analyzer.state == "active" else None
         known = regime in list(Regime)
         look = REGIMES[Regime(regime) if known else None]
-        self._regime.set_text(look.label if known else "not measured")
-        self._regime.style(f"background-color: {look.colour} !important")
+        trend = analyzer.figures.get("trend") if known else None
+        if trend:  # what the regime was some cycles ago is not what is seen
+            self._regime.set_text(f"not steady: {trend}")
+        else:
+            self._regime.set_text(look.label if known else "not measured")
+        colour = GREY if trend else look.colour
+        self._regime.style(f"background-color: {colour} !important")
 
     def _show_control(self, health: Health) -> None:
         there = health.state not in (ABSENT, SILENT)

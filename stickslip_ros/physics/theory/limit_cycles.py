@@ -7,7 +7,7 @@ durations; arguments and results are SI.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isclose, sqrt
 from typing import Any, Self
 
@@ -414,5 +414,5 @@ def _cycle(motion: SensitiveMotion, shot: _Shot) -> LimitCycle | None:
         filter_state=float(start[2]) * drive.length_scale if motion.order > 2 else None,
         period=period,
         multipliers=shot.multipliers(),
-        measures=measures,
+        measures=replace(measures, steady=True, trend=None),
     )

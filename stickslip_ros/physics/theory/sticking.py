@@ -1,7 +1,8 @@
-"""The onset of sticking: the belt speed below which the slide sticks once a cycle."""
+"""The belt speeds at which the slide sticks once a cycle, and the highest of them, the onset."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,6 +18,9 @@ _AVERAGED = np.geomspace(1e-4, 1e4, 200)
 
 _FOLLOWED = np.geomspace(4.0, 0.02, 100)
 """Belt speeds between which the motion is followed, in averaged onsets, or else in the drive's."""
+
+_RANGE_PRECISION = 1e-9
+"""Share to which the ends of ranges of belt speeds are found."""
 
 _ROUNDING = 1e-12
 """Share of the belt speed below which a difference of speeds is rounding."""
@@ -37,6 +41,15 @@ class StickingOnset:
     """Where there is no approximate speed, a sentence that says why."""
     no_exact: str | None
     """Where there is no exact speed, a sentence that says why."""
+    ranges: tuple[tuple[float, float], ...]
+    """Least and highest belt speed (m/s) of each range with a cycle that sticks, ascending.
+
+    Below the onset a slide may come back to the belt with forces that friction cannot hold, and
+    overtake it. The exact onset is the upper end of the last range.
+    """
+    followed: tuple[float, float]
+    """Belt speeds (m/s) between which the ranges were looked for: one that begins at the lower end
+    goes on below it."""
 
 
 def sticking_onset(drive: Drive) -> StickingOnset:
@@ -47,12 +60,17 @@ def sticking_onset(drive: Drive) -> StickingOnset:
     """
     averaged = _averaged(drive)
     reference = averaged if isinstance(averaged, float) else abs(drive.belt_speed)
-    followed = _followed(drive, reference or drive.speed_scale)
+    release = Release()
+    speeds = ((reference or drive.speed_scale) * _FOLLOWED).tolist()
+    followed = _followed(drive, release, speeds)
+    onset = followed if isinstance(followed, float) else None
     return StickingOnset(
         approximate=averaged if isinstance(averaged, float) else None,
-        exact=followed if isinstance(followed, float) else None,
+        exact=onset,
         no_approximate=averaged if isinstance(averaged, str) else None,
         no_exact=followed if isinstance(followed, str) else None,
+        ranges=tuple(_ranges(drive, release, speeds, onset)),
+        followed=(speeds[-1], speeds[0]),
     )
 
 
@@ -83,10 +101,8 @@ def _averaged(drive: Drive) -> float | str:
     return onset * drive.speed_scale
 
 
-def _followed(drive: Drive, reference: float) -> float | str:
-    """Return the exact onset (m/s), or why there is none."""
-    release = Release()
-    speeds = (reference * _FOLLOWED).tolist()
+def _followed(drive: Drive, release: "Release", speeds: Sequence[float]) -> float | str:
+    """Return the exact onset (m/s), or why there is none; the speeds to follow descend."""
 
     def excess(speed: float) -> float:
         at_speed = replace(drive, belt_speed=speed)
@@ -110,6 +126,42 @@ def _followed(drive: Drive, reference: float) -> float | str:
         f"above {sticking:.3g} m/s, up to {speed:.3g} m/s at least, it overtakes the belt and does "
         "not stick: no orbit touches the belt's speed"
     )
+
+
+def _ranges(
+    drive: Drive, release: "Release", speeds: Sequence[float], onset: float | None
+) -> Iterator[tuple[float, float]]:
+    """Yield the ranges of belt speeds, ascending, at which a slide that stuck sticks again."""
+
+    def sticks(speed: float) -> bool:
+        at_speed = replace(drive, belt_speed=speed)
+        return least_cycle(at_speed) is not None and release.sticks_again(at_speed)
+
+    tried = [(speed, sticks(speed)) for speed in speeds if onset is None or speed < onset]
+    if onset is not None:  # below it there is a range, be it ever so narrow
+        tried.insert(0, (onset * (1.0 - _RANGE_PRECISION), True))
+    tried.reverse()
+    low = tried[0][0] if tried[0][1] else None
+    for (speed, before), (next_speed, now) in pairwise(tried):
+        if before == now:
+            continue
+        edge = _edge(sticks, speed, next_speed)
+        if now:
+            low = edge
+        elif low is not None:
+            yield low, edge
+            low = None
+    if low is not None:
+        yield low, tried[-1][0] if onset is None else onset
+
+
+def _edge(sticks: Callable[[float], bool], low: float, high: float) -> float:
+    """Return the belt speed between two at which it changes whether the slide sticks."""
+    at_low = sticks(low)
+    while high - low > _RANGE_PRECISION * high:
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if sticks(middle) == at_low else (low, middle)
+    return (low + high) / 2.0
 
 
 class Release:

@@ -174,3 +174,38 @@ def test_a_cycle_that_sticks_exists_up_to_the_onset(law: FrictionLaw, damping: f
             or (share == 0.5 and (cycle.measures.velocity_amplitude or 0.0) > share * onset)
         ]
         assert len(sticking) == (share < 1.0)
+
+
+def test_a_stiff_drive_sticks_in_two_ranges_of_belt_speeds() -> None:
+    stiff = replace(PAPER, stiffness=1000.0)
+    onset = sticking_onset(stiff)
+    low, high = onset.ranges
+    assert low == pytest.approx((onset.followed[0], 0.18888), rel=1e-4)
+    assert high == pytest.approx((0.39236, 0.43716), rel=1e-4)
+    assert high[1] == onset.exact
+    for belt_speed in (low[1], high[0], high[1]):
+        below, above = (replace(stiff, belt_speed=belt_speed * (1.0 + d)) for d in (-1e-4, 1e-4))
+        assert sticks(below) == (belt_speed != high[0])
+        assert sticks(above) == (belt_speed == high[0])
+    for belt_speed in (0.2, 0.25, 0.3, 0.35):
+        assert not sticks(replace(stiff, belt_speed=belt_speed))
+
+
+def test_the_paper_sticks_at_all_belt_speeds_below_the_onset() -> None:
+    onset = sticking_onset(PAPER)
+    assert onset.ranges == ((onset.followed[0], onset.exact),)
+    assert sticking_onset(replace(PAPER, friction=Coulomb(0.4))).ranges == ()
+
+
+def test_exact_grazing_is_pure_slip() -> None:
+    for drive in (PAPER, FEED_DRIVE):
+        onset = sticking_onset(drive).exact
+        assert onset is not None
+        found = {
+            part: {
+                cycle.measures.regime
+                for cycle in limit_cycles(replace(drive, belt_speed=onset * (1.0 - part)))
+            }
+            for part in (0.0, 1e-12)
+        }
+        assert found == {0.0: {Regime.PURE_SLIP}, 1e-12: {Regime.STICK_SLIP}}

@@ -1,0 +1,57 @@
+"""Whether forces and samples are in time: the share of those that were late lately, and why."""
+
+from collections import deque
+
+_MOST_LATE = 0.01
+"""Share of forces or samples from which on lateness is a complaint."""
+
+_WINDOW = 10
+"""Looks over which shares are taken."""
+
+_LEAST_SAMPLES = 100
+"""Fewer say nothing of a share."""
+
+
+class Punctuality:
+    """Looks at the counts of a plant every now and then, and says what is wrong with them."""
+
+    def __init__(self) -> None:
+        self._counts: deque[tuple[int, int, int]] = deque(maxlen=_WINDOW + 1)
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin a segment."""
+        self._counts.clear()
+        self._counts.append((0, 0, 0))
+
+    def look(
+        self, samples: int, late_forces: int, missed_deadlines: int, *, controlled: bool
+    ) -> str:
+        """Return what there is to complain of in the last looks, if anything.
+
+        While there is no controller, be it that none is expected, no force can be late.
+        """
+        counts = samples, late_forces, missed_deadlines
+        if not controlled:  # from when there is one again its own forces count
+            self._counts = deque(
+                ((n, late_forces, missed) for n, _, missed in self._counts), maxlen=_WINDOW + 1
+            )
+        before = self._counts[0]
+        self._counts.append(counts)
+        number, late, missed = (now - then for now, then in zip(counts, before, strict=True))
+        if number < _LEAST_SAMPLES:
+            return ""
+        found = [
+            f"{100.0 * count / number:.2g} % of the latest {what}"
+            for count, what in (
+                (late, "forces came late (the last one was held)"),
+                (missed, "samples missed their deadlines"),
+            )
+            if count > _MOST_LATE * number
+        ]
+        if not found:
+            return ""
+        return (
+            f"{' and '.join(found)}: lower rate or real_time_factor, close what else is busy here, "
+            "or set pace to lockstep"
+        )

@@ -1,0 +1,71 @@
+"""When a plant complains of late forces and of samples that miss their deadlines."""
+
+from itertools import count
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+
+from stickslip_ros.bags.messages import pack_wrench, unpack_header
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.punctuality import Punctuality
+from stickslip_ros.nodes.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
+from tests.nodes.graph import Graph
+
+
+@pytest.mark.parametrize(
+    ("late", "missed", "words"),
+    [
+        (0, 0, ""),
+        (9, 10, ""),
+        (410, 0, "41 % of the latest forces came late"),
+        (0, 280, "28 % of the latest samples missed their deadlines"),
+        (410, 280, "41 % of the latest forces came late (the last one was held) and 28 %"),
+    ],
+)
+def test_more_than_a_hundredth_is_a_complaint(late: int, missed: int, words: str) -> None:
+    complaint = Punctuality().look(1000, late, missed, controlled=True)
+    assert complaint.startswith(words)
+    assert bool(complaint) == bool(words)
+    if words:
+        assert "lower rate or real_time_factor" in complaint
+
+
+def test_only_the_latest_looks_count() -> None:
+    punctuality = Punctuality()
+    assert punctuality.look(1000, 100, 0, controlled=True)
+    said = [punctuality.look(1000 * n, 100, 0, controlled=True) for n in range(2, 13)]
+    assert said[-1] == ""
+
+
+def test_without_a_controller_no_force_is_late_then_or_later() -> None:
+    punctuality = Punctuality()
+    assert punctuality.look(1000, 1000, 0, controlled=False) == ""
+    assert punctuality.look(2000, 1005, 0, controlled=True) == ""
+    assert punctuality.look(3000, 1500, 0, controlled=True) != ""
+
+
+def test_a_plant_whose_controller_answers_every_third_sample_warns(graph: Graph) -> None:
+    health: list[DiagnosticArray] = graph.listen(DIAGNOSTICS)
+    force = graph.observer.create_publisher(
+        CONTROL_FORCE.type, f"/test/{CONTROL_FORCE.name}", CONTROL_FORCE.qos()
+    )
+    counted = count()
+
+    def answer(message: bytes) -> None:
+        if next(counted) % 3 == 0:
+            force.publish(pack_wrench(unpack_header(message), 0.0))
+
+    graph.observer.create_subscription(
+        JOINT_STATES.type, f"/test/{JOINT_STATES.name}", answer, JOINT_STATES.qos(), raw=True
+    )
+    graph.add(PlantNode, pace="realtime", rate=100.0, wait_for=["observer"])
+
+    def warnings() -> list[str]:
+        return [
+            status.message
+            for array in health
+            for status in array.status
+            if status.level == DiagnosticStatus.WARN
+        ]
+
+    graph.wait_until(lambda: any("forces came late" in said for said in warnings()), "a warning")
