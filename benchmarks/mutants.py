@@ -52,11 +52,12 @@ def main() -> int:
     arguments = parser.parse_args()
     everything = list(chain.from_iterable(map(mutants_of, sorted(PHYSICS.rglob("*.py")))))
     chosen = random.Random(arguments.seed).sample(everything, arguments.count)
+    caught = 0
     with ThreadPoolExecutor(arguments.workers) as pool:
-        caught = list(pool.map(is_caught, chosen))
-    for mutant, noticed in zip(chosen, caught, strict=True):
-        print(f"{'caught  ' if noticed else 'SURVIVES'} {mutant}")
-    print(f"{sum(caught)} of {len(caught)} caught")
+        for mutant, noticed in zip(chosen, pool.map(is_caught, chosen), strict=True):
+            print(f"{'caught  ' if noticed else 'SURVIVES'} {mutant}", flush=True)
+            caught += noticed
+    print(f"{caught} of {len(chosen)} caught")
     return 0
 
 
