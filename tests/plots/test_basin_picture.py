@@ -134,3 +134,8 @@ def test_two_attractors_of_one_regime_have_two_colours(tmp_path: Path) -> None:
     regimes = [Regime.STICK_SLIP, Regime.STICK_SLIP]
     path = drawn(tmp_path / "basin.png", grid_shape=(30, 40), regimes=regimes)
     assert min(shares(path, ORANGE, SKY_BLUE)) > 0.02
+
+
+def test_the_belt_line_hides_no_points() -> None:
+    (axes,) = basin_figure(**starts()).axes
+    assert "white" not in {line.get_color() for line in axes.lines if line.get_marker() == "None"}

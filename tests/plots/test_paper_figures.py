@@ -87,3 +87,12 @@ def test_a_bifurcation_diagram_names_regimes_and_marks(tmp_path: Path) -> None:
     for text in ("rests with the belt", "Hopf point 0.48876", "onset of sticking 0.4396"):
         assert text in picture
     assert "runs away" not in picture
+
+
+def test_the_title_of_every_diagram_fits(tmp_path: Path) -> None:
+    for number in (2, 3, 4, 5):
+        path = tmp_path / f"figure_{number}.png"
+        draw_paper_figure(path, compute_figure(number, points=3))
+        with Image.open(path) as image:
+            edges = np.asarray(image.convert("L"))[:40][:, [0, -1]]
+        assert edges.min() > 250

@@ -238,6 +238,41 @@ def test_a_line_breaks_where_samples_are_missing() -> None:
     assert np.mean(shade.get_array()) == pytest.approx(5.98 / 8.99, rel=1e-3)
 
 
+def test_where_no_force_came_the_last_one_is_dotted() -> None:
+    history = RunHistory()
+    time = np.arange(0.0, 3.0, 0.01)
+    ones = np.ones(len(time))
+    history.take_samples(time, 0.1 * time, 0.4 * ones, 0.4 * ones, ones, [])
+    late = (time > 1.0) & (time < 1.5)
+    history.take_control(time[~late], 7.0 * time[~late])
+    figure = run_figure(history, CycleMeter(20).measures(), PAPER, title="it")
+    held = figure.axes[FORCE].lines[2]
+    assert held.get_linestyle() == ":"
+    x, y = np.array(held.get_xydata()).T
+    assert x[:2] == pytest.approx((1.0, 1.5))
+    assert y[0] == pytest.approx(7.0)
+    (legend,) = figure.legends
+    assert "none came: the last one" in {text.get_text() for text in legend.get_texts()}
+
+
+def test_without_such_a_gap_the_legend_says_nothing_of_it(reference: Drawn) -> None:
+    (legend,) = reference.figure.legends
+    assert "none came: the last one" not in {text.get_text() for text in legend.get_texts()}
+
+
+def test_rounding_is_no_wave() -> None:
+    history = RunHistory()
+    time = np.arange(0.0, 3.0, 0.01)
+    wave = np.sin(time)
+    history.take_samples(
+        time, 0.25 + 1e-16 * wave, 1e-16 * wave, np.full(len(time), 0.4), 0.25 + 1e-16 * wave, []
+    )
+    figure = run_figure(history, CycleMeter(20).measures(), PAPER, title="it")
+    for panel in (POSITION, VELOCITY, FORCE, PORTRAIT):
+        bottom, top = figure.axes[panel].get_ylim()
+        assert top - bottom >= 0.9e-6 * max(abs(bottom), abs(top))
+
+
 def test_what_goes_back_in_time_is_left_out_and_said() -> None:
     history = RunHistory()
     time = np.arange(0.0, 3.0, 0.01)

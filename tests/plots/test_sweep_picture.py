@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from stickslip_ros.plots.style import BLUE, GREEN, LIGHT_GREY, ORANGE
-from stickslip_ros.plots.sweep_picture import diagram_figure, draw_diagram, draw_map
+from stickslip_ros.plots.sweep_picture import diagram_figure, draw_diagram, draw_map, map_figure
 from stickslip_ros.scenario.files import load_scenario
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.journal import Journal
@@ -175,6 +175,23 @@ def test_a_map_has_each_point_where_it_is(tmp_path: Path, over_two: Swept) -> No
     assert share(path, GREEN) > 0.1
     assert share(path, ORANGE) > 0.1
     assert share(path, BLUE) < 0.1
+
+
+@pytest.mark.parametrize("spacing", ["", ":log"])
+def test_a_map_ends_where_the_sweep_does(spacing: str) -> None:
+    over = (f"plant.damping=0.01:0.08:3{spacing}", f"plant.belt_speed=0.1:0.7:3{spacing}")
+    (axes,) = map_figure(*swept(*over)).axes
+    assert axes.get_xlim() == pytest.approx((0.01, 0.08))
+    assert axes.get_ylim() == pytest.approx((0.1, 0.7))
+
+
+def test_a_stick_fraction_has_no_prefix() -> None:
+    si = (FREE, "plant.mass=100.0", "plant.stiffness=1e6", "plant.normal_force=1000.0")
+    over = ("plant.damping=0:800:3", "plant.belt_speed=0.002:0.06:3")
+    figure = map_figure(*swept(*over, overrides=si), "stick_fraction")
+    bar = figure.axes[-1]
+    assert bar.get_ylabel() == "stick fraction"
+    assert bar.get_ylim()[1] <= 1.0
 
 
 def test_a_map_carried_both_ways_has_two_panels(tmp_path: Path) -> None:
