@@ -20,6 +20,7 @@ from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.nodes.lifeline import die_with_parent
 from stickslip_ros.nodes.managed import ManagedNode
 from stickslip_ros.scenario.parameters import NodeParameters, parameters_of
+from stickslip_ros.streams import open_closed_streams
 
 ROS_ARGUMENTS = ["--ros-args", "--log-level", "warn", "--disable-external-lib-logs"]
 """Of the commands: they say on standard error what there is to say, and need no home directory."""
@@ -50,6 +51,7 @@ def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) 
 
     Status 2 says that a parameter or an argument was refused, with the reason on standard error.
     """
+    open_closed_streams()
     parser = argparse.ArgumentParser(
         description=sys.modules[make.__module__].__doc__,
         epilog=_parameter_help(model),

@@ -115,12 +115,12 @@ class ClosedLoop:
         self._runs = 0
         self._brought_up: set[str] = set()
         with ExitStack() as opened:
-            opened.callback(self._forget)
             self._domain = opened.enter_context(own_domain())
             self._directory = opened.enter_context(
                 tempfile.TemporaryDirectory(prefix="stickslip_ros_")
             )
             self.context = opened.enter_context(ros_context(self._domain, self.ros_arguments))
+            opened.callback(self._forget)  # before ROS ends: then nothing of it is left
             self._nodes = Composition(
                 self.context, self._parameters(), washout=self._to_control == "washout"
             )

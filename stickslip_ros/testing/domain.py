@@ -64,6 +64,7 @@ def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
     That is rclpy's default context, so that nodes which name none are in it, unless that is in
     use already.
     """
+    _collect_before_forks()
     with _initialising:
         context = Context() if rclpy.ok() else rclpy.get_default_context()
         with _environment({**_this_process_only_here(), **_NO_PEERS}):
@@ -78,6 +79,12 @@ def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
         # What rclpy's destroyed nodes still hold, threads, sockets and shared memory of the
         # middleware, goes with the last of them, and they refer to each other.
         gc.collect()
+
+
+@cache
+def _collect_before_forks() -> None:
+    """Leave no nodes for a forked child to collect: it lacks the threads that they end with."""
+    os.register_at_fork(before=gc.collect)
 
 
 @cache

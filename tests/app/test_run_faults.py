@@ -187,3 +187,26 @@ def test_who_reads_no_further_is_no_failure() -> None:
     done = subprocess.run(report, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writing)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
+def test_a_run_does_without_standard_streams(
+    process_environment: dict[str, str], tmp_path: Path, closed: str
+) -> None:
+    run = f"{sys.executable} -m stickslip_ros.app.main run paper --bag bag --duration 1 --json"
+    done = subprocess.run(
+        f"{run} {closed}",
+        shell=True,
+        cwd=tmp_path,
+        env=process_environment,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr
+    if ">&-" not in closed.split():
+        assert json.loads(done.stdout)["samples"] == 101
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.complete
