@@ -2,6 +2,7 @@
 
 import argparse
 import io
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -65,11 +66,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except BrokenPipeError:  # whoever read our output has seen enough
         sys.stdout = nowhere()
         status = 0
-    except OSError as error:  # the disk that standard output goes to is full
+    except OSError as error:  # the disk that standard output goes to is full, for one
         sys.stdout = nowhere()
-        print(f"stickslip {command}: {error}", file=sys.stderr)
+        print(f"stickslip {command}: {_reason(error)}", file=sys.stderr)
         status = 1
     sys.exit(status)
+
+
+def _reason(error: OSError) -> str:
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return "the current directory has been deleted: change to one that exists"
+    return str(error)
 
 
 def _version() -> str:

@@ -432,4 +432,9 @@ def _sync_directories(directories: Collection[Path]) -> None:
 
 def _absolute(path: Path) -> Path:
     """Return the path without `.` and `..`, so that its last part is a name."""
-    return Path(os.path.abspath(path))
+    try:
+        return Path(os.path.abspath(path))
+    except FileNotFoundError:
+        raise BagError(
+            f"the bag {path} cannot be created: the current directory has been deleted"
+        ) from None

@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from stickslip_ros.errors import RunError
-from stickslip_ros.nodes.process import this_machine_only
+from stickslip_ros.nodes.process import check_machine, this_machine_only
 
 DOMAINS = range(1, 102)
 """Domains all ports of which are below those that the system gives away."""
@@ -67,6 +67,8 @@ def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
     _collect_before_forks()
     with _initialising:
         context = Context() if rclpy.ok() else rclpy.get_default_context()
+        with _environment(this_machine_only()):
+            check_machine(domain)
         with _environment({**_this_process_only_here(), **_NO_PEERS}):
             _initialise(context, domain, arguments)
     try:

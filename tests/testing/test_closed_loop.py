@@ -320,6 +320,7 @@ def test_a_controller_that_cannot_be_heard_is_told_why(
         ({"controller": lambda: 5}, "made 5, not an rclpy node"),
         ({"controller": controllers.Refusing}, "refusing could not be configured: failure"),
         ({"namespace": "a b"}, "namespace = 'a b' is refused"),
+        ({"namespace": "/" + 230 * "n"}, "must have at most 200 characters"),
     ],
 )
 def test_what_cannot_be_is_refused(options: dict[str, Any], sentence: str) -> None:
