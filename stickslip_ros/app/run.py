@@ -152,10 +152,10 @@ def record(
             raise RunError(f"{error}; {_state_of(bag)}") from None
     try:
         return _figures(bag, outcome), outcome.interrupted
-    except BagError:
+    except BagError as error:
         if outcome.interrupted:  # before the first sample
             raise KeyboardInterrupt from None
-        raise
+        raise RunError(str(error)) from None
 
 
 @contextmanager
