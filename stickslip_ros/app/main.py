@@ -3,6 +3,7 @@
 import argparse
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -28,6 +29,9 @@ _COMMANDS = (
 )
 """Each is a module here, imported when it is asked for: some import what takes seconds."""
 
+_NEGATIVE = re.compile(r"-(\.?\d|inf)")
+_LONG_OPTION = re.compile(r"--[\w-]+")
+
 _PASSING_ON = ("run",)
 """Those that pass on to others what follows `--`, in the attribute `further`."""
 
@@ -43,6 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if command in _PASSING_ON and "--" in given:
         end = given.index("--")
         given, further = given[:end], given[end + 1 :]
+    given = _with_negative_values(given)
     open_closed_streams()
     if isinstance(sys.stdout, io.TextIOWrapper):  # µ is not in every encoding
         sys.stdout.reconfigure(errors="backslashreplace")
@@ -71,6 +76,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"stickslip {command}: {_reason(error)}", file=sys.stderr)
         status = 1
     sys.exit(status)
+
+
+def _with_negative_values(given: Sequence[str]) -> list[str]:
+    """Join what begins with a negative number to its option: argparse takes it for another."""
+    joined: list[str] = []
+    for word in given:
+        if _NEGATIVE.match(word) and joined and _LONG_OPTION.fullmatch(joined[-1]):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 def _reason(error: OSError) -> str:

@@ -94,6 +94,13 @@ def test_a_wrong_call_shows_the_usage(stickslip: Run, arguments: tuple[str, ...]
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize("value", ["-2", "-.5", "-1e-3", "-inf"])
+def test_a_negative_number_is_a_value_and_no_option(stickslip: Run, value: str) -> None:
+    done = stickslip("simulate", "paper", "--duration", value)
+    assert done.returncode == 2
+    assert f"{value!r} is not a time in seconds, 0 or more" in done.stderr
+
+
 def test_an_existing_bag_is_left_as_it_is(stickslip: Run, tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     bag.mkdir()
