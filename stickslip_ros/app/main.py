@@ -65,8 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except StickslipError as error:
         print(f"stickslip {command}: {error}", file=sys.stderr)
         status = 1
-    except KeyboardInterrupt:
-        print(f"stickslip {command}: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as error:
+        print(": ".join([f"stickslip {command}: interrupted", *error.args]), file=sys.stderr)
         status = INTERRUPTED
     except BrokenPipeError:  # whoever read our output has seen enough
         sys.stdout = nowhere()
