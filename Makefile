@@ -71,10 +71,10 @@ lint: setup
 	$(BIN)/ruff format --check
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
-# A table, and the same as JSON; needs a quiet machine.
+# A table, and the same as JSON; needs a quiet machine. What lacks a browser, say, is skipped (77).
 bench: setup
 	@mkdir -p build
-	$(BIN)/python -m benchmarks --out build/benchmarks.json
+	$(BIN)/python -m benchmarks --out build/benchmarks.json || test $$? -eq 77
 
 # The picture of the dashboard in README.md, made by its test.
 screenshot: setup

@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.slices import Row, table
+from benchmarks.slices import LACKING, Row, table
 from stickslip_ros.versions import versions
 
 NAMES = (
@@ -26,7 +26,10 @@ TIMEOUT = 600.0
 
 
 def main() -> int:
-    """Run the benchmarks named, print their table or JSON; return the exit status."""
+    """Run the benchmarks named, print their table or JSON; return the exit status.
+
+    0 done; 1 some failed; 77 none failed, but some lack what they need here.
+    """
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks",
         description=__doc__,
@@ -48,6 +51,7 @@ def main() -> int:
     report: dict[str, Any] = {
         "benchmarks": {},
         "failed": {},
+        "skipped": [],
         "processors": os.cpu_count(),
         "load_average": os.getloadavg()[0],
         "versions": versions(),
@@ -65,19 +69,26 @@ def main() -> int:
         print(table(sections))
     for name, why in report["failed"].items():
         print(f"benchmarks.{name} failed: {why}", file=sys.stderr)
+    for name in report["skipped"]:
+        print(f"benchmarks.{name} skipped: what it needs is not installed", file=sys.stderr)
     if arguments.out is not None:
         arguments.out.write_text(text + "\n", encoding="utf-8")
-    return 1 if report["failed"] else 0
+    if report["failed"]:
+        return 1
+    return LACKING if report["skipped"] else 0
 
 
 def run(name: str, report: dict[str, Any]) -> None:
-    """Run one benchmark and enter its rows, or that it failed, in the report."""
+    """Run one benchmark and enter its rows, or that there are none, in the report."""
     print(f"{name} ...", end=" ", flush=True, file=sys.stderr)
     started = time.monotonic()
     command = [sys.executable, "-m", f"benchmarks.{name}", "--json"]
     try:
         done = subprocess.run(command, stdout=subprocess.PIPE, timeout=TIMEOUT, check=True)
     except subprocess.CalledProcessError as error:
+        if error.returncode == LACKING:
+            report["skipped"].append(name)
+            return
         report["failed"][name] = f"exit status {error.returncode}"
     except subprocess.TimeoutExpired:
         report["failed"][name] = f"not done within {TIMEOUT:g} s"

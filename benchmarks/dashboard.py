@@ -21,13 +21,12 @@ from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from statistics import median
 from urllib.error import URLError
 
-from playwright.sync_api import sync_playwright
-
 from benchmarks.parties import READY_TIMEOUT, ObservedPlant, Slice, closed_loop, party
-from benchmarks.slices import Row, by_turns, compare_rates, show
+from benchmarks.slices import Row, by_turns, compare_rates, lacks, show
 from stickslip_ros.nodes.lifeline import start
 
 LOCKSTEP_ROUNDS = 9
@@ -92,6 +91,8 @@ def dashboard(*, with_page: bool) -> Generator[Callable[[], AbstractContextManag
         resources.callback(process.send_signal, signal.SIGCONT)
         page = None
         if with_page:
+            from playwright.sync_api import sync_playwright
+
             playwright = resources.enter_context(sync_playwright())
             browser = playwright.chromium.launch(executable_path=shutil.which("chromium"))
             resources.callback(browser.close)
@@ -127,7 +128,9 @@ def wait_for_page(url: str) -> None:
 
 def measure() -> list[Row]:
     if shutil.which("chromium") is None:
-        raise SystemExit("this needs chromium: sudo apt-get install chromium")
+        lacks("chromium: sudo apt-get install chromium")
+    if find_spec("playwright") is None:
+        lacks("playwright: pip install playwright")
     kinds = (SEEN, UNSEEN, NOBODY)
     rows: list[Row] = []
     with ExitStack() as resources:

@@ -2,14 +2,18 @@
 
 import argparse
 import json
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from statistics import median
-from typing import TypeVar
+from typing import NoReturn, TypeVar
 
 from stickslip_ros.versions import versions
 
 T = TypeVar("T")
+
+LACKING = 77
+"""Exit status of a benchmark that cannot run here, as of tests that are skipped elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,12 @@ def compare_times(
     """Compare durations, s, taken by turns: medians, and the median of the ratios of neighbours."""
     ratio = median(b / a for a, b in zip(ours, peer, strict=True))
     return Row(what, "s", median(ours), against, median(peer), ratio, required)
+
+
+def lacks(what: str) -> NoReturn:
+    """End a benchmark for which something is not installed here."""
+    print(f"this needs {what}", file=sys.stderr)
+    sys.exit(LACKING)
 
 
 def show(question: str | None, make_rows: Callable[[], list[Row]]) -> None:

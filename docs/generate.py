@@ -29,9 +29,6 @@ from stickslip_ros.scenario.parameters import (
 HERE = Path(__file__).parent
 PAGES = ("parameters.md", "topics.md", "theory.md", "reference.md")
 
-_FROM_ANYWHERE = {"at least -1e+30", "at most 1e+30"}
-"""Bounds of every number, which the page tells once."""
-
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a Markdown table."""
@@ -58,8 +55,9 @@ def _parameter_row(parameter: Parameter) -> list[str]:
         default = str(default).lower()
     elif parameter.kind is float:
         default = "inf" if isinf(default) else repr(default)
-    limits = [part for part in parameter.bounds.split(" and ") if part not in _FROM_ANYWHERE]
-    allowed = " and ".join(limits) + ("" if parameter.finite else ", or inf" if limits else "inf")
+    allowed = parameter.bounds
+    if not parameter.finite:
+        allowed += ", or inf" if allowed else "inf"
     return [
         f"`{parameter.name}`",
         parameter.unit or "",

@@ -8,7 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario, load_scenario
+from stickslip_ros.scenario.files import (
+    DEFAULT_NAMESPACE,
+    LONGEST_NAMESPACE,
+    Scenario,
+    load_scenario,
+)
+from stickslip_ros.scenario.parameters import shown
 from stickslip_ros.versions import versions
 
 _PICTURES = (".png", ".svg", ".pdf")
@@ -106,6 +112,11 @@ def namespace_of(text: str) -> str:
     if not all(token.isidentifier() and token.isascii() for token in tokens):
         raise InvalidInputError(
             f"--namespace {text!r}: must be names of letters, digits and _ joined by /"
+        )
+    if len(namespace) > LONGEST_NAMESPACE:
+        raise InvalidInputError(
+            f"--namespace {shown(text)}: has {len(namespace)} characters, and must have at most "
+            f"{LONGEST_NAMESPACE}"
         )
     return namespace
 

@@ -54,9 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             f"--{name}",
             metavar="A:B:COUNT",
-            help=f"{what} of the grid, {unit}, as in --{name}=-2:2:{_COUNT} (with = before a minus "
-            f"sign; of a --sample A:B will do; default: {_COUNT}, twice as far to either side as a "
-            "vibration goes, about)",
+            help=f"{what} of the grid, {unit}, as in --{name} -2:2:{_COUNT} (of a --sample A:B "
+            f"will do; default: {_COUNT}, twice as far to either side as a vibration goes, about)",
         )
     parser.add_argument(
         "--sample",

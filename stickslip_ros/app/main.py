@@ -3,13 +3,15 @@
 import argparse
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import TextIO
 
 from stickslip_ros.app import INTERRUPTED
+from stickslip_ros.app.optional import interrupts_kept
 from stickslip_ros.errors import InvalidInputError, StickslipError
+from stickslip_ros.streams import nowhere, open_closed_streams
 from stickslip_ros.versions import versions
 
 _COMMANDS = (
@@ -27,6 +29,9 @@ _COMMANDS = (
 )
 """Each is a module here, imported when it is asked for: some import what takes seconds."""
 
+_NEGATIVE = re.compile(r"-(\.?\d|inf)")
+_LONG_OPTION = re.compile(r"--[\w-]+")
+
 _PASSING_ON = ("run",)
 """Those that pass on to others what follows `--`, in the attribute `further`."""
 
@@ -42,8 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if command in _PASSING_ON and "--" in given:
         end = given.index("--")
         given, further = given[:end], given[end + 1 :]
-    if sys.stdout is None:  # closed by who called
-        sys.stdout = _nowhere()
+    given = _with_negative_values(given)
+    open_closed_streams()
     if isinstance(sys.stdout, io.TextIOWrapper):  # µ is not in every encoding
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -60,22 +65,36 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except StickslipError as error:
         print(f"stickslip {command}: {error}", file=sys.stderr)
         status = 1
-    except KeyboardInterrupt:
-        print(f"stickslip {command}: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as error:
+        print(": ".join([f"stickslip {command}: interrupted", *error.args]), file=sys.stderr)
         status = INTERRUPTED
     except BrokenPipeError:  # whoever read our output has seen enough
-        sys.stdout = _nowhere()
+        sys.stdout = nowhere()
         status = 0
-    except OSError as error:  # the disk that standard output goes to is full
-        sys.stdout = _nowhere()
-        print(f"stickslip {command}: {error}", file=sys.stderr)
+    except OSError as error:  # the disk that standard output goes to is full, for one
+        sys.stdout = nowhere()
+        print(f"stickslip {command}: {_reason(error)}", file=sys.stderr)
         status = 1
     sys.exit(status)
 
 
-def _nowhere() -> TextIO:
-    """Return what may stand in for standard output: the interpreter flushes it at exit."""
-    return open(os.devnull, "w")
+def _with_negative_values(given: Sequence[str]) -> list[str]:
+    """Join what begins with a negative number to its option: argparse takes it for another."""
+    joined: list[str] = []
+    for word in given:
+        if _NEGATIVE.match(word) and joined and _LONG_OPTION.fullmatch(joined[-1]):
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
+def _reason(error: OSError) -> str:
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return "the current directory has been deleted: change to one that exists"
+    return str(error)
 
 
 def _version() -> str:
@@ -92,7 +111,8 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=_version())
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in [name for name in _COMMANDS if name in given[:1]] or _COMMANDS:
-        command = import_module(f"stickslip_ros.app.{name}")
+        with interrupts_kept():
+            command = import_module(f"stickslip_ros.app.{name}")
         subparser = commands.add_parser(name, help=command.HELP, description=command.HELP)
         command.add_arguments(subparser)
         subparser.set_defaults(run=command.run, parser=subparser)

@@ -13,7 +13,7 @@ from stickslip_ros.errors import RunError
 def ros_nodes(module: str) -> ModuleType:
     """Return a module of `nodes`; the commands that need no ROS do without."""
     try:
-        with _interrupts_kept():
+        with interrupts_kept():
             return import_module(f"stickslip_ros.nodes.{module}")
     except ModuleNotFoundError as error:
         raise RunError(
@@ -23,7 +23,7 @@ def ros_nodes(module: str) -> ModuleType:
 
 
 @contextmanager
-def _interrupts_kept() -> Generator[None]:
+def interrupts_kept() -> Generator[None]:
     """Let SIGINT wait: where it meets a C extension being loaded, it becomes an ImportError."""
     kept: list[int] = []
     handler = signal.signal(signal.SIGINT, lambda number, _: kept.append(number))

@@ -118,7 +118,10 @@ def run(arguments: argparse.Namespace) -> int:
         print_figures(scenario.name, {"": {**figures["report"], **figures}})
     if not figures["report"]["complete"]:
         raise RunError(f"the bag {bag} could not be written to its end")
-    return INTERRUPTED if interrupted else 0
+    if interrupted:
+        _tell(f"stickslip run: interrupted: the bag {bag} is closed; the nodes have ended")
+        return INTERRUPTED
+    return 0
 
 
 def record(
@@ -152,10 +155,11 @@ def record(
             raise RunError(f"{error}; {_state_of(bag)}") from None
     try:
         return _figures(bag, outcome), outcome.interrupted
-    except BagError:
+    except BagError as error:
         if outcome.interrupted:  # before the first sample
-            raise KeyboardInterrupt from None
-        raise
+            left = f"; {bag} holds nothing" if bag.exists() else ""
+            raise KeyboardInterrupt(f"nothing was recorded{left}; the nodes have ended") from None
+        raise RunError(str(error)) from None
 
 
 @contextmanager

@@ -27,6 +27,7 @@ from mcap.writer import CompressionType, Writer
 from stickslip_ros.bags.definitions import message_definition, type_hash
 from stickslip_ros.bags.mcap_file import McapFile
 from stickslip_ros.bags.metadata import BagDescription, opening_information
+from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError
 from stickslip_ros.physics.samples import NANOSECONDS
 
@@ -383,9 +384,15 @@ class Recorder:
         self._end()
         self._stream.cut()
         raise BagError(
-            f"the bag {self.directory} cannot be written any more ({error}); "
-            "what it holds so far can be read"
+            f"the bag {self.directory} cannot be written any more ({error}); {self._left()}"
         ) from error
+
+    def _left(self) -> str:
+        """Say what a bag that failed holds: the first messages may have been too many for it."""
+        with suppress(BagError), Recording(self.directory) as recording:
+            for _ in recording.messages(*self._topics):
+                return "what it holds so far can be read"
+        return "it holds no message"
 
     def _end(self) -> None:
         self._closed = True
@@ -432,4 +439,9 @@ def _sync_directories(directories: Collection[Path]) -> None:
 
 def _absolute(path: Path) -> Path:
     """Return the path without `.` and `..`, so that its last part is a name."""
-    return Path(os.path.abspath(path))
+    try:
+        return Path(os.path.abspath(path))
+    except FileNotFoundError:
+        raise BagError(
+            f"the bag {path} cannot be created: the current directory has been deleted"
+        ) from None

@@ -187,6 +187,9 @@ class _Bringup:
                 if composed:
                     self._compose({node: parameters[node] for node in nodes})
                 else:
+                    self._signal_handlers[signal.SIGTSTP] = signal.signal(
+                        signal.SIGTSTP, self._stop_alone
+                    )
                     self._spawn(nodes, file)
                 self._start_other(file)
                 self._bring_up(nodes)
@@ -225,6 +228,11 @@ class _Bringup:
         for name in nodes:
             module = _NODES[name].__module__
             self._processes[name] = start([sys.executable, "-m", module, *arguments])
+
+    def _stop_alone(self, *_: object) -> None:
+        """Be stopped, as by Ctrl-Z, which does not reach the nodes."""
+        self._tell("stopped, and the nodes go on without being watched: fg takes the run up again")
+        signal.raise_signal(signal.SIGSTOP)
 
     def _start_other(self, file: Path) -> None:
         """Start the other controller, if that is for us to do, with the scenario's parameters."""

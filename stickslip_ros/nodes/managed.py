@@ -9,7 +9,8 @@ from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
-from rclpy.exceptions import ParameterException
+from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -21,9 +22,12 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.collecting import Collecting
 from stickslip_ros.nodes.topics import DIAGNOSTICS, Topic, mismatch, type_name
 from stickslip_ros.scenario import parameters
+from stickslip_ros.scenario.files import LONGEST_NAMESPACE
 from stickslip_ros.scenario.parameters import Fixed, NodeParameters, shown
 
 ParametersT = TypeVar("ParametersT", bound=NodeParameters)
+
+RCLError: type[Exception] = rclpy_implementation.RCLError
 
 Level = bytes
 OK: Level = DiagnosticStatus.OK
@@ -71,6 +75,11 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
         except (ParameterException, ValueError) as error:  # an empty list, for one
             raise InvalidInputError(
                 f"{name}: ROS refuses a parameter (an empty list is to be left out): {error}"
+            ) from None
+        except (NameValidationException, RCLError) as error:
+            raise InvalidInputError(
+                f"{name}: ROS refuses to make the node, maybe because its namespace has more than "
+                f"{LONGEST_NAMESPACE} characters: {first_line(error)}"
             ) from None
         self.stopped = Future()
         """Done when the node's process may end; carries the refusal, if that was the reason."""
@@ -340,6 +349,11 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
     def _as_ros(self, values: Mapping[str, Any]) -> list[Parameter]:
         known = parameters.known_parameters(self._model)
         return [Parameter(name, _ROS_TYPES[known[name].kind], v) for name, v in values.items()]
+
+
+def first_line(error: Exception) -> str:
+    """Return what an exception of ROS's says, without where in its code and what follows."""
+    return str(error).strip().split("\n", 1)[0].split(", at ", 1)[0].rstrip(":")
 
 
 _ROS_TYPES = {

@@ -3,8 +3,11 @@
 import argparse
 import os
 import signal
+import socket
 import sys
+import time
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +19,13 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
+from stickslip_ros.bags.messages import END_OF_TIME
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.nodes.lifeline import die_with_parent
-from stickslip_ros.nodes.managed import ManagedNode
+from stickslip_ros.nodes.managed import ManagedNode, first_line
+from stickslip_ros.physics.samples import NANOSECONDS
 from stickslip_ros.scenario.parameters import NodeParameters, parameters_of
+from stickslip_ros.streams import open_closed_streams
 
 ROS_ARGUMENTS = ["--ros-args", "--log-level", "warn", "--disable-external-lib-logs"]
 """Of the commands: they say on standard error what there is to say, and need no home directory."""
@@ -31,6 +37,8 @@ _LOCALHOST_ONLY = "ROS_LOCALHOST_ONLY"
 _PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _NO_PROFILES_FROM_HERE = "SKIP_DEFAULT_XML_FILE"
 """Set, it keeps Fast DDS from reading profiles of the working directory, which overrule others."""
+_LARGEST_DOMAIN = 232
+_ECHO_TIMEOUT = 1.0
 _SPIN_TIMEOUT = 0.2
 
 
@@ -42,7 +50,12 @@ def initialise() -> None:
     try:
         rclpy.init(args=ROS_ARGUMENTS, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:
-        raise InvalidInputError(_first_line(error)) from None
+        raise InvalidInputError(first_line(error)) from None
+    try:
+        check_machine(rclpy.get_default_context().get_domain_id())
+    except InvalidInputError:
+        rclpy.try_shutdown()
+        raise
 
 
 def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) -> int:
@@ -50,6 +63,7 @@ def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) 
 
     Status 2 says that a parameter or an argument was refused, with the reason on standard error.
     """
+    open_closed_streams()
     parser = argparse.ArgumentParser(
         description=sys.modules[make.__module__].__doc__,
         epilog=_parameter_help(model),
@@ -66,9 +80,10 @@ def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) 
         parser.parse_args(remove_ros_args(sys.argv)[1:])
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # what rcl could not parse; its first line names it
-        print(f"{parser.prog}: {_first_line(error)}", file=sys.stderr)
+        print(f"{parser.prog}: {first_line(error)}", file=sys.stderr)
         return 2
     try:
+        check_machine(rclpy.get_default_context().get_domain_id())
         run_until_stopped(make())
         return 0
     except InvalidInputError as error:
@@ -129,6 +144,43 @@ def this_machine_only() -> dict[str, str]:
         _PROFILES: _profile("loopback"),
         _NO_PROFILES_FROM_HERE: "1",
     }
+
+
+def check_machine(domain: int) -> None:
+    """Raise InvalidInputError where nodes could not live: for the domain, the clock, the network.
+
+    What the middleware itself says of these is no sentence, or nothing.
+    """
+    if domain > _LARGEST_DOMAIN:
+        raise InvalidInputError(
+            f"ROS_DOMAIN_ID = {domain} is refused: must be at most {_LARGEST_DOMAIN}, the last "
+            "domain that has ports"
+        )
+    now = time.time_ns()
+    if not 0 < now < END_OF_TIME:
+        year = datetime.fromtimestamp(now / NANOSECONDS, UTC).year
+        raise InvalidInputError(
+            f"the clock of this machine says {year}: the stamps of ROS messages reach from 1970 "
+            "to January 2038"
+        )
+    if os.environ.get(_PROFILES) == _profile("loopback") and not _reaches_itself():
+        raise InvalidInputError(
+            "the loopback interface of this machine is down, and nodes that are kept on it need "
+            "that: ip link set lo up"
+        )
+
+
+def _reaches_itself() -> bool:
+    kind = socket.AF_INET, socket.SOCK_DGRAM
+    with socket.socket(*kind) as reader, socket.socket(*kind) as writer:
+        reader.bind(("127.0.0.1", 0))
+        reader.settimeout(_ECHO_TIMEOUT)
+        try:
+            writer.sendto(b"", reader.getsockname())
+            reader.recv(1)
+        except OSError:
+            return False
+    return True
 
 
 def prefer_prompt_middleware() -> None:
@@ -196,7 +248,3 @@ def _parameter_help(model: type[NodeParameters]) -> str:
         lines.append(f"  {parameter.name}  (default {parameter.default}{unit}{bounds}{when})")
         lines.append(f"      {parameter.meaning}")
     return "\n".join(lines)
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().split("\n", 1)[0].split(", at ", 1)[0]

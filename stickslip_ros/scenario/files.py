@@ -23,6 +23,8 @@ from stickslip_ros.scenario.parameters import (
 )
 
 DEFAULT_NAMESPACE = "/feed_drive"
+LONGEST_NAMESPACE = 200
+"""Characters with which the names of all topics and services are short enough for ROS."""
 
 _PARAMETERS_KEY = "ros__parameters"
 _LARGEST = 1_000_000

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
-from math import isinf, pi, sqrt
+from math import inf, isinf, pi, sqrt
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -415,7 +415,9 @@ class Parameter:
     choices: tuple[str, ...]
     """What a parameter of kind str may be; empty: anything."""
     bounds: str
-    """What is allowed, in words; empty: anything."""
+    """What is allowed, in words, but for limits that only a mistake meets; empty: anything."""
+    limits: str
+    """What is allowed, with those."""
     finite: bool
     """Whether a number must be finite."""
 
@@ -450,7 +452,8 @@ def _parameter(name: str, field: FieldInfo) -> Parameter:
         meaning=field.description or "",
         fixed=extra["fixed"],
         choices=choices,
-        bounds=_bounds(field, choices),
+        bounds=_bounds(field, choices, told=True),
+        limits=_bounds(field, choices, told=False),
         finite=not any(
             getattr(constraint, "allow_inf_nan", False) for constraint in field.metadata
         ),
@@ -466,19 +469,34 @@ def known_parameters(model: type[BaseModel]) -> Mapping[str, Parameter]:
 _COMPARISONS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
 
 
-def _bounds(field: FieldInfo, choices: tuple[str, ...]) -> str:
+_NOT_TOLD = {("at least", -_LARGEST), ("at most", _LARGEST), ("at most", 2**62)}
+
+
+def _bounds(field: FieldInfo, choices: tuple[str, ...], *, told: bool) -> str:
     if choices:
         return "one of " + ", ".join(choices)
-    limits = (
+    limits = [
         (words, getattr(constraint, name))
         for constraint in field.metadata
         for name, words in _COMPARISONS.items()
         if hasattr(constraint, name)
-    )
+    ]
+    if told:
+        limits = [
+            ("above", 0) if limit == ("at least", _SMALLEST) else limit
+            for limit in limits
+            if limit not in _NOT_TOLD
+        ]
     return " and ".join(
         f"{words} {limit:g}" if isinstance(limit, float) else f"{words} {limit}"
         for words, limit in limits
     )
+
+
+def _is_extreme(value: Any) -> bool:
+    """Return whether a number is beyond limits that are not told otherwise."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and (_LARGEST < abs(value) < inf or 0 < value < _SMALLEST)
 
 
 def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -520,9 +538,10 @@ def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str
         allowed = _KIND_NAMES[parameter.kind]
         if parameter.kind is float and parameter.finite:
             allowed = "a finite number"
-        if parameter.bounds:
-            allowed = parameter.bounds if parameter.choices else f"{allowed} {parameter.bounds}"
-        unit = f" {parameter.unit}" if parameter.unit else ""
         value = values.get(name, detail["input"])
+        bounds = parameter.limits if _is_extreme(value) else parameter.bounds
+        if bounds:
+            allowed = bounds if parameter.choices else f"{allowed} {bounds}"
+        unit = f" {parameter.unit}" if parameter.unit else ""
         complaints.append(f"{name} = {shown(value)} is refused: must be {allowed}{unit}")
     return "; ".join(complaints)

@@ -20,7 +20,13 @@ from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.controllers import find_controllers, find_managed, near_misses
 from stickslip_ros.nodes.managed import ERROR
 from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
-from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario, load_scenario
+from stickslip_ros.scenario.files import (
+    DEFAULT_NAMESPACE,
+    LONGEST_NAMESPACE,
+    Scenario,
+    load_scenario,
+)
+from stickslip_ros.scenario.parameters import shown
 from stickslip_ros.testing.composition import Composition
 from stickslip_ros.testing.controllers import ControllerNode, ControllerProcess
 from stickslip_ros.testing.domain import domain_variables, own_domain, ros_context
@@ -115,12 +121,12 @@ class ClosedLoop:
         self._runs = 0
         self._brought_up: set[str] = set()
         with ExitStack() as opened:
-            opened.callback(self._forget)
             self._domain = opened.enter_context(own_domain())
             self._directory = opened.enter_context(
                 tempfile.TemporaryDirectory(prefix="stickslip_ros_")
             )
             self.context = opened.enter_context(ros_context(self._domain, self.ros_arguments))
+            opened.callback(self._forget)  # before ROS ends: then nothing of it is left
             self._nodes = Composition(
                 self.context, self._parameters(), washout=self._to_control == "washout"
             )
@@ -370,4 +376,9 @@ def _checked_namespace(namespace: str) -> str:
     except InvalidNamespaceException as error:
         reason = str(error).splitlines()[0]
         raise InvalidInputError(f"namespace = {namespace!r} is refused: {reason}") from None
+    if len(namespace) > LONGEST_NAMESPACE:
+        raise InvalidInputError(
+            f"namespace = {shown(namespace)} is refused: must have at most {LONGEST_NAMESPACE} "
+            "characters"
+        )
     return namespace

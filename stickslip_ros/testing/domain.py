@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from stickslip_ros.errors import RunError
-from stickslip_ros.nodes.process import this_machine_only
+from stickslip_ros.nodes.process import check_machine, this_machine_only
 
 DOMAINS = range(1, 102)
 """Domains all ports of which are below those that the system gives away."""
@@ -64,8 +64,11 @@ def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
     That is rclpy's default context, so that nodes which name none are in it, unless that is in
     use already.
     """
+    _collect_before_forks()
     with _initialising:
         context = Context() if rclpy.ok() else rclpy.get_default_context()
+        with _environment(this_machine_only()):
+            check_machine(domain)
         with _environment({**_this_process_only_here(), **_NO_PEERS}):
             _initialise(context, domain, arguments)
     try:
@@ -78,6 +81,12 @@ def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
         # What rclpy's destroyed nodes still hold, threads, sockets and shared memory of the
         # middleware, goes with the last of them, and they refer to each other.
         gc.collect()
+
+
+@cache
+def _collect_before_forks() -> None:
+    """Leave no nodes for a forked child to collect: it lacks the threads that they end with."""
+    os.register_at_fork(before=gc.collect)
 
 
 @cache

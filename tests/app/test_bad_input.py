@@ -1,9 +1,12 @@
 """What came in is refused in one clear line, with status 2, and leaves nothing behind."""
 
+from contextlib import chdir
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
+from stickslip_ros.app.main import main
 from tests.app.conftest import Run
 
 
@@ -17,11 +20,15 @@ from tests.app.conftest import Run
         (("simulate", "paper", "-p", "plant.mass=heavy"), ("plant: mass = 'heavy'", "number")),
         (
             ("run", "paper", "-p", "plant.mass=-1"),
-            ("paper.yaml", "mass = -1", "at least 1e-30 and at most 1e+30 kg"),
+            ("paper.yaml", "mass = -1", "must be a finite number above 0 kg"),
         ),
         (("run", "paper", "-p", "plant.belt_speed=.nan"), ("belt_speed = nan", "finite")),
         (("run", "paper", "-p", "plant.mass"), ("NODE.PARAMETER=VALUE",)),
         (("run", "paper", "--namespace", "a b"), ("--namespace 'a b'",)),
+        (
+            ("run", "paper", "--namespace", 230 * "n"),
+            ("has 231 characters, and must have at most 200",),
+        ),
         (("run", "paper", "--bag", "/proc/none/bag"), ("/proc/none/bag",)),
         (("run", "paper", "--bag", "."), ("exists already",)),
         (("run", "paper", "--controller", "damper"), ("--controller damper", "PACKAGE/EXECUTABLE")),
@@ -87,6 +94,13 @@ def test_a_wrong_call_shows_the_usage(stickslip: Run, arguments: tuple[str, ...]
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize("value", ["-2", "-.5", "-1e-3", "-inf"])
+def test_a_negative_number_is_a_value_and_no_option(stickslip: Run, value: str) -> None:
+    done = stickslip("simulate", "paper", "--duration", value)
+    assert done.returncode == 2
+    assert f"{value!r} is not a time in seconds, 0 or more" in done.stderr
+
+
 def test_an_existing_bag_is_left_as_it_is(stickslip: Run, tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     bag.mkdir()
@@ -98,11 +112,60 @@ def test_an_existing_bag_is_left_as_it_is(stickslip: Run, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("arguments", [("run", "paper"), ("replay", "bag")])
+@pytest.mark.parametrize(
+    ("given", "refusal"),
+    [
+        ("here", "ROS_DOMAIN_ID is not an integral number"),
+        ("233", "ROS_DOMAIN_ID = 233 is refused: must be at most 232"),
+    ],
+)
 def test_an_impossible_domain_is_refused(
-    stickslip: Run, process_environment: dict[str, str], arguments: tuple[str, ...]
+    stickslip: Run,
+    process_environment: dict[str, str],
+    arguments: tuple[str, ...],
+    given: str,
+    refusal: str,
 ) -> None:
-    process_environment["ROS_DOMAIN_ID"] = "here"
+    process_environment["ROS_DOMAIN_ID"] = given
     done = stickslip(*arguments)
     assert done.returncode == 2
-    assert "ROS_DOMAIN_ID is not an integral number" in done.stderr.splitlines()[-1]
+    assert refusal in done.stderr.splitlines()[-1]
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("year", [1969, 2039])
+def test_a_clock_that_no_stamp_can_hold_is_refused(
+    stickslip: Run, monkeypatch: pytest.MonkeyPatch, year: int
+) -> None:
+    now = int(datetime(year, 7, 1, tzinfo=UTC).timestamp()) * 1_000_000_000
+    monkeypatch.setattr("time.time_ns", lambda: now)
+    done = stickslip("run", "paper", "--duration", "1")
+    assert done.returncode == 2
+    assert f"the clock of this machine says {year}: " in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "named"),
+    [
+        (("run", "paper"), 2, "the bag bags/paper-"),
+        (("simulate", "paper", "--duration", "1", "--plot", "x.png"), 1, "simulate: "),
+        (("design", "paper", "--belt-speed", "0.2", "--out", "x.yaml"), 1, "design: "),
+    ],
+)
+def test_a_current_directory_that_was_deleted_is_named(
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    status: int,
+    named: str,
+) -> None:
+    deleted = tmp_path / "deleted"
+    deleted.mkdir()
+    with chdir(deleted):
+        deleted.rmdir()
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+    assert ended.value.code == status
+    (line,) = capfd.readouterr().err.splitlines()
+    assert named in line
+    assert "the current directory has been deleted" in line

@@ -52,7 +52,7 @@ def test_a_sample_is_the_same_each_time_and_another_with_another_seed(
     stickslip: Run, drive: str
 ) -> None:
     def starts(*arguments: str) -> list[list[float]]:
-        sample = ("--position=-2:2", "--velocity=0:2", "--sample", "6", "--json")
+        sample = ("--position", "-2:2", "--velocity", "0:2", "--sample", "6", "--json")
         done = stickslip("basin", drive, *sample, *arguments)
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)["values"]

@@ -131,6 +131,39 @@ def test_a_run_that_is_killed_leaves_no_file_behind(
     assert list(folder.iterdir()) == []
 
 
+def test_a_run_that_is_stopped_says_that_its_nodes_go_on(
+    start_stickslip: Start, tmp_path: Path
+) -> None:
+    process = start_stickslip(*RUN)
+    wait_for_samples(process, tmp_path / "bag")
+    process.send_signal(signal.SIGTSTP)
+    state = Path(f"/proc/{process.pid}/stat")
+    wait_for(lambda: state.read_text().rpartition(")")[2].split()[0] == "T", "it is stopped")
+    process.send_signal(signal.SIGCONT)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert "stopped, and the nodes go on" in errors
+    assert "interrupted: the bag bag is closed; the nodes have ended" in errors
+
+
+@pytest.mark.parametrize("flags", [("--composed",), ()])
+def test_a_run_that_is_interrupted_early_says_that_nothing_was_recorded(
+    start_stickslip: Start, tmp_path: Path, flags: tuple[str, ...]
+) -> None:
+    process = start_stickslip("run", "feed_drive", "--external-controller", "--bag", "bag", *flags)
+    assert process.stderr is not None
+    said = ""
+    while "waiting for a controller" not in said:
+        said = process.stderr.readline()
+        assert said
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130
+    assert errors == "stickslip run: interrupted: nothing was recorded; the nodes have ended\n"
+    assert not (tmp_path / "bag").exists()
+
+
 NEIGHBOUR = """
 import rclpy
 from sensor_msgs.msg import JointState
@@ -187,3 +220,26 @@ def test_who_reads_no_further_is_no_failure() -> None:
     done = subprocess.run(report, stdout=writing, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writing)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
+def test_a_run_does_without_standard_streams(
+    process_environment: dict[str, str], tmp_path: Path, closed: str
+) -> None:
+    run = f"{sys.executable} -m stickslip_ros.app.main run paper --bag bag --duration 1 --json"
+    done = subprocess.run(
+        f"{run} {closed}",
+        shell=True,
+        cwd=tmp_path,
+        env=process_environment,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr
+    if ">&-" not in closed.split():
+        assert json.loads(done.stdout)["samples"] == 101
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.complete

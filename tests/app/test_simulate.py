@@ -1,8 +1,6 @@
 """`stickslip simulate`: the limit cycles of the paper's drive, from the command line."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -89,18 +87,6 @@ def test_a_motion_that_runs_away_is_a_result(stickslip: Run) -> None:
     found = json.loads(done.stdout)
     assert found["regime"] == "unbounded"
     assert found["period"] is None
-
-
-@pytest.mark.process
-def test_without_a_standard_output_there_is_no_traceback(tmp_path: Path) -> None:
-    done = subprocess.run(
-        f"{sys.executable} -m stickslip_ros.app.main simulate paper --duration 1 >&-",
-        shell=True,
-        cwd=tmp_path,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize(

@@ -456,7 +456,7 @@ def full_disk():
 def test_a_full_disk_ends_the_recording_and_keeps_what_was_written(tmp_path):
     recorder = Recorder(tmp_path / "bag", compression="none")
     channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
-    with pytest.raises(BagError, match="cannot be written any more"):  # noqa: PT012
+    with pytest.raises(BagError, match=r"any more .*; what it holds so far can be read"):  # noqa: PT012
         for stamp in range(100_000):
             recorder.write(channel, bytes(12), stamp)
             if stamp % 100 == 99:
@@ -483,6 +483,17 @@ def test_on_a_full_disk_no_half_record_is_left(tmp_path):
     content = (tmp_path / "bag" / "bag_0.mcap").read_bytes()
     with_an_end = StreamReader(BytesIO(content + END)).records
     assert [record.log_time for record in with_an_end if isinstance(record, Message)] == [1]
+
+
+@pytest.mark.usefixtures("full_disk")
+def test_a_disk_that_is_full_before_the_first_message_leaves_none(tmp_path):
+    recorder = Recorder(tmp_path / "bag")
+    channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
+    recorder.write(channel, os.urandom(200_000), 1)
+    with pytest.raises(BagError, match=r"cannot be written any more .*; it holds no message"):
+        recorder.flush()
+    with Recording(tmp_path / "bag") as recording:
+        assert list(recording.messages("/a")) == []
 
 
 @pytest.mark.usefixtures("full_disk")

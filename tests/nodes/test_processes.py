@@ -1,5 +1,6 @@
 """Each node as `ros2 run` starts it: a process of its own, with ROS arguments."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -94,14 +95,14 @@ def test_topics_are_remapped_and_parameters_come_from_a_file(
 @pytest.mark.parametrize(
     ("node", "arguments", "named"),
     [
-        ("plant", ("-p", "mass:=-1.0"), ("mass = -1.0", "at least 1e-30", "/plant")),
+        ("plant", ("-p", "mass:=-1.0"), ("mass = -1.0", "above 0", "/plant")),
         ("plant", ("-p", "mass:=heavy"), ("mass = 'heavy'", "a finite number")),
         ("plant", ("-p", "masss:=1.0"), ("unknown parameter masss",)),
         ("plant", ("--params-file", "/nowhere/to/be/found.yaml"), ("/nowhere/to/be/found.yaml",)),
         ("washout_controller", ("-p", "corner_frequency:=.nan"), ("corner_frequency = nan",)),
         ("analyzer", ("-p", "window:=0"), ("window = 0", "at least 1")),
         ("analyzer", ("-p", "bag:=/proc/none/bag"), ("/proc/none/bag",)),
-        ("replay", ("-p", "rate:=0"), ("rate = 0", "at least 1e-30")),
+        ("replay", ("-p", "rate:=0"), ("rate = 0", "above 0")),
         ("replay", ("-p", "bag:=/nowhere"), ("the bag /nowhere does not exist",)),
     ],
 )
@@ -115,6 +116,36 @@ def test_bad_parameters_end_the_process_with_one_line(
     assert len(lines) == 1
     for text in named:
         assert text in lines[0]
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["-m", "stickslip_ros.nodes.plant"],
+        ["-m", "stickslip_ros.nodes.replay"],
+        ["-c", "from stickslip_ros.nodes.executables import plant; plant()"],
+    ],
+)
+def test_a_node_that_still_imports_ends_quietly(
+    process_environment: dict[str, str], tmp_path: Path, command: list[str]
+) -> None:
+    slow = "import signal; print('importing', flush=True); signal.pause()"
+    (tmp_path / "rclpy.py").write_text(slow, encoding="utf-8")
+    path = [str(tmp_path), *filter(None, [process_environment.get("PYTHONPATH")])]
+    process_environment["PYTHONPATH"] = os.pathsep.join(path)
+    with subprocess.Popen(
+        [sys.executable, *command],
+        env=process_environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "importing\n"
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, errors) == (-signal.SIGINT, "")
 
 
 @pytest.mark.process

@@ -68,13 +68,13 @@ def test_an_override_has_a_form(override: str) -> None:
         ("plant.masss=1", ["-p plant.masss=1", "plant: unknown parameter masss = 1", " mass,"]),
         (
             "plant.mass=-1",
-            ["-p plant.mass=-1", "plant: mass = -1", "at least 1e-30 and at most 1e+30 kg"],
+            ["-p plant.mass=-1", "plant: mass = -1", "must be a finite number above 0 kg"],
         ),
         (
             "plant.mass=",
-            ["-p plant.mass=", "plant: mass = None", "at least 1e-30 and at most 1e+30 kg"],
+            ["-p plant.mass=", "plant: mass = None", "must be a finite number above 0 kg"],
         ),
-        ("plant.mass=heavy", ["plant: mass = 'heavy'", "at least 1e-30 and at most 1e+30 kg"]),
+        ("plant.mass=heavy", ["plant: mass = 'heavy'", "must be a finite number above 0 kg"]),
         ("plant.friction=coulomb", ["plant: unknown parameter friction = 'coulomb'"]),
         ("analyzer.window=2.5", ["analyzer: window = 2.5", "whole number at least 1"]),
     ],

@@ -61,7 +61,7 @@ def test_a_file_that_contains_itself(tmp_path: Path) -> None:
 
 
 FINITE = "must be a finite number"
-POSITIVE = f"{FINITE} at least 1e-30"
+POSITIVE = f"{FINITE} above 0"
 WHOLE = "must be a whole number"
 
 
@@ -69,46 +69,50 @@ WHOLE = "must be a whole number"
     ("node", "parameter", "value", "shown", "allowed"),
     [
         # Bounds.
-        ("plant", "mass", "0", "0", f"{POSITIVE} and at most 1e+30 kg"),
-        ("plant", "mass", "-1.5", "-1.5", f"{POSITIVE} and at most 1e+30 kg"),
-        ("plant", "damping", "-1e-9", "-1e-09", f"{FINITE} at least 0 and at most 1e+30 N s/m"),
-        ("plant", "stiffness", "0.0", "0.0", f"{POSITIVE} and at most 1e+30 N/m"),
-        ("plant", "normal_force", "-1", "-1", f"{POSITIVE} and at most 1e+30 N"),
-        ("plant", "friction.static", "-0.1", "-0.1", f"{FINITE} at least 0 and at most 1e+30"),
-        ("plant", "friction.minimum_speed", "0", "0", f"{POSITIVE} and at most 1e+30 m/s"),
-        ("plant", "friction.decay_speed", "0", "0", f"{POSITIVE} and at most 1e+30 m/s"),
+        ("plant", "mass", "0", "0", f"{POSITIVE} kg"),
+        ("plant", "mass", "-1.5", "-1.5", f"{POSITIVE} kg"),
+        ("plant", "damping", "-1e-9", "-1e-09", f"{FINITE} at least 0 N s/m"),
+        ("plant", "stiffness", "0.0", "0.0", f"{POSITIVE} N/m"),
+        ("plant", "normal_force", "-1", "-1", f"{POSITIVE} N"),
+        ("plant", "friction.static", "-0.1", "-0.1", f"{FINITE} at least 0"),
+        ("plant", "friction.minimum_speed", "0", "0", f"{POSITIVE} m/s"),
+        ("plant", "friction.decay_speed", "0", "0", f"{POSITIVE} m/s"),
         ("plant", "rate", "0", "0", f"{FINITE} at least 1e-06 and at most 1e+09 Hz"),
         ("plant", "rate", "1.1e9", "1100000000.0", f"{FINITE} at least 1e-06 and at most 1e+09 Hz"),
-        ("plant", "real_time_factor", "0", "0", f"{POSITIVE} and at most 1e+30"),
-        ("plant", "force_delay", "-0.1", "-0.1", f"{FINITE} at least 0 and at most 1e+30 s"),
-        ("plant", "force_jitter", "-0.1", "-0.1", f"{FINITE} at least 0 and at most 1e+30 s"),
+        ("plant", "real_time_factor", "0", "0", f"{POSITIVE}"),
+        ("plant", "force_delay", "-0.1", "-0.1", f"{FINITE} at least 0 s"),
+        ("plant", "force_jitter", "-0.1", "-0.1", f"{FINITE} at least 0 s"),
         ("plant", "force_jitter_seed", "-1", "-1", f"{WHOLE} at least 0"),
-        ("plant", "reply_timeout", "0", "0", f"{FINITE} at least 0.001 and at most 1e+30 s"),
+        ("plant", "reply_timeout", "0", "0", f"{FINITE} at least 0.001 s"),
         ("plant", "flow_window", "199", "199", f"{WHOLE} at least 200 and at most 4000 samples"),
         ("plant", "flow_window", "100001", "100001", f"{WHOLE} at least 200"),
         ("plant", "disturbance.frequency", "0", "0", f"{POSITIVE} and at most 1e+09 Hz"),
         ("plant", "disturbance.start", "-1", "-1", f"{FINITE} at least 0 and at most 1e+09 s"),
-        ("washout_controller", "corner_frequency", "0", "0", f"{POSITIVE} and at most 1e+30 rad/s"),
+        ("washout_controller", "corner_frequency", "0", "0", f"{POSITIVE} rad/s"),
         ("washout_controller", "force_limit", "-1", "-1", "at least 0 N"),
         (
             "washout_controller",
             "start_after",
             "-1",
             "-1",
-            f"{FINITE} at least 0 and at most 1e+30 s",
+            f"{FINITE} at least 0 s",
         ),
         ("analyzer", "window", "0", "0", f"{WHOLE} at least 1 and at most 100000 cycles"),
-        ("analyzer", "flush_period", "0", "0", f"{FINITE} at least 0.001 and at most 1e+30 s"),
+        ("analyzer", "flush_period", "0", "0", f"{FINITE} at least 0.001 s"),
+        # Limits that only a mistake meets.
+        ("plant", "mass", "1e31", "1e+31", f"{FINITE} at least 1e-30 and at most 1e+30 kg"),
+        ("plant", "mass", "1e-31", "1e-31", f"{FINITE} at least 1e-30 and at most 1e+30 kg"),
+        ("plant", "belt_speed", "-1e31", "-1e+31", "at least -1e+30 and at most 1e+30 m/s"),
         # Choices.
         ("plant", "pace", "fast", "'fast'", "must be one of realtime, lockstep"),
         ("plant", "friction.law", "dry", "'dry'", "one of stribeck, coulomb, linear, exponential"),
         ("plant", "disturbance.kind", "on", "True", "must be one of none, step, impulse, sine"),
         ("analyzer", "compression", "zip", "'zip'", "must be one of lz4, zstd, none"),
         # Not finite.
-        ("plant", "mass", ".nan", "nan", f"{POSITIVE} and at most 1e+30 kg"),
-        ("plant", "mass", ".inf", "inf", f"{POSITIVE} and at most 1e+30 kg"),
-        ("plant", "belt_speed", ".nan", "nan", f"{FINITE} at least -1e+30 and at most 1e+30 m/s"),
-        ("plant", "belt_speed", "-.inf", "-inf", f"{FINITE} at least -1e+30 and at most 1e+30 m/s"),
+        ("plant", "mass", ".nan", "nan", f"{POSITIVE} kg"),
+        ("plant", "mass", ".inf", "inf", f"{POSITIVE} kg"),
+        ("plant", "belt_speed", ".nan", "nan", f"{FINITE} m/s"),
+        ("plant", "belt_speed", "-.inf", "-inf", f"{FINITE} m/s"),
         ("plant", "duration", ".nan", "nan", "at least 0 s"),
         ("plant", "disturbance.duration", ".nan", "nan", "at least 0 s"),
         (
@@ -116,7 +120,7 @@ WHOLE = "must be a whole number"
             "linear_gain",
             ".nan",
             "nan",
-            f"{FINITE} at least -1e+30 and at most 1e+30 N s/m",
+            f"{FINITE} N s/m",
         ),
         ("washout_controller", "force_limit", ".nan", "nan", "at least 0 N"),
         (
@@ -124,13 +128,13 @@ WHOLE = "must be a whole number"
             "start_after",
             ".inf",
             "inf",
-            f"{FINITE} at least 0 and at most 1e+30 s",
+            f"{FINITE} at least 0 s",
         ),
         # Types.
-        ("plant", "mass", "yes", "True", f"{POSITIVE} and at most 1e+30 kg"),
-        ("plant", "mass", "'1'", "'1'", f"{POSITIVE} and at most 1e+30 kg"),
-        ("plant", "mass", "[1.0]", "[1.0]", f"{POSITIVE} and at most 1e+30 kg"),
-        ("plant", "mass", "~", "None", f"{POSITIVE} and at most 1e+30 kg"),
+        ("plant", "mass", "yes", "True", f"{POSITIVE} kg"),
+        ("plant", "mass", "'1'", "'1'", f"{POSITIVE} kg"),
+        ("plant", "mass", "[1.0]", "[1.0]", f"{POSITIVE} kg"),
+        ("plant", "mass", "~", "None", f"{POSITIVE} kg"),
         ("plant", "expects_control", "1", "1", "must be true or false"),
         ("plant", "autostart", "'true'", "'true'", "must be true or false"),
         ("plant", "wait_for", "analyzer", "'analyzer'", "must be a list of strings"),

@@ -72,6 +72,6 @@ def _allowed(parameter: Parameter, value: float) -> bool:
     if abs(value) == inf and parameter.finite:
         return False
     limits = {
-        words: float(limit) for words, limit in re.findall(r"(at \w+) (\S+)", parameter.bounds)
+        words: float(limit) for words, limit in re.findall(r"(at \w+) (\S+)", parameter.limits)
     }
     return limits.get("at least", -inf) <= value <= limits.get("at most", inf)

@@ -1,7 +1,10 @@
+import gc
+import multiprocessing
 import os
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from pathlib import Path
 from select import select
 from typing import Any
@@ -22,6 +25,7 @@ from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.scenario.files import load_scenario
 from stickslip_ros.testing import ClosedLoop
+from tests.nodes.graph import PATIENCE
 from tests.testing import controllers
 from tests.testing.controllers import GAIN, VelocityFeedback, WithoutArguments
 
@@ -316,6 +320,7 @@ def test_a_controller_that_cannot_be_heard_is_told_why(
         ({"controller": lambda: 5}, "made 5, not an rclpy node"),
         ({"controller": controllers.Refusing}, "refusing could not be configured: failure"),
         ({"namespace": "a b"}, "namespace = 'a b' is refused"),
+        ({"namespace": "/" + 230 * "n"}, "must have at most 200 characters"),
     ],
 )
 def test_what_cannot_be_is_refused(options: dict[str, Any], sentence: str) -> None:
@@ -402,6 +407,19 @@ def test_nothing_is_left_behind(
         raise ZeroDivisionError
     assert _in_use() == before
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("timeout", [300.0, 0.01])
+def test_a_fork_has_nothing_of_a_closed_loop_to_finalise(timeout: float) -> None:
+    """Whether its run came to its end or failed: what raised held the nodes for longer."""
+    with suppress(RunError), ClosedLoop("paper") as loop:
+        loop.run(20.0, timeout=timeout)
+    child = multiprocessing.get_context("fork").Process(target=gc.collect)
+    child.start()
+    child.join(PATIENCE)
+    child.kill()
+    assert child.exitcode == 0
 
 
 @pytest.mark.process
