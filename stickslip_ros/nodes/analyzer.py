@@ -11,7 +11,6 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from rclpy.publisher import Publisher
 from std_msgs.msg import Float64
 
 from stickslip_ros.bags.messages import (
@@ -89,9 +88,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if self.parameters.bag:
             self._open_bag()
         # It exists while there is a recorder to wait for, and the plant sees by it that there is.
-        self._recorded: Publisher = self.create_publisher(
-            RECORDED.type, RECORDED.name, RECORDED.qos()
-        )
+        self._recorded = self.advertise(RECORDED)
         self._inquiries = [
             ask_parameters(self, node, list(known_parameters(model)), partial(self._keep, node))
             for node, model in NODE_PARAMETERS.items()
@@ -105,10 +102,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._take_in()
         self._measure()
         report = self._meter.report()
-        self.destroy_publisher(self._recorded)
-        for subscription in self._listening.values():
-            self._connections.remove(subscription)
-            self.destroy_subscription(subscription)
+        for end in (self._recorded, *self._listening.values()):
+            self.disconnect(end)
         for inquiry in self._inquiries:
             inquiry.close()
         self._keep("report", report)

@@ -13,6 +13,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
+from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.timer import Timer
@@ -145,6 +146,22 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
         self._connections.append(subscription)
         return subscription
 
+    def disconnect(self, connection: Any) -> None:
+        """Give up what `connect` or `start` has made, before the node is cleaned up."""
+        self._connections.remove(connection)
+        # The node has to let go of it, too: what is only destroyed by itself goes on to be heard.
+        match connection:
+            case Publisher():
+                self.destroy_publisher(connection)
+            case Subscription():
+                self.destroy_subscription(connection)
+            case Service():
+                self.destroy_service(connection)
+            case Timer():
+                self.destroy_timer(connection)
+            case _:
+                connection.destroy()
+
     def wait_for_delivery(self, publisher: Publisher) -> None:
         """Wait, within bounds, until every reader has what was published."""
         publisher.wait_for_all_acked(Duration(seconds=_DELIVERY_TIMEOUT))
@@ -210,9 +227,8 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
             self.active = False
 
     def _disconnect(self) -> None:
-        for connection in self._connections:
-            connection.destroy()
-        self._connections.clear()
+        for connection in list(self._connections):
+            self.disconnect(connection)
 
     def _transition(self, action: Callable[[], None]) -> TransitionCallbackReturn:
         try:

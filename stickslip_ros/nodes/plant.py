@@ -46,12 +46,13 @@ class PlantNode(ManagedNode[PlantParameters]):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("plant", PlantParameters, **options)
+        self._next_start = LOCKSTEP_START
 
     def connect(self) -> None:
         """Compile the motion; publish the state, listen to forces and to the recorder."""
         initial = self.parameters.initial
         self._motion = Motion(self.parameters.as_drive(), initial.position, initial.velocity)
-        self._next_start = LOCKSTEP_START
+        self._moved = False
         self._disturbance = 0.0
         self._lock = threading.Lock()
         self._dropped = Dropped(self)
@@ -87,7 +88,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         stampable = self._loop.number(latest) - 1
         if stampable < 0:
             raise InvalidInputError(
-                f"no stamps are left behind {latest // NANOSECONDS} s: configure anew"
+                f"no stamps are left behind {latest // NANOSECONDS} s: start the node anew"
             )
         if realtime:
             self._pacer = RealtimePacer(
@@ -106,6 +107,7 @@ class PlantNode(ManagedNode[PlantParameters]):
     def stop(self) -> None:
         """Pause the motion, once the states sent have arrived."""
         self._pacer.stop()
+        self._moved = True
         self._next_start = self._loop.stamp(self._loop.sample.number + 1)
         self.wait_for_delivery(self._state)
         self.wait_for_delivery(self._applied)
@@ -118,7 +120,7 @@ class PlantNode(ManagedNode[PlantParameters]):
                 self._loop.scenario_disturbance = self.parameters.as_disturbance()
         elif self._connections:
             self._motion.drive = self.parameters.as_drive()
-            if self._next_start == LOCKSTEP_START:  # it has not moved yet
+            if not self._moved:
                 initial = self.parameters.initial
                 self._motion.restart(initial.position, initial.velocity)
 
