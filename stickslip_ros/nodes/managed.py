@@ -5,7 +5,12 @@ from collections.abc import Callable, Mapping
 from typing import Any, Generic, TypeVar, cast
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
@@ -22,6 +27,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.collecting import Collecting
 from stickslip_ros.nodes.topics import DIAGNOSTICS, Topic, mismatch, type_name
 from stickslip_ros.scenario import parameters
+from stickslip_ros.scenario.files import number_in
 from stickslip_ros.scenario.parameters import Fixed, NodeParameters, shown
 
 ParametersT = TypeVar("ParametersT", bound=NodeParameters)
@@ -37,6 +43,7 @@ STATE = "state"
 _DIAGNOSTICS_PERIOD = 1.0
 _AUTOSTART_PERIOD = 0.05
 _DELIVERY_TIMEOUT = 1.0
+_LARGEST_ON_SLIDER = 2**31 - 1
 _OWNED_BY_ROS = ("start_type_description_service",)
 
 
@@ -320,11 +327,12 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set all parameters or none; what is refused is named, with what is allowed.
 
-        Whole numbers are taken where numbers are declared, as parameter files and -p do.
+        Whole numbers are taken where numbers are declared, as parameter files and -p do, and text
+        that is a number: `ros2 param load` sends inf and 1e-05 in no other way.
         """
         given = {parameter.name: parameter for parameter in parameter_list}
         owned = [parameter for name, parameter in given.items() if name in _OWNED_BY_ROS]
-        values = {name: p.value for name, p in given.items() if name not in _OWNED_BY_ROS}
+        values = {n: self._as_meant(n, p.value) for n, p in given.items() if n not in _OWNED_BY_ROS}
         source = self.get_fully_qualified_name()
         try:
             changed = self._model.validated(self.parameters.flat() | values, source)
@@ -353,6 +361,13 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
                     f"the node is {fixed}, and is {shown(present[name])}"
                 )
 
+    def _as_meant(self, name: str, value: Any) -> Any:
+        known = parameters.known_parameters(self._model)
+        if isinstance(value, str) and name in known and known[name].kind is float:
+            number = number_in(value)
+            return value if number is None else number
+        return value
+
     def _as_ros(self, values: Mapping[str, Any]) -> list[Parameter]:
         known = parameters.known_parameters(self._model)
         return [Parameter(name, _ROS_TYPES[known[name].kind], v) for name, v in values.items()]
@@ -369,8 +384,16 @@ _ROS_TYPES = {
 
 def _descriptor(parameter: parameters.Parameter) -> ParameterDescriptor:
     unit = f" [{parameter.unit}]" if parameter.unit else ""
-    return ParameterDescriptor(
+    descriptor = ParameterDescriptor(
         name=parameter.name,
         description=parameter.meaning + unit,
         additional_constraints=parameter.bounds,
     )
+    # rqt_reconfigure makes a slider of a range, which fails with an infinite end or a long integer.
+    if parameter.range is not None and parameter.kind is float:
+        least, largest = parameter.range
+        descriptor.floating_point_range = [FloatingPointRange(from_value=least, to_value=largest)]
+    elif parameter.range is not None and parameter.range[1] <= _LARGEST_ON_SLIDER:
+        least, largest = (int(end) for end in parameter.range)
+        descriptor.integer_range = [IntegerRange(from_value=least, to_value=largest)]
+    return descriptor

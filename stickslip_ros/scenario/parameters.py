@@ -418,6 +418,8 @@ class Parameter:
     """What is allowed, in words; empty: anything."""
     finite: bool
     """Whether a number must be finite."""
+    range: tuple[float, float] | None
+    """Least and largest value of a number, if it has both and they are not those of any."""
 
 
 def parameters_of(model: type[BaseModel], prefix: str = "") -> Iterator[Parameter]:
@@ -454,6 +456,7 @@ def _parameter(name: str, field: FieldInfo) -> Parameter:
         finite=not any(
             getattr(constraint, "allow_inf_nan", False) for constraint in field.metadata
         ),
+        range=_range(field),
     )
 
 
@@ -466,15 +469,25 @@ def known_parameters(model: type[BaseModel]) -> Mapping[str, Parameter]:
 _COMPARISONS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
 
 
+def _limits(field: FieldInfo) -> Iterator[tuple[str, Any]]:
+    """Yield the comparisons with what bounds a number, and that."""
+    for constraint in field.metadata:
+        for name in _COMPARISONS:
+            if hasattr(constraint, name):
+                yield name, getattr(constraint, name)
+
+
+def _range(field: FieldInfo) -> tuple[float, float] | None:
+    limits = {name[0]: limit for name, limit in _limits(field)}
+    if len(limits) < 2 or limits == {"g": -_LARGEST, "l": _LARGEST}:
+        return None
+    return limits["g"], limits["l"]
+
+
 def _bounds(field: FieldInfo, choices: tuple[str, ...]) -> str:
     if choices:
         return "one of " + ", ".join(choices)
-    limits = (
-        (words, getattr(constraint, name))
-        for constraint in field.metadata
-        for name, words in _COMPARISONS.items()
-        if hasattr(constraint, name)
-    )
+    limits = ((_COMPARISONS[name], limit) for name, limit in _limits(field))
     return " and ".join(
         f"{words} {limit:g}" if isinstance(limit, float) else f"{words} {limit}"
         for words, limit in limits
@@ -524,5 +537,6 @@ def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str
             allowed = parameter.bounds if parameter.choices else f"{allowed} {parameter.bounds}"
         unit = f" {parameter.unit}" if parameter.unit else ""
         value = values.get(name, detail["input"])
-        complaints.append(f"{name} = {shown(value)} is refused: must be {allowed}{unit}")
+        text = ", not text" if isinstance(value, str) and parameter.kind is not str else ""
+        complaints.append(f"{name} = {shown(value)} is refused: must be {allowed}{unit}{text}")
     return "; ".join(complaints)
