@@ -41,6 +41,7 @@ from stickslip_ros.nodes.topics import (
     Topic,
 )
 from stickslip_ros.physics.samples import RunMeter
+from stickslip_ros.prefixes import quantity
 from stickslip_ros.scenario.parameters import NODE_PARAMETERS, AnalyzerParameters, known_parameters
 from stickslip_ros.versions import versions
 
@@ -82,6 +83,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         """Open a bag, start to measure, and then listen: who is heard is not lost."""
         self._meter = RunMeter(self.parameters.window)
         self._cycles = self._told = 0
+        self._logged = ""
         self._bag_failure = ""
         self._dropped.clear()
         self._recorder: Recorder | None = None
@@ -192,9 +194,19 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             inquiry.pursue()
 
     def _log_measures(self) -> None:
-        figures = self._meter.motion.measures().as_dict()
-        text = ", ".join(f"{name} {value}" for name, value in figures.items() if value is not None)
-        self.get_logger().info(text)
+        """Log what the last window of cycles was, unless it reads as the one before."""
+        measures = self._meter.motion.measures()
+        if measures.amplitude is None or measures.frequency is None:
+            text = f"{measures.regime}"
+        else:
+            text = (
+                f"{measures.regime}: amplitude {quantity(measures.amplitude, 'm')}, "
+                f"frequency {quantity(measures.frequency, 'Hz')}, "
+                f"stick fraction {measures.stick_fraction:.3g}"
+            )
+        if text != self._logged:
+            self._logged = text
+            self.get_logger().info(text)
 
     def _columns(
         self, topic: Topic, decode: Callable[[Sequence[bytes]], tuple[ColumnsT, Refused]]

@@ -91,6 +91,7 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
         """The parameters in force."""
         self._connections: list[Any] = []
         self._last_refusal = ""
+        self._waiting = False
         self._diagnostics = self.create_publisher(
             DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos()
         )
@@ -196,25 +197,27 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Connect."""
-        return self._transition(self.connect)
+        self._waiting = False
+        return self._transition(self.connect, "configured")
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start, if those waited for are there."""
         missing = self.unmatched()
         if missing:
-            self.get_logger().debug(f"not activated: {missing}")
+            self._tell_waiting(missing)
             return TransitionCallbackReturn.FAILURE
-        result = self._transition(self.start)
+        self._waiting = False
+        result = self._transition(self.start, "active")
         self.active = result is TransitionCallbackReturn.SUCCESS
         return result
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop."""
-        return self._transition(self._stop_and_tell)
+        return self._transition(self._stop_and_tell, "paused")
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Disconnect."""
-        return self._transition(self._disconnect)
+        return self._transition(self._disconnect, "cleaned up")
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop if need be, and disconnect."""
@@ -237,7 +240,8 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
         for connection in list(self._connections):
             self.disconnect(connection)
 
-    def _transition(self, action: Callable[[], None]) -> TransitionCallbackReturn:
+    def _transition(self, action: Callable[[], None], done: str = "") -> TransitionCallbackReturn:
+        """Do what a transition asks for, and log what the node is then."""
         try:
             action()
         except InvalidInputError as error:
@@ -251,15 +255,28 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
             self.get_logger().error(f"{type(error).__name__}: {error}")
             self._end_autostart()
             return TransitionCallbackReturn.ERROR
+        if done:
+            self.get_logger().info(done)
         return TransitionCallbackReturn.SUCCESS
+
+    def _tell_waiting(self, missing: str) -> None:
+        """Log once, until the node is active, whom it waits for."""
+        if not self._waiting:
+            self._waiting = True
+            whom = " for " + ", ".join(self.parameters.wait_for) if self.parameters.wait_for else ""
+            self.get_logger().info(f"waiting{whom}: {missing}")
 
     def _autostart(self) -> None:
         """Configure, then try to activate until those waited for are there."""
         if self._state_machine.current_state[1] == "unconfigured":
             self.trigger_configure()
         # In one go, if nobody is missing: a plant may take whoever is there for one that answers.
-        if self._state_machine.current_state[1] == "inactive" and not self.unmatched():
-            self.trigger_activate()
+        if self._state_machine.current_state[1] == "inactive":
+            missing = self.unmatched()
+            if missing:
+                self._tell_waiting(missing)
+            else:
+                self.trigger_activate()
         if self.active or self.stopped.done():
             self._end_autostart()
 

@@ -186,6 +186,8 @@ class PlantNode(ManagedNode[PlantParameters]):
             self.get_logger().error("the motion runs away (regime unbounded): plant deactivated")
         elif self._pacer.failure:
             self.get_logger().error(f"{self._pacer.failure}: plant deactivated")
+        else:
+            self.get_logger().info("finished: the last sample was reached")
         if self.active:
             self.trigger_deactivate()
 

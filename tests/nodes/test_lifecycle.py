@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.parameter import Parameter
 
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.nodes.analyzer import AnalyzerNode
@@ -86,3 +87,25 @@ def test_rounds_of_the_life_cycle_leave_one_of_each_and_time_goes_on(
     assert len(forces) > ROUNDS
     assert (np.diff(states) > 0).all()
     assert (np.diff(forces) > 0).all()
+
+
+def test_a_node_says_once_what_it_is_and_whom_it_waits_for(
+    graph: Graph, capfd: pytest.CaptureFixture[str]
+) -> None:
+    said: list[str] = []
+
+    def logged(text: str) -> int:
+        lines = capfd.readouterr().err.splitlines()
+        said.extend(line.partition("[test.plant]: ")[2] for line in lines if "[INFO]" in line)
+        return said.count(text)
+
+    plant = graph.add(PlantNode, wait_for=["observer", "nobody"], expects_control=False)
+    graph.wait_until(lambda: logged("configured"), "it is configured")
+    graph.run_for(1.0)
+    assert logged("waiting for observer, nobody: not there: nobody, observer") == 1
+    graph.listen(JOINT_STATES, raw=True)
+    plant.set_parameters([Parameter("wait_for", value=["observer"])])
+    plant.set_parameters([Parameter("duration", value=1.0)])
+    graph.wait_until(lambda: logged("paused"), "its second is over")
+    assert said[-3:] == ["active", "finished: the last sample was reached", "paused"]
+    assert len([line for line in said if line.startswith("waiting")]) == 1
