@@ -11,7 +11,6 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from rclpy.publisher import Publisher
 from std_msgs.msg import Float64
 
 from stickslip_ros.bags.messages import (
@@ -42,6 +41,7 @@ from stickslip_ros.nodes.topics import (
     Topic,
 )
 from stickslip_ros.physics.samples import RunMeter
+from stickslip_ros.prefixes import quantity
 from stickslip_ros.scenario.parameters import NODE_PARAMETERS, AnalyzerParameters, known_parameters
 from stickslip_ros.versions import versions
 
@@ -83,15 +83,14 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         """Open a bag, start to measure, and then listen: who is heard is not lost."""
         self._meter = RunMeter(self.parameters.window)
         self._cycles = self._told = 0
+        self._logged = ""
         self._bag_failure = ""
         self._dropped.clear()
         self._recorder: Recorder | None = None
         if self.parameters.bag:
             self._open_bag()
         # It exists while there is a recorder to wait for, and the plant sees by it that there is.
-        self._recorded: Publisher = self.create_publisher(
-            RECORDED.type, RECORDED.name, RECORDED.qos()
-        )
+        self._recorded = self.advertise(RECORDED)
         self._inquiries = [
             ask_parameters(self, node, list(known_parameters(model)), partial(self._keep, node))
             for node, model in NODE_PARAMETERS.items()
@@ -105,10 +104,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._take_in()
         self._measure()
         report = self._meter.report()
-        self.destroy_publisher(self._recorded)
-        for subscription in self._listening.values():
-            self._connections.remove(subscription)
-            self.destroy_subscription(subscription)
+        for end in (self._recorded, *self._listening.values()):
+            self.disconnect(end)
         for inquiry in self._inquiries:
             inquiry.close()
         self._keep("report", report)
@@ -198,9 +195,19 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             inquiry.pursue()
 
     def _log_measures(self) -> None:
-        figures = self._meter.motion.measures().as_dict()
-        text = ", ".join(f"{name} {value}" for name, value in figures.items() if value is not None)
-        self.get_logger().info(text)
+        """Log what the last window of cycles was, unless it reads as the one before."""
+        measures = self._meter.motion.measures()
+        if measures.amplitude is None or measures.frequency is None:
+            text = f"{measures.regime}"
+        else:
+            text = (
+                f"{measures.regime}: amplitude {quantity(measures.amplitude, 'm')}, "
+                f"frequency {quantity(measures.frequency, 'Hz')}, "
+                f"stick fraction {measures.stick_fraction:.3g}"
+            )
+        if text != self._logged:
+            self._logged = text
+            self.get_logger().info(text)
 
     def _columns(
         self, topic: Topic, decode: Callable[[Sequence[bytes]], tuple[ColumnsT, Refused]]

@@ -12,7 +12,7 @@ from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from lifecycle_msgs.msg import State, Transition, TransitionEvent
+from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import SetParameters
 from rclpy.client import Client
@@ -29,7 +29,7 @@ from stickslip_ros.nodes.claim import claim
 from stickslip_ros.nodes.controllers import find_controllers, find_managed, near_misses
 from stickslip_ros.nodes.lifeline import GUARD_PATIENCE, start
 from stickslip_ros.nodes.managed import STATE, ManagedNode
-from stickslip_ros.nodes.plant import FAILURE, NEWEST_STAMP, PlantNode
+from stickslip_ros.nodes.plant import FAILURE, FINISHED, NEWEST_STAMP, PlantNode
 from stickslip_ros.nodes.process import ROS_ARGUMENTS, initialise, spin, stop_on_signals
 from stickslip_ros.nodes.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
@@ -94,7 +94,9 @@ def run_nodes(
     progress: Progress = lambda _: None,
     tell: Tell = lambda _: None,
 ) -> RunOutcome:
-    """Run the scenario's nodes until the plant pauses by itself or a signal comes.
+    """Run the scenario's nodes until the plant has finished or a signal comes.
+
+    A plant that somebody deactivates is waited for until it is activated again.
 
     `controller` is the command, executable and arguments, of one in place of ours, which is
     configured and activated if it is a managed (lifecycle) node. If the command is empty, somebody
@@ -157,16 +159,14 @@ class _Bringup:
         self._clients: dict[str, tuple[Client, float]] = {}
         self._active: list[str] = []
         self._failed = Future()
-        self._plant_paused = Future()
+        self._plant_finished = Future()
         self._last_words = Future()
+        self._paused = False
         self._outcome = RunOutcome()
         self._first_recorded: int | None = None
         self._recorded = 0
         self._node.create_subscription(
             DIAGNOSTICS.type, DIAGNOSTICS.name, self._on_diagnostics, DIAGNOSTICS.qos()
-        )
-        self._node.create_subscription(
-            TransitionEvent, "plant/transition_event", self._on_plant_transition, 10
         )
         self._node.create_subscription(
             RECORDED.type, RECORDED.name, self._on_recorded, RECORDED.qos()
@@ -193,7 +193,7 @@ class _Bringup:
                     self._spawn(nodes, file)
                 self._start_other(file)
                 self._bring_up(nodes)
-            self._spin_until(self._plant_paused, None)
+            self._spin_until(self._plant_finished, None)
         finally:
             self._bring_down()
         if self._failed.done():
@@ -353,8 +353,8 @@ class _Bringup:
         for node in reversed(self._active):
             if node == "analyzer":
                 self._let_the_analyzer_catch_up()
-            paused = node == "plant" and self._plant_paused.done()
-            if not paused and not self._is_dead(node):
+            finished = node == "plant" and self._plant_finished.done()
+            if not finished and not self._is_dead(node):
                 self._deactivate(node)
             if node == "plant" and not self._is_dead(node):
                 self._spin_until(self._last_words, _LAST_WORDS_TIMEOUT, always=True)
@@ -455,8 +455,9 @@ class _Bringup:
     def _watch_processes(self) -> None:
         for name, process in self._processes.items():
             status = process.poll()
-            ended_by_others = name == "plant" and status == 0 and self._plant_paused.done()
-            if status is not None and not ended_by_others:
+            if name == "plant" and status == 0 and self._last_words.done():
+                self._finish()  # somebody has ended it in order
+            elif status is not None:
                 how = f"killed by signal {-status}" if status < 0 else f"exit status {status}"
                 self._fail(f"the node {name} died ({how})")
 
@@ -468,18 +469,32 @@ class _Bringup:
         for status in message.status:
             if status.name == f"{self._namespace.rstrip('/')}/plant":
                 self._outcome.plant = {entry.key: entry.value for entry in status.values}
-                pausing = self._outcome.plant.get(STATE) in ("deactivating", "inactive")
-                if pausing and self._active and not self._last_words.done():
-                    self._last_words.set_result(None)
-                if FAILURE in self._outcome.plant:
-                    self._fail(f"the plant could not go on: {self._outcome.plant[FAILURE]}")
+                self._follow_plant()
 
-    def _on_plant_transition(self, event: TransitionEvent) -> None:
-        left_active = event.goal_state.id == State.PRIMARY_STATE_INACTIVE and (
-            event.start_state.id == State.TRANSITION_STATE_DEACTIVATING
-        )
-        if left_active and not self._plant_paused.done():
-            self._plant_paused.set_result(None)
+    def _follow_plant(self) -> None:
+        """Notice when the plant has come to its end, and tell when somebody pauses it."""
+        plant = self._outcome.plant
+        state = plant.get(STATE)
+        if FAILURE in plant:
+            self._fail(f"the plant could not go on: {plant[FAILURE]}")
+        if state == _ACTIVE:
+            if self._paused:
+                self._tell("the plant goes on")
+            self._paused = False
+            if self._last_words.done():
+                self._last_words = Future()
+        elif NEWEST_STAMP in plant:
+            if not self._last_words.done():
+                self._last_words.set_result(None)
+            if plant.get(FINISHED) == str(True) or state == "finalized":
+                self._finish()
+            elif state in _NEXT_TRANSITION and not (self._paused or self._ended):
+                self._paused = True
+                self._tell("the plant is paused: activate it to go on, or end the run with Ctrl-C")
+
+    def _finish(self) -> None:
+        if not self._plant_finished.done():
+            self._plant_finished.set_result(None)
 
     def _on_recorded(self, message: Header) -> None:
         self._recorded = message.stamp.sec * NANOSECONDS + message.stamp.nanosec

@@ -15,6 +15,7 @@ class Dropped:
 
     def __init__(self, node: ManagedNode[Any]) -> None:
         """Count from now on; what is dropped after a quiet time is logged by `node`."""
+        self._node = node
         self._logger = node.get_logger()
         self._timer = node.every(_PERIOD, self._forget)
         self.clear()
@@ -47,7 +48,7 @@ class Dropped:
 
     def destroy(self) -> None:
         """End."""
-        self._timer.destroy()
+        self._node.destroy_timer(self._timer)
 
     def _forget(self) -> None:
         self._periods_to_complain = max(0, self._periods_to_complain - 1)

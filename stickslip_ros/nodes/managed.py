@@ -5,7 +5,12 @@ from collections.abc import Callable, Mapping
 from typing import Any, Generic, TypeVar, cast
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
@@ -14,6 +19,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
+from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.timer import Timer
@@ -22,7 +28,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.collecting import Collecting
 from stickslip_ros.nodes.topics import DIAGNOSTICS, Topic, mismatch, type_name
 from stickslip_ros.scenario import parameters
-from stickslip_ros.scenario.files import LONGEST_NAMESPACE
+from stickslip_ros.scenario.files import LONGEST_NAMESPACE, number_in
 from stickslip_ros.scenario.parameters import Fixed, NodeParameters, shown
 
 ParametersT = TypeVar("ParametersT", bound=NodeParameters)
@@ -40,6 +46,7 @@ STATE = "state"
 _DIAGNOSTICS_PERIOD = 1.0
 _AUTOSTART_PERIOD = 0.05
 _DELIVERY_TIMEOUT = 1.0
+_LARGEST_ON_SLIDER = 2**31 - 1
 _OWNED_BY_ROS = ("start_type_description_service",)
 
 
@@ -92,6 +99,7 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
         """The parameters in force."""
         self._connections: list[Any] = []
         self._last_refusal = ""
+        self._waiting = False
         self._diagnostics = self.create_publisher(
             DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos()
         )
@@ -154,6 +162,22 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
         self._connections.append(subscription)
         return subscription
 
+    def disconnect(self, connection: Any) -> None:
+        """Give up what `connect` or `start` has made, before the node is cleaned up."""
+        self._connections.remove(connection)
+        # The node has to let go of it, too: what is only destroyed by itself goes on to be heard.
+        match connection:
+            case Publisher():
+                self.destroy_publisher(connection)
+            case Subscription():
+                self.destroy_subscription(connection)
+            case Service():
+                self.destroy_service(connection)
+            case Timer():
+                self.destroy_timer(connection)
+            case _:
+                connection.destroy()
+
     def wait_for_delivery(self, publisher: Publisher) -> None:
         """Wait, within bounds, until every reader has what was published."""
         publisher.wait_for_all_acked(Duration(seconds=_DELIVERY_TIMEOUT))
@@ -181,25 +205,27 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Connect."""
-        return self._transition(self.connect)
+        self._waiting = False
+        return self._transition(self.connect, "configured")
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start, if those waited for are there."""
         missing = self.unmatched()
         if missing:
-            self.get_logger().debug(f"not activated: {missing}")
+            self._tell_waiting(missing)
             return TransitionCallbackReturn.FAILURE
-        result = self._transition(self.start)
+        self._waiting = False
+        result = self._transition(self.start, "active")
         self.active = result is TransitionCallbackReturn.SUCCESS
         return result
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop."""
-        return self._transition(self._stop_and_tell)
+        return self._transition(self._stop_and_tell, "paused")
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Disconnect."""
-        return self._transition(self._disconnect)
+        return self._transition(self._disconnect, "cleaned up")
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Stop if need be, and disconnect."""
@@ -219,11 +245,11 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
             self.active = False
 
     def _disconnect(self) -> None:
-        for connection in self._connections:
-            connection.destroy()
-        self._connections.clear()
+        for connection in list(self._connections):
+            self.disconnect(connection)
 
-    def _transition(self, action: Callable[[], None]) -> TransitionCallbackReturn:
+    def _transition(self, action: Callable[[], None], done: str = "") -> TransitionCallbackReturn:
+        """Do what a transition asks for, and log what the node is then."""
         try:
             action()
         except InvalidInputError as error:
@@ -237,15 +263,28 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
             self.get_logger().error(f"{type(error).__name__}: {error}")
             self._end_autostart()
             return TransitionCallbackReturn.ERROR
+        if done:
+            self.get_logger().info(done)
         return TransitionCallbackReturn.SUCCESS
+
+    def _tell_waiting(self, missing: str) -> None:
+        """Log once, until the node is active, whom it waits for."""
+        if not self._waiting:
+            self._waiting = True
+            whom = " for " + ", ".join(self.parameters.wait_for) if self.parameters.wait_for else ""
+            self.get_logger().info(f"waiting{whom}: {missing}")
 
     def _autostart(self) -> None:
         """Configure, then try to activate until those waited for are there."""
         if self._state_machine.current_state[1] == "unconfigured":
             self.trigger_configure()
         # In one go, if nobody is missing: a plant may take whoever is there for one that answers.
-        if self._state_machine.current_state[1] == "inactive" and not self.unmatched():
-            self.trigger_activate()
+        if self._state_machine.current_state[1] == "inactive":
+            missing = self.unmatched()
+            if missing:
+                self._tell_waiting(missing)
+            else:
+                self.trigger_activate()
         if self.active or self.stopped.done():
             self._end_autostart()
 
@@ -313,11 +352,12 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set all parameters or none; what is refused is named, with what is allowed.
 
-        Whole numbers are taken where numbers are declared, as parameter files and -p do.
+        Whole numbers are taken where numbers are declared, as parameter files and -p do, and text
+        that is a number: `ros2 param load` sends inf and 1e-05 in no other way.
         """
         given = {parameter.name: parameter for parameter in parameter_list}
         owned = [parameter for name, parameter in given.items() if name in _OWNED_BY_ROS]
-        values = {name: p.value for name, p in given.items() if name not in _OWNED_BY_ROS}
+        values = {n: self._as_meant(n, p.value) for n, p in given.items() if n not in _OWNED_BY_ROS}
         source = self.get_fully_qualified_name()
         try:
             changed = self._model.validated(self.parameters.flat() | values, source)
@@ -346,6 +386,13 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
                     f"the node is {fixed}, and is {shown(present[name])}"
                 )
 
+    def _as_meant(self, name: str, value: Any) -> Any:
+        known = parameters.known_parameters(self._model)
+        if isinstance(value, str) and name in known and known[name].kind is float:
+            number = number_in(value)
+            return value if number is None else number
+        return value
+
     def _as_ros(self, values: Mapping[str, Any]) -> list[Parameter]:
         known = parameters.known_parameters(self._model)
         return [Parameter(name, _ROS_TYPES[known[name].kind], v) for name, v in values.items()]
@@ -367,8 +414,16 @@ _ROS_TYPES = {
 
 def _descriptor(parameter: parameters.Parameter) -> ParameterDescriptor:
     unit = f" [{parameter.unit}]" if parameter.unit else ""
-    return ParameterDescriptor(
+    descriptor = ParameterDescriptor(
         name=parameter.name,
         description=parameter.meaning + unit,
         additional_constraints=parameter.bounds,
     )
+    # rqt_reconfigure makes a slider of a range, which fails with an infinite end or a long integer.
+    if parameter.range is not None and parameter.kind is float:
+        least, largest = parameter.range
+        descriptor.floating_point_range = [FloatingPointRange(from_value=least, to_value=largest)]
+    elif parameter.range is not None and parameter.range[1] <= _LARGEST_ON_SLIDER:
+        least, largest = (int(end) for end in parameter.range)
+        descriptor.integer_range = [IntegerRange(from_value=least, to_value=largest)]
+    return descriptor

@@ -101,6 +101,8 @@ class Pacer:
     """What is wrong, in words."""
     failure = ""
     """Why it could not go on, in words."""
+    finished = False
+    """Whether it has stopped by itself: at the last sample, or because it could not go on."""
     missed_deadlines = 0
     largest_lateness = 0.0
     """Time by which a sample was published after its deadline, s."""
@@ -125,6 +127,10 @@ class Pacer:
         if self._running:
             self._stopped = time.monotonic()
         self._running = False
+
+    def _finish(self) -> None:
+        self.finished = True
+        self._end()
 
     @property
     def steps_per_second(self) -> float:
@@ -194,7 +200,7 @@ class LockstepPacer(Pacer):
             held_up = self._awaits_force or self._flow.full
             if loop.unbounded or (loop.sample.number >= self._last and not held_up):
                 self.stop()
-                self._end()
+                self._finish()
                 return
             if held_up:
                 return
@@ -203,7 +209,7 @@ class LockstepPacer(Pacer):
             except StickslipError as error:
                 self.failure = str(error)
                 self.stop()
-                self._end()
+                self._finish()
                 return
             self._publish(sample)
             self._flow.sent(sample.stamp)
@@ -256,10 +262,9 @@ class RealtimePacer(Pacer):
         call_soon: Callable[[Callable[[], None]], Any],
     ) -> None:
         """Hold `lock` while the loop advances; call `end` through `call_soon`."""
-        super().__init__(loop, publish, end)
+        super().__init__(loop, publish, lambda: call_soon(end))
         self._lock = lock
         self._interval = loop.period / real_time_factor
-        self._call_soon = call_soon
         self._sleeper = Sleeper()
         self._thread = Thread(target=self._run, name="pacer", daemon=True)
 
@@ -285,13 +290,13 @@ class RealtimePacer(Pacer):
         except Exception as error:  # it would end the thread without a word
             known = isinstance(error, StickslipError)
             self.failure = str(error) if known else f"{type(error).__name__}: {error}"
-            self._call_soon(self._end)
+            self._finish()
 
     def _keep_deadlines(self) -> None:
         loop = self._loop
         while self._running:
             if loop.sample.number >= self._last or loop.unbounded:
-                self._call_soon(self._end)
+                self._finish()
                 return
             deadline = self.deadline(loop.sample.number + 1)
             self._sleeper.sleep_until(deadline)

@@ -40,6 +40,8 @@ NEWEST_STAMP = "newest_stamp"
 """Key under which the diagnostics tell the stamp of the newest sample, ns."""
 FAILURE = "failure"
 """Key under which they tell why the plant could not go on, if so."""
+FINISHED = "finished"
+"""Key under which they tell whether it has paused by itself, and not because somebody asked."""
 
 
 class PlantNode(ManagedNode[PlantParameters]):
@@ -47,12 +49,16 @@ class PlantNode(ManagedNode[PlantParameters]):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("plant", PlantParameters, **options)
+        self._next_start = LOCKSTEP_START
+        self.elapsed = 0.0
+        """Simulated time, s, before the last pause that counts as part of the duration."""
 
     def connect(self) -> None:
         """Compile the motion; publish the state, listen to forces and to the recorder."""
         initial = self.parameters.initial
         self._motion = Motion(self.parameters.as_drive(), initial.position, initial.velocity)
-        self._next_start = LOCKSTEP_START
+        self._moved = False
+        self.elapsed = 0.0
         self._disturbance = 0.0
         self._lock = threading.Lock()
         self._dropped = Dropped(self)
@@ -90,7 +96,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         stampable = self._loop.number(latest) - 1
         if stampable < 0:
             raise InvalidInputError(
-                f"no stamps are left behind {latest // NANOSECONDS} s: configure anew"
+                f"no stamps are left behind {latest // NANOSECONDS} s: start the node anew"
             )
         if realtime:
             self._pacer = RealtimePacer(
@@ -104,11 +110,16 @@ class PlantNode(ManagedNode[PlantParameters]):
         else:
             self._pacer = LockstepPacer(self._loop, self._publish, self._end, self)
         last = parameters.last_sample
+        if last is not None:
+            last = max(last - round(self.elapsed * parameters.rate), 0)
         self._pacer.start(stampable if last is None else min(last, stampable))
 
     def stop(self) -> None:
         """Pause the motion, once the states sent have arrived."""
         self._pacer.stop()
+        self._moved = True
+        done = self._loop.sample.number * self._loop.period
+        self.elapsed = 0.0 if self._pacer.finished else self.elapsed + done
         self._next_start = self._loop.stamp(self._loop.sample.number + 1)
         self.wait_for_delivery(self._state)
         self.wait_for_delivery(self._applied)
@@ -121,7 +132,7 @@ class PlantNode(ManagedNode[PlantParameters]):
                 self._loop.scenario_disturbance = self.parameters.as_disturbance()
         elif self._connections:
             self._motion.drive = self.parameters.as_drive()
-            if self._next_start == LOCKSTEP_START:  # it has not moved yet
+            if not self._moved:
                 initial = self.parameters.initial
                 self._motion.restart(initial.position, initial.velocity)
 
@@ -133,6 +144,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         figures = {
             "samples": loop.sample.number + 1,
             NEWEST_STAMP: loop.sample.stamp,
+            FINISHED: pacer.finished,
             "late_forces": loop.late_forces,
             "missed_deadlines": pacer.missed_deadlines,
             "largest_lateness": round(pacer.largest_lateness, 6),
@@ -180,10 +192,14 @@ class PlantNode(ManagedNode[PlantParameters]):
 
     def _end(self) -> None:
         """Pause by itself: the last sample was reached, or the motion cannot go on."""
+        if not self._pacer.finished:  # it was that of a segment before, and came too late
+            return
         if self._loop.unbounded:
             self.get_logger().error("the motion runs away (regime unbounded): plant deactivated")
         elif self._pacer.failure:
             self.get_logger().error(f"{self._pacer.failure}: plant deactivated")
+        else:
+            self.get_logger().info("finished: the last sample was reached")
         if self.active:
             self.trigger_deactivate()
 

@@ -67,7 +67,7 @@ class WashoutControllerNode(ManagedNode[WashoutControllerParameters]):
             return
         force = self._washout.answer(stamp, velocity)
         if force is None:
-            self._dropped.add(f"a joint state stamped {stamp} ns, which was answered already")
+            self._dropped.add(f"a joint state stamped {stamp} ns, not later than the last one")
         elif not isfinite(force):
             self._dropped.add(f"to the velocity {velocity} m/s the force would be {force} N")
         else:

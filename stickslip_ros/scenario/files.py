@@ -130,6 +130,12 @@ def load_scenario(
     )
 
 
+def number_in(text: str) -> float | None:
+    """Return the number that a text is to ROS, None if it is none."""
+    value = yaml.load(text, Loader=_RosLoader) if _NUMBER.fullmatch(text) else None
+    return value if isinstance(value, int | float) else None
+
+
 def section_matches(pattern: str, node: str) -> bool:
     """Return whether a section applies to the node of that full name, as ROS has it."""
     tokens = {"**": r"(/\w+)*", "*": r"/\w+"}
@@ -210,6 +216,7 @@ _SCALARS = {
     r"|[-+]?\.?(inf|Inf|INF)|[-+]?\.?(nan|NaN|NAN)",
     "null": "~|null|Null|NULL|",
 }
+_NUMBER = re.compile(f"(?:{_SCALARS['int']}|{_SCALARS['float']})")
 for _tag, _pattern in _SCALARS.items():
     _RosLoader.add_implicit_resolver(
         f"tag:yaml.org,2002:{_tag}", re.compile(f"^(?:{_pattern})$"), None

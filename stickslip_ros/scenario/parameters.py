@@ -420,6 +420,8 @@ class Parameter:
     """What is allowed, with those."""
     finite: bool
     """Whether a number must be finite."""
+    range: tuple[float, float] | None
+    """Least and largest value of a number, if it has both and they are not those of any."""
 
 
 def parameters_of(model: type[BaseModel], prefix: str = "") -> Iterator[Parameter]:
@@ -457,6 +459,7 @@ def _parameter(name: str, field: FieldInfo) -> Parameter:
         finite=not any(
             getattr(constraint, "allow_inf_nan", False) for constraint in field.metadata
         ),
+        range=_range(field),
     )
 
 
@@ -472,15 +475,25 @@ _COMPARISONS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
 _NOT_TOLD = {("at least", -_LARGEST), ("at most", _LARGEST), ("at most", 2**62)}
 
 
+def _limits(field: FieldInfo) -> Iterator[tuple[str, Any]]:
+    """Yield the comparisons with what bounds a number, and that."""
+    for constraint in field.metadata:
+        for name in _COMPARISONS:
+            if hasattr(constraint, name):
+                yield name, getattr(constraint, name)
+
+
+def _range(field: FieldInfo) -> tuple[float, float] | None:
+    limits = {name[0]: limit for name, limit in _limits(field)}
+    if len(limits) < 2 or limits == {"g": -_LARGEST, "l": _LARGEST}:
+        return None
+    return limits["g"], limits["l"]
+
+
 def _bounds(field: FieldInfo, choices: tuple[str, ...], *, told: bool) -> str:
     if choices:
         return "one of " + ", ".join(choices)
-    limits = [
-        (words, getattr(constraint, name))
-        for constraint in field.metadata
-        for name, words in _COMPARISONS.items()
-        if hasattr(constraint, name)
-    ]
+    limits = [(_COMPARISONS[name], limit) for name, limit in _limits(field)]
     if told:
         limits = [
             ("above", 0) if limit == ("at least", _SMALLEST) else limit
@@ -543,5 +556,6 @@ def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str
         if bounds:
             allowed = bounds if parameter.choices else f"{allowed} {bounds}"
         unit = f" {parameter.unit}" if parameter.unit else ""
-        complaints.append(f"{name} = {shown(value)} is refused: must be {allowed}{unit}")
+        text = ", not text" if isinstance(value, str) and parameter.kind is not str else ""
+        complaints.append(f"{name} = {shown(value)} is refused: must be {allowed}{unit}{text}")
     return "; ".join(complaints)

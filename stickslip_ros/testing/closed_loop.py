@@ -158,6 +158,7 @@ class ClosedLoop:
         if not 0.0 < duration < float("inf"):
             raise InvalidInputError(f"duration = {duration} s is refused: must be above 0, finite")
         nodes.set_parameters(nodes.plant, {"duration": float(duration)})
+        nodes.plant.elapsed = 0.0
         try:
             nodes.activate(nodes.analyzer)
             self._runs += 1

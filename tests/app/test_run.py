@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.nodes.managed import STATE
@@ -126,6 +128,47 @@ def test_samples_that_the_analyzer_has_not_taken_in_at_the_end_are_waited_for(
     assert process.returncode == 0, errors
     result = json.loads(output)
     assert (result["samples"], result["report"]["complete"]) == (301, True)
+
+
+@pytest.mark.parametrize("flags", [(), pytest.param(("--composed",), marks=pytest.mark.long)])
+@pytest.mark.parametrize(("pace", "duration"), [("realtime", 4), ("lockstep", None)])
+def test_a_plant_that_is_deactivated_pauses_the_run(
+    start_stickslip: Callable[..., subprocess.Popen[str]],
+    domain: int,
+    monkeypatch: pytest.MonkeyPatch,
+    pace: str,
+    duration: int | None,
+    flags: tuple[str, ...],
+) -> None:
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    graph = Graph(domain)
+    health = graph.listen(DIAGNOSTICS)
+
+    def ask_for(transition: int) -> None:
+        request = ChangeState.Request(transition=Transition(id=transition))
+        assert graph.call(ChangeState, "/feed_drive/plant/change_state", request).success
+
+    until = ("--duration", str(duration)) if duration else ()
+    process = start_stickslip("run", "paper", "--pace", pace, *until, *flags, "--json")
+    graph.wait_until(lambda: "active" in states_of_plant(health), "the plant is active")
+    ask_for(Transition.TRANSITION_DEACTIVATE)
+    told = len(states_of_plant(health))
+    graph.wait_until(lambda: len(states_of_plant(health)) > told + 2, "it stays paused")
+    assert states_of_plant(health)[-1] == "inactive"
+    assert process.poll() is None
+    ask_for(Transition.TRANSITION_ACTIVATE)
+    graph.wait_until(lambda: states_of_plant(health)[-1] == "active", "it goes on")
+    graph.close()
+    if duration is None:
+        process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == (0 if duration else 130), errors
+    assert errors.count("the plant is paused") == errors.count("the plant goes on") == 1
+    result = json.loads(output)
+    assert result["report"]["complete"]
+    assert result["lost_samples"] == 0 or pace == "realtime"
+    if duration:  # each of the two segments has a sample 0
+        assert result["samples"] == duration * 100 + 2
 
 
 def states_of_plant(health: list[DiagnosticArray]) -> list[str]:

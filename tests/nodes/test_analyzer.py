@@ -1,8 +1,10 @@
 """The analyzer node on the real middleware."""
 
 import json
+import re
 import resource
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -24,6 +26,8 @@ from stickslip_ros.nodes.topics import (
 )
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import PATIENCE, Graph
+
+_FIGURES = r"stick_slip: amplitude \d+\.?\d* mm, frequency \d+\.?\d* mHz, stick fraction 0\.\d{1,3}"
 
 
 def run_to_the_end(graph: Graph, bag: Path, **plant_parameters: object) -> None:
@@ -59,6 +63,26 @@ def test_it_records_the_bytes_it_hears_and_measures_them(graph: Graph, tmp_path:
     assert fractions[-1].data == pytest.approx(0.285506954, abs=2e-3)
     assert plant is not None
     assert json.loads(plant["belt_speed"]) == 0.2
+
+
+def test_it_logs_rounded_figures_and_no_line_that_reads_as_the_one_before(
+    graph: Graph, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    parameters = {"expects_control": False, "belt_speed": 0.2, "duration": 200.0}
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"), window=2)
+    graph.wait_until(lambda: analyzer.active, "analyzer active")
+    plant = graph.add(PlantNode, wait_for=["analyzer"], **parameters)
+    graph.wait_until(lambda: plant.active, "plant active")
+    graph.wait_until(lambda: not plant.active, "plant pauses")
+    graph.deactivate("analyzer")
+    lines = [
+        line.partition("[test.analyzer]: ")[2]
+        for line in capfd.readouterr().err.splitlines()
+        if "amplitude" in line and "report: " not in line
+    ]
+    assert lines[-1].startswith("stick_slip: amplitude 318.6 mm, ")
+    assert all(re.fullmatch(_FIGURES, line) for line in lines)
+    assert all(one != next_one for one, next_one in pairwise(lines))
 
 
 def test_it_listens_only_while_it_is_active(graph: Graph) -> None:

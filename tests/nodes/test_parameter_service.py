@@ -3,14 +3,23 @@
 import random
 import struct
 from collections.abc import Iterator
+from math import inf, isfinite
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from rcl_interfaces.msg import Parameter as ParameterMessage
-from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
 from rclpy.parameter import Parameter as RosParameter
-from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter import parameter_dict_from_yaml_file, parameter_value_to_python
 
 from stickslip_ros.bags.messages import joint_state_columns
 from stickslip_ros.nodes.analyzer import AnalyzerNode
@@ -133,6 +142,100 @@ def test_good_values_are_taken_exactly_in_every_state(graph: Graph, name: str) -
                 assert any(part in reason for part in allowed), (state, parameter, value, reason)
             assert set_all(graph, name, **{name: start[name] for name in settable}) == ""
             assert bits(told(graph, name)) == bits(start)
+
+
+def load(graph: Graph, node: str, file: Path) -> dict[str, str]:
+    """Do as `ros2 param load` does; return why parameters are refused, by name."""
+    parameters = parameter_dict_from_yaml_file(str(file), use_wildcard=True)
+    request = SetParameters.Request(parameters=list(parameters.values()))
+    results = graph.call(SetParameters, f"/test/{node}/set_parameters", request).results
+    return {
+        name: result.reason
+        for name, result in zip(parameters, results, strict=True)
+        if not result.successful
+    }
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_what_ros2_dumps_it_loads_again(graph: Graph, name: str, tmp_path: Path) -> None:
+    node = graph.add(NODES[name], autostart=False)
+    given = {p.name: good_values(p)[-1] for p in parameters_of(MODELS[name]) if p.kind is float}
+    given |= {"friction.minimum_speed": 1e-5, "friction.minimum": 0.0, "friction.static": 5e-5}
+    for choice in ({n: v for n, v in given.items() if n in told(graph, name)}, {}):
+        set_each(graph, name, *choice.items())
+        before = bits(told(graph, name))
+        names = sorted(
+            graph.call(
+                ListParameters, f"/test/{name}/list_parameters", ListParameters.Request()
+            ).result.names
+        )
+        request = GetParameters.Request(names=names)
+        values = graph.call(GetParameters, f"/test/{name}/get_parameters", request).values
+        dumped: dict[str, Any] = {}
+        for parameter, value in zip(names, values, strict=True):
+            *groups, last = parameter.split(".")
+            group = dumped
+            for each in groups:
+                group = group.setdefault(each, {})
+            group[last] = parameter_value_to_python(value)
+        file = tmp_path / "dump.yaml"
+        file.write_text(yaml.dump({f"/test/{name}": {"ros__parameters": dumped}}))
+        refused = load(graph, name, file)
+        assert set(refused) <= {"start_type_description_service"}, refused
+        assert bits(told(graph, name)) == before == bits(node.parameters.flat())
+
+
+def test_text_is_a_number_where_ros_reads_one_and_is_told_otherwise(graph: Graph) -> None:
+    graph.add(PlantNode, autostart=False)
+    texts = [("mass", "1.0e6"), ("duration", "inf"), ("duration", ".inf"), ("damping", "5")]
+    assert set_each(graph, "plant", *texts) == [""] * 4
+    now = told(graph, "plant")
+    assert (now["mass"], now["duration"], now["damping"]) == (1e6, inf, 5.0)
+    for name, text in (
+        ("mass", "heavy"),
+        ("mass", "1e400"),
+        ("rate", "1_0"),
+        ("autostart", "maybe"),
+    ):
+        (reason,) = set_each(graph, "plant", (name, text))
+        assert f"{name} = {text!r} is refused: must be " in reason
+        assert reason.endswith(", not text")
+    (reason,) = set_each(graph, "plant", ("mass", "-1e-05"))
+    assert "mass = -1e-05 is refused" in reason
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_ranges_tell_the_bounds_wherever_a_slider_can_show_them(graph: Graph, name: str) -> None:
+    graph.add(NODES[name], autostart=False)
+    known = list(parameters_of(MODELS[name]))
+    request = DescribeParameters.Request(names=[parameter.name for parameter in known])
+    answer = graph.call(DescribeParameters, f"/test/{name}/describe_parameters", request)
+    ranges: dict[str, tuple[float, float]] = {}
+    for descriptor in answer.descriptors:
+        for each in (*descriptor.floating_point_range, *descriptor.integer_range):
+            ranges[descriptor.name] = (each.from_value, each.to_value)
+            assert isfinite(each.to_value - each.from_value)
+            assert each.step == 0
+    expected = {
+        "plant": {
+            "mass": (1e-30, 1e30),
+            "damping": (0.0, 1e30),
+            "rate": (1e-6, 1e9),
+            "flow_window": (200, 4000),
+            "force_jitter_seed": (0, 1_000_000_000),
+        },
+        "washout_controller": {"corner_frequency": (1e-30, 1e30)},
+        "analyzer": {"window": (1, 100_000), "max_bag_duration": (0.0, 1e9)},
+        "replay": {"start": (0.0, 1e10)},
+    }
+    assert expected[name].items() <= ranges.items()
+    assert not ranges.keys() & {
+        "belt_speed",
+        "duration",
+        "force_limit",
+        "max_bag_size",
+        "autostart",
+    }
 
 
 def test_what_is_not_all_good_is_not_taken_at_all(graph: Graph) -> None:

@@ -145,6 +145,27 @@ def test_activated_again_it_starts_a_new_segment_where_it_stopped(graph: Graph) 
     assert columns.position[201] > columns.position[101] > 0.0
 
 
+@pytest.mark.parametrize("pace", ["lockstep", "realtime"])
+def test_a_pause_is_no_end_and_does_not_count_as_duration(graph: Graph, pace: str) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    recorded = graph.observer.create_publisher(
+        RECORDED.type, f"/test/{RECORDED.name}", RECORDED.qos()
+    )
+    parameters = {"expects_control": False, "wait_for": ["observer"], "flow_window": 200}
+    plant = graph.add(PlantNode, pace=pace, duration=3.0, **parameters)
+    graph.wait_until(lambda: len(heard) >= 200, "lockstep has used up its window")
+    plant.trigger_deactivate()
+    paused = plant.diagnose()[2]
+    assert not paused["finished"]
+    graph.observer.destroy_publisher(recorded)
+    left = 300 - (paused["samples"] - 1)
+    for samples in (left + 1, 301):
+        plant.trigger_activate()
+        graph.wait_until(lambda: not plant.active, "the plant pauses by itself")
+        assert plant.diagnose()[2]["finished"]
+        assert plant.diagnose()[2]["samples"] == samples
+
+
 @pytest.mark.parametrize("duration", [0.0, 0.3])
 def test_a_run_shorter_than_a_batch_ends(graph: Graph, duration: float) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)

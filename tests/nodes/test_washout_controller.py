@@ -9,6 +9,7 @@ from stickslip_ros.bags.messages import pack_joint_state, unpack_wrench
 from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.physics.washout import Washout, WashoutParameters
+from stickslip_ros.scenario.parameters import WashoutControllerParameters
 from tests.nodes.graph import Graph
 
 SECOND = 1_000_000_000
@@ -60,6 +61,29 @@ def test_what_is_not_a_finite_state_is_dropped_and_diagnosed(graph: Graph) -> No
     stamp, _ = loop.answer(3 * SECOND, 0.1)
     assert stamp == 3 * SECOND
     assert len(loop.forces) == 2
+
+
+def test_a_state_older_than_the_last_is_dropped_and_the_filter_goes_on(graph: Graph) -> None:
+    loop = Loop(graph)
+    law = Washout(WashoutControllerParameters().as_washout())
+    for number, velocity in enumerate((0.1, 0.3, -0.2)):
+        stamp = SECOND + number * SECOND // 100
+        assert loop.answer(stamp, velocity) == (stamp, law.answer(stamp, velocity))
+    loop.send(SECOND + SECOND // 100, 0.3)
+    graph.wait_until(lambda: "not later than the last" in loop.controller.diagnose()[1], "dropped")
+    later = 2 * SECOND
+    assert loop.answer(later, 0.4) == (later, law.answer(later, 0.4))
+    assert len(loop.forces) == 4
+
+
+def test_a_plant_in_lockstep_that_was_started_again_is_answered_at_once(graph: Graph) -> None:
+    loop = Loop(graph)
+    heard: list[list[tuple[int, float]]] = []
+    for _ in range(2):
+        heard.append(
+            [loop.answer(SECOND + n * SECOND // 100, v) for n, v in enumerate((0.1, 0.3, -0.2))]
+        )
+    assert heard[0] == heard[1]
 
 
 def test_an_inactive_controller_is_silent(graph: Graph) -> None:

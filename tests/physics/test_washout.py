@@ -126,12 +126,48 @@ def test_a_stamp_is_answered_once(steps: list[tuple[int, float]]) -> None:
         assert again.answer(stamp, speed + 1.0) is None
 
 
-def test_it_starts_anew_where_time_goes_back() -> None:
+def test_it_restarts_where_time_goes_back_to_the_beginning() -> None:
     washout = Washout(replace(UNIT_GAIN, start_after=0.5))
     fresh = Washout(replace(UNIT_GAIN, start_after=0.5))
     for stamp, speed in [(5 * SECOND, 0.1), (6 * SECOND, 0.9)]:
         washout.answer(stamp, speed)
     for stamp, speed in [(2 * SECOND, 0.3), (2 * SECOND + 10**8, 0.5), (3 * SECOND, -0.4)]:
+        assert washout.answer(stamp, speed) == fresh.answer(stamp, speed)
+
+
+@given(measurements, st.integers(-5 * SECOND, 50 * SECOND), st.integers(0, 20))
+def test_one_measurement_that_is_not_later_leaves_the_filter_alone(
+    steps: list[tuple[int, float]], older: int, place: int
+) -> None:
+    undisturbed, disturbed = Washout(UNIT_GAIN), Washout(UNIT_GAIN)
+    stamp = SECOND
+    for number, (step, speed) in enumerate(steps):
+        stamp += step
+        assert disturbed.answer(stamp, speed) == undisturbed.answer(stamp, speed)
+        if number == place:
+            first = stamp if number == 0 else SECOND + steps[0][0]
+            answer = disturbed.answer(min(older, stamp), 3.0)
+            assert answer == (0.0 if min(older, stamp) <= first and older < stamp else None)
+
+
+def test_measurements_that_come_twice_leave_the_filter_alone() -> None:
+    once, twice = Washout(UNIT_GAIN), Washout(UNIT_GAIN)
+    speeds = np.sin(np.arange(20.0))
+    expected = [once.answer(SECOND + n, speed) for n, speed in enumerate(speeds)]
+    for n, speed in enumerate(speeds):
+        assert twice.answer(SECOND + n, speed) == expected[n]
+        if n >= 2:
+            assert twice.answer(SECOND + n - 1, speeds[n - 1]) is None
+            assert twice.answer(SECOND + n, speed) is None
+
+
+def test_it_follows_time_that_has_gone_back_into_the_run() -> None:
+    washout, fresh = Washout(UNIT_GAIN), Washout(UNIT_GAIN)
+    for stamp, speed in [(SECOND, 0.1), (6 * SECOND, 0.9)]:
+        washout.answer(stamp, speed)
+    assert washout.answer(2 * SECOND, 0.3) is None
+    fresh.answer(2 * SECOND, 0.3)
+    for stamp, speed in [(2 * SECOND + 10**8, 0.5), (3 * SECOND, -0.4), (9 * SECOND, 0.2)]:
         assert washout.answer(stamp, speed) == fresh.answer(stamp, speed)
 
 

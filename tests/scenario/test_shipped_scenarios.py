@@ -1,12 +1,16 @@
+import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
-from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.scenario.files import load_scenario, number_in, parameter_file
 from stickslip_ros.scenario.parameters import NODE_PARAMETERS
 
-CONFIG = Path(__file__).parents[2] / "config"
+ROOT = Path(__file__).parents[2]
+CONFIG = ROOT / "config"
 
 STRIBECK = {"friction.law": "stribeck", "friction.static": 0.4, "friction.minimum": 0.25}
 SHIPPED: dict[str, dict[str, dict[str, Any]]] = {
@@ -59,6 +63,26 @@ def test_numbers_of_the_shipped_scenarios(name: str) -> None:
     for node, expected in SHIPPED[name].items():
         values = scenario.as_dict()[node]
         assert {parameter: values[parameter] for parameter in expected} == expected
+
+
+def leaves(tree: Any) -> Iterator[Any]:
+    below = tree.values() if isinstance(tree, dict) else tree if isinstance(tree, list) else ()
+    if not below:
+        yield tree
+    for each in below:
+        yield from leaves(each)
+
+
+def test_numbers_in_yaml_are_numbers_to_pyyaml_which_ros2_param_load_reads_them_with() -> None:
+    texts = [file.read_text() for file in CONFIG.glob("*.yaml")]
+    for page in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md")):
+        texts += re.findall(r"^```yaml$(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL)
+    assert len(texts) > len(SHIPPED)
+    extremes = {"a": 1e-30, "b": 1e16, "c": float("inf"), "d": -1e6, "e": 5e-324}
+    texts.append(parameter_file({"plant": extremes}))
+    found = [leaf for text in texts for leaf in leaves(yaml.safe_load(text))]
+    assert not [leaf for leaf in found if isinstance(leaf, str) and number_in(leaf) is not None]
+    assert {leaf for leaf in found if isinstance(leaf, float)} >= set(extremes.values())
 
 
 def test_there_are_no_others() -> None:

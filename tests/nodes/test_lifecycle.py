@@ -1,0 +1,111 @@
+"""The life cycle gone through again and again, from outside, while the loop runs."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.parameter import Parameter
+
+from stickslip_ros.bags.reader import Recording
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.managed import ManagedNode
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.topics import CONTROL_FORCE, DISTURBANCE_FORCE, JOINT_STATES, RECORDED
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from tests.nodes.graph import Graph
+from tests.nodes.processes import Processes
+
+ROUNDS = 10
+ROUND = {
+    Transition.TRANSITION_DEACTIVATE: "inactive",
+    Transition.TRANSITION_CLEANUP: "unconfigured",
+    Transition.TRANSITION_CONFIGURE: "inactive",
+    Transition.TRANSITION_ACTIVATE: "active",
+}
+ENDS = {JOINT_STATES: (1, 2), CONTROL_FORCE: (1, 2), DISTURBANCE_FORCE: (0, 1), RECORDED: (1, 1)}
+"""Publishers and subscriptions of each topic while plant, controller and analyzer are active."""
+
+NODES: dict[str, type[ManagedNode]] = {
+    "analyzer": AnalyzerNode,
+    "washout_controller": WashoutControllerNode,
+    "plant": PlantNode,
+}
+
+
+def state_of(graph: Graph, node: str) -> str:
+    return graph.call(GetState, f"/test/{node}/get_state", GetState.Request()).current_state.label
+
+
+def go_round(graph: Graph, node: str) -> None:
+    """Deactivate, clean up, configure and activate a node, as `ros2 lifecycle` does."""
+    for transition, state in ROUND.items():
+        request = ChangeState.Request(transition=Transition(id=transition))
+        # Who is waited for may not be there yet.
+        while state_of(graph, node) != state:
+            graph.call(ChangeState, f"/test/{node}/change_state", request)
+
+
+def ends(graph: Graph) -> dict[object, tuple[int, int]]:
+    """Return how many publishers and subscriptions the topics have."""
+    names = {topic: f"/test/{topic.name}" for topic in ENDS}
+    return {
+        topic: (graph.observer.count_publishers(name), graph.observer.count_subscribers(name))
+        for topic, name in names.items()
+    }
+
+
+@pytest.fixture(params=["composed", pytest.param("processes", marks=pytest.mark.process)])
+def bring(request: pytest.FixtureRequest, graph: Graph) -> Callable[..., None]:
+    """Start a node in this process, or in one of its own."""
+    if request.param == "composed":
+        return lambda name, **parameters: graph.add(NODES[name], **parameters)
+    processes: Processes = request.getfixturevalue("processes")
+    return processes.node
+
+
+@pytest.mark.parametrize("pace", ["lockstep", "realtime"])
+def test_rounds_of_the_life_cycle_leave_one_of_each_and_time_goes_on(
+    graph: Graph, tmp_path: Path, bring: Callable[..., None], pace: str
+) -> None:
+    bring("analyzer", bag=str(tmp_path / "bag"))
+    bring("washout_controller", wait_for=["analyzer"])
+    bring("plant", pace=pace, wait_for=["analyzer", "washout_controller"], reply_timeout=0.2)
+    graph.wait_until(lambda: ends(graph) == ENDS, "the loop is closed")
+    for _ in range(ROUNDS):
+        for node in ("washout_controller", "plant"):
+            go_round(graph, node)
+            graph.wait_until(lambda: ends(graph) == ENDS, f"one of each again: {ends(graph)}")
+    go_round(graph, "analyzer")
+    graph.wait_until(lambda: ends(graph) == ENDS, f"one of each again: {ends(graph)}")
+
+    with Recording(tmp_path / "bag") as recording:
+        assert recording.complete
+        states, forces = recording.joint_states.stamp, recording.control_forces.stamp
+    assert len(forces) > ROUNDS
+    assert (np.diff(states) > 0).all()
+    assert (np.diff(forces) > 0).all()
+
+
+def test_a_node_says_once_what_it_is_and_whom_it_waits_for(
+    graph: Graph, capfd: pytest.CaptureFixture[str]
+) -> None:
+    said: list[str] = []
+
+    def logged(text: str) -> int:
+        lines = capfd.readouterr().err.splitlines()
+        said.extend(line.partition("[test.plant]: ")[2] for line in lines if "[INFO]" in line)
+        return said.count(text)
+
+    plant = graph.add(PlantNode, wait_for=["observer", "nobody"], expects_control=False)
+    graph.wait_until(lambda: logged("configured"), "it is configured")
+    graph.run_for(1.0)
+    assert logged("waiting for observer, nobody: not there: nobody, observer") == 1
+    graph.listen(JOINT_STATES, raw=True)
+    plant.set_parameters([Parameter("wait_for", value=["observer"])])
+    plant.set_parameters([Parameter("duration", value=1.0)])
+    graph.wait_until(lambda: logged("paused"), "its second is over")
+    assert said[-3:] == ["active", "finished: the last sample was reached", "paused"]
+    assert len([line for line in said if line.startswith("waiting")]) == 1
