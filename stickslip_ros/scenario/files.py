@@ -21,12 +21,14 @@ from stickslip_ros.scenario.parameters import (
     WashoutControllerParameters,
     parameters_of,
 )
+from stickslip_ros.suggestions import did_you_mean
 
 DEFAULT_NAMESPACE = "/feed_drive"
 
 _PARAMETERS_KEY = "ros__parameters"
 _LARGEST = 1_000_000
 """Characters of a scenario file."""
+_NAMED_BY_PATH = "a file is given by its path ending in .yaml"
 
 
 @dataclass(frozen=True)
@@ -143,20 +145,25 @@ def config_directories() -> list[Path]:
 
 
 def _find(name_or_path: str) -> Path:
-    if "/" not in name_or_path and not name_or_path.endswith((".yaml", ".yml")):
-        for directory in config_directories():
-            path = directory / f"{name_or_path}.yaml"
-            if path.is_file():
-                return path
-        known = sorted({path.stem for d in config_directories() for path in d.glob("*.yaml")})
-        raise InvalidInputError(
-            f"unknown scenario {name_or_path!r}: known by name are {', '.join(known)}; "
-            "a file is given by its path ending in .yaml"
-        )
+    """Return the file of that path, or else of that name, with or without .yaml."""
     path = Path(name_or_path)
-    if not path.is_file():
+    name = name_or_path.removesuffix(".yaml")
+    given_as_file = "/" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
+    if given_as_file and path.is_file():
+        return path
+    if "/" in name_or_path:
         raise InvalidInputError(f"no scenario file {name_or_path}")
-    return path
+    shipped = {path.stem: path for d in config_directories()[::-1] for path in d.glob("*.yaml")}
+    if name in shipped:
+        return shipped[name]
+    if given_as_file:
+        raise InvalidInputError(
+            f"no scenario file {name_or_path}; {did_you_mean(name, shipped, _NAMED_BY_PATH)}"
+        )
+    every = f"known by name are {', '.join(sorted(shipped))}; {_NAMED_BY_PATH}"
+    raise InvalidInputError(
+        f"unknown scenario {name_or_path!r}; {did_you_mean(name, shipped, every)}"
+    )
 
 
 class _RosLoader(yaml.SafeLoader):
@@ -285,15 +292,24 @@ def _apply(
     """Give the parameters of a section to every node that it matches."""
     nodes = _matching(pattern, namespace)
     if not nodes:
+        node = pattern.rpartition("/")[2]
         raise InvalidInputError(
-            f"{path}: section {pattern} matches no node; in namespace {namespace} there are "
-            f"{', '.join(NODE_PARAMETERS)}"
+            f"{path}: section {pattern} matches no node; "
+            + did_you_mean(
+                node,
+                NODE_PARAMETERS.keys() - {node},
+                f"in namespace {namespace} there are {', '.join(NODE_PARAMETERS)}",
+            )
         )
     for_all = len(nodes) > 1
     for name, value in parameters.items():
         takers = [n for n in nodes if not for_all or name in _names(n)]
         if not takers:
-            raise InvalidInputError(f"{path}: section {pattern}: no node has a parameter {name}")
+            known = {known for node in nodes for known in _names(node)}
+            raise InvalidInputError(
+                f"{path}: section {pattern}: no node has a parameter {name:.80}; "
+                + did_you_mean(name, known, "docs/parameters.md has them all")
+            )
         for node in takers:
             values[node][name] = value
 
@@ -310,10 +326,20 @@ def _names(node: str) -> set[str]:
 def _parse_override(override: str) -> tuple[str, str, Any]:
     target, equals, text = override.partition("=")
     node, _, parameter = target.partition(".")
+    known = [f"{node}.{name}" for node in NODE_PARAMETERS for name in sorted(_names(node))]
     if not equals or not parameter:
-        raise InvalidInputError(f"-p {override:.80}: must be NODE.PARAMETER=VALUE")
+        raise InvalidInputError(
+            f"-p {override:.80}: must be NODE.PARAMETER=VALUE; "
+            + did_you_mean(target, known, "as in -p plant.belt_speed=0.2")
+        )
     if node not in NODE_PARAMETERS:
         raise InvalidInputError(
-            f"-p {override:.80}: unknown node {node:.80}; known are {', '.join(NODE_PARAMETERS)}"
+            f"-p {override:.80}: unknown node {node:.80}; {did_you_mean(node, NODE_PARAMETERS)}"
+        )
+    if target not in known:
+        every = f"{node} has {', '.join(sorted(_names(node)))}"
+        raise InvalidInputError(
+            f"-p {override:.80}: unknown parameter {parameter:.80}; "
+            + did_you_mean(target, known, every)
         )
     return node, parameter, _parse_yaml(text, f"-p {override:.80}: the value")

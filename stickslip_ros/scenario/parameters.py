@@ -20,6 +20,7 @@ from stickslip_ros.physics.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.friction import LAWS, FrictionLaw
 from stickslip_ros.physics.washout import WashoutParameters
+from stickslip_ros.suggestions import did_you_mean
 
 
 class Pace(StrEnum):
@@ -176,7 +177,7 @@ class NodeParameters(_Model):
             if name not in known:
                 raise InvalidInputError(
                     f"{source}: unknown parameter {name:.80} = {shown(value)}; "
-                    f"known are {', '.join(sorted(known))}"
+                    f"{did_you_mean(name, known)}"
                 )
         try:
             return cls.model_validate(_nested(values))

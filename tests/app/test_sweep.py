@@ -103,7 +103,10 @@ def test_a_point_that_cannot_be_is_a_row_with_its_reason(stickslip: Run) -> None
     ("arguments", "message"),
     [
         (["--over", "belt_speed=1:2:3"], "belt_speed: must be a parameter of plant or washout"),
-        (["--over", "plant.speed=1:2:3"], "plant.speed: unknown parameter; numbers of plant are"),
+        (
+            ["--over", "plant.speed=1:2:3"],
+            "plant.speed: unknown parameter; did you mean plant.belt_speed or",
+        ),
         (["--over", "plant.pace=1:2:3"], "plant.pace: is no number"),
         (["--over", "plant.mass=1:2"], "must be NODE.PARAMETER=A:B:COUNT"),
         (["--over", "plant.mass=1:1:3"], "must be two different finite numbers"),
