@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from stickslip_ros.physics.measures import Regime
-from stickslip_ros.prefixes import prefix_for
+from stickslip_ros.plots.units import SI, Units
 from stickslip_ros.printable import printable
 
 _LABELS: dict[str, tuple[str, str]] = {
@@ -39,12 +39,14 @@ _LABELS: dict[str, tuple[str, str]] = {
 }
 
 _STYLES: dict[str, str] = {
-    Regime.EQUILIBRIUM: "green",
-    Regime.STICK_SLIP: "yellow",
-    Regime.PURE_SLIP: "yellow",
-    Regime.UNBOUNDED: "red",
+    Regime.label(Regime.EQUILIBRIUM): "green",
+    Regime.label(Regime.STICK_SLIP): "yellow",
+    Regime.label(Regime.PURE_SLIP): "yellow",
+    Regime.label(Regime.UNBOUNDED): "red",
 }
 """Of what stands out on a terminal."""
+
+_ALL_SI: Mapping[str, Units] = {}
 
 _FRAME = 3
 """Characters that the frame of a column takes, beside one for the whole table."""
@@ -67,13 +69,32 @@ def finite(value: Any) -> Any:
     return value
 
 
-def print_figures(title: str, columns: Mapping[str, Mapping[str, Any]]) -> None:
-    """Print figures by name, one column for each of `columns`, those that nobody has left out."""
+def print_figures(
+    title: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, Units] = _ALL_SI
+) -> None:
+    """Print figures by name, one column for each of `columns`, those that nobody has left out.
+
+    `units` are those of each column, by its name; without it is in SI.
+    """
     rows: list[list[str]] = []
     for name, (label, unit) in _LABELS.items():
         if any(name in figures for figures in columns.values()):
-            rows.append([label, *quantities([f.get(name) for f in columns.values()], unit)])
+            rows.append([label, *_row(name, unit, columns, units)])
     print_table(title, ["", *columns], rows)
+
+
+def _row(
+    name: str, unit: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, Units]
+) -> list[str]:
+    """Return the cells of one figure; columns in the same units have the same prefix."""
+    if name == "regime":
+        return [Regime.label(figures.get(name)) for figures in columns.values()]
+    cells: dict[str, str] = {}
+    for shown_in in {units.get(column, SI) for column in columns}:
+        own = [column for column in columns if units.get(column, SI) == shown_in]
+        values = [columns[column].get(name) for column in own]
+        cells |= zip(own, shown_in.texts(values, unit), strict=True)
+    return [cells[column] for column in columns]
 
 
 def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
@@ -86,16 +107,6 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
         _print_framed(Console(), printable(title), shown[0], shown[1:])
     else:
         _print_plain(printable(title), shown[0], shown[1:])
-
-
-def quantities(values: Sequence[Any], unit: str, digits: int = 4) -> list[str]:
-    """Return values to show with their unit, all with the SI prefix that suits the largest.
-
-    A unit that begins with a number, such as 1/s, gets no prefix.
-    """
-    largest = max((abs(value) for value in values if isinstance(value, float)), default=0.0)
-    scale, prefix = prefix_for(largest) if unit[:1].isalpha() else (1.0, "")
-    return [_text(value, scale, f" {prefix}{unit}".rstrip(), digits) for value in values]
 
 
 @contextmanager
@@ -149,11 +160,3 @@ def _print_framed(console: Console, title: str, headings: list[str], rows: list[
     for row in rows:
         table.add_row(*(Text(cell, _STYLES.get(cell, "")) for cell in row))
     console.print(table)
-
-
-def _text(value: Any, scale: float, unit: str, digits: int) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value / scale:.{digits}g}{unit}" if isinstance(value, float) else str(value)

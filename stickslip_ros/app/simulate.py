@@ -17,6 +17,7 @@ from stickslip_ros.app.arguments import (
     seconds,
     writing,
 )
+from stickslip_ros.app.no_cycle import why_no_cycle
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.physics.disturbance import DisturbanceKind
 from stickslip_ros.physics.equations import WashoutGains
@@ -25,6 +26,7 @@ from stickslip_ros.physics.measures import Cycle, CycleMeter, Measures
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.simulation import Progress, simulate_continuous, simulate_sampled
 from stickslip_ros.physics.washout import Washout
+from stickslip_ros.plots.units import Units
 from stickslip_ros.scenario.files import Scenario
 from stickslip_ros.studies.settled import check_continuous, sampled_loop
 
@@ -83,7 +85,12 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json({**measures.as_dict(), "duration": duration, **made_of(scenario)})
     else:
-        print_figures(f"{scenario.name}, {duration:g} s", {"": measures.as_dict()})
+        units = Units.of(scenario.plant.as_drive())
+        title = f"{scenario.name}, {duration:g} {units.of_unit('s')}"
+        print_figures(title.rstrip(), {"": measures.as_dict()}, {"": units})
+        reason = why_no_cycle(measures.regime, duration, scenario.plant.as_drive())
+        if reason is not None:
+            print(reason)
     return 0
 
 

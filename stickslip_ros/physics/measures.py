@@ -31,6 +31,20 @@ class Regime(StrEnum):
     STUCK = "stuck"
     UNBOUNDED = "unbounded"
 
+    @classmethod
+    def label(cls, regime: str | None) -> str:
+        """Return what a person reads of a regime, or of none, wherever one is shown."""
+        return "no whole cycle" if regime is None else _LABELS[cls(regime)]
+
+
+_LABELS = {
+    Regime.STICK_SLIP: "stick-slip",
+    Regime.PURE_SLIP: "pure slip",
+    Regime.EQUILIBRIUM: "equilibrium",
+    Regime.STUCK: "stuck",
+    Regime.UNBOUNDED: "unbounded",
+}
+
 
 class Cycle(NamedTuple):
     """One cycle, from one upward zero crossing of the velocity to the next; SI units."""

@@ -1,6 +1,7 @@
 """`stickslip simulate`: the limit cycles of the paper's drive, from the command line."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -101,3 +102,31 @@ def test_without_a_standard_output_there_is_no_traceback(tmp_path: Path) -> None
         text=True,
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (
+            ("-p", "plant.belt_speed=40", "--duration", "1"),
+            ("in 1 s: the slide has not turned back", "40 m/s is 818.4 times the Hopf speed of"),
+        ),
+        (("--duration", "0.05"), ("in 0.05 s: the natural period is 62.83 ms",)),
+        (("-p", "plant.belt_speed=0.005", "--duration", "0.19"), ("0.19 s: ", "may take longer")),
+    ],
+)
+def test_where_nothing_is_measured_it_says_why(
+    stickslip: Run, arguments: tuple[str, ...], why: tuple[str, ...]
+) -> None:
+    done = stickslip("simulate", "feed_drive", "--no-control", *arguments)
+    lines = done.stdout.splitlines()
+    assert "no whole cycle" in lines[1]
+    for text in why:
+        assert text in lines[-1]
+
+
+def test_the_dimensionless_drive_has_no_units(stickslip: Run) -> None:
+    lines = stickslip("simulate", "paper", "--no-control", "--duration", "100").stdout.splitlines()
+    assert lines[0] == "paper, 100"
+    assert [line.split()[-1] for line in lines[1:4]] == ["stick-slip", "0.4341", "0.4144"]
+    assert all(len(re.split("  +", line)[1].split()) == 1 for line in lines[1:])

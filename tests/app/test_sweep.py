@@ -38,7 +38,7 @@ def test_the_table_has_what_the_python_interface_returns(stickslip: Run, tmp_pat
     assert sections == list(found.turning_points)
     assert (tmp_path / "diagram.png").read_bytes().startswith(PNG)
     assert not (tmp_path / "table.csv.part").exists()
-    for text in ("stick_slip", "200 to 400 mm/s", "equilibrium"):
+    for text in ("stick-slip", "0.2 to 0.4", "equilibrium"):
         assert text in done.stdout
 
 
@@ -76,7 +76,7 @@ def test_a_map_is_drawn_in_each_colour(stickslip: Run, tmp_path: Path) -> None:
         done = stickslip(*FREE, *over, "--plot", f"{colour}.svg", "--colour", colour)
         assert done.returncode == 0, done.stderr
         assert "<svg" in (tmp_path / f"{colour}.svg").read_text()
-    assert "stick_slip" in done.stdout
+    assert "stick-slip" in done.stdout
 
 
 def test_control_is_sampled_unless_it_is_to_be_continuous(stickslip: Run) -> None:

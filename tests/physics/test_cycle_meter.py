@@ -236,3 +236,10 @@ def test_the_size_of_the_blocks_does_not_matter(
 def figures(measures: Cycle | Measures) -> list[float]:
     values = [getattr(measures, name) for name in Cycle._fields]
     return [nan if value is None else value for value in values]
+
+
+def test_every_regime_has_a_name_for_people() -> None:
+    names = [Regime.label(regime) for regime in (*Regime, None)]
+    assert names[:2] == ["stick-slip", "pure slip"]
+    assert len(set(names)) == len(Regime) + 1
+    assert Regime.label("stick_slip") == "stick-slip"
