@@ -41,6 +41,8 @@ _CONTROLLER = {
     "start_after": ("start after", "s"),
 }
 
+_PROPOSED = [f"washout_controller.{name}" for name in _CONTROLLER if name != "force_limit"]
+
 _MARGINS = {
     "gain_down": ("unstable below this share of the linear gain", ""),
     "gain_up": ("unstable above this multiple of it", ""),
@@ -80,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    scenario = scenario_of(arguments)
+    scenario = scenario_of(arguments, unused=_PROPOSED)
     if not scenario.plant.expects_control:
         raise InvalidInputError("plant.expects_control = False: without control there are no gains")
     task = Task.of(scenario, _belt_speeds(arguments.belt_speed))

@@ -138,7 +138,4 @@ def _drive_of(bag: Path, namespace: str | None) -> Drive | None:
         plant = PlantParameters.validated(values, str(bag))
     except (ValueError, RecursionError, InvalidInputError):
         return None
-    drive = plant.as_drive()
-    needed = {field.name for field in fields(drive)} - {"friction"}
-    needed |= {f"friction.{name}" for name in ("law", *drive.friction.constants())}
-    return drive if needed <= values.keys() else None
+    return plant.as_drive() if values.keys() >= set(plant.drive_names()) else None

@@ -32,10 +32,12 @@ from stickslip_ros.installed import find_executable
 from stickslip_ros.plots.units import Units
 from stickslip_ros.printable import printable
 from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario
-from stickslip_ros.scenario.parameters import Pace
+from stickslip_ros.scenario.parameters import Pace, WashoutControllerParameters
 
 _PAGE_TIMEOUT = 5.0
 """Time, s, that a dashboard has to end."""
+
+_LAW_OF_OURS = [f"washout_controller.{name}" for name in WashoutControllerParameters.law_names()]
 
 HELP = "run a scenario as ROS 2 nodes, record it and report"
 
@@ -97,7 +99,11 @@ def run(arguments: argparse.Namespace) -> int:
     namespace = namespace_of(arguments.namespace)
     controller = _other_controller(arguments)
     scenario = scenario_of(
-        arguments, *overrides, namespace=namespace, other_nodes=controller is not None
+        arguments,
+        *overrides,
+        namespace=namespace,
+        other_nodes=controller is not None,
+        unused=[] if controller is None else _LAW_OF_OURS,
     )
     if controller is not None and not scenario.plant.expects_control:
         raise InvalidInputError(

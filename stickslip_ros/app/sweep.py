@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     if len(axes) == 1 and arguments.colour != "regime":
         raise InvalidInputError(f"--colour {arguments.colour}: is for maps, of two parameters")
     study = sweep_study(
-        scenario_of(arguments),
+        scenario_of(arguments, unused=[axis.parameter for axis in axes]),
         axes,
         carry=None if arguments.carry is None else Carry(arguments.carry),
         course=course_of(arguments, Course()),

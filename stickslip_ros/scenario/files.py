@@ -7,7 +7,7 @@ from functools import cached_property
 from math import inf
 from pathlib import Path
 from sys import float_info
-from typing import Any, ClassVar, Self, cast
+from typing import Any, ClassVar, NamedTuple, Self, cast
 
 import yaml
 
@@ -20,6 +20,7 @@ from stickslip_ros.scenario.parameters import (
     PlantParameters,
     WashoutControllerParameters,
     parameters_of,
+    shown,
 )
 from stickslip_ros.suggestions import did_you_mean
 
@@ -28,6 +29,8 @@ DEFAULT_NAMESPACE = "/feed_drive"
 _PARAMETERS_KEY = "ros__parameters"
 _LARGEST = 1_000_000
 """Characters of a scenario file."""
+_SCENARIO = "scenario"
+"""Last part of the name of the section that is for no node, but says what completes the file."""
 _NAMED_BY_PATH = "a file is given by its path ending in .yaml"
 
 
@@ -44,6 +47,16 @@ class Scenario:
     """The scenario file."""
     other_sections: tuple[str, ...] = ()
     """Sections of the file that match none of these nodes: parameters of a user's own node."""
+    given: frozenset[str] = field(default=frozenset(), compare=False, repr=False)
+    """NODE.PARAMETER of what the file, its base or an override gives."""
+
+    @property
+    def left_to_defaults(self) -> list[str]:
+        """NODE.PARAMETER of the drive, its rate and its washout controller that nothing gives."""
+        names = [f"plant.{name}" for name in (*self.plant.drive_names(), "rate")]
+        if self.plant.expects_control:
+            names += [f"washout_controller.{name}" for name in self.washout_controller.law_names()]
+        return [name for name in names if name not in self.given]
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
         """Return every node's parameters by node and flat name."""
@@ -92,22 +105,29 @@ def load_scenario(
     overrides: Sequence[str] = (),
     namespace: str = DEFAULT_NAMESPACE,
     *,
+    base: str | None = None,
     other_nodes: bool = False,
 ) -> Scenario:
     """Load the scenario of that name in config/, or of that path.
 
-    `overrides` are texts NODE.PARAMETER=VALUE, the value written as in the file. Sections apply to
-    the nodes in `namespace` as ROS applies them. Raises InvalidInputError for anything unknown,
-    ill-typed or out of bounds; with `other_nodes`, sections of unknown nodes are left alone.
+    What it leaves out is that of the scenario `base`, by default the one that its own section
+    `scenario` names; without one the parameters' defaults act. `overrides` are texts
+    NODE.PARAMETER=VALUE, the value written as in the file. Sections apply to the nodes in
+    `namespace` as ROS applies them. Raises InvalidInputError for anything unknown, ill-typed or out
+    of bounds; with `other_nodes`, sections of unknown nodes are left alone.
     """
     path = _find(name_or_path)
-    values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
-    other_sections: list[str] = []
-    for pattern, parameters in _sections(path):
-        if other_nodes and not _matching(pattern, namespace):
-            other_sections.append(pattern)
-        else:
-            _apply(values, path, pattern, parameters, namespace)
+    files = [_read(path, namespace, other_nodes=other_nodes)]
+    below = _path_of_base(files[0]) if base is None else _find(base)
+    while below is not None:
+        if any(below.samefile(file.path) for file in files):
+            raise InvalidInputError(f"{path}: base {below} is a file that it completes")
+        files.append(_read(below, namespace, other_nodes=other_nodes))
+        below = _path_of_base(files[-1])
+    values: dict[str, dict[str, Any]] = {
+        node: {name: value for file in files[::-1] for name, value in file.values[node].items()}
+        for node in NODE_PARAMETERS
+    }
     for node, parameters in values.items():
         NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
     given = dict.fromkeys(NODE_PARAMETERS, "")
@@ -125,7 +145,8 @@ def load_scenario(
         name=path.stem,
         overrides=tuple(overrides),
         path=path,
-        other_sections=tuple(other_sections),
+        other_sections=tuple(files[0].other_sections),
+        given=frozenset(f"{node}.{name}" for node in values for name in values[node]),
         **models,
     )
 
@@ -164,6 +185,59 @@ def _find(name_or_path: str) -> Path:
     raise InvalidInputError(
         f"unknown scenario {name_or_path!r}; {did_you_mean(name, shipped, every)}"
     )
+
+
+class _File(NamedTuple):
+    """What a scenario file says."""
+
+    path: Path
+    values: dict[str, dict[str, Any]]
+    """By node and flat name."""
+    other_sections: list[str]
+    base: str | None
+
+
+def _path_of_base(file: _File) -> Path | None:
+    """Return the path of the base that a file names; a path is relative to that file."""
+    if file.base is None:
+        return None
+    beside = file.path.parent / file.base
+    if beside.suffix in (".yaml", ".yml") and beside.is_file():
+        return beside
+    try:
+        return _find(file.base)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{file.path}: base: {error}") from None
+
+
+def _read(path: Path, namespace: str, *, other_nodes: bool) -> _File:
+    values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
+    other_sections: list[str] = []
+    base: str | None = None
+    for pattern, parameters in _sections(path):
+        own = section_matches(pattern, f"{namespace.rstrip('/')}/{_SCENARIO}")
+        if own and pattern.endswith(f"/{_SCENARIO}"):
+            base = _base_of(path, pattern, parameters)
+        elif other_nodes and not _matching(pattern, namespace):
+            other_sections.append(pattern)
+        else:
+            _apply(values, path, pattern, parameters, namespace)
+    return _File(path, values, other_sections, base)
+
+
+def _base_of(path: Path, pattern: str, parameters: Mapping[str, Any]) -> str:
+    for name in parameters:
+        if name != "base":
+            raise InvalidInputError(
+                f"{path}: section {pattern}: unknown parameter {name:.80}; known is base"
+            )
+    base = parameters.get("base")
+    if not isinstance(base, str) or not base:
+        raise InvalidInputError(
+            f"{path}: section {pattern}: base = {shown(base)} is refused: must be the name or the "
+            "path of a scenario"
+        )
+    return base
 
 
 class _RosLoader(yaml.SafeLoader):

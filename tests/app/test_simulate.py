@@ -130,3 +130,18 @@ def test_the_dimensionless_drive_has_no_units(stickslip: Run) -> None:
     assert lines[0] == "paper, 100"
     assert [line.split()[-1] for line in lines[1:4]] == ["stick-slip", "0.4341", "0.4144"]
     assert all(len(re.split("  +", line)[1].split()) == 1 for line in lines[1:])
+
+
+def test_what_is_left_to_defaults_is_told_once(stickslip: Run, tmp_path: Path) -> None:
+    text = "/**/plant:\n  ros__parameters: {mass: 80.0, stiffness: 1.2e+6}\n"
+    (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
+    call = ("simulate", "mine.yaml", "--duration", "1", "--json")
+    alone, based = stickslip(*call), stickslip(*call, "--base", "feed_drive")
+    (line,) = alone.stderr.splitlines()
+    assert "mine.yaml does not give plant.damping = 0.02 N s/m, plant.normal_force = 1.0 N" in line
+    assert "washout_controller.corner_frequency = 2.0 rad/s" in line
+    assert "plant.mass" not in line
+    assert based.stderr == ""
+    assert json.loads(based.stdout)["scenario"]["plant"]["normal_force"] == 1000.0
+    (line,) = stickslip(*call, "--no-control").stderr.splitlines()
+    assert "washout_controller" not in line

@@ -170,3 +170,12 @@ def test_interrupted_it_keeps_what_is_done_and_goes_on_from_there(
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "table.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
     assert not part.exists()
+
+
+def test_of_what_it_varies_no_default_is_told(stickslip: Run, tmp_path: Path) -> None:
+    text = "/**/plant:\n  ros__parameters: {mass: 2.0}\n"
+    (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
+    over = ("--over", "plant.belt_speed=0.6:0.7:2", "--no-control")
+    (line,) = stickslip("sweep", "mine.yaml", *over).stderr.splitlines()
+    assert "plant.stiffness = 1.0 N/m" in line
+    assert "belt_speed" not in line
