@@ -282,6 +282,9 @@ def _sufficient_limit(bench: Bench, candidates: "_Candidates") -> float | None:
     def simulated(limit: float) -> Design:
         return _propose(bench, candidates.limited(limit), lambda _: None)
 
+    def tried(limit: float) -> bool:
+        return simulated(limit).controller is not None
+
     def in_theory(limit: float) -> bool:
         return candidates.limited(limit).best(_RESERVE, _CUBIC_SHARES) is not None
 
@@ -290,12 +293,12 @@ def _sufficient_limit(bench: Bench, candidates: "_Candidates") -> float | None:
         return None
     enough = max(check.peak_force or 0.0 for check in free.checks) / _RESERVE
     least = max(candidates.task.force_limit, _LEAST_LIMIT * enough)
-    for does in (in_theory, lambda limit: simulated(limit).controller is not None):
+    for does in (in_theory, tried):
         highest = enough
         while highest > _LIMIT_SPACING * least:
             middle = sqrt(least * highest)
             least, highest = (least, middle) if does(middle) else (middle, highest)
-        if simulated(_rounded(highest, up=True)).controller is not None:
+        if tried(_rounded(highest, up=True)):
             return _rounded(highest, up=True)
     return None
 
