@@ -72,7 +72,9 @@ def run(arguments: argparse.Namespace) -> int:
         duration = _DEFAULT_PERIODS * scenario.plant.as_drive().natural_period
     plot: Path | None = arguments.plot
     history = None if plot is None else _history_to_draw(plot)
-    with progress_bar(f"simulating {duration:g} s", 1.0) as progress:
+    units = Units.of(scenario.plant.as_drive())
+    shown = f"{duration:g} {units.of_unit('s')}".rstrip()
+    with progress_bar(f"simulating {shown}", 1.0) as progress:
         measures = simulate(
             scenario,
             duration,
@@ -85,9 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json({**measures.as_dict(), "duration": duration, **made_of(scenario)})
     else:
-        units = Units.of(scenario.plant.as_drive())
-        title = f"{scenario.name}, {duration:g} {units.of_unit('s')}"
-        print_figures(title.rstrip(), {"": measures.as_dict()}, {"": units})
+        print_figures(f"{scenario.name}, {shown}", {"": measures.as_dict()}, {"": units})
         reason = why_no_cycle(measures.regime, duration, scenario.plant.as_drive())
         if reason is not None:
             print(reason)

@@ -289,9 +289,9 @@ def _sufficient_limit(bench: Bench, candidates: "_Candidates") -> float | None:
         return candidates.limited(limit).best(_RESERVE, _CUBIC_SHARES) is not None
 
     free = simulated(inf)
-    if free.controller is None:
+    enough = max((check.peak_force or 0.0 for check in free.checks), default=0.0) / _RESERVE
+    if enough <= candidates.task.force_limit:
         return None
-    enough = max(check.peak_force or 0.0 for check in free.checks) / _RESERVE
     least = max(candidates.task.force_limit, _LEAST_LIMIT * enough)
     for does in (in_theory, tried):
         highest = enough
