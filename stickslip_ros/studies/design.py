@@ -61,6 +61,10 @@ _LEAST_LIMIT, _LIMIT_SPACING = 1e-3, 1.015
 """Of the force limit that would do: where its search begins, in that without any limit, and up to
 which ratio it goes on."""
 
+_SLOWEST_DECAY = 0.01
+"""In a natural period, of small deviations, with the force limit that would do: what decays more
+slowly takes too long to be tried, and needs hardly less force."""
+
 _LITTLE_GAIN, _LITTLE_DELAY, _LITTLE_SPEED = 1.1, 0.02, 1.05
 """What is next to no margin: a factor in the linear gain, a delay in natural periods, and a factor
 from the Hopf speed."""
@@ -286,8 +290,11 @@ def _sufficient_limit(bench: Bench, candidates: "_Candidates") -> float | None:
         return simulated(limit).controller is not None
 
     def in_theory(limit: float) -> bool:
-        return candidates.limited(limit).best(_RESERVE, _CUBIC_SHARES) is not None
+        limited = candidates.limited(limit)
+        gains = limited.best(_RESERVE, _CUBIC_SHARES)
+        return gains is not None and limited.slowest(gains).decay_rate(gains) > slowest
 
+    slowest = _SLOWEST_DECAY / candidates.task.drive.natural_period
     free = simulated(inf)
     enough = max((check.peak_force or 0.0 for check in free.checks), default=0.0) / _RESERVE
     if enough <= candidates.task.force_limit:

@@ -235,7 +235,7 @@ def test_the_force_that_it_says_would_do_does(task: Task) -> None:
     enough = float(hint[1])
     assert enough > task.force_limit
     assert design(replace(task, force_limit=enough)).controller is not None
-    assert design(replace(task, force_limit=0.96 * enough)).controller is None
+    assert design(replace(task, force_limit=0.95 * enough)).controller is None
 
 
 def test_next_to_no_margin_is_said() -> None:
