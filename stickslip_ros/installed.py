@@ -3,10 +3,10 @@
 import os
 import sys
 from collections.abc import Iterator
-from difflib import get_close_matches
 from pathlib import Path
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.suggestions import did_you_mean
 
 _MARKERS = "share/ament_index/resource_index/packages"
 
@@ -34,17 +34,16 @@ def find_executable(name: str, source: str) -> Path:
     prefix = next((p for p in prefixes() if (p / _MARKERS / package).is_file()), None)
     if prefix is None:
         known = {marker.name for p in prefixes() for marker in (p / _MARKERS).glob("*")}
-        close = " or ".join(get_close_matches(package, known))
+        places = "the places are those of AMENT_PREFIX_PATH and the Python environment"
         raise InvalidInputError(
-            f"{source} {name}: no package {package} in {', '.join(map(str, prefixes()))} "
-            "(AMENT_PREFIX_PATH and the Python environment)"
-            + (f"; did you mean {close}?" if close else "")
+            f"{source} {name}: no package {package} in {', '.join(map(str, prefixes()))}; "
+            f"{did_you_mean(package, known, places)}"
         )
     files = {file.name: file for file in _executables(prefix / "lib" / package)}
     if executable not in files:
         raise InvalidInputError(
             f"{source} {name}: the package {package} in {prefix} has no executable {executable}; "
-            f"it has {', '.join(sorted(files)) or 'none'}"
+            + did_you_mean(executable, files, f"it has {', '.join(sorted(files)) or 'none'}")
         )
     return files[executable]
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from velocity_feedback import VelocityFeedback
 
+from stickslip_ros.physics.measures import Regime
 from stickslip_ros.plots.controllers import Course, draw_courses
 from stickslip_ros.testing import ClosedLoop, RunResult
 
@@ -50,7 +51,7 @@ def figures(belt_speed: float, controller: str, result: RunResult) -> dict[str, 
 def table(rows: list[dict]) -> str:
     """Return the figures of several runs as a table of the page."""
     lines = [
-        f"| {row['belt_speed'] * 1e3:g} | {row['controller']} | {row['regime']} "
+        f"| {row['belt_speed'] * 1e3:g} | {row['controller']} | {Regime.label(row['regime'])} "
         f"| {row['amplitude'] * 1e6:.1f} "
         f"| {_number(row['midpoint'] * 1e6 if row['regime'] == 'equilibrium' else None)} "
         f"| {_number(row['peak_force'])} | {_number(row['resting_force'])} |\n"

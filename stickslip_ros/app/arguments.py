@@ -1,20 +1,22 @@
 """Arguments that several commands have."""
 
 import argparse
-from collections.abc import Generator
+import sys
+from collections.abc import Collection, Generator
 from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.printable import printable
 from stickslip_ros.scenario.files import (
     DEFAULT_NAMESPACE,
     LONGEST_NAMESPACE,
     Scenario,
     load_scenario,
 )
-from stickslip_ros.scenario.parameters import shown
+from stickslip_ros.scenario.parameters import NODE_PARAMETERS, known_parameters, shown
 from stickslip_ros.versions import versions
 
 _PICTURES = (".png", ".svg", ".pdf")
@@ -34,6 +36,12 @@ def add_scenario(parser: argparse.ArgumentParser) -> Any:
         default=[],
         metavar="NODE.PARAMETER=VALUE",
         help="override a parameter, as in -p plant.belt_speed=0.2 (SI units; repeatable)",
+    )
+    parser.add_argument(
+        "--base",
+        metavar="SCENARIO",
+        help="scenario to take from what a parameter file leaves out (default: the one that its "
+        "section /**/scenario names)",
     )
     control = parser.add_mutually_exclusive_group()
     control.add_argument("--no-control", action="store_true", help="leave the controller out")
@@ -89,11 +97,35 @@ def scenario_of(
     *overrides: str,
     namespace: str = DEFAULT_NAMESPACE,
     other_nodes: bool = False,
+    unused: Collection[str] = (),
 ) -> Scenario:
-    """Return the scenario that was asked for, `overrides` applied after those given."""
+    """Return the scenario that was asked for, `overrides` applied after those given.
+
+    Of what is left to defaults a person is told, but for what is `unused` (NODE.PARAMETER).
+    """
     control = ["plant.expects_control=false"] if arguments.no_control else []
     asked = [*arguments.overrides, *control, *overrides]
-    return load_scenario(arguments.scenario, asked, namespace, other_nodes=other_nodes)
+    scenario = load_scenario(
+        arguments.scenario, asked, namespace, base=arguments.base, other_nodes=other_nodes
+    )
+    _tell_defaults(scenario, unused)
+    return scenario
+
+
+def _tell_defaults(scenario: Scenario, unused: Collection[str]) -> None:
+    values = scenario.as_dict()
+    shown: list[str] = []
+    for full_name in scenario.left_to_defaults:
+        if full_name not in unused:
+            node, _, name = full_name.partition(".")
+            unit = known_parameters(NODE_PARAMETERS[node])[name].unit or ""
+            shown.append(f"{full_name} = {values[node][name]} {unit}".rstrip())
+    if shown:
+        sentence = (
+            f"{scenario.path} does not give {', '.join(shown)}: these are the defaults; "
+            "--base SCENARIO takes what is left out from another scenario"
+        )
+        print(printable(sentence), file=sys.stderr)
 
 
 def made_of(scenario: Scenario) -> dict[str, Any]:

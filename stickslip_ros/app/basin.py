@@ -3,7 +3,6 @@
 import argparse
 import sys
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +15,11 @@ from stickslip_ros.app.arguments import (
     scenario_of,
     writing,
 )
-from stickslip_ros.app.output import finite, print_table, quantities
+from stickslip_ros.app.output import finite, print_table
 from stickslip_ros.app.studying import add_running, course_of, done, write_table
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.measures import Regime
+from stickslip_ros.plots.units import Units
 from stickslip_ros.scenario.files import Scenario
 from stickslip_ros.studies.basin import (
     COURSE,
@@ -32,9 +33,6 @@ from stickslip_ros.studies.basin import (
 from stickslip_ros.studies.columns import Columns, Further, write_json
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Grid, Plan, Sample
-
-if TYPE_CHECKING:
-    from stickslip_ros.plots.units import Units
 
 HELP = "find which motion each start leads to, and the share of starts that each motion gets"
 
@@ -95,7 +93,8 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.json:
             write_json(sys.stdout, journal, further, finite({**made_of(scenario), **made}))
         else:
-            _print(f"{scenario.name}, {study.plan.size} starts", basins)
+            title = f"{scenario.name}, {study.plan.size} starts"
+            _print(title, basins, Units.of(scenario.plant.as_drive()))
     return 0
 
 
@@ -121,12 +120,12 @@ def _plan(arguments: argparse.Namespace, scenario: Scenario) -> Plan:
     return Sample(tuple(axes), arguments.sample, arguments.seed or 0)
 
 
-def _print(title: str, basins: Basins) -> None:
+def _print(title: str, basins: Basins, units: Units) -> None:
     rows = [
         [
             _name(attractor),
-            *quantities([attractor.amplitude], "m"),
-            *quantities([attractor.midpoint], "m"),
+            *units.texts([attractor.amplitude], "m"),
+            *units.texts([attractor.midpoint], "m"),
             str(attractor.count),
             f"{attractor.share:.4f}",
             f"{attractor.standard_error:.4f}",
@@ -138,14 +137,13 @@ def _print(title: str, basins: Basins) -> None:
 
 
 def _name(attractor: Attractor) -> str:
-    name = str(attractor.regime or "not known")
+    name = Regime.label(attractor.regime)
     return name if attractor.steady or attractor.regime is None else f"{name}, not steady"
 
 
 def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> None:
     # Half as long again to import as everything else.
     from stickslip_ros.plots.basin_picture import draw_basin
-    from stickslip_ros.plots.units import Units
 
     plan, scenario = journal.study.plan, journal.study.scenario
     drive = scenario.plant.as_drive()
@@ -167,15 +165,10 @@ def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> No
         )
 
 
-def _label(attractor: Attractor, units: "Units") -> str:
+def _label(attractor: Attractor, units: Units) -> str:
     """Return what a legend says of an attractor."""
-    from stickslip_ros.plots.regimes import REGIMES
-
     amplitude = ""
     if attractor.amplitude is not None:
         amplitude = f", amplitude {units.text(attractor.amplitude, 'm')}"
     share, error = 100.0 * attractor.share, 100.0 * attractor.standard_error
-    name = REGIMES[attractor.regime].label
-    if not attractor.steady and attractor.regime is not None:
-        name += ", not steady"
-    return f"{name}{amplitude}: {share:.1f} % \N{PLUS-MINUS SIGN} {error:.1f} %"
+    return f"{_name(attractor)}{amplitude}: {share:.1f} % \N{PLUS-MINUS SIGN} {error:.1f} %"

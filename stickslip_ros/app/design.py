@@ -1,6 +1,7 @@
 """`stickslip design`: gains for a drive, tried out by simulation."""
 
 import argparse
+import shlex
 import sys
 from collections.abc import Iterable
 from dataclasses import asdict, replace
@@ -17,9 +18,11 @@ from stickslip_ros.app.arguments import (
     scenario_of,
     writing,
 )
-from stickslip_ros.app.output import print_json, print_table, progress_bar, quantities
+from stickslip_ros.app.output import print_json, print_table, progress_bar
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.theory.stability_map import StabilityMap
+from stickslip_ros.plots.units import Units
+from stickslip_ros.printable import printable
 from stickslip_ros.studies.design import OWN_SPEED_RANGE, Design, Task, design
 
 HELP = "propose corner frequency and gains that damp the vibration within a force limit"
@@ -37,6 +40,8 @@ _CONTROLLER = {
     "force_limit": ("force limit", "N"),
     "start_after": ("start after", "s"),
 }
+
+_PROPOSED = [f"washout_controller.{name}" for name in _CONTROLLER if name != "force_limit"]
 
 _MARGINS = {
     "gain_down": ("unstable below this share of the linear gain", ""),
@@ -68,7 +73,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FILE",
-        help="write the parameter file there; an existing one is left alone",
+        help="write the scenario there, complete, with what is proposed; an existing file is left "
+        "alone",
     )
     add_plot(parser, "the decay rate over corner frequency and linear gain")
     add_json(parser)
@@ -76,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    scenario = scenario_of(arguments)
+    scenario = scenario_of(arguments, unused=_PROPOSED)
     if not scenario.plant.expects_control:
         raise InvalidInputError("plant.expects_control = False: without control there are no gains")
     task = Task.of(scenario, _belt_speeds(arguments.belt_speed))
@@ -91,7 +97,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json({**_as_dict(found), **made_of(scenario)})
     else:
-        _print(scenario.name, found)
+        _print(scenario.name, found, written=arguments.out is not None)
     if arguments.out is not None:
         _write(arguments.out, found)
     if arguments.plot is not None:
@@ -124,6 +130,8 @@ def _write(path: Path, found: Design) -> None:
         return
     with writing("--out", path), path.open("x", encoding="utf-8") as file:
         file.write(found.parameter_file)
+    command = shlex.join(["stickslip", "run", str(path)])
+    print(f"{printable(str(path))} is written: `{printable(command)}` runs it", file=sys.stderr)
 
 
 def _draw(path: Path, found: Design) -> None:
@@ -163,27 +171,29 @@ def _largest(values: Iterable[float | None]) -> float | None:
     return max((value for value in values if value is not None), default=None)
 
 
-def _print(name: str, found: Design) -> None:
-    task = f"{name}, belt speed {' to '.join(quantities(sorted({*found.task.belt_speeds}), 'm/s'))}"
+def _print(name: str, found: Design, *, written: bool) -> None:
+    units = Units.of(found.task.drive)
+    speeds = units.texts(sorted({*found.task.belt_speeds}), "m/s")
+    task = f"{name}, belt speed {' to '.join(speeds)}"
     if found.controller is not None:
         figures = {
             name: value if isfinite(value) else None
             for name, value in asdict(found.controller).items()
         }
         rows = [
-            [label, *quantities([figures[key]], unit)] for key, (label, unit) in _CONTROLLER.items()
+            [label, units.text(figures[key], unit)] for key, (label, unit) in _CONTROLLER.items()
         ]
         print_table(task, ["proposal", ""], rows)
         if found.margins is not None:
             figures = asdict(found.margins)
             rows = [
-                [label, *quantities([figures[key]], unit)]
-                for key, (label, unit) in _MARGINS.items()
+                [label, units.text(figures[key], unit)] for key, (label, unit) in _MARGINS.items()
             ]
             print_table("to instability at any of these belt speeds", ["margins", ""], rows)
         checks = [asdict(check) for check in found.checks]
         columns = [
-            quantities([check[key] for check in checks], unit) for key, (_, unit) in _CHECKS.items()
+            units.texts([check[key] for check in checks], unit)
+            for key, (_, unit) in _CHECKS.items()
         ]
         headings = [label for label, _ in _CHECKS.values()]
         print_table("while it catches the vibration", headings, zip(*columns, strict=True))
@@ -191,5 +201,5 @@ def _print(name: str, found: Design) -> None:
         print(f"{task}: nothing to propose")
     if found.remark is not None:
         print(found.remark)
-    if found.parameter_file is not None:
-        print(found.parameter_file, end="")
+    if found.parameter_file is not None and not written:
+        print("--out FILE writes the scenario with these gains, --json has it as parameter_file")

@@ -12,6 +12,7 @@ from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.optional import interrupts_kept
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.streams import nowhere, open_closed_streams
+from stickslip_ros.suggestions import did_you_mean
 from stickslip_ros.versions import versions
 
 _COMMANDS = (
@@ -52,11 +53,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):  # µ is not in every encoding
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        chosen, unknown = _parser(given).parse_known_args(
-            given, argparse.Namespace(further=further)
-        )
+        parser = _parser(given)
+        if command and not command.startswith("-") and command not in _COMMANDS:
+            parser.error(f"unknown command {command!r:.80}; {did_you_mean(command, _COMMANDS)}")
+        chosen, unknown = parser.parse_known_args(given, argparse.Namespace(further=further))
         if unknown:
-            chosen.parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+            chosen.parser.error(_unrecognized(unknown, chosen.parser.format_usage()))
         status: int = chosen.run(chosen)
         sys.stdout.flush()
     except InvalidInputError as error:
@@ -76,6 +78,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"stickslip {command}: {_reason(error)}", file=sys.stderr)
         status = 1
     sys.exit(status)
+
+
+def _unrecognized(arguments: Sequence[str], usage: str) -> str:
+    """Return what is wrong with arguments that no parser has taken, and what they may stand for."""
+    option = next((text for text in arguments if text.startswith("--")), "").partition("=")[0]
+    meant = did_you_mean(option, set(re.findall(r"--[a-z][\w-]*", usage)), "")
+    return "; ".join(filter(None, [f"unrecognized arguments: {' '.join(arguments)}", meant]))
 
 
 def _with_negative_values(given: Sequence[str]) -> list[str]:

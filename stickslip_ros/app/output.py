@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from stickslip_ros.physics.measures import Regime, with_trend
-from stickslip_ros.prefixes import prefix_for
+from stickslip_ros.plots.units import NOISE, SI, Units
 from stickslip_ros.printable import printable
 
 _LABELS: dict[str, tuple[str, str]] = {
@@ -39,18 +39,17 @@ _LABELS: dict[str, tuple[str, str]] = {
 }
 
 _STYLES: dict[str, str] = {
-    Regime.EQUILIBRIUM: "green",
-    Regime.STICK_SLIP: "yellow",
-    Regime.PURE_SLIP: "yellow",
-    Regime.UNBOUNDED: "red",
+    Regime.label(Regime.EQUILIBRIUM): "green",
+    Regime.label(Regime.STICK_SLIP): "yellow",
+    Regime.label(Regime.PURE_SLIP): "yellow",
+    Regime.label(Regime.UNBOUNDED): "red",
 }
 """Of what stands out on a terminal."""
 
-_NOISE = 1e-9
-"""Share of the largest value below which a value is rounding, and is shown as 0."""
-
 _SAME_SCALE = {"amplitude": "midpoint", "midpoint": "amplitude", "resting_force": "peak_force"}
 """Which other quantity tells how large one is that may be rounding."""
+
+_ALL_SI: Mapping[str, Units] = {}
 
 _FRAME = 3
 """Characters that the frame of a column takes, beside one for the whole table."""
@@ -73,23 +72,39 @@ def finite(value: Any) -> Any:
     return value
 
 
-def print_figures(title: str, columns: Mapping[str, Mapping[str, Any]]) -> None:
-    """Print figures by name, one column for each of `columns`, those that nobody has left out."""
+def print_figures(
+    title: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, Units] = _ALL_SI
+) -> None:
+    """Print figures by name, one column for each of `columns`, those that nobody has left out.
+
+    `units` are those of each column, by its name; without it is in SI.
+    """
     rows: list[list[str]] = []
     for name, (label, unit) in _LABELS.items():
         if any(name in figures for figures in columns.values()):
-            values = [_shown(name, figures) for figures in columns.values()]
-            others = [figures.get(_SAME_SCALE.get(name, "")) for figures in columns.values()]
-            largest = max((abs(value) for value in others if value is not None), default=0.0)
-            rows.append([label, *quantities(values, unit, largest=largest)])
+            rows.append([label, *_row(name, unit, columns, units)])
     print_table(title, ["", *columns], rows)
+
+
+def _row(
+    name: str, unit: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, Units]
+) -> list[str]:
+    """Return the cells of one figure; columns in the same units have the same prefix."""
+    cells: dict[str, str] = {}
+    for shown_in in {units.get(column, SI) for column in columns}:
+        own = [column for column in columns if units.get(column, SI) == shown_in]
+        values = [_shown(name, columns[column]) for column in own]
+        others = [columns[column].get(_SAME_SCALE.get(name, "")) for column in own]
+        largest = max((abs(value) for value in others if value is not None), default=0.0)
+        cells |= zip(own, shown_in.texts(values, unit, largest=largest), strict=True)
+    return [cells[column] for column in columns]
 
 
 def _shown(name: str, figures: Mapping[str, Any]) -> Any:
     """Return what is shown of a figure: of a regime also whether it is steady."""
     value = figures.get(name)
-    if name == "regime" and value is not None:
-        return with_trend(value, figures.get("trend"))
+    if name == "regime":
+        return with_trend(Regime.label(value), figures.get("trend"))
     if name == "velocity_amplitude" and value is not None and _at_rest(figures):
         return 0.0
     return value
@@ -98,7 +113,7 @@ def _shown(name: str, figures: Mapping[str, Any]) -> Any:
 def _at_rest(figures: Mapping[str, Any]) -> bool:
     """Return whether all that is left of the motion is rounding."""
     amplitude, midpoint = (figures.get(name) or 0.0 for name in ("amplitude", "midpoint"))
-    return amplitude <= _NOISE * abs(midpoint)
+    return amplitude <= NOISE * abs(midpoint)
 
 
 def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
@@ -111,22 +126,6 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
         _print_framed(Console(), printable(title), shown[0], shown[1:])
     else:
         _print_plain(printable(title), shown[0], shown[1:])
-
-
-def quantities(
-    values: Sequence[Any], unit: str, digits: int = 4, *, largest: float = 0.0
-) -> list[str]:
-    """Return values to show with their unit, all with the SI prefix that suits the largest.
-
-    A unit that begins with a number, such as 1/s, gets no prefix. What is below a billionth of the
-    largest, or of a `largest` that is not among them, is shown as 0.
-    """
-    found = max((abs(value) for value in values if isinstance(value, float)), default=0.0)
-    least = _NOISE * max(found, largest)
-    values = [0.0 if isinstance(v, float) and abs(v) < least else v for v in values]
-    found = found if found >= least else 0.0
-    scale, prefix = prefix_for(found) if unit[:1].isalpha() else (1.0, "")
-    return [_text(value, scale, f" {prefix}{unit}".rstrip(), digits) for value in values]
 
 
 @contextmanager
@@ -180,11 +179,3 @@ def _print_framed(console: Console, title: str, headings: list[str], rows: list[
     for row in rows:
         table.add_row(*(Text(cell, _STYLES.get(cell.partition(",")[0], "")) for cell in row))
     console.print(table)
-
-
-def _text(value: Any, scale: float, unit: str, digits: int) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value / scale:.{digits}g}{unit}" if isinstance(value, float) else str(value)

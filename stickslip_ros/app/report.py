@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app.arguments import add_json, add_plot, check_picture, seconds, writing
+from stickslip_ros.app.no_cycle import why_no_cycle
 from stickslip_ros.app.output import print_figures, print_json
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.measures import Measures
+from stickslip_ros.plots.units import Units
 from stickslip_ros.printable import printable
 from stickslip_ros.scenario.parameters import PlantParameters, known_parameters
 from stickslip_ros.versions import versions
@@ -74,19 +76,25 @@ def run(arguments: argparse.Namespace) -> int:
         for bag in arguments.bags
     }
     if plot is not None and history is not None:
-        _draw(plot, arguments.bags[0], history, reports[str(arguments.bags[0])])
+        _draw(plot, arguments, history, reports[str(arguments.bags[0])])
     if arguments.json:
         results = [{**report, "bag": bag} for bag, report in reports.items()]
         result = results[0] if len(results) == 1 else {"reports": results}
         print_json({**result, "versions": versions()})
         return 0
     several = len(reports) > 1
+    drives = {str(bag): _drive_of(bag, arguments.namespace) for bag in arguments.bags}
     print_figures(
         "" if several else str(arguments.bags[0]),
         {bag if several else "": report for bag, report in reports.items()},
+        {bag if several else "": Units.of(drive) for bag, drive in drives.items()},
     )
     for bag, report in reports.items():
-        for sentence in [*report["missing"], *report["notes"]]:
+        sentences = [*report["missing"], *report["notes"]]
+        if report["samples"] > 0:
+            reason = why_no_cycle(report["regime"], report["duration"], drives[bag])
+            sentences += [] if reason is None else [reason]
+        for sentence in sentences:
             print(printable(f"{bag}: {sentence}") if several else sentence)
     return 0
 
@@ -101,11 +109,14 @@ def _history_to_draw(path: Path, bags: Sequence[Path]) -> "RunHistory":
     return RunHistory()
 
 
-def _draw(path: Path, bag: Path, history: "RunHistory", report: dict[str, Any]) -> None:
+def _draw(
+    path: Path, arguments: argparse.Namespace, history: "RunHistory", report: dict[str, Any]
+) -> None:
     from stickslip_ros.plots.run_figure import run_figure
     from stickslip_ros.plots.style import save
 
-    drive = _drive_of(bag)
+    (bag,) = arguments.bags
+    drive = _drive_of(bag, arguments.namespace)
     notes = [*report["missing"], *report["notes"]]
     if drive is None:
         notes.append("the bag does not say what drive it was: no equilibrium, no friction law")
@@ -114,9 +125,9 @@ def _draw(path: Path, bag: Path, history: "RunHistory", report: dict[str, Any]) 
         save(run_figure(history, measures, drive, title=str(bag), notes=notes), path)
 
 
-def _drive_of(bag: Path) -> Drive | None:
+def _drive_of(bag: Path, namespace: str | None) -> Drive | None:
     """Return the drive whose parameters were recorded, None where they are not or not all."""
-    with Recording(bag) as recording:
+    with Recording(bag, namespace) as recording:
         texts = recording.metadata("stickslip_ros/plant") or {}
     try:
         values = {
@@ -127,7 +138,4 @@ def _drive_of(bag: Path) -> Drive | None:
         plant = PlantParameters.validated(values, str(bag))
     except (ValueError, RecursionError, InvalidInputError):
         return None
-    drive = plant.as_drive()
-    needed = {field.name for field in fields(drive)} - {"friction"}
-    needed |= {f"friction.{name}" for name in ("law", *drive.friction.constants())}
-    return drive if needed <= values.keys() else None
+    return plant.as_drive() if values.keys() >= set(plant.drive_names()) else None

@@ -21,6 +21,7 @@ from stickslip_ros.app.arguments import (
     scenario_of,
     seconds,
 )
+from stickslip_ros.app.no_cycle import why_no_cycle
 from stickslip_ros.app.optional import check_dashboard, ros_nodes
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.bags.reader import Recording
@@ -28,12 +29,15 @@ from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed import find_executable
+from stickslip_ros.plots.units import Units
 from stickslip_ros.printable import printable
 from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario
-from stickslip_ros.scenario.parameters import Pace
+from stickslip_ros.scenario.parameters import Pace, WashoutControllerParameters
 
 _PAGE_TIMEOUT = 5.0
 """Time, s, that a dashboard has to end."""
+
+_LAW_OF_OURS = [f"washout_controller.{name}" for name in WashoutControllerParameters.law_names()]
 
 HELP = "run a scenario as ROS 2 nodes, record it and report"
 
@@ -95,7 +99,11 @@ def run(arguments: argparse.Namespace) -> int:
     namespace = namespace_of(arguments.namespace)
     controller = _other_controller(arguments)
     scenario = scenario_of(
-        arguments, *overrides, namespace=namespace, other_nodes=controller is not None
+        arguments,
+        *overrides,
+        namespace=namespace,
+        other_nodes=controller is not None,
+        unused=[] if controller is None else _LAW_OF_OURS,
     )
     if controller is not None and not scenario.plant.expects_control:
         raise InvalidInputError(
@@ -115,7 +123,12 @@ def run(arguments: argparse.Namespace) -> int:
         command = shlex.join([arguments.controller, *arguments.further]) if controller else None
         print_json({**figures, "controller_command": command, **made_of(scenario)})
     else:
-        print_figures(scenario.name, {"": {**figures["report"], **figures}})
+        units = Units.of(scenario.plant.as_drive())
+        print_figures(scenario.name, {"": {**figures["report"], **figures}}, {"": units})
+        report = figures["report"]
+        reason = why_no_cycle(report["regime"], report["duration"], scenario.plant.as_drive())
+        if reason is not None:
+            print(reason)
     if not figures["report"]["complete"]:
         raise RunError(f"the bag {bag} could not be written to its end")
     if interrupted:

@@ -17,6 +17,7 @@ from stickslip_ros.app.arguments import (
     seconds,
     writing,
 )
+from stickslip_ros.app.no_cycle import why_no_cycle
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.physics.disturbance import DisturbanceKind
 from stickslip_ros.physics.equations import WashoutGains
@@ -25,6 +26,7 @@ from stickslip_ros.physics.measures import Cycle, CycleMeter, Measures
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.simulation import Progress, simulate_continuous, simulate_sampled
 from stickslip_ros.physics.washout import Washout
+from stickslip_ros.plots.units import Units
 from stickslip_ros.scenario.files import Scenario
 from stickslip_ros.studies.settled import check_continuous, sampled_loop
 
@@ -70,7 +72,9 @@ def run(arguments: argparse.Namespace) -> int:
         duration = _DEFAULT_PERIODS * scenario.plant.as_drive().natural_period
     plot: Path | None = arguments.plot
     history = None if plot is None else _history_to_draw(plot)
-    with progress_bar(f"simulating {duration:g} s", 1.0) as progress:
+    units = Units.of(scenario.plant.as_drive())
+    shown = f"{duration:g} {units.of_unit('s')}".rstrip()
+    with progress_bar(f"simulating {shown}", 1.0) as progress:
         measures = simulate(
             scenario,
             duration,
@@ -83,7 +87,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json({**measures.as_dict(), "duration": duration, **made_of(scenario)})
     else:
-        print_figures(f"{scenario.name}, {duration:g} s", {"": measures.as_dict()})
+        print_figures(f"{scenario.name}, {shown}", {"": measures.as_dict()}, {"": units})
+        reason = why_no_cycle(measures.regime, duration, scenario.plant.as_drive())
+        if reason is not None:
+            print(reason)
     return 0
 
 

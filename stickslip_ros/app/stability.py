@@ -23,7 +23,6 @@ from stickslip_ros.app.output import (
     print_json,
     print_table,
     progress_bar,
-    quantities,
 )
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.drive import Drive
@@ -41,6 +40,7 @@ from stickslip_ros.physics.theory.sampled import (
 )
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
 from stickslip_ros.physics.theory.sticking import sticking_onset
+from stickslip_ros.plots.units import Units
 from stickslip_ros.scenario.files import Scenario
 
 HELP = "equilibrium, Hopf speeds, limit cycles and critical gains of a scenario, by theory"
@@ -143,9 +143,9 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
     if plant.force_jitter > 0.0 and "sampled_loop" not in notes:
         notes["sampled_loop"] = "force_jitter is left out: the delay of the force is constant here"
     if expansion is None:
+        reach = Units.of(drive).text(float(drive.friction.static) * drive.length_scale, "m")
         reason = (
-            "the belt rests, and friction holds the slide anywhere within mu_s N / k = "
-            f"{drive.friction.static * drive.length_scale:.4g} m"
+            f"the belt rests, and friction holds the slide anywhere within mu_s N / k = {reach}"
         )
         for place, value in _places(found):
             if value is None and not {place, place.split(".")[0]} & notes.keys():
@@ -379,13 +379,15 @@ def _draw(path: Path, scenario: Scenario) -> None:
 
 
 def _print(scenario: Scenario, found: Section, notes: Notes) -> None:
+    units = Units.of(scenario.plant.as_drive())
     rows: list[list[str]] = []
     for section, labels in _LABELS.items():
         figures = found[section] if section else found
         if section:
             rows.append([section.replace("_", " "), ""])
         for name, (label, unit) in labels.items():
-            rows.append([f"  {label}" if section else label, _shown(name, figures[name], unit)])
+            shown = _shown(name, figures[name], unit, units)
+            rows.append([f"  {label}" if section else label, shown])
     print_table(f"{scenario.name}, by theory", ["", ""], rows)
     for loop in ("open_loop", "closed_loop"):
         cycles: list[Section] = found[loop]["limit_cycles"]
@@ -396,21 +398,22 @@ def _print(scenario: Scenario, found: Section, notes: Notes) -> None:
                 }
                 for number, cycle in enumerate(cycles, 1)
             }  # fmt: skip
-            print_figures(f"limit cycles, {loop.replace('_', ' ')}", columns)
+            title = f"limit cycles, {loop.replace('_', ' ')}"
+            print_figures(title, columns, dict.fromkeys(columns, units))
     for place, reason in notes.items():
         print(f"{place.replace('_', ' ').replace('.', ', ')}: {reason}")
 
 
-def _shown(name: str, value: Any, unit: str) -> str:
+def _shown(name: str, value: Any, unit: str, units: Units) -> str:
     """Return a figure, or a list of them, to be read."""
     if value is None or not isinstance(value, list):
-        return quantities([value], unit, digits=8 if name == "spectral_radius" else 4)[0]
+        return units.texts([value], unit, digits=8 if name == "spectral_radius" else 4)[0]
     items = cast(list[Any], value)
     if name == "eigenvalues":
-        return _complex(items, unit)
+        return _complex(items, units.of_unit(unit))
     if name in ("stable_linear_gains", "speed_ranges"):
-        return "; ".join(" to ".join(quantities(ends, unit)) for ends in items) or "-"
-    return ", ".join(quantities(items, unit)) or "-"
+        return "; ".join(" to ".join(units.texts(ends, unit)) for ends in items) or "-"
+    return ", ".join(units.texts(items, unit)) or "-"
 
 
 def _complex(pairs: list[list[float]], unit: str) -> str:

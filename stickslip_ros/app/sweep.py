@@ -16,9 +16,11 @@ from stickslip_ros.app.arguments import (
     scenario_of,
     writing,
 )
-from stickslip_ros.app.output import finite, print_table, quantities
+from stickslip_ros.app.output import finite, print_table
 from stickslip_ros.app.studying import add_running, course_of, done, write_table
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.measures import Regime
+from stickslip_ros.plots.units import Units
 from stickslip_ros.studies.columns import Columns, Further, write_json
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid
@@ -73,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     if len(axes) == 1 and arguments.colour != "regime":
         raise InvalidInputError(f"--colour {arguments.colour}: is for maps, of two parameters")
     study = sweep_study(
-        scenario_of(arguments),
+        scenario_of(arguments, unused=[axis.parameter for axis in axes]),
         axes,
         carry=None if arguments.carry is None else Carry(arguments.carry),
         course=course_of(arguments, Course()),
@@ -126,7 +128,7 @@ class _Kind(NamedTuple):
 
     @classmethod
     def of(cls, point: Point, plan: Grid) -> Self:
-        regime = str(point.measures.regime or point.reason)
+        regime = point.reason or Regime.label(point.measures.regime)
         if point.reason is None and not point.steady:
             regime += ", not steady"
         return cls(str(plan.direction(point.number) or ""), regime)
@@ -148,6 +150,7 @@ def _print(journal: Journal, plan: Grid) -> None:
 
 def _ranges(journal: Journal, plan: Grid) -> Iterator[list[str]]:
     unit = plan.axes[0].unit
+    units = Units.of(journal.study.scenario.plant.as_drive(), plan.parameters)
     for kind, points in groupby(journal.points(), lambda point: _Kind.of(point, plan)):
         values, amplitudes, stick_fractions = _Extremes(), _Extremes(), _Extremes()
         count = 0
@@ -158,10 +161,10 @@ def _ranges(journal: Journal, plan: Grid) -> Iterator[list[str]]:
             stick_fractions.add(point.measures.stick_fraction)
         yield [
             " ".join(filter(None, kind)),
-            values.shown(unit),
+            values.shown(unit, units),
             str(count),
-            amplitudes.shown("m"),
-            stick_fractions.shown(""),
+            amplitudes.shown("m", units),
+            stick_fractions.shown("", units),
         ]
 
 
@@ -176,8 +179,8 @@ class _Extremes:
             low, high = self._ends or (value, value)
             self._ends = min(low, value), max(high, value)
 
-    def shown(self, unit: str) -> str:
+    def shown(self, unit: str, units: Units) -> str:
         if self._ends is None:
             return "-"
-        low, high = quantities(self._ends, unit)
+        low, high = units.texts(self._ends, unit)
         return low if low == high else f"{low.split()[0]} to {high}"

@@ -34,6 +34,11 @@ class Drive:
         return sqrt(self.stiffness / self.mass)
 
     @property
+    def is_dimensionless(self) -> bool:
+        """Whether it is the dimensionless system itself, whose figures have no units."""
+        return self.mass == self.stiffness == self.normal_force == 1.0
+
+    @property
     def natural_period(self) -> float:
         """Period of the undamped free vibration, s."""
         return 2.0 * pi / self.angular_frequency

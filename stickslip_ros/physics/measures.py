@@ -46,6 +46,20 @@ class Regime(StrEnum):
     STUCK = "stuck"
     UNBOUNDED = "unbounded"
 
+    @classmethod
+    def label(cls, regime: str | None) -> str:
+        """Return what a person reads of a regime, or of none, wherever one is shown."""
+        return "no whole cycle" if regime is None else _LABELS[cls(regime)]
+
+
+_LABELS = {
+    Regime.STICK_SLIP: "stick-slip",
+    Regime.PURE_SLIP: "pure slip",
+    Regime.EQUILIBRIUM: "equilibrium",
+    Regime.STUCK: "stuck",
+    Regime.UNBOUNDED: "unbounded",
+}
+
 
 class Trend(StrEnum):
     """How the amplitude changes in a motion that is not steady."""

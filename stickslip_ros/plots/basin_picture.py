@@ -22,9 +22,7 @@ from stickslip_ros.plots.style import (
     set_title,
     styled,
 )
-from stickslip_ros.plots.units import Units
-
-_SI = Units()
+from stickslip_ros.plots.units import SI, Units
 
 _MORE_COLOURS = (SKY_BLUE, YELLOW, PURPLE, AMBER)
 _MORE_HATCHES = ("+++", "", "ooo", "|||", "---")
@@ -43,7 +41,7 @@ def basin_figure(
     grid_shape: tuple[int, ...] | None,
     belt_speed: float,
     equilibrium_position: float,
-    units: Units = _SI,
+    units: Units = SI,
     title: str = "",
 ) -> Figure:
     """Return the picture of which attractor each of n starts leads to.

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.plots.style import BLUE, GREY, ORANGE, drawing, styled
-from stickslip_ros.plots.units import Units
+from stickslip_ros.plots.units import SI
 
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": GREY, "ls": "-", "lw": 0.8},
@@ -37,7 +37,7 @@ def courses_figure(courses: Sequence[Course], shown: float = 0.6) -> Figure:
 
     Three controllers can be told apart.
     """
-    units = Units()
+    units = SI
     length, length_label = units.axis("displacement", "m", *(one.position for one in courses))
     newton, force_label = units.axis("control force", "N", *(one.force for one in courses))
     speeds = sorted({course.belt_speed for course in courses})

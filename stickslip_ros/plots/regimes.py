@@ -1,4 +1,4 @@
-"""What each regime looks like, and is called, in every picture."""
+"""What each regime looks like in every picture."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -28,12 +28,15 @@ class Look(NamedTuple):
 
 
 REGIMES: Mapping[Regime | None, Look] = {
-    Regime.STICK_SLIP: Look(ORANGE, "sticks and slips", "o", ""),
-    Regime.PURE_SLIP: Look(BLUE, "slips only", "^", "..."),
-    Regime.EQUILIBRIUM: Look(GREEN, "comes to rest", "s", "///"),
-    Regime.STUCK: Look(GREY, "rests with the belt", "D", "xxx"),
-    Regime.UNBOUNDED: Look("black", "runs away", "X", ""),
-    None: Look(LIGHT_GREY, "completes no cycle", "P", "\\\\\\"),
+    regime: Look(colour, Regime.label(regime), marker, hatch)
+    for regime, colour, marker, hatch in (
+        (Regime.STICK_SLIP, ORANGE, "o", ""),
+        (Regime.PURE_SLIP, BLUE, "^", "..."),
+        (Regime.EQUILIBRIUM, GREEN, "s", "///"),
+        (Regime.STUCK, GREY, "D", "xxx"),
+        (Regime.UNBOUNDED, "black", "X", ""),
+        (None, LIGHT_GREY, "P", "\\\\\\"),
+    )
 }
 """Of each regime; None is for a motion that has none."""
 

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, drawing, styled
-from stickslip_ros.plots.units import Units
+from stickslip_ros.plots.units import SI
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def control_coming_on_figure(
     before = figure.add_subplot(grid[2, 0])
     after = figure.add_subplot(grid[2, 1], sharex=before, sharey=before)
 
-    units = Units()
+    units = SI
     length, length_label = units.axis("displacement", "m", run.position)
     speed, speed_label = units.axis("velocity", "m/s", run.velocity)
     newton, force_label = units.axis("control force", "N", run.force)

@@ -45,9 +45,6 @@ _AWAY = REGIMES[Regime.UNBOUNDED]._replace(colour=LIGHT_GREY, hatch="...")
 _MEASURES = {"amplitude": ("amplitude", "m"), "stick_fraction": ("stick fraction", "")}
 """What is drawn beside the regimes: name and unit."""
 
-_UNIT_DRIVE = ("plant.mass", "plant.stiffness", "plant.normal_force")
-"""Parameters that make a drive dimensionless."""
-
 
 @styled
 def diagram_figure(columns: Columns, study: Study) -> Figure:
@@ -172,10 +169,7 @@ draw_diagram, draw_map = drawing(diagram_figure), drawing(map_figure)
 
 
 def _units(study: Study) -> Units:
-    """Return the units of a study; one that varies what makes a drive dimensionless is in SI."""
-    if any(axis.parameter in _UNIT_DRIVE for axis in _grid(study).axes):
-        return Units()
-    return Units.of(study.scenario.plant.as_drive())
+    return Units.of(study.scenario.plant.as_drive(), _grid(study).parameters)
 
 
 def _grid(study: Study) -> Grid:
@@ -249,7 +243,7 @@ def _mark_transitions(
                 axes.axvline(value, **look)
         more = [] if len(values) <= _MOST_SHOWN else ["..."]
         shown = ", ".join([f"{value:.5g}" for value in values[:_MOST_SHOWN]] + more)
-        unit = "" if units.dimensionless else axis.unit
+        unit = units.of_unit(axis.unit)
         handles.append(Line2D([], [], **look, label=f"{name} {shown} {unit}".rstrip()))
     return handles
 

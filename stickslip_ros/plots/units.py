@@ -1,13 +1,19 @@
-"""What an axis is labelled with: SI units with a suitable prefix, or none for the unit drive."""
+"""How quantities are shown: in SI units with a suitable prefix, or without for the unit drive."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.prefixes import prefix_for
+
+NOISE = 1e-9
+"""Share of the largest value below which a value is rounding, and is shown as 0."""
+
+_SCALES = {"plant.mass", "plant.stiffness", "plant.normal_force"}
 
 
 @dataclass(frozen=True)
@@ -17,10 +23,10 @@ class Units:
     dimensionless: bool = False
 
     @classmethod
-    def of(cls, drive: Drive | None) -> Self:
-        """Return those of a drive: with mass, stiffness and normal force 1 it is dimensionless."""
-        unit = drive is not None and drive.mass == drive.stiffness == drive.normal_force == 1.0
-        return cls(dimensionless=unit)
+    def of(cls, drive: Drive | None, varied: Iterable[str] = ()) -> Self:
+        """Return those of a drive; SI where one of its scales is among the parameters `varied`."""
+        unit = drive is not None and drive.is_dimensionless
+        return cls(dimensionless=unit and _SCALES.isdisjoint(varied))
 
     def label(self, name: str, unit: str) -> str:
         """Return the label of an axis, as "velocity (mm/s)"; of a number its name alone."""
@@ -39,14 +45,43 @@ class Units:
         scale, prefix = prefix_for(largest)
         return scale, self.label(name, prefix + unit)
 
-    def text(self, value: float, unit: str) -> str:
+    def of_unit(self, unit: str) -> str:
+        """Return the unit as it is shown: none where all is dimensionless."""
+        return "" if self.dimensionless else unit
+
+    def text(self, value: float | None, unit: str, *, largest: float = 0.0) -> str:
         """Return a value (SI) as text with its unit."""
-        if self.dimensionless or not unit:
-            return f"{value:.4g}"
-        scale, prefix = prefix_for(value)
-        return f"{value / scale:.4g} {prefix}{unit}"
+        return self.texts([value], unit, largest=largest)[0]
+
+    def texts(
+        self, values: Sequence[Any], unit: str, digits: int = 4, *, largest: float = 0.0
+    ) -> list[str]:
+        """Return values as texts with their unit, all with the prefix that suits the largest.
+
+        A unit that begins with a number, such as 1/s, gets no prefix; None is "-". What is below a
+        billionth of the largest, or of a `largest` that is not among them, is shown as 0.
+        """
+        unit = self.of_unit(unit)
+        found = max((abs(value) for value in values if isinstance(value, float)), default=0.0)
+        least = NOISE * max(found, largest)
+        values = [0.0 if isinstance(v, float) and abs(v) < least else v for v in values]
+        scale, prefix = prefix_for(found if found >= least else 0.0)
+        if not unit[:1].isalpha():
+            scale, prefix = 1.0, ""
+        return [_text(value, scale, f" {prefix}{unit}".rstrip(), digits) for value in values]
+
+
+def _text(value: Any, scale: float, unit: str, digits: int) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value / scale:.{digits}g}{unit}" if isinstance(value, float) else str(value)
 
 
 def _largest(*values: npt.ArrayLike) -> float:
     arrays = [np.asarray(value, dtype=float) for value in values]
     return max((float(np.nanmax(np.abs(array), initial=0.0)) for array in arrays), default=0.0)
+
+
+SI = Units()

@@ -7,7 +7,7 @@ from functools import cached_property
 from math import inf
 from pathlib import Path
 from sys import float_info
-from typing import Any, ClassVar, Self, cast
+from typing import Any, ClassVar, NamedTuple, Self, cast
 
 import yaml
 
@@ -20,7 +20,9 @@ from stickslip_ros.scenario.parameters import (
     PlantParameters,
     WashoutControllerParameters,
     parameters_of,
+    shown,
 )
+from stickslip_ros.suggestions import did_you_mean
 
 DEFAULT_NAMESPACE = "/feed_drive"
 LONGEST_NAMESPACE = 200
@@ -29,6 +31,9 @@ LONGEST_NAMESPACE = 200
 _PARAMETERS_KEY = "ros__parameters"
 _LARGEST = 1_000_000
 """Characters of a scenario file."""
+_SCENARIO = "scenario"
+"""Last part of the name of the section that is for no node, but says what completes the file."""
+_NAMED_BY_PATH = "a file is given by its path ending in .yaml"
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,16 @@ class Scenario:
     """The scenario file."""
     other_sections: tuple[str, ...] = ()
     """Sections of the file that match none of these nodes: parameters of a user's own node."""
+    given: frozenset[str] = field(default=frozenset(), compare=False, repr=False)
+    """NODE.PARAMETER of what the file, its base or an override gives."""
+
+    @property
+    def left_to_defaults(self) -> list[str]:
+        """NODE.PARAMETER of the drive, its rate and its washout controller that nothing gives."""
+        names = [f"plant.{name}" for name in (*self.plant.drive_names(), "rate")]
+        if self.plant.expects_control:
+            names += [f"washout_controller.{name}" for name in self.washout_controller.law_names()]
+        return [name for name in names if name not in self.given]
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
         """Return every node's parameters by node and flat name."""
@@ -92,22 +107,29 @@ def load_scenario(
     overrides: Sequence[str] = (),
     namespace: str = DEFAULT_NAMESPACE,
     *,
+    base: str | None = None,
     other_nodes: bool = False,
 ) -> Scenario:
     """Load the scenario of that name in config/, or of that path.
 
-    `overrides` are texts NODE.PARAMETER=VALUE, the value written as in the file. Sections apply to
-    the nodes in `namespace` as ROS applies them. Raises InvalidInputError for anything unknown,
-    ill-typed or out of bounds; with `other_nodes`, sections of unknown nodes are left alone.
+    What it leaves out is that of the scenario `base`, by default the one that its own section
+    `scenario` names; without one the parameters' defaults act. `overrides` are texts
+    NODE.PARAMETER=VALUE, the value written as in the file. Sections apply to the nodes in
+    `namespace` as ROS applies them. Raises InvalidInputError for anything unknown, ill-typed or out
+    of bounds; with `other_nodes`, sections of unknown nodes are left alone.
     """
     path = _find(name_or_path)
-    values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
-    other_sections: list[str] = []
-    for pattern, parameters in _sections(path):
-        if other_nodes and not _matching(pattern, namespace):
-            other_sections.append(pattern)
-        else:
-            _apply(values, path, pattern, parameters, namespace)
+    files = [_read(path, namespace, other_nodes=other_nodes)]
+    below = _path_of_base(files[0]) if base is None else _find(base)
+    while below is not None:
+        if any(below.samefile(file.path) for file in files):
+            raise InvalidInputError(f"{path}: base {below} is a file that it completes")
+        files.append(_read(below, namespace, other_nodes=other_nodes))
+        below = _path_of_base(files[-1])
+    values: dict[str, dict[str, Any]] = {
+        node: {name: value for file in files[::-1] for name, value in file.values[node].items()}
+        for node in NODE_PARAMETERS
+    }
     for node, parameters in values.items():
         NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
     given = dict.fromkeys(NODE_PARAMETERS, "")
@@ -125,7 +147,8 @@ def load_scenario(
         name=path.stem,
         overrides=tuple(overrides),
         path=path,
-        other_sections=tuple(other_sections),
+        other_sections=tuple(files[0].other_sections),
+        given=frozenset(f"{node}.{name}" for node in values for name in values[node]),
         **models,
     )
 
@@ -151,20 +174,78 @@ def config_directories() -> list[Path]:
 
 
 def _find(name_or_path: str) -> Path:
-    if "/" not in name_or_path and not name_or_path.endswith((".yaml", ".yml")):
-        for directory in config_directories():
-            path = directory / f"{name_or_path}.yaml"
-            if path.is_file():
-                return path
-        known = sorted({path.stem for d in config_directories() for path in d.glob("*.yaml")})
-        raise InvalidInputError(
-            f"unknown scenario {name_or_path!r}: known by name are {', '.join(known)}; "
-            "a file is given by its path ending in .yaml"
-        )
+    """Return the file of that path, or else of that name, with or without .yaml."""
     path = Path(name_or_path)
-    if not path.is_file():
+    name = name_or_path.removesuffix(".yaml")
+    given_as_file = "/" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
+    if given_as_file and path.is_file():
+        return path
+    if "/" in name_or_path:
         raise InvalidInputError(f"no scenario file {name_or_path}")
-    return path
+    shipped = {path.stem: path for d in config_directories()[::-1] for path in d.glob("*.yaml")}
+    if name in shipped:
+        return shipped[name]
+    if given_as_file:
+        raise InvalidInputError(
+            f"no scenario file {name_or_path}; {did_you_mean(name, shipped, _NAMED_BY_PATH)}"
+        )
+    every = f"known by name are {', '.join(sorted(shipped))}; {_NAMED_BY_PATH}"
+    raise InvalidInputError(
+        f"unknown scenario {name_or_path!r}; {did_you_mean(name, shipped, every)}"
+    )
+
+
+class _File(NamedTuple):
+    """What a scenario file says."""
+
+    path: Path
+    values: dict[str, dict[str, Any]]
+    """By node and flat name."""
+    other_sections: list[str]
+    base: str | None
+
+
+def _path_of_base(file: _File) -> Path | None:
+    """Return the path of the base that a file names; a path is relative to that file."""
+    if file.base is None:
+        return None
+    beside = file.path.parent / file.base
+    if beside.suffix in (".yaml", ".yml") and beside.is_file():
+        return beside
+    try:
+        return _find(file.base)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{file.path}: base: {error}") from None
+
+
+def _read(path: Path, namespace: str, *, other_nodes: bool) -> _File:
+    values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
+    other_sections: list[str] = []
+    base: str | None = None
+    for pattern, parameters in _sections(path):
+        own = section_matches(pattern, f"{namespace.rstrip('/')}/{_SCENARIO}")
+        if own and pattern.endswith(f"/{_SCENARIO}"):
+            base = _base_of(path, pattern, parameters)
+        elif other_nodes and not _matching(pattern, namespace):
+            other_sections.append(pattern)
+        else:
+            _apply(values, path, pattern, parameters, namespace)
+    return _File(path, values, other_sections, base)
+
+
+def _base_of(path: Path, pattern: str, parameters: Mapping[str, Any]) -> str:
+    for name in parameters:
+        if name != "base":
+            raise InvalidInputError(
+                f"{path}: section {pattern}: unknown parameter {name:.80}; known is base"
+            )
+    base = parameters.get("base")
+    if not isinstance(base, str) or not base:
+        raise InvalidInputError(
+            f"{path}: section {pattern}: base = {shown(base)} is refused: must be the name or the "
+            "path of a scenario"
+        )
+    return base
 
 
 class _RosLoader(yaml.SafeLoader):
@@ -294,15 +375,24 @@ def _apply(
     """Give the parameters of a section to every node that it matches."""
     nodes = _matching(pattern, namespace)
     if not nodes:
+        node = pattern.rpartition("/")[2]
         raise InvalidInputError(
-            f"{path}: section {pattern} matches no node; in namespace {namespace} there are "
-            f"{', '.join(NODE_PARAMETERS)}"
+            f"{path}: section {pattern} matches no node; "
+            + did_you_mean(
+                node,
+                NODE_PARAMETERS.keys() - {node},
+                f"in namespace {namespace} there are {', '.join(NODE_PARAMETERS)}",
+            )
         )
     for_all = len(nodes) > 1
     for name, value in parameters.items():
         takers = [n for n in nodes if not for_all or name in _names(n)]
         if not takers:
-            raise InvalidInputError(f"{path}: section {pattern}: no node has a parameter {name}")
+            known = {known for node in nodes for known in _names(node)}
+            raise InvalidInputError(
+                f"{path}: section {pattern}: no node has a parameter {name:.80}; "
+                + did_you_mean(name, known, "docs/parameters.md has them all")
+            )
         for node in takers:
             values[node][name] = value
 
@@ -319,10 +409,20 @@ def _names(node: str) -> set[str]:
 def _parse_override(override: str) -> tuple[str, str, Any]:
     target, equals, text = override.partition("=")
     node, _, parameter = target.partition(".")
+    known = [f"{node}.{name}" for node in NODE_PARAMETERS for name in sorted(_names(node))]
     if not equals or not parameter:
-        raise InvalidInputError(f"-p {override:.80}: must be NODE.PARAMETER=VALUE")
+        raise InvalidInputError(
+            f"-p {override:.80}: must be NODE.PARAMETER=VALUE; "
+            + did_you_mean(target, known, "as in -p plant.belt_speed=0.2")
+        )
     if node not in NODE_PARAMETERS:
         raise InvalidInputError(
-            f"-p {override:.80}: unknown node {node:.80}; known are {', '.join(NODE_PARAMETERS)}"
+            f"-p {override:.80}: unknown node {node:.80}; {did_you_mean(node, NODE_PARAMETERS)}"
+        )
+    if target not in known:
+        every = f"{node} has {', '.join(sorted(_names(node)))}"
+        raise InvalidInputError(
+            f"-p {override:.80}: unknown parameter {parameter:.80}; "
+            + did_you_mean(target, known, every)
         )
     return node, parameter, _parse_yaml(text, f"-p {override:.80}: the value")

@@ -6,7 +6,7 @@ models. A nested field `friction.static` is the ROS parameter of that name.
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cache
 from math import inf, isinf, pi, sqrt
@@ -20,6 +20,7 @@ from stickslip_ros.physics.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.friction import LAWS, FrictionLaw
 from stickslip_ros.physics.washout import WashoutParameters
+from stickslip_ros.suggestions import did_you_mean
 
 
 class Pace(StrEnum):
@@ -176,7 +177,7 @@ class NodeParameters(_Model):
             if name not in known:
                 raise InvalidInputError(
                     f"{source}: unknown parameter {name:.80} = {shown(value)}; "
-                    f"known are {', '.join(sorted(known))}"
+                    f"{did_you_mean(name, known)}"
                 )
         try:
             return cls.model_validate(_nested(values))
@@ -299,6 +300,15 @@ class PlantParameters(NodeParameters):
             friction=self.friction.as_law(),
         )
 
+    def drive_names(self) -> list[str]:
+        """Return the flat names of what makes the drive: those that its friction law uses, too."""
+        constants = LAWS[self.friction.law].constants()
+        return [
+            *(each.name for each in fields(Drive) if each.name != "friction"),
+            "friction.law",
+            *(f"friction.{name}" for name in constants),
+        ]
+
     def as_disturbance(self) -> Disturbance:
         """Return the disturbance of the scenario."""
         return Disturbance(**dict(self.disturbance))
@@ -321,10 +331,12 @@ class WashoutControllerParameters(NodeParameters):
 
     def as_washout(self) -> WashoutParameters:
         """Return the constants of the control law."""
-        names = (
-            name for name in type(self).model_fields if name not in NodeParameters.model_fields
-        )
-        return WashoutParameters(**{name: getattr(self, name) for name in names})
+        return WashoutParameters(**{name: getattr(self, name) for name in self.law_names()})
+
+    @classmethod
+    def law_names(cls) -> list[str]:
+        """Return the names of the constants of the control law."""
+        return [name for name in cls.model_fields if name not in NodeParameters.model_fields]
 
 
 class AnalyzerParameters(NodeParameters):

@@ -5,9 +5,10 @@ then tried on the drive itself, sampled, held and delayed as between the nodes.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from copy import copy
+from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
-from math import ceil, floor, inf, isinf, log10
+from math import ceil, copysign, floor, inf, isinf, log10, sqrt
 from typing import Self
 
 import numpy as np
@@ -27,6 +28,7 @@ from stickslip_ros.physics.theory.sampled import (
 )
 from stickslip_ros.physics.washout import WashoutParameters
 from stickslip_ros.scenario.files import Scenario, parameter_file
+from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
 from stickslip_ros.studies.trial import FILTER_SETTLED, Bench, Vibration
 
 OWN_SPEED_RANGE = 0.1
@@ -55,6 +57,18 @@ _ATTEMPTS, _RESERVE, _RETREAT = 8, 0.95, 0.8
 """How often a proposal is tried, what share of what is allowed the first one uses, and by what
 factor the next one uses less."""
 
+_LEAST_LIMIT, _LIMIT_SPACING = 1e-3, 1.015
+"""Of the force limit that would do: where its search begins, in that without any limit, and up to
+which ratio it goes on."""
+
+_SLOWEST_DECAY = 0.01
+"""In a natural period, of small deviations, with the force limit that would do: what decays more
+slowly takes too long to be tried, and needs hardly less force."""
+
+_LITTLE_GAIN, _LITTLE_DELAY, _LITTLE_SPEED = 1.1, 0.02, 1.05
+"""What is next to no margin: a factor in the linear gain, a delay in natural periods, and a factor
+from the Hopf speed."""
+
 _SHARE_OF_VIBRATIONS = 0.1
 """Share of the work, about, that it is to find the vibrations without control."""
 
@@ -76,6 +90,8 @@ class Task:
     """Largest force there may be, N."""
     belt_speeds: tuple[float, float]
     """Lowest and highest, m/s, above zero; the other direction mirrors them."""
+    scenario: Scenario | None = field(default=None, compare=False, repr=False)
+    """What sets the task, if a scenario does."""
 
     @classmethod
     def of(cls, scenario: Scenario, belt_speeds: tuple[float, float] | None = None) -> Self:
@@ -97,13 +113,17 @@ class Task:
                 f"belt speeds {low:g} to {high:g} m/s: must be finite, above zero, the lower first"
             )
         limit = scenario.washout_controller.force_limit
-        return cls(plant.as_drive(), plant.rate, plant.force_delay, limit, (low, high))
+        return cls(plant.as_drive(), plant.rate, plant.force_delay, limit, (low, high), scenario)
 
     def drives(self) -> list[Drive]:
         """Return the drive at speeds throughout the range."""
         low, high = self.belt_speeds
         speeds = np.linspace(low, high, _SPEEDS if low < high else 1)
         return [replace(self.drive, belt_speed=speed) for speed in speeds.tolist()]
+
+    def shown(self, value: float, unit: str) -> str:
+        """Return a value as remarks show it, without a unit where the drive is dimensionless."""
+        return f"{value:.4g}" if self.drive.is_dimensionless else f"{value:.4g} {unit}"
 
 
 @dataclass(frozen=True)
@@ -156,10 +176,22 @@ class Design:
 
     @property
     def parameter_file(self) -> str | None:
-        """The parameter file with what is proposed."""
+        """The scenario of the task, complete, with what is proposed; without one its gains alone.
+
+        Its belt speed is that of the scenario, or the one in the range that is next to it.
+        """
         if self.controller is None:
             return None
-        return parameter_file({"washout_controller": asdict(self.controller)})
+        gains = asdict(self.controller)
+        scenario = self.task.scenario
+        if scenario is None:
+            return parameter_file({"washout_controller": gains})
+        (low, high), own = self.task.belt_speeds, scenario.plant.belt_speed
+        proposed = {f"washout_controller.{name}": value for name, value in gains.items()}
+        proposed["plant.belt_speed"] = copysign(min(max(abs(own), low), high), own)
+        nodes = scenario.changed(proposed).as_dict()
+        del nodes["analyzer"]["bag"]
+        return parameter_file(nodes)
 
 
 def design(task: Task, progress: Progress = lambda _: None) -> Design:
@@ -167,7 +199,7 @@ def design(task: Task, progress: Progress = lambda _: None) -> Design:
 
     The force stays within the limit while the vibration is caught at any phase, the filter having
     forgotten its start. What fails in simulation is not proposed: the next attempt is more
-    cautious, and after some the design says why there is none.
+    cautious, and after some the design says why there is none, and from which limit on there is.
     """
     drives = task.drives()
     reason = why_no_linear_loop(drives[0], task.rate, task.force_delay)
@@ -180,11 +212,28 @@ def design(task: Task, progress: Progress = lambda _: None) -> Design:
         progress(_SHARE_OF_VIBRATIONS * number / len(drives))
         if vibrations[-1].regime is Regime.UNBOUNDED:
             reason = (
-                f"without control the motion runs away at a belt speed of {drive.belt_speed:.4g} "
-                "m/s, so there is no limit cycle to catch it from"
+                "without control the motion runs away at a belt speed of "
+                f"{task.shown(drive.belt_speed, 'm/s')}, so there is no limit cycle to catch it "
+                "from"
             )
             return Design(task, remark=reason)
     candidates = _Candidates(task, vibrations)
+    found = _propose(bench, candidates, progress)
+    if found.controller is not None or isinf(task.force_limit):
+        return found
+    enough = _sufficient_limit(bench, candidates)
+    if enough is None:
+        return found
+    remark = (
+        f"{found.remark}; from a force limit of about {task.shown(enough, 'N')} on there is a "
+        "proposal"
+    )
+    return replace(found, remark=remark)
+
+
+def _propose(bench: Bench, candidates: "_Candidates", progress: Progress) -> Design:
+    """Return a proposal that was tried out, or why there is none."""
+    task, drives = candidates.task, candidates.task.drives()
     strength, shares = _RESERVE, _CUBIC_SHARES
     failure: str | None = None
     for attempt in range(_ATTEMPTS):
@@ -206,14 +255,17 @@ def design(task: Task, progress: Progress = lambda _: None) -> Design:
             done(0.5 * len(checks) / len(drives))
         slowest = candidates.slowest(gains)
         remark, found = candidates.why_zero(), None
+        little: str | None = None
         if failure is None and gains.linear != 0.0:
             found = margins(candidates.loops, gains)
+            little = _little_margin(task, found)
             ends = [drive for drive in drives if drive in (drives[0], drives[-1], slowest.drive)]
             remark, failure = _from_high_speeds(
-                bench, ends, controller, lambda share: done(0.5 + 0.5 * share)
+                task, bench, ends, controller, lambda share: done(0.5 + 0.5 * share)
             )
         if failure is None:
             progress(1.0)
+            remark = "; ".join(filter(None, (remark, little))) or None
             return Design(task, controller, remark, slowest, found, tuple(checks))
         peak = max((check.peak_force or 0.0 for check in checks), default=0.0)
         if peak > task.force_limit:
@@ -223,6 +275,51 @@ def design(task: Task, progress: Progress = lambda _: None) -> Design:
         else:
             strength *= _RETREAT
     return Design(task, remark=failure)
+
+
+def _sufficient_limit(bench: Bench, candidates: "_Candidates") -> float | None:
+    """Return the lowest force limit (N) with which there is a proposal, to a few per cent.
+
+    None where even a force without limit does not do.
+    """
+
+    def simulated(limit: float) -> Design:
+        return _propose(bench, candidates.limited(limit), lambda _: None)
+
+    def tried(limit: float) -> bool:
+        return simulated(limit).controller is not None
+
+    def in_theory(limit: float) -> bool:
+        limited = candidates.limited(limit)
+        gains = limited.best(_RESERVE, _CUBIC_SHARES)
+        return gains is not None and limited.slowest(gains).decay_rate(gains) > slowest
+
+    slowest = _SLOWEST_DECAY / candidates.task.drive.natural_period
+    free = simulated(inf)
+    enough = max((check.peak_force or 0.0 for check in free.checks), default=0.0) / _RESERVE
+    if enough <= candidates.task.force_limit:
+        return None
+    least = max(candidates.task.force_limit, _LEAST_LIMIT * enough)
+    for does in (in_theory, tried):
+        highest = enough
+        while highest > _LIMIT_SPACING * least:
+            middle = sqrt(least * highest)
+            least, highest = (least, middle) if does(middle) else (middle, highest)
+        if tried(_rounded(highest, up=True)):
+            return _rounded(highest, up=True)
+    return None
+
+
+def _little_margin(task: Task, found: Margins) -> str | None:
+    """Return what is to be said of loops that are next to instability; None where none is."""
+    little: list[str] = []
+    if found.gain_down is not None and found.gain_down > 1.0 / _LITTLE_GAIN:
+        little.append(f"{found.gain_down:.3g} times the linear gain is unstable")
+    if found.gain_up is not None and found.gain_up < _LITTLE_GAIN:
+        little.append(f"{found.gain_up:.3g} times the linear gain is unstable")
+    if found.delay is not None and found.delay < _LITTLE_DELAY * task.drive.natural_period:
+        little.append(f"a further delay of {task.shown(found.delay, 's')} makes it unstable")
+    return f"there is next to no margin: {', '.join(little)}" if little else None
 
 
 def margins(loops: Sequence[LinearSampledLoop], gains: WashoutGains) -> Margins:
@@ -265,7 +362,7 @@ class _Candidates:
             for vibration in vibrations
             if (loop := LinearSampledLoop.of(vibration.drive, task.rate, task.force_delay))
         ]
-        self._task = task
+        self.task = task
         # The loops differ in one number, the slope of the friction: those at its ends tell all.
         slopes = [float(loop.jacobian[SPEED, SPEED]) for loop in self.loops]
         ends = sorted({int(np.argmin(slopes)), int(np.argmax(slopes))})
@@ -274,6 +371,12 @@ class _Candidates:
         unit = task.drive.normal_force / task.drive.speed_scale
         self._largest_gain = (4.0 + 2.0 * max(map(abs, slopes))) * unit
         self._cubic_coefficient = _cubic_coefficient(task.drive)
+
+    def limited(self, force_limit: float) -> Self:
+        """Return those for another force limit, N."""
+        other = copy(self)
+        other.task = replace(self.task, force_limit=force_limit)
+        return other
 
     def slowest(self, gains: WashoutGains) -> LinearSampledLoop:
         """Return the loop in which a small deviation dies out most slowly."""
@@ -285,13 +388,13 @@ class _Candidates:
         They have three digits, and are zero if nothing vibrates. None if none is stable.
         """
         if not any(vibration.vibrates for vibration in self.vibrations):
-            none = WashoutGains(_rounded(self._task.drive.angular_frequency), 0.0, 0.0)
+            none = WashoutGains(_rounded(self.task.drive.angular_frequency), 0.0, 0.0)
             if self.slowest(none).decay_rate(none) > 0.0:
                 return none
         best, fastest = None, 0.0
         for share in cubic_shares:
             cubic = share * self._cubic_coefficient
-            if share > 0.0 and (cubic == 0.0 or isinf(self._task.force_limit)):
+            if share > 0.0 and (cubic == 0.0 or isinf(self.task.force_limit)):
                 break
             gains = self._fastest(strength, cubic)
             decay_rate = self.slowest(gains).decay_rate(gains)
@@ -303,35 +406,40 @@ class _Candidates:
         """Return why zero gains may be proposed."""
         if any(vibration.vibrates for vibration in self.vibrations):
             return "no gains within the force limit damp faster than none"
-        return "nothing vibrates without control at these belt speeds: the gains are zero"
+        distances = {
+            abs(log10(ratio)): hopf_distance(vibration.drive)
+            for vibration in self.vibrations
+            if (ratio := hopf_ratio(vibration.drive)) is not None
+        }
+        said = ["nothing vibrates without control at these belt speeds: the gains are zero"]
+        if distances:
+            nearest = min(distances)
+            little = ", with next to no margin" if nearest < log10(_LITTLE_SPEED) else ""
+            said.append(distances[nearest] + little)
+        return "; ".join(said)
 
     def why_none(self) -> str:
         """Return why no gains are stable at all speeds within the force limit."""
-        needed = inf
-        for corner_frequency in self._corner_frequencies(17).tolist():
-            peak = self._peak(corner_frequency)
-            for gain in self._weakest_gains(corner_frequency):
-                needed = min(needed, gain * peak)
-        if isinf(needed):
+        frequencies = self._corner_frequencies(17).tolist()
+        if not any(map(self._can_be_stable, frequencies)):
             return (
                 "no linear gain makes the equilibrium stable at all these belt speeds, at this "
                 "rate and delay"
             )
         return (
-            f"the force limit of {self._task.force_limit:.3g} N is too small: a linear gain that "
-            "makes the equilibrium stable at all these belt speeds asks for at least "
-            f"{needed:.3g} N while it catches the vibration"
+            f"the force limit of {self.task.shown(self.task.force_limit, 'N')} is too small for "
+            "gains that make the equilibrium stable at all these belt speeds and catch the "
+            "vibration"
         )
 
-    def _weakest_gains(self, corner_frequency: float) -> list[float]:
-        """Return the smallest magnitudes of the intervals of gains stable at all speeds."""
+    def _can_be_stable(self, corner_frequency: float) -> bool:
+        """Return whether some linear gain is stable at all speeds."""
         sets = [loop.stable_linear_gains(corner_frequency) for loop in self._extremes]
-        overlaps = [
-            (max(one.low, other.low), min(one.high, other.high))
+        return any(
+            max(one.low, other.low) < min(one.high, other.high)
             for one in sets[0]
             for other in sets[-1]
-        ]
-        return [max(low, -high, 0.0) for low, high in overlaps if low < high]
+        )
 
     def _fastest(self, strength: float, cubic: float) -> WashoutGains:
         """Return the fastest gains: the best of a grid that closes in on them."""
@@ -360,9 +468,9 @@ class _Candidates:
 
     def _corner_frequencies(self, count: int) -> FloatArray:
         """Return corner frequencies (rad/s), up to the rate: a faster filter passes nothing on."""
-        omega = self._task.drive.angular_frequency
+        omega = self.task.drive.angular_frequency
         low, high = (share * omega for share in _CORNER_FREQUENCIES)
-        return np.geomspace(low, max(min(high, self._task.rate), 2.0 * low), count)
+        return np.geomspace(low, max(min(high, self.task.rate), 2.0 * low), count)
 
     def _peak(self, corner_frequency: float) -> float:
         """Return the largest filtered speed, m/s, of all vibrations."""
@@ -376,7 +484,7 @@ class _Candidates:
 
         With a softening cubic gain the force k v - k2 v^3 may be largest short of the peak.
         """
-        peak, limit = self._peak(corner_frequency), strength * self._task.force_limit
+        peak, limit = self._peak(corner_frequency), strength * self.task.force_limit
         gain = limit / peak + cubic * peak**2 if peak > 0.0 else inf
         if gain < 3.0 * cubic * peak**2:
             gain = (6.75 * cubic * limit**2) ** (1.0 / 3.0)
@@ -427,19 +535,23 @@ def _check(
 
 def _failure(task: Task, check: Check) -> str | None:
     """Return in what the simulated control fails, if it does."""
-    speed = f"at a belt speed of {check.belt_speed:.4g} m/s"
+    speed = f"at a belt speed of {task.shown(check.belt_speed, 'm/s')}"
     if check.vibrates and check.settling_time is None:
         return f"{speed} the vibration does not die out, though a small one would"
     if check.peak_force is not None and check.peak_force > task.force_limit:
         return (
-            f"{speed} the force reaches {check.peak_force:.3g} N, above the limit of "
-            f"{task.force_limit:.3g} N"
+            f"{speed} the force reaches {task.shown(check.peak_force, 'N')}, above the limit of "
+            f"{task.shown(task.force_limit, 'N')}"
         )
     return None
 
 
 def _from_high_speeds(
-    bench: Bench, drives: Sequence[Drive], controller: WashoutParameters, done: Progress
+    task: Task,
+    bench: Bench,
+    drives: Sequence[Drive],
+    controller: WashoutParameters,
+    done: Progress,
 ) -> tuple[str | None, str | None]:
     """Return what is to be said of motions that begin fast, and in what the controller fails."""
 
@@ -452,7 +564,10 @@ def _from_high_speeds(
     throws = [(drive, share * drive.speed_scale) for drive in drives for share in _THROWN]
     for number, (drive, speed) in enumerate(throws, 1):
         if escapes(drive, speed, controller):
-            slide = f"thrown to {speed:.3g} m/s off a belt at {drive.belt_speed:.4g} m/s the slide"
+            slide = (
+                f"thrown to {task.shown(speed, 'm/s')} off a belt at "
+                f"{task.shown(drive.belt_speed, 'm/s')} the slide"
+            )
             if controller.cubic_gain != 0.0 or escapes(drive, speed, unlimited):
                 return None, f"{slide} does not come back"
             remark = remark or f"{slide} needs more force than the limit"

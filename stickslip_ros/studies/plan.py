@@ -12,6 +12,7 @@ import numpy as np
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.scenario.parameters import NODE_PARAMETERS, Parameter, known_parameters
+from stickslip_ros.suggestions import did_you_mean
 
 MOST_POINTS = 1_000_000_000
 """Points of a study: what is to be kept of them has to go into a file."""
@@ -117,18 +118,27 @@ class Axis:
         node, _, name = self.parameter.partition(".")
         if node not in _NODES:
             raise InvalidInputError(
-                f"{self.parameter:.80}: must be a parameter of {' or '.join(_NODES)}"
+                f"{self.parameter:.80}: must be a parameter of {' or '.join(_NODES)}; "
+                + did_you_mean(self.parameter, _numbers(*_NODES), "as in plant.belt_speed")
             )
         known = known_parameters(NODE_PARAMETERS[node])
         if name not in known:
-            numbers = sorted(name for name, found in known.items() if found.kind in (int, float))
+            every = f"numbers of {node} are {', '.join(sorted(_numbers(node)))}"
             raise InvalidInputError(
-                f"{self.parameter:.80}: unknown parameter; numbers of {node} are "
-                f"{', '.join(numbers)}"
+                f"{self.parameter:.80}: unknown parameter; "
+                + did_you_mean(f"{node}.{name}", _numbers(*_NODES), every)
             )
         if known[name].kind not in (int, float):
             raise InvalidInputError(f"{self.parameter}: is no number, and has no values between")
         return known[name]
+
+
+def _numbers(*nodes: str) -> Iterator[str]:
+    """Yield the parameters of nodes that are numbers, as NODE.PARAMETER."""
+    for node in nodes:
+        for name, parameter in known_parameters(NODE_PARAMETERS[node]).items():
+            if parameter.kind in (int, float):
+                yield f"{node}.{name}"
 
 
 class Plan(Protocol):

@@ -15,8 +15,10 @@ from tests.app.conftest import Run
     [
         (("simulate", "nosuch"), ("unknown scenario 'nosuch'", "feed_drive, paper")),
         (("run", "./nosuch.yaml"), ("no scenario file ./nosuch.yaml",)),
-        (("run", "paper", "-p", "plantt.mass=1"), ("unknown node plantt", "plant")),
-        (("run", "paper", "-p", "plant.masss=1"), ("unknown parameter masss", "mass")),
+        (("simulate", "feed_driv"), ("unknown scenario 'feed_driv'", "did you mean feed_drive?")),
+        (("simulate", "papre.yaml"), ("no scenario file papre.yaml", "did you mean paper?")),
+        (("run", "paper", "-p", "plantt.mass=1"), ("unknown node plantt", "did you mean plant?")),
+        (("run", "paper", "-p", "plant.masss=1"), ("parameter masss", "did you mean plant.mass?")),
         (("simulate", "paper", "-p", "plant.mass=heavy"), ("plant: mass = 'heavy'", "number")),
         (
             ("run", "paper", "-p", "plant.mass=-1"),
@@ -43,6 +45,10 @@ from tests.app.conftest import Run
         (
             ("run", "paper", "--controller", "stickslip_ros/damper"),
             ("no executable damper", "plant_node, replay_node"),
+        ),
+        (
+            ("run", "paper", "--controller", "stickslip_ros/washout_controller"),
+            ("no executable washout_controller;", "did you mean washout_controller_node?"),
         ),
         (
             ("run", "paper", "--external-controller", "-p", "plant.expects_control=false"),
@@ -99,6 +105,27 @@ def test_a_negative_number_is_a_value_and_no_option(stickslip: Run, value: str) 
     done = stickslip("simulate", "paper", "--duration", value)
     assert done.returncode == 2
     assert f"{value!r} is not a time in seconds, 0 or more" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "meant"),
+    [
+        (("simulat", "paper"), "'simulat'; did you mean simulate?"),
+        (("simulate", "paper", "--durations=3"), "--durations=3; did you mean --duration?"),
+        (("run", "paper", "--dashbord"), "--dashbord; did you mean --dashboard?"),
+    ],
+)
+def test_a_misspelt_command_or_option_is_guessed(
+    stickslip: Run, arguments: tuple[str, ...], meant: str
+) -> None:
+    done = stickslip(*arguments)
+    assert done.returncode == 2
+    assert done.stderr.endswith(f"{meant}\n")
+
+
+def test_a_name_with_its_ending_finds_what_ships(stickslip: Run) -> None:
+    done = stickslip("simulate", "feed_drive.yaml", "--duration", "0.1", "--json")
+    assert '"name": "feed_drive"' in done.stdout
 
 
 def test_an_existing_bag_is_left_as_it_is(stickslip: Run, tmp_path: Path) -> None:

@@ -109,7 +109,7 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
     control.click()
     expect(page.get_by_text("washout_controller inactive")).to_be_visible()
     page.get_by_role("button", name="Reset").click()
-    expect(page.get_by_text("sticks and slips", exact=True)).to_be_visible()
+    expect(page.get_by_text("stick-slip", exact=True)).to_be_visible()
     expect(page.get_by_text(re.compile(r"^43\d(\.\d+)? µm$"))).to_be_visible()
     wait_for(lambda: swing(page) > 800.0, "the limit cycle is drawn")  # µm
     expect(control).not_to_be_checked()
@@ -119,7 +119,7 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
     wait_for(lambda: last_amplitude(page) < 200.0, "the limit cycle collapses")
     SCREENSHOT.parent.mkdir(exist_ok=True)
     page.screenshot(path=SCREENSHOT)
-    expect(page.get_by_text("comes to rest", exact=True)).to_be_visible()
+    expect(page.get_by_text("equilibrium", exact=True)).to_be_visible()
     page.get_by_text("10 periods").click()
     wait_for(lambda: 0.0 <= swing(page) < 50.0, "the collapse is drawn")
 

@@ -80,6 +80,8 @@ def test_values_are_in_the_units_of_their_axes(
     motion, drive = body["motion"], plant.as_drive()
     length, speed, force = scales
     assert motion["labels"] == labels
+    time_unit = "s" if scenario == "feed_drive" else "dimensionless"
+    assert motion["time_label"] == f"time before now ({time_unit})"
     assert body["cycles"]["label"] == labels[0].replace("displacement", "amplitude")
     assert body["cycles"]["amplitude"] == [pytest.approx(4e-4 * length)]
     assert motion["window"] == pytest.approx(50.0 * drive.natural_period)

@@ -30,8 +30,10 @@ def test_the_parameter_file_quenches_the_vibration(stickslip: Run, tmp_path: Pat
         for name in ("corner_frequency", "linear_gain", "cubic_gain", "start_after")
         for text in ("-p", f"washout_controller.{name}={found[name]}")
     ]
-    done = stickslip("simulate", "feed_drive", *LIMIT, *gains, "--json")
-    assert json.loads(done.stdout)["regime"] == "equilibrium"
+    for scenario in (("feed_drive", *LIMIT, *gains), ("gains.yaml",)):
+        done = stickslip("simulate", *scenario, "--json")
+        assert json.loads(done.stdout)["regime"] == "equilibrium"
+        assert done.stderr == ""
 
 
 def test_the_table_has_the_proposal_and_what_it_does(stickslip: Run) -> None:
@@ -39,10 +41,17 @@ def test_the_table_has_the_proposal_and_what_it_does(stickslip: Run) -> None:
     assert done.returncode == 0, done.stderr
     for text in (
         "belt speed 30 mm/s to 40 mm/s", "linear gain", "further delay", "peak force",
-        "ros__parameters",
+        "--out FILE",
     ):  # fmt: skip
         assert text in done.stdout
     assert "nan" not in done.stdout
+    assert "ros__parameters" not in done.stdout
+
+
+def test_it_says_how_to_run_what_it_has_written(stickslip: Run) -> None:
+    done = stickslip("design", "feed_drive", "--belt-speed", "0.06", "--out", "gains.yaml")
+    assert done.stderr == "gains.yaml is written: `stickslip run gains.yaml` runs it\n"
+    assert "--out" not in done.stdout
 
 
 def test_no_proposal_is_a_result_with_a_reason(stickslip: Run, tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ def on_terminal(command: list[str], columns: int, **environment: str) -> list[st
 @pytest.mark.process
 def test_a_person_gets_a_frame_and_a_colour() -> None:
     lines = on_terminal([*REPORT, str(REFERENCE)], 80)
-    (regime,) = (line for line in lines if "stick_slip" in line)
+    (regime,) = (line for line in lines if "stick-slip" in line)
     assert regime.count("│") == 3
     assert "\x1b[" in regime
 
@@ -56,7 +56,7 @@ def test_a_person_gets_a_frame_and_a_colour() -> None:
 @pytest.mark.parametrize("environment", [{"NO_COLOR": "1"}, {"TERM": "dumb"}])
 def test_colours_are_left_out_where_they_are_not_wanted(environment: dict[str, str]) -> None:
     lines = on_terminal([*REPORT, str(REFERENCE)], 80, **environment)
-    (regime,) = (line for line in lines if "stick_slip" in line)
+    (regime,) = (line for line in lines if "stick-slip" in line)
     assert re.search(r"\x1b\[[0-9;]*3[0-9]m", regime) is None
 
 
@@ -71,18 +71,18 @@ def test_nothing_is_lost_on_a_narrow_terminal(columns: int, tmp_path: Path) -> N
     assert max(map(len, lines)) <= columns
     text = "\n".join(lines)
     assert "…" not in text
-    for figure in ("stick_slip", "325.8 µm", "30.77 mm/s", "114.9 N"):
+    for figure in ("stick-slip", "325.8 µm", "30.77 mm/s", "114.9 N"):
         assert text.count(figure) == 2
 
 
 def test_a_pipe_gets_plain_lines(capsys: pytest.CaptureFixture[str]) -> None:
     print_table(
-        "drives [bold]", ["", "first", "second"], [["regime", "stick_slip", LONG], ["bag", "-", ""]]
+        "drives [bold]", ["", "first", "second"], [["regime", "stick-slip", LONG], ["bag", "-", ""]]
     )
     assert capsys.readouterr().out.splitlines() == [
         "drives [bold]",
         "        first       second",
-        f"regime  stick_slip  {LONG}",
+        f"regime  stick-slip  {LONG}",
         "bag     -",
     ]
 
@@ -115,7 +115,7 @@ def test_colours_forced_on_a_pipe_change_nothing() -> None:
         ).stdout
         for force in ("", "1")
     )
-    assert "stick_slip" in plain
+    assert "stick-slip" in plain
     assert forced == plain
 
 

@@ -79,9 +79,7 @@ def test_a_picture_changes_nothing_of_the_report(command, tmp_path):
     assert json.loads(out) == plain
     shown = texts(picture)
     assert "displacement (µm)" in shown
-    assert any(
-        "sticks and slips, not steady: decaying, amplitude 325.8 µm" in text for text in shown
-    )
+    assert any("stick-slip, not steady: decaying, amplitude 325.8 µm" in text for text in shown)
     for bag_lacks in ("the drive is not known", "no cycle was completed"):
         assert bag_lacks not in shown
 
@@ -92,6 +90,11 @@ def test_a_picture_is_of_the_part_that_is_measured(command, tmp_path):
     command("report", REFERENCE, *part, "--plot", picture)
     assert "no cycle was completed" in texts(picture)
     assert "1.01" in texts(picture)
+
+
+def test_a_part_without_a_cycle_says_so(command):
+    out = command("report", REFERENCE, "--to", "0.05")[1]
+    assert "no whole cycle was completed in 0.049 s: the natural period is 62.83 ms" in out
 
 
 def test_a_picture_says_what_a_bag_lacks(command, tmp_path):

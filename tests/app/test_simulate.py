@@ -1,6 +1,9 @@
 """`stickslip simulate`: the limit cycles of the paper's drive, from the command line."""
 
 import json
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -109,3 +112,58 @@ def test_it_says_whether_the_motion_was_steady(
 ) -> None:
     found = json.loads(stickslip("simulate", *arguments, "--json").stdout)
     assert (found["regime"], found["steady"], found["trend"]) == (regime, steady, trend)
+
+
+@pytest.mark.process
+def test_without_a_standard_output_there_is_no_traceback(tmp_path: Path) -> None:
+    done = subprocess.run(
+        f"{sys.executable} -m stickslip_ros.app.main simulate paper --duration 1 >&-",
+        shell=True,
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (
+            ("-p", "plant.belt_speed=40", "--duration", "1"),
+            ("in 1 s: the slide has not turned back", "40 m/s is 818.4 times the Hopf speed of"),
+        ),
+        (("--duration", "0.05"), ("in 0.05 s: the natural period is 62.83 ms",)),
+        (("-p", "plant.belt_speed=0.005", "--duration", "0.19"), ("0.19 s: ", "may take longer")),
+    ],
+)
+def test_where_nothing_is_measured_it_says_why(
+    stickslip: Run, arguments: tuple[str, ...], why: tuple[str, ...]
+) -> None:
+    done = stickslip("simulate", "feed_drive", "--no-control", *arguments)
+    lines = done.stdout.splitlines()
+    assert "no whole cycle" in lines[1]
+    for text in why:
+        assert text in lines[-1]
+
+
+def test_the_dimensionless_drive_has_no_units(stickslip: Run) -> None:
+    lines = stickslip("simulate", "paper", "--no-control", "--duration", "100").stdout.splitlines()
+    assert lines[0] == "paper, 100"
+    assert [line.split()[-1] for line in lines[1:4]] == ["stick-slip", "0.4341", "0.4144"]
+    assert all(len(re.split("  +", line)[1].split()) == 1 for line in lines[1:])
+
+
+def test_what_is_left_to_defaults_is_told_once(stickslip: Run, tmp_path: Path) -> None:
+    text = "/**/plant:\n  ros__parameters: {mass: 80.0, stiffness: 1.2e+6}\n"
+    (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
+    call = ("simulate", "mine.yaml", "--duration", "1", "--json")
+    alone, based = stickslip(*call), stickslip(*call, "--base", "feed_drive")
+    (line,) = alone.stderr.splitlines()
+    assert "mine.yaml does not give plant.damping = 0.02 N s/m, plant.normal_force = 1.0 N" in line
+    assert "washout_controller.corner_frequency = 2.0 rad/s" in line
+    assert "plant.mass" not in line
+    assert based.stderr == ""
+    assert json.loads(based.stdout)["scenario"]["plant"]["normal_force"] == 1000.0
+    (line,) = stickslip(*call, "--no-control").stderr.splitlines()
+    assert "washout_controller" not in line

@@ -38,7 +38,7 @@ def test_the_table_has_what_the_python_interface_returns(stickslip: Run, tmp_pat
     assert sections == list(found.turning_points)
     assert (tmp_path / "diagram.png").read_bytes().startswith(PNG)
     assert not (tmp_path / "table.csv.part").exists()
-    for text in ("stick_slip", "200 to 400 mm/s", "equilibrium"):
+    for text in ("stick-slip", "0.2 to 0.4", "equilibrium"):
         assert text in done.stdout
 
 
@@ -76,7 +76,7 @@ def test_a_map_is_drawn_in_each_colour(stickslip: Run, tmp_path: Path) -> None:
         done = stickslip(*FREE, *over, "--plot", f"{colour}.svg", "--colour", colour)
         assert done.returncode == 0, done.stderr
         assert "<svg" in (tmp_path / f"{colour}.svg").read_text()
-    assert "stick_slip" in done.stdout
+    assert "stick-slip" in done.stdout
 
 
 def test_control_is_sampled_unless_it_is_to_be_continuous(stickslip: Run) -> None:
@@ -103,7 +103,10 @@ def test_a_point_that_cannot_be_is_a_row_with_its_reason(stickslip: Run) -> None
     ("arguments", "message"),
     [
         (["--over", "belt_speed=1:2:3"], "belt_speed: must be a parameter of plant or washout"),
-        (["--over", "plant.speed=1:2:3"], "plant.speed: unknown parameter; numbers of plant are"),
+        (
+            ["--over", "plant.speed=1:2:3"],
+            "plant.speed: unknown parameter; did you mean plant.belt_speed or",
+        ),
         (["--over", "plant.pace=1:2:3"], "plant.pace: is no number"),
         (["--over", "plant.mass=1:2"], "must be NODE.PARAMETER=A:B:COUNT"),
         (["--over", "plant.mass=1:1:3"], "must be two different finite numbers"),
@@ -167,3 +170,12 @@ def test_interrupted_it_keeps_what_is_done_and_goes_on_from_there(
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "table.csv").read_bytes() == (tmp_path / "whole.csv").read_bytes()
     assert not part.exists()
+
+
+def test_of_what_it_varies_no_default_is_told(stickslip: Run, tmp_path: Path) -> None:
+    text = "/**/plant:\n  ros__parameters: {mass: 2.0}\n"
+    (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
+    over = ("--over", "plant.belt_speed=0.6:0.7:2", "--no-control")
+    (line,) = stickslip("sweep", "mine.yaml", *over).stderr.splitlines()
+    assert "plant.stiffness = 1.0 N/m" in line
+    assert "belt_speed" not in line

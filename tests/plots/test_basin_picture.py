@@ -14,7 +14,7 @@ from stickslip_ros.plots.regimes import REGIMES as LOOKS
 from stickslip_ros.plots.style import GREEN, ORANGE, SKY_BLUE
 from stickslip_ros.plots.units import Units
 
-LABELS = ["sticks and slips, amplitude 0.318 m: 68.8 % +- 0.7 %", "comes to rest: 31.2 %"]
+LABELS = ["stick-slip, amplitude 0.318 m: 68.8 % +- 0.7 %", "equilibrium: 31.2 %"]
 REGIMES = [Regime.STICK_SLIP, Regime.EQUILIBRIUM]
 
 

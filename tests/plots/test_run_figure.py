@@ -218,7 +218,7 @@ def test_without_a_drive_it_says_so() -> None:
     assert [text.get_text() for text in figure.axes[LAW].texts] == ["the drive is not known"]
     assert len(figure.axes[PORTRAIT].lines) == 5
     title = figure.get_suptitle()
-    assert title == "it\ncompletes no cycle\na $note"
+    assert title == "it\nno whole cycle\na $note"
     legend = {text.get_text() for text in figure.legends[0].get_texts()}
     assert "equilibrium" not in legend
 
@@ -368,5 +368,5 @@ def test_a_motion_that_runs_away_is_drawn(tmp_path: Path) -> None:
     meter = CycleMeter(20)
     meter.report_run_away()
     figure = run_figure(history, meter.measures(), PAPER, title="it")
-    assert figure.get_suptitle() == "it\nruns away"
+    assert figure.get_suptitle() == "it\nunbounded"
     save(figure, tmp_path / "away.png")

@@ -89,11 +89,11 @@ def test_a_diagram_names_axes_regimes_and_transitions(tmp_path: Path, over_speed
     picture = diagram(tmp_path / "diagram.svg", over_speed)
     for name in ("plant.belt_speed", "turning points of x", "amplitude"):
         assert f"{name} (dimensionless)" in picture
-    for text in ("sticks and slips", "comes to rest", "stick fraction", FREE):
+    for text in ("stick-slip", "equilibrium", "stick fraction", FREE):
         assert text in picture
     for text in ("Hopf point 0.48876", "onset of sticking 0.43947"):
         assert text in picture
-    for text in ("runs away", "no result", "carried", "hysteresis"):
+    for text in ("unbounded", "no result", "carried", "hysteresis"):
         assert text not in picture
 
 
@@ -130,7 +130,7 @@ def test_where_up_and_down_agree_nothing_is_shaded(tmp_path: Path) -> None:
 def test_points_without_turning_points_are_not_left_out(tmp_path: Path) -> None:
     overrides = (FREE, LINEAR, "plant.belt_speed=0.2")
     runs_away = swept("plant.friction.slope=0.7:0.9:3", overrides=overrides)
-    assert "runs away" in diagram(tmp_path / "away.svg", runs_away)
+    assert "unbounded" in diagram(tmp_path / "away.svg", runs_away)
     impossible = swept("plant.friction.static=0.1:0.3:3")
     assert "no result" in diagram(tmp_path / "impossible.svg", impossible)
 
@@ -149,7 +149,7 @@ def test_an_axis_may_be_logarithmic_below_zero(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("colour", "label"),
     [
-        ("regime", "sticks and slips"),
+        ("regime", "stick-slip"),
         ("amplitude", "amplitude (dimensionless)"),
         ("stick_fraction", "fraction"),
     ],

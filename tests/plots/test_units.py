@@ -36,7 +36,13 @@ def test_the_unit_drive_is_dimensionless() -> None:
         assert units.axis(name, unit, [largest]) == (1.0, f"{name} (dimensionless)")
     assert units.axis("stick fraction", "", [0.1])[1] == "stick fraction"
     assert units.text(0.43408, "m") == "0.4341"
+    assert units.texts([0.43408, 1e-6, None], "m") == ["0.4341", "1e-06", "-"]
     assert SI.text(4.3408e-4, "m") == "434.1 µm"
+
+
+def test_a_study_that_varies_one_of_its_scales_is_in_si() -> None:
+    assert Units.of(PAPER, ["plant.belt_speed"]).dimensionless
+    assert not Units.of(PAPER, ["plant.belt_speed", "plant.mass"]).dimensionless
 
 
 @pytest.mark.parametrize("other", ["mass", "stiffness", "normal_force"])

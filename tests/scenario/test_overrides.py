@@ -57,15 +57,23 @@ def test_an_override_does_not_mend_a_bad_file(tmp_path: Path) -> None:
     "override", ["plant.mass", "mass=1", "plant=1", "=", "=1", "", "plant.=1", "plant"]
 )
 def test_an_override_has_a_form(override: str) -> None:
-    assert refusal("paper", override) == f"-p {override}: must be NODE.PARAMETER=VALUE"
+    assert refusal("paper", override).startswith(f"-p {override}: must be NODE.PARAMETER=VALUE; ")
+
+
+def test_an_override_without_a_node_is_guessed() -> None:
+    assert refusal("paper", "belt_speed=1").endswith("; did you mean plant.belt_speed?")
 
 
 @pytest.mark.parametrize(
     ("override", "fragments"),
     [
-        ("motor.mass=1", ["-p motor.mass=1", "unknown node motor", "plant, washout_controller"]),
+        ("motor.mass=1", ["-p motor.mass=1", "unknown node motor", "washout_controller"]),
         ("plant.mass=[", ["-p plant.mass=[", "not YAML"]),
-        ("plant.masss=1", ["-p plant.masss=1", "plant: unknown parameter masss = 1", " mass,"]),
+        ("plant.masss=1", ["-p plant.masss=1: unknown parameter masss; did you mean plant.mass?"]),
+        ("plant.beltspeed=1", ["parameter beltspeed; did you mean plant.belt_speed?"]),
+        ("plant.static=1", ["parameter static; did you mean plant.friction.static?"]),
+        ("plant.linear_gain=1", ["; did you mean washout_controller.linear_gain?"]),
+        ("plant.colour=1", ["parameter colour; plant has autostart, belt_speed,"]),
         (
             "plant.mass=-1",
             ["-p plant.mass=-1", "plant: mass = -1", "must be a finite number above 0 kg"],
@@ -75,7 +83,7 @@ def test_an_override_has_a_form(override: str) -> None:
             ["-p plant.mass=", "plant: mass = None", "must be a finite number above 0 kg"],
         ),
         ("plant.mass=heavy", ["plant: mass = 'heavy'", "must be a finite number above 0 kg"]),
-        ("plant.friction=coulomb", ["plant: unknown parameter friction = 'coulomb'"]),
+        ("plant.friction=coulomb", ["unknown parameter friction; did you mean plant.friction."]),
         ("analyzer.window=2.5", ["analyzer: window = 2.5", "whole number at least 1"]),
     ],
 )

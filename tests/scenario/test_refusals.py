@@ -4,18 +4,30 @@ from pathlib import Path
 
 import pytest
 
+from stickslip_ros.scenario.files import load_scenario
 from tests.scenario.files import refusal, scenario_file, section
 
 
 def test_an_unknown_scenario() -> None:
-    message = refusal("papre")
-    assert "'papre'" in message
-    assert "feed_drive, paper" in message
+    assert "unknown scenario 'lathe'; known by name are feed_drive, paper; " in refusal("lathe")
+    assert refusal("papre") == "unknown scenario 'papre'; did you mean paper?"
 
 
 @pytest.mark.parametrize("path", ["nowhere.yaml", "./paper", "/nowhere/paper.yaml", "nowhere.yml"])
 def test_a_file_that_is_not_there(path: str) -> None:
-    assert refusal(path) == f"no scenario file {path}"
+    assert refusal(path).startswith(f"no scenario file {path}")
+
+
+@pytest.mark.parametrize("name", ["feed_drive", "feed_drive.yaml"])
+def test_what_ships_is_found_with_and_without_its_ending(name: str) -> None:
+    assert load_scenario(name).name == "feed_drive"
+
+
+def test_a_file_comes_before_what_ships(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("feed_drive.yaml").write_text(section("/**/plant", "{mass: 7}"), encoding="utf-8")
+    assert load_scenario("feed_drive.yaml").plant.mass == 7.0
+    assert load_scenario("feed_drive").plant.mass == 100.0
 
 
 def test_a_file_that_is_no_text(tmp_path: Path) -> None:
@@ -182,26 +194,27 @@ def test_values_that_do_not_go_together(
 
 
 @pytest.mark.parametrize(
-    ("parameters", "name", "value"),
+    ("parameters", "name", "value", "meant"),
     [
-        ("{masss: 1}", "masss", "1"),
-        ("{friction.statik: 0.4}", "friction.statik", "0.4"),
-        ("{friction: {statik: 0.4}}", "friction.statik", "0.4"),
-        ("{friction: 0.4}", "friction", "0.4"),
-        ("{mass: {kg: 1}}", "mass.kg", "1"),
-        ("{linear_gain: -1.0}", "linear_gain", "-1.0"),
-        ("{1: a}", "1", "'a'"),
+        ("{masss: 1}", "masss", "1", "did you mean mass?"),
+        ("{friction.statik: 0.4}", "friction.statik", "0.4", "did you mean friction.static?"),
+        ("{friction: {statik: 0.4}}", "friction.statik", "0.4", "did you mean friction.static?"),
+        ("{friction: 0.4}", "friction", "0.4", "did you mean friction."),
+        ("{mass: {kg: 1}}", "mass.kg", "1", "did you mean mass?"),
+        ("{linear_gain: -1.0}", "linear_gain", "-1.0", "known are autostart, belt_speed,"),
+        ("{1: a}", "1", "'a'", "known are autostart, belt_speed,"),
     ],
 )
 def test_a_parameter_that_is_not_known(
-    tmp_path: Path, parameters: str, name: str, value: str
+    tmp_path: Path, parameters: str, name: str, value: str, meant: str
 ) -> None:
     path = scenario_file(tmp_path, section("/**/plant", parameters))
     message = refusal(path)
-    assert message.startswith(f"{path}, plant: unknown parameter {name} = {value}; known are ")
-    assert "normal_force" in message
+    assert message.startswith(f"{path}, plant: unknown parameter {name} = {value}; {meant}")
 
 
 def test_a_parameter_of_no_node(tmp_path: Path) -> None:
     path = scenario_file(tmp_path, section("/**", "{masss: 1}"))
-    assert refusal(path) == f"{path}: section /**: no node has a parameter masss"
+    assert refusal(path) == (
+        f"{path}: section /**: no node has a parameter masss; did you mean mass?"
+    )

@@ -56,6 +56,11 @@ SHIPPED: dict[str, dict[str, dict[str, Any]]] = {
 
 
 @pytest.mark.parametrize("name", SHIPPED)
+def test_the_shipped_scenarios_are_complete(name: str) -> None:
+    assert load_scenario(name).left_to_defaults == []
+
+
+@pytest.mark.parametrize("name", SHIPPED)
 def test_numbers_of_the_shipped_scenarios(name: str) -> None:
     scenario = load_scenario(name)
     assert scenario.name == name

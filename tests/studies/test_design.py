@@ -1,5 +1,6 @@
 """Gains for a drive, and whether they do what they are said to."""
 
+import re
 from dataclasses import replace
 from functools import lru_cache
 from math import inf
@@ -221,6 +222,44 @@ def test_where_there_is_nothing_to_propose_it_says_why(task: Task, reason: str) 
     assert reason in (found.remark or "")
 
 
+@pytest.mark.parametrize(
+    "task",
+    [
+        replace(FEED, force_limit=135.0, force_delay=0.0015, belt_speeds=(0.02, 0.04)),
+        pytest.param(replace(FEED, force_limit=0.0), marks=pytest.mark.long),
+    ],
+)
+def test_the_force_that_it_says_would_do_does(task: Task) -> None:
+    hint = re.search(r"from a force limit of about (\S+) N on", designed(task).remark or "")
+    assert hint is not None
+    enough = float(hint[1])
+    assert enough > task.force_limit
+    assert design(replace(task, force_limit=enough)).controller is not None
+    assert design(replace(task, force_limit=0.95 * enough)).controller is None
+
+
+def test_next_to_no_margin_is_said() -> None:
+    late = designed(replace(FEED, force_delay=0.018, belt_speeds=(0.02, 0.04)))
+    assert late.margins is not None
+    assert late.margins.delay == pytest.approx(2e-4, rel=0.1)
+    assert "next to no margin: a further delay of 0.0001" in (late.remark or "")
+    assert "margin" not in (designed(FEED).remark or "")
+
+
+@pytest.mark.parametrize(
+    ("belt_speed", "said"),
+    [
+        (40.0, "40 m/s is 818.4 times the Hopf speed of 0.04888 m/s (belt speeds are in m/s)"),
+        (0.05, "(belt speeds are in m/s), with next to no margin"),
+    ],
+)
+def test_zero_gains_come_with_the_distance_from_the_hopf_speed(
+    belt_speed: float, said: str
+) -> None:
+    found = design(replace(FEED, belt_speeds=(belt_speed, belt_speed)))
+    assert (found.remark or "").endswith(said)
+
+
 def test_what_a_limited_force_cannot_do_is_said() -> None:
     drive = replace(FEED_DRIVE, friction=Linear(0.4, 4.5))
     found = designed(replace(FEED, drive=drive, force_limit=600.0))
@@ -243,6 +282,33 @@ def test_the_parameter_file_is_one(tmp_path: Path) -> None:
     assert found.parameter_file is not None
     read = load_scenario(scenario_file(tmp_path, found.parameter_file))
     assert read.washout_controller.as_washout() == found.controller
+
+
+@pytest.mark.parametrize(
+    ("belt_speed", "belt_speeds", "written"),
+    [
+        (0.04, None, 0.04),
+        (-0.04, None, -0.04),
+        (0.04, (0.01, 0.03), 0.03),
+        (-0.04, (0.05, 0.06), -0.05),
+    ],
+)
+def test_of_a_scenario_it_is_that_scenario_with_the_gains(
+    tmp_path: Path,
+    belt_speed: float,
+    belt_speeds: tuple[float, float] | None,
+    written: float,
+) -> None:
+    overrides = (f"plant.belt_speed={belt_speed}", "plant.mass=90", "analyzer.window=7")
+    scenario = load_scenario("feed_drive", overrides)
+    text = Design(Task.of(scenario, belt_speeds), WashoutParameters(3.0, -2.0, 0.0)).parameter_file
+    assert text is not None
+    read = load_scenario(scenario_file(tmp_path, text))
+    assert (read.plant.mass, read.plant.stiffness, read.analyzer.window) == (90.0, 1e6, 7)
+    assert read.plant.belt_speed == written
+    assert read.washout_controller.as_washout() == WashoutParameters(3.0, -2.0, 0.0)
+    names = {name for name, value in scenario.as_dict()["plant"].items() if value != []}
+    assert all(f'"{name}":' in text for name in names)
 
 
 @pytest.mark.parametrize("belt_speeds", [(2.0, 1.0), (0.0, 1.0), (-1.0, 1.0), (0.1, inf)])

@@ -29,7 +29,7 @@ TRACE: dict[str, Any] = {
     "xAxis": [
         _AXIS | {"gridIndex": 0, "axisLabel": {"show": False}},
         _AXIS | {"gridIndex": 1, "axisLabel": {"show": False}},
-        _AXIS | _CENTRED | {"gridIndex": 2, "name": "time before now (s)"},
+        _AXIS | _CENTRED | {"gridIndex": 2},
     ],
     "yAxis": [_AXIS | {"gridIndex": index} for index in range(3)],
     "series": [{"type": "line", "xAxisIndex": index, "yAxisIndex": index} for index in range(3)],

@@ -85,6 +85,7 @@ class Frames:
                 "end": frame.end,
                 "window": periods * period,
                 "labels": [label for _, label in axes],
+                "time_label": Units.of(drive).label("time before now", "s"),
                 "counts": {name: len(line[0]) for name, line in lines.items()},
                 "equilibrium": drive.equilibrium_position / length if drive and at_rest else None,
                 "belt_speed": float(frame.belt_velocity.y[-1]) / speed,

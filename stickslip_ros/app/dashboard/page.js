@@ -101,7 +101,7 @@ function drawHeld(context, scale, { x, y }, colour) {
   context.stroke();
 }
 
-function drawMotion({ lines, labels, window: width, end, equilibrium, belt_speed }) {
+function drawMotion({ lines, labels, time_label, window: width, end, equilibrium, belt_speed }) {
   const last = page.motion;
   const another = last && (String(last.labels) !== String(labels) || end < last.end);
   if (another) page.fit(); // other units, or another run
@@ -110,7 +110,7 @@ function drawMotion({ lines, labels, window: width, end, equilibrium, belt_speed
   const speeds = range("velocity", [velocity, belt]);
   const positions = range("position", [position]);
   setChanged("trace", {
-    xAxis: [0, 1, 2].map(() => ({ min: -width, max: 0 })),
+    xAxis: ["", "", time_label].map((name) => ({ name, min: -width, max: 0 })),
     yAxis: [
       { name: displacement, ...positions },
       { name: speed, ...speeds },

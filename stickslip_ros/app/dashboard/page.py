@@ -13,12 +13,12 @@ from nicegui import ui
 
 from stickslip_ros.app.dashboard.charts import CYCLES, PORTRAIT, TRACE
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
-from stickslip_ros.app.output import quantities
 from stickslip_ros.nodes.observer import ABSENT, SILENT, Answer, Health, ObserverNode
 from stickslip_ros.nodes.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.physics.measures import Regime
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.style import BLUE, GREY, ORANGE
+from stickslip_ros.plots.units import Units
 from stickslip_ros.scenario.parameters import NODE_PARAMETERS, Fixed, known_parameters
 
 _CONTROLLER = "washout_controller"
@@ -162,20 +162,25 @@ class _Page:
 
     def _refresh(self) -> None:
         observer, drive = self._observer, self._frames.drive
+        units = Units.of(drive)
         for topic, label in self._measures.items():
             values = observer.cycles[topic]
             unit = {AMPLITUDE: "m", FREQUENCY: "Hz"}.get(topic, "")
             largest = max(values, default=0.0)
-            label.set_text(quantities([values[-1]], unit, largest=largest)[0] if values else "-")
+            label.set_text(units.text(values[-1] if values else None, unit, largest=largest))
         self._show_regime(observer.health["analyzer"])
         self._trouble.set_text(", ".join(self._missing()))
         scales = (drive.normal_force, drive.natural_period) if drive is not None else None
         if scales is not None and scales != self._tap_scales:
             self._tap_scales = scales
-            for field, scale in zip((self._tap_force, self._tap_time), scales, strict=True):
+            for field, scale, label in (
+                (self._tap_force, scales[0], units.label("force", "N")),
+                (self._tap_time, scales[1], units.label("for", "s")),
+            ):
                 field.value = float(f"{_TAP_PART * scale:.2g}")
+                field.props["label"] = label
         for field in self._fields:
-            field.refresh()
+            field.refresh(units)
         self._show_control(observer.health[_CONTROLLER])
         rows = [_row(node, health) for node, health in sorted(observer.health.items())]
         if rows != self._health.rows:
@@ -257,9 +262,9 @@ class _ParameterField:
             ui.button("Set", on_click=self._apply).props("flat dense")
         self._refusal = _refusal()
 
-    def refresh(self) -> None:
+    def refresh(self, units: Units) -> None:
         """Show the value in force."""
-        hint = self._in_force()
+        hint = self._in_force(units)
         if hint != self._hint:
             self._hint = hint
             self._field.props["hint"] = hint
@@ -278,15 +283,15 @@ class _ParameterField:
         node, _, name = full_name.partition(".")
         await _report(self._observer.set_parameter(node, name, value), self._refusal)
 
-    def _in_force(self) -> str:
+    def _in_force(self, units: Units) -> str:
         full_name = self._name_of()
         if full_name is None:
             return ""
         node, _, name = full_name.partition(".")
         value = self._observer.parameters[node].get(name)
-        unit = known_parameters(NODE_PARAMETERS[node])[name].unit or ""
+        unit = units.of_unit(known_parameters(NODE_PARAMETERS[node])[name].unit or "")
         number = f"{value:g}" if isinstance(value, float) else value
-        return "not known" if value is None else f"now {number} {unit}"
+        return "not known" if value is None else f"now {number} {unit}".rstrip()
 
 
 async def _report(answer: Answer, refusal: ui.label) -> None:

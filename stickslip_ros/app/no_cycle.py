@@ -1,0 +1,26 @@
+"""Why there is nothing to measure in a motion."""
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.plots.units import Units
+from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
+
+_FEW_PERIODS = 3.0
+_FAR = 10.0
+"""Ratio of belt speed and Hopf speed from which on another unit may have been meant."""
+
+
+def why_no_cycle(regime: str | None, duration: float, drive: Drive | None) -> str | None:
+    """Return why a motion over `duration` (s) has no regime; None if it has one."""
+    if regime is not None:
+        return None
+    units = Units.of(drive)
+    said = f"no whole cycle was completed in {duration:g} {units.of_unit('s')}".rstrip()
+    if drive is None:
+        return said
+    period = drive.natural_period
+    if duration < _FEW_PERIODS * period:
+        return f"{said}: the natural period is {units.text(period, 's')}, so it takes longer"
+    ratio = hopf_ratio(drive)
+    if ratio is not None and not 1.0 / _FAR < ratio < _FAR:
+        return f"{said}: the slide has not turned back, nor come to rest; {hopf_distance(drive)}"
+    return f"{said}: the slide has not turned back twice, nor come to rest; it may take longer"

@@ -1,0 +1,24 @@
+"""How far a belt speed is from the Hopf speed, told to who may have meant another unit."""
+
+from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.theory.hopf import hopf_points
+
+
+def hopf_ratio(drive: Drive) -> float | None:
+    """Return the belt speed in the nearest Hopf speed; None where the drive has none, or rests."""
+    speeds = [point.belt_speed for point in hopf_points(drive)]
+    speed = abs(drive.belt_speed)
+    if not speeds or speed == 0.0:
+        return None
+    return min((speed / each for each in speeds), key=lambda ratio: max(ratio, 1.0 / ratio))
+
+
+def hopf_distance(drive: Drive) -> str:
+    """Return a clause on the belt speed and the nearest Hopf speed; empty where there is none."""
+    ratio = hopf_ratio(drive)
+    if ratio is None:
+        return ""
+    unit = "" if drive.is_dimensionless else " m/s"
+    speed = abs(drive.belt_speed)
+    clause = f"{speed:.4g}{unit} is {ratio:.4g} times the Hopf speed of {speed / ratio:.4g}{unit}"
+    return clause if drive.is_dimensionless else f"{clause} (belt speeds are in m/s)"

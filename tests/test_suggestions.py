@@ -1,0 +1,35 @@
+"""What may have been meant by a name."""
+
+import pytest
+
+from stickslip_ros.suggestions import did_you_mean
+
+KNOWN = ("plant.mass", "plant.rate", "plant.friction.static", "washout_controller.linear_gain")
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("plant.maas", "plant.mass"),
+        ("PLANT.MASS", "plant.mass"),
+        ("plant.static", "plant.friction.static"),
+        ("motor.mass", "plant.mass"),
+        ("washout_controller.gain", "washout_controller.linear_gain"),
+        ("plant.linear_gain", "washout_controller.linear_gain"),
+    ],
+)
+def test_a_close_name_is_meant(name: str, meant: str) -> None:
+    assert did_you_mean(name, KNOWN) == f"did you mean {meant}?"
+
+
+def test_several_may_be_meant() -> None:
+    assert did_you_mean("stop", ["a.stop", "b.stop"]) == "did you mean a.stop or b.stop?"
+
+
+@pytest.mark.parametrize("name", ["", "plant.", "plant.colour", "x" * 1_000_000])
+def test_without_a_close_one_all_are_told(name: str) -> None:
+    assert did_you_mean(name, KNOWN) == (
+        "known are plant.friction.static, plant.mass, plant.rate, washout_controller.linear_gain"
+    )
+    assert did_you_mean(name, KNOWN, "see there") == "see there"
+    assert did_you_mean(name, [], "see there") == "see there"
