@@ -219,7 +219,11 @@ def _sticking(drive: Drive, notes: Notes) -> Section:
         if reason is not None:
             notes[f"sticking.{name}"] = reason
     lowest, highest = onset.followed
-    if len(onset.ranges) > 1:
+    if not onset.ranges:
+        notes["sticking.speed_ranges"] = (
+            f"it sticks at no belt speed from {lowest:.4g} to {highest:.4g} m/s"
+        )
+    elif len(onset.ranges) > 1:
         notes["sticking.speed_ranges"] = (
             f"between them the slide overtakes the belt; looked for from {lowest:.4g} to "
             f"{highest:.4g} m/s"

@@ -8,6 +8,7 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
+from rclpy.logging import LoggingSeverity, set_logger_level
 
 from stickslip_ros.app.main import main
 from tests.nodes.conftest import domain, process_environment  # noqa: F401 - fixtures used here
@@ -32,6 +33,7 @@ def stickslip(
         environment = mock.patch.dict(os.environ, process_environment, clear=True)
         with environment, chdir(tmp_path), pytest.raises(SystemExit) as ended:
             main(arguments)
+        set_logger_level("", LoggingSeverity.INFO)  # a run has raised it for the whole process
         return subprocess.CompletedProcess(arguments, ended.value.code, *capfd.readouterr())
 
     return run

@@ -134,4 +134,4 @@ def test_rounding_reads_zero(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_transient_says_that_it_is_not_steady(capsys: pytest.CaptureFixture[str]) -> None:
     print_figures("", {"": {"regime": "stick_slip", "steady": False, "trend": "decaying"}})
-    assert capsys.readouterr().out == "regime  stick_slip, not steady: decaying\n"
+    assert capsys.readouterr().out == "regime  stick-slip, not steady: decaying\n"

@@ -164,6 +164,6 @@ def test_what_cannot_be_is_refused_in_a_line(command, tmp_path, monkeypatch, arg
 
 def test_a_run_that_has_come_to_rest_does_not_read_as_a_regime(command):
     _, out, _ = command("report", REFERENCE)
-    assert "stick_slip, not steady: decaying\n" in out
+    assert "stick-slip, not steady: decaying\n" in out
     found = json.loads(command("report", REFERENCE, "--json")[1])
     assert (found["steady"], found["trend"]) == (False, "decaying")
