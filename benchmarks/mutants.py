@@ -52,6 +52,8 @@ def main() -> int:
     arguments = parser.parse_args()
     everything = list(chain.from_iterable(map(mutants_of, sorted(PHYSICS.rglob("*.py")))))
     chosen = random.Random(arguments.seed).sample(everything, arguments.count)
+    if is_caught(Mutant(chosen[0].file, 0, 0, 0, "", "")):
+        parser.error("the tests fail without a change: what they would catch says nothing")
     caught = 0
     with ThreadPoolExecutor(arguments.workers) as pool:
         for mutant, noticed in zip(chosen, pool.map(is_caught, chosen), strict=True):
