@@ -2,8 +2,9 @@
 
 Each mutant is a copy of the checkout with one change below `stickslip_ros/physics`: another sign,
 operator, comparison, number or condition. Which ones is drawn by the seed. Against each the tests
-that start no process are run, those of the physics first, until one fails. A mutant that survives
-is printed as it stands; some are equivalent, up to rounding, to what was there.
+that start neither a process nor a node are run, those of the physics first, until one fails. What
+is printed is the mutant and the test that caught it; some of those that survive are equivalent, up
+to rounding, to what was there.
 """
 
 import argparse
@@ -22,7 +23,7 @@ from typing import NamedTuple
 
 CHECKOUT = Path(__file__).parents[1]
 PHYSICS = Path("stickslip_ros/physics")
-TIERS = (("tests/physics",), ("tests/studies", "tests/testing", "tests/nodes", "tests/app"))
+TIERS = (("tests/physics",), ("tests/studies", "tests/testing", "tests/bags", "tests/app"))
 TIMEOUT = 600.0
 
 OPERATORS = {"+": "-", "-": "+", "*": "/", "/": "*", "<": ">=", ">": "<=", "<=": ">", ">=": "<"}
@@ -52,13 +53,13 @@ def main() -> int:
     arguments = parser.parse_args()
     everything = list(chain.from_iterable(map(mutants_of, sorted(PHYSICS.rglob("*.py")))))
     chosen = random.Random(arguments.seed).sample(everything, arguments.count)
-    if is_caught(Mutant(chosen[0].file, 0, 0, 0, "", "")):
-        parser.error("the tests fail without a change: what they would catch says nothing")
+    if failure := first_failure(Mutant(chosen[0].file, 0, 0, 0, "", "")):
+        parser.error(f"without a change {failure}: what the tests catch would say nothing")
     caught = 0
     with ThreadPoolExecutor(arguments.workers) as pool:
-        for mutant, noticed in zip(chosen, pool.map(is_caught, chosen), strict=True):
-            print(f"{'caught  ' if noticed else 'SURVIVES'} {mutant}", flush=True)
-            caught += noticed
+        for mutant, failure in zip(chosen, pool.map(first_failure, chosen), strict=True):
+            print(f"{'caught  ' if failure else 'SURVIVES'} {mutant}  {failure}", flush=True)
+            caught += bool(failure)
     print(f"{caught} of {len(chosen)} caught")
     return 0
 
@@ -102,8 +103,8 @@ def mutants_of(file: Path) -> Generator[Mutant]:
                 pass
 
 
-def is_caught(mutant: Mutant) -> bool:
-    """Return whether a test fails for the mutant."""
+def first_failure(mutant: Mutant) -> str:
+    """Return which test fails for the mutant, and how; empty if none does."""
     with tempfile.TemporaryDirectory() as directory:
         copy = Path(directory) / "checkout"
         listing = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
@@ -114,11 +115,11 @@ def is_caught(mutant: Mutant) -> bool:
         text = (copy / mutant.file).read_bytes()
         changed = text[: mutant.start] + mutant.after.encode() + text[mutant.end :]
         (copy / mutant.file).write_bytes(changed)
-        return any(fails(copy, tests) for tests in TIERS)
+        return next(filter(None, (failure_of(copy, tests) for tests in TIERS)), "")
 
 
-def fails(copy: Path, tests: Sequence[str]) -> bool:
-    """Return whether the tests of a copy fail, or do not end."""
+def failure_of(copy: Path, tests: Sequence[str]) -> str:
+    """Return which of the tests of a copy fails first, or that they do not end."""
     pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-m", "not process and not long"]
     environment = os.environ | {"PYTHONPATH": str(copy), "CI": "true"}
     try:
@@ -126,8 +127,11 @@ def fails(copy: Path, tests: Sequence[str]) -> bool:
             [*pytest, *tests], cwd=copy, env=environment, timeout=TIMEOUT, capture_output=True
         )
     except subprocess.TimeoutExpired:
-        return True
-    return done.returncode != 0
+        return f"not done after {TIMEOUT:g} s"
+    if done.returncode == 0:
+        return ""
+    lines = done.stdout.decode().splitlines()
+    return next((line for line in lines if line.startswith(("FAILED", "ERROR"))), "no test ran")
 
 
 if __name__ == "__main__":
