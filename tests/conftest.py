@@ -9,6 +9,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -31,6 +32,8 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 STARTING_FIXTURES = {"cluster", "processes", "recorded", "start", "start_stickslip"}
 
+MIDDLEWARE = {Path(__file__).parent / floor for floor in ("nodes", "bags")}
+
 _STARTS = {"os.fork", "os.forkpty", "os.posix_spawn", "os.system", "subprocess.Popen"}
 _FOUND_BY_LIBRARIES = {"fc-list", "ldconfig", "/sbin/ldconfig"}
 """Programs that libraries ask about the machine, once."""
@@ -52,6 +55,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if STARTING_FIXTURES.intersection(getattr(item, "fixturenames", ())):
             item.add_marker("process")
+        if item.path.parent in MIDDLEWARE:
+            item.add_marker("middleware")
 
 
 def pytest_runtest_setup() -> None:
