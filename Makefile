@@ -12,7 +12,7 @@ PYTHON ?= $(shell for python in python3.12 python3.13 python3.11 python3; do \
 PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check
 
 # A test that hangs fails by itself, with its name. What was skipped is listed at the end, and why.
-# Three at a time on two cores: some of it is waiting.
+# Three at a time on two cores: some of it is waiting. Of what takes long, more is.
 PYTEST := $(BIN)/python -m pytest --timeout=300 --numprocesses=3 --dist=worksteal -rs
 
 # What Python compiles is kept, even if the environment says not to: the tests start hundreds.
@@ -64,7 +64,7 @@ test: setup
 
 # Besides, what takes long, and what needs a browser, a network of its own or new environments.
 test-all: setup
-	$(PYTEST) --hypothesis-profile=thorough $(PYTEST_OPTIONS)
+	$(PYTEST) --numprocesses=4 --hypothesis-profile=thorough $(PYTEST_OPTIONS)
 
 lint: setup
 	$(BIN)/ruff check

@@ -1,4 +1,4 @@
-"""How many examples hypothesis tries, and in which tier a test is.
+"""How many examples hypothesis tries, in which tier a test is, and which worker begins with it.
 
 A test that takes a fixture which starts a process is marked `process` by that; one that starts a
 process in another way has to say so, and fails where it does not.
@@ -9,6 +9,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -31,6 +32,8 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 STARTING_FIXTURES = {"cluster", "processes", "recorded", "start", "start_stickslip"}
 
+MIDDLEWARE = {Path(__file__).parent / floor for floor in ("nodes", "bags")}
+
 _STARTS = {"os.fork", "os.forkpty", "os.posix_spawn", "os.system", "subprocess.Popen"}
 _FOUND_BY_LIBRARIES = {"fc-list", "ldconfig", "/sbin/ldconfig"}
 """Programs that libraries ask about the machine, once."""
@@ -47,11 +50,36 @@ sys.addaudithook(_note_start)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests whose fixtures start processes, and begin with those that take minutes."""
-    items.sort(key=lambda item: ("test_pages" not in item.nodeid, "long" not in item.keywords))
+    """Mark the tests whose fixtures start processes, and deal them to the workers."""
+    items[:] = dealt(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
     for item in items:
         if STARTING_FIXTURES.intersection(getattr(item, "fixturenames", ())):
             item.add_marker("process")
+        if item.path.parent in MIDDLEWARE:
+            item.add_marker("middleware")
+
+
+def dealt(items: list[pytest.Item], workers: int) -> list[pytest.Item]:
+    """Let every worker begin with long tests: of a list, the first gets the first share, and so on.
+
+    A page of the docs takes a minute; of other modules one worker gets all long tests, since they
+    may share what takes long.
+    """
+    others = [item for item in items if "long" not in item.keywords]
+    units: dict[object, list[pytest.Item]] = {}
+    for item in items:
+        if "long" in item.keywords:
+            is_page = item.path.name == "test_pages.py"
+            units.setdefault(item if is_page else item.path, []).append(item)
+    first = sorted(units.values(), key=lambda unit: "test_pages" not in unit[0].nodeid)
+    order: list[pytest.Item] = []
+    for number in range(workers):
+        share = (len(items) - len(order)) // (workers - number)
+        begin = [item for unit in first[number::workers] for item in unit]
+        rest = max(0, share - len(begin))
+        order += begin + others[:rest]
+        others = others[rest:]
+    return order + others
 
 
 def pytest_runtest_setup() -> None:

@@ -31,7 +31,7 @@ from rclpy.qos import QoSProfile, QoSReliabilityPolicy, qos_profile_sensor_data
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-_PATIENCE = 20.0
+_PATIENCE = 60.0
 """How long to wait, s, for what the graph should hold."""
 
 _SETTLED = 1.0

@@ -22,6 +22,12 @@ def domain() -> Iterator[int]:
 
 
 @pytest.fixture
+def often_diagnosed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let nodes of this process publish their diagnostics ten times a second."""
+    monkeypatch.setattr("stickslip_ros.nodes.managed._DIAGNOSTICS_PERIOD", 0.1)
+
+
+@pytest.fixture
 def graph(domain: int) -> Iterator[Graph]:
     graph = Graph(domain)
     yield graph

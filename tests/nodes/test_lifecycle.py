@@ -18,7 +18,6 @@ from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
 from tests.nodes.processes import Processes
 
-ROUNDS = 10
 ROUND = {
     Transition.TRANSITION_DEACTIVATE: "inactive",
     Transition.TRANSITION_CLEANUP: "unconfigured",
@@ -43,8 +42,8 @@ def go_round(graph: Graph, node: str) -> None:
     """Deactivate, clean up, configure and activate a node, as `ros2 lifecycle` does."""
     for transition, state in ROUND.items():
         request = ChangeState.Request(transition=Transition(id=transition))
-        # Who is waited for may not be there yet.
-        while state_of(graph, node) != state:
+        graph.call(ChangeState, f"/test/{node}/change_state", request)
+        while state_of(graph, node) != state:  # who is waited for may not be there yet
             graph.call(ChangeState, f"/test/{node}/change_state", request)
 
 
@@ -66,9 +65,10 @@ def bring(request: pytest.FixtureRequest, graph: Graph) -> Callable[..., None]:
     return processes.node
 
 
+@pytest.mark.parametrize("rounds", [2, pytest.param(10, marks=pytest.mark.long)])
 @pytest.mark.parametrize("pace", ["lockstep", "realtime"])
 def test_rounds_of_the_life_cycle_leave_one_of_each_and_time_goes_on(
-    graph: Graph, tmp_path: Path, bring: Callable[..., None], pace: str
+    graph: Graph, tmp_path: Path, bring: Callable[..., None], pace: str, rounds: int
 ) -> None:
     bring("analyzer", bag=str(tmp_path / "bag"))
     bring("washout_controller", wait_for=["analyzer"])
@@ -77,7 +77,7 @@ def test_rounds_of_the_life_cycle_leave_one_of_each_and_time_goes_on(
     for node in NODES:  # they start by themselves: a round before that is over would meet it
         while state_of(graph, node) != "active":
             graph.run_for(0.05)
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         for node in ("washout_controller", "plant"):
             go_round(graph, node)
             graph.wait_until(lambda: ends(graph) == ENDS, f"one of each again: {ends(graph)}")
@@ -87,7 +87,7 @@ def test_rounds_of_the_life_cycle_leave_one_of_each_and_time_goes_on(
     with Recording(tmp_path / "bag") as recording:
         assert recording.complete
         states, forces = recording.joint_states.stamp, recording.control_forces.stamp
-    assert len(forces) > ROUNDS
+    assert len(forces) > rounds
     assert (np.diff(states) > 0).all()
     assert (np.diff(forces) > 0).all()
 

@@ -20,6 +20,8 @@ from stickslip_ros.nodes.topics import (
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
 
+pytestmark = pytest.mark.usefixtures("often_diagnosed")
+
 
 class Shown:
     """Collects what an observer passes on."""
@@ -205,8 +207,9 @@ def test_a_node_that_is_not_there_does_not_answer(
 
 
 def test_a_node_that_falls_silent_and_comes_back_is_shown_as_that(
-    graph: Graph, observer: ObserverNode
+    graph: Graph, observer: ObserverNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(observer_module, "SILENCE", 1.0)
     plant = graph.add(PlantNode, pace="realtime", expects_control=False)
     graph.wait_until(lambda: observer.health["plant"].state == "active", "the plant")
     graph.executor.remove_node(plant)

@@ -44,7 +44,9 @@ def test_without_a_controller_no_force_is_late_then_or_later() -> None:
     assert punctuality.look(3000, 1500, 0, controlled=True) != ""
 
 
-def test_a_plant_whose_controller_answers_every_third_sample_warns(graph: Graph) -> None:
+def test_a_plant_whose_controller_answers_every_third_sample_warns(
+    graph: Graph, often_diagnosed: None
+) -> None:
     health: list[DiagnosticArray] = graph.listen(DIAGNOSTICS)
     force = graph.observer.create_publisher(
         CONTROL_FORCE.type, f"/test/{CONTROL_FORCE.name}", CONTROL_FORCE.qos()
@@ -58,7 +60,7 @@ def test_a_plant_whose_controller_answers_every_third_sample_warns(graph: Graph)
     graph.observer.create_subscription(
         JOINT_STATES.type, f"/test/{JOINT_STATES.name}", answer, JOINT_STATES.qos(), raw=True
     )
-    graph.add(PlantNode, pace="realtime", rate=100.0, wait_for=["observer"])
+    graph.add(PlantNode, pace="realtime", rate=500.0, wait_for=["observer"])
 
     def warnings() -> list[str]:
         return [

@@ -1,9 +1,13 @@
+import os
 import subprocess
 import sys
 import zipfile
 from email.parser import Parser
+from importlib import metadata
+from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 pytestmark = pytest.mark.long
 
@@ -34,6 +38,11 @@ def content(wheel):
 
 
 @pytest.fixture
+def header(content, stem):
+    return Parser().parsestr(content.read(f"{stem}.dist-info/METADATA").decode())
+
+
+@pytest.fixture
 def stem(wheel):
     """What the wheel's own folders begin with: name and version."""
     return "-".join(wheel.name.split("-")[:2])
@@ -60,32 +69,64 @@ def test_holds_what_ros_looks_for(content, stem, checkout, executables):
         assert content.getinfo(f"{data}/{stub}").external_attr >> 16 & 0o111 == 0o111
 
 
-def test_names_its_extras(content, stem):
-    metadata = Parser().parsestr(content.read(f"{stem}.dist-info/METADATA").decode())
-    assert set(metadata.get_all("Provides-Extra")) == {"dashboard", "ros", "dask", "test", "dev"}
-    assert metadata["Requires-Python"] == ">=3.11"
+def test_names_its_extras(header):
+    assert set(header.get_all("Provides-Extra")) == {"dashboard", "ros", "dask", "test", "dev"}
+    assert header["Requires-Python"] == ">=3.11"
+
+
+def distributions(requirements, extras):
+    """What pip would install for these, of what is installed here."""
+    found = {}
+    waiting = [(requirements, extras)]
+    while waiting:
+        requirements, extras = waiting.pop()
+        for requirement in map(Requirement, requirements):
+            marker = requirement.marker
+            key = requirement.name, frozenset(requirement.extras)
+            if key not in found and (
+                marker is None or any(marker.evaluate({"extra": extra}) for extra in ("", *extras))
+            ):
+                found[key] = metadata.distribution(requirement.name)
+                waiting.append((found[key].requires or [], requirement.extras))
+    return found.values()
+
+
+def link(distribution, prefix):
+    """Make what is installed here be installed there, too."""
+    for file in distribution.files:
+        # A directory of site-packages belongs to one distribution.
+        entry = file if file.parts[0] == ".." else file.parts[0]
+        path = Path(os.path.normpath(distribution.locate_file(entry))).relative_to(sys.prefix)
+        there = prefix / path
+        used = path.parts[0] in ("lib", "share") and path.name != "__pycache__"
+        if used and not there.is_symlink():
+            there.parent.mkdir(parents=True, exist_ok=True)
+            there.symlink_to(sys.prefix / path)
 
 
 def test_runs_in_a_new_environment(
-    wheel, tmp_path, environment, executables, find_executables, check_executable
+    wheel, header, tmp_path, environment, executables, find_executables, check_executable
 ):
     """With nothing but what it asks for: no tool of ours stands in for a missing dependency."""
     prefix = tmp_path / "prefix"
-    subprocess.run([sys.executable, "-m", "venv", prefix], env=environment, check=True)
+    bare = [sys.executable, "-m", "venv", "--without-pip", prefix]
+    subprocess.run(bare, env=environment, check=True)
     python = prefix / "bin" / "python"
-    pip = [python, "-m", "pip", "install", "--quiet"]
-    subprocess.run([*pip, f"{wheel}[ros]"], env=environment, check=True)
+    pip = [sys.executable, "-m", "pip", "--python", python]
 
-    def import_all_but(*left_out):
+    def import_with(*extras, left_out=()):
+        for distribution in distributions(header.get_all("Requires-Dist"), extras):
+            link(distribution, prefix)
+        subprocess.run([*pip, "check"], env=environment, check=True)
         program = IMPORT_ALL.format(left_out=("stickslip_ros.pytest_plugin", *left_out))
         subprocess.run([python, "-c", program], cwd=tmp_path, env=environment, check=True)
 
-    import_all_but("stickslip_ros.app.dashboard.")
+    subprocess.run([*pip, "install", "--quiet", "--no-deps", wheel], env=environment, check=True)
+    import_with("ros", left_out=["stickslip_ros.app.dashboard."])
 
     found = find_executables(prefix)
     assert found.keys() == executables
     for executable in found.values():
         check_executable(executable, environment | {"AMENT_PREFIX_PATH": str(prefix)})
 
-    subprocess.run([*pip, f"{wheel}[ros,dashboard]"], env=environment, check=True)
-    import_all_but()
+    import_with("ros", "dashboard")
