@@ -55,7 +55,7 @@ def test_it_says_how_to_run_what_it_has_written(stickslip: Run) -> None:
 
 
 def test_no_proposal_is_a_result_with_a_reason(stickslip: Run, tmp_path: Path) -> None:
-    limit = ("-p", "washout_controller.force_limit=5")
+    limit = ("-p", "washout_controller.force_limit=5", "--belt-speed", "0.04")
     done = stickslip("design", "feed_drive", *limit, "--out", "gains.yaml", "--plot", "map.png")
     assert done.returncode == 0, done.stderr
     assert "force limit of 5 N is too small" in done.stdout
