@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from stickslip_ros.physics.simulation import Progress
+from stickslip_ros.studies.design import Design, Task, design
 from tests.app.conftest import Run
 
 LIMIT = ("-p", "washout_controller.force_limit=200")
@@ -86,6 +88,8 @@ def test_no_proposal_is_a_result_with_a_reason(stickslip: Run, tmp_path: Path) -
         (("--plot", "map.txt"), ("--plot map.txt", ".png")),
         (("--plot", "nosuch/map.png"), ("nosuch",)),
         (("--out", "nosuch/gains.yaml"), ("nosuch",)),
+        (("--plot", "/proc/map.png"), ("--plot /proc/map.png: cannot be written",)),
+        (("--out", "/proc/gains.yaml"), ("--out /proc/gains.yaml: cannot be written",)),
     ],
 )
 def test_bad_input_is_refused_in_one_line(
@@ -101,12 +105,22 @@ def test_bad_input_is_refused_in_one_line(
 
 
 @pytest.mark.parametrize(("option", "file"), [("--out", "x.yaml"), ("--plot", "x.png")])
-def test_what_cannot_be_written_costs_no_result(stickslip: Run, option: str, file: str) -> None:
-    done = stickslip("design", "feed_drive", "--json", option, f"/proc/{file}")
+def test_what_cannot_be_written_in_the_end_costs_no_result(
+    stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str, file: str
+) -> None:
+    (tmp_path / "below").mkdir()
+
+    def design_while_the_directory_goes(task: Task, progress: Progress) -> Design:
+        (tmp_path / "below").rmdir()
+        return design(task, progress)
+
+    monkeypatch.setattr("stickslip_ros.app.design.design", design_while_the_directory_goes)
+    where = ("--belt-speed", "0.04")
+    done = stickslip("design", "feed_drive", *where, "--json", option, f"below/{file}")
     assert done.returncode == 2
     assert json.loads(done.stdout)["linear_gain"] < 0.0
     (line,) = done.stderr.splitlines()
-    assert f"{option} /proc/{file}: cannot be written" in line
+    assert f"{option} below/{file}: cannot be written" in line
 
 
 def test_without_vibration_nothing_is_simulated(stickslip: Run) -> None:
