@@ -124,8 +124,11 @@ def test_the_table_says_why(stickslip: Run) -> None:
     assert "nan" not in done.stdout
 
 
-def test_coexisting_cycles_are_told_apart(stickslip: Run) -> None:
-    law = ("-p", "plant.friction.law=exponential", "-p", "plant.friction.decay_speed=0.05")
+def test_coexisting_cycles_are_told_apart(stickslip: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    overrides = ("plant.friction.law=exponential", "plant.friction.decay_speed=0.05")
+    law = [text for override in overrides for text in ("-p", override)]
+    theory = theory_of(load_scenario("paper", overrides))
+    monkeypatch.setattr("stickslip_ros.app.stability.stability", lambda _: theory)
     found = stability(stickslip, "paper", *law)
     assert found["open_loop"]["stable"] is True
     unstable, stable = found["open_loop"]["limit_cycles"]
