@@ -6,6 +6,7 @@ from collections.abc import Collection, Generator
 from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
@@ -79,8 +80,18 @@ def check_picture(path: Path) -> None:
     """Refuse what no picture can be written to, before anything is computed."""
     if path.suffix.lower() not in _PICTURES:
         raise InvalidInputError(f"--plot {path}: must end in one of {', '.join(_PICTURES)}")
+    check_writable("--plot", path)
+
+
+def check_writable(option: str, path: Path) -> None:
+    """Refuse `path`, given with `option`, where no file can be written, and leave it as it is."""
     if not path.absolute().parent.is_dir():
-        raise InvalidInputError(f"--plot {path}: there is no directory {path.parent}")
+        raise InvalidInputError(f"{option} {path}: there is no directory {path.parent}")
+    with writing(option, path):
+        if path.exists():
+            path.open("ab").close()
+        else:
+            TemporaryFile(dir=path.absolute().parent).close()
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from stickslip_ros.app.arguments import (
     add_plot,
     add_scenario,
     check_picture,
+    check_writable,
     made_of,
     scenario_of,
     writing,
@@ -120,8 +121,7 @@ def _belt_speeds(text: str | None) -> tuple[float, float] | None:
 def _refuse_unless_new(path: Path) -> None:
     if path.exists():
         raise InvalidInputError(f"--out {path}: exists already, and is left as it is")
-    if not path.absolute().parent.is_dir():
-        raise InvalidInputError(f"--out {path}: there is no directory {path.parent}")
+    check_writable("--out", path)
 
 
 def _write(path: Path, found: Design) -> None:

@@ -111,8 +111,9 @@ def run(arguments: argparse.Namespace) -> int:
     scenario = scenario_of(arguments)
     if arguments.plot is not None:
         check_picture(arguments.plot)
-        if not scenario.plant.expects_control:
-            raise InvalidInputError(f"--plot {arguments.plot}: nothing to draw: {_NO_CONTROL}")
+        reason = _why_no_map(scenario)
+        if reason is not None:
+            raise InvalidInputError(f"--plot {arguments.plot}: there is nothing to draw: {reason}")
     with progress_bar(f"theory of {scenario.name}", None):
         found, notes = stability(scenario)
     if arguments.plot is not None:
@@ -364,6 +365,13 @@ def _cycle(cycle: LimitCycle) -> Section:
     }
 
 
+def _why_no_map(scenario: Scenario) -> str | None:
+    plant = scenario.plant
+    if not plant.expects_control:
+        return _NO_CONTROL
+    return why_no_linear_loop(plant.as_drive(), plant.rate, plant.force_delay)
+
+
 def _draw(path: Path, scenario: Scenario) -> None:
     # Half as long again to import as everything else.
     from stickslip_ros.plots.stability_map import draw_stability_map
@@ -371,9 +379,7 @@ def _draw(path: Path, scenario: Scenario) -> None:
     plant = scenario.plant
     drive, gains = plant.as_drive(), scenario.washout_controller.as_washout().gains
     loop = LinearSampledLoop.of(drive, plant.rate, plant.force_delay)
-    if loop is None:
-        reason = why_no_linear_loop(drive, plant.rate, plant.force_delay)
-        raise InvalidInputError(f"--plot {path}: there is nothing to draw: {reason}")
+    assert loop is not None
     rates = plant.rate * np.array(_DRAWN_RATES)
     latest = min(_DRAWN_DELAY * drive.natural_period, LONGEST_DELAY / rates.max())
     delays = np.linspace(0.0, latest, _DRAWN_DELAYS)

@@ -4,7 +4,7 @@ What is proposed comes from the linear sampled loop and from the vibration witho
 then tried on the drive itself, sampled, held and delayed as between the nodes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
@@ -294,20 +294,27 @@ def _sufficient_limit(bench: Bench, candidates: "_Candidates") -> float | None:
         gains = limited.best(_RESERVE, _CUBIC_SHARES)
         return gains is not None and limited.slowest(gains).decay_rate(gains) > slowest
 
+    def narrowed(does: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
+        low = max(low, _LEAST_LIMIT * high)
+        while high > _LIMIT_SPACING * low:
+            middle = sqrt(low * high)
+            low, high = (low, middle) if does(middle) else (middle, high)
+        return low, _rounded(high, up=True)
+
     slowest = _SLOWEST_DECAY / candidates.task.drive.natural_period
+    limit = least = candidates.task.force_limit
+    # To try one limit takes longer than to narrow it down in theory.
+    enough = candidates.free_peak_force() / _RESERVE
+    if enough > limit:
+        least, enough = narrowed(in_theory, limit, enough)
+        if tried(enough):
+            return enough
     free = simulated(inf)
     enough = max((check.peak_force or 0.0 for check in free.checks), default=0.0) / _RESERVE
-    if enough <= candidates.task.force_limit:
+    if enough <= limit:
         return None
-    least = max(candidates.task.force_limit, _LEAST_LIMIT * enough)
-    for does in (in_theory, tried):
-        highest = enough
-        while highest > _LIMIT_SPACING * least:
-            middle = sqrt(least * highest)
-            least, highest = (least, middle) if does(middle) else (middle, highest)
-        if tried(_rounded(highest, up=True)):
-            return _rounded(highest, up=True)
-    return None
+    _, enough = narrowed(tried, least, enough)
+    return enough if tried(enough) else None
 
 
 def _little_margin(task: Task, found: Margins) -> str | None:
@@ -371,12 +378,20 @@ class _Candidates:
         unit = task.drive.normal_force / task.drive.speed_scale
         self._largest_gain = (4.0 + 2.0 * max(map(abs, slopes))) * unit
         self._cubic_coefficient = _cubic_coefficient(task.drive)
+        self._peaks: dict[float, float] = {}
 
     def limited(self, force_limit: float) -> Self:
         """Return those for another force limit, N."""
         other = copy(self)
         other.task = replace(self.task, force_limit=force_limit)
         return other
+
+    def free_peak_force(self) -> float:
+        """Return the largest force, N, of the fastest gains without limit; 0 if none is stable."""
+        gains = self.limited(inf).best(_RESERVE, _CUBIC_SHARES)
+        if gains is None:
+            return 0.0
+        return max(vibration.peak_force(gains) for vibration in self.vibrations)
 
     def slowest(self, gains: WashoutGains) -> LinearSampledLoop:
         """Return the loop in which a small deviation dies out most slowly."""
@@ -474,10 +489,12 @@ class _Candidates:
 
     def _peak(self, corner_frequency: float) -> float:
         """Return the largest filtered speed, m/s, of all vibrations."""
-        return max(
-            float(np.abs(vibration.filtered(corner_frequency)).max(initial=0.0))
-            for vibration in self.vibrations
-        )
+        if corner_frequency not in self._peaks:
+            self._peaks[corner_frequency] = max(
+                float(np.abs(vibration.filtered(corner_frequency)).max(initial=0.0))
+                for vibration in self.vibrations
+            )
+        return self._peaks[corner_frequency]
 
     def _largest(self, corner_frequency: float, strength: float, cubic: float) -> float:
         """Return the magnitude of the linear gain that is allowed.
@@ -511,7 +528,6 @@ def _check(
     decay_rate = loop.decay_rate(gains)
     predicted = settling_time(decay_rate)
     assert predicted is not None
-    peak = float(np.abs(gains.force(vibration.filtered(gains.corner_frequency))).max(initial=0.0))
     settling_times: list[float | None] = []
     peaks: list[float] = []
     if vibration.vibrates:
@@ -528,7 +544,7 @@ def _check(
         decay_rate=decay_rate,
         predicted_settling_time=predicted,
         settling_time=max(settled) if settled and len(settled) == len(settling_times) else None,
-        predicted_peak_force=peak,
+        predicted_peak_force=vibration.peak_force(gains),
         peak_force=max(peaks, default=None),
     )
 

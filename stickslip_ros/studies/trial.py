@@ -3,11 +3,14 @@
 from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import ceil, hypot, inf
+from typing import Any
 
 import numpy as np
 
 from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.equations import WashoutGains
 from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.physics.measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.motion import Motion
@@ -66,9 +69,19 @@ class Vibration:
         count = len(self.velocity)
         if count == 0:
             return self.velocity
+        forward, differences = self._harmonics
+        return np.fft.irfft(differences / (forward - np.exp(-corner_frequency / self.rate)), count)
+
+    def peak_force(self, gains: WashoutGains) -> float:
+        """Return the largest force, N, of a washout controller that comes on at the worst phase."""
+        return float(np.abs(gains.force(self.filtered(gains.corner_frequency))).max(initial=0.0))
+
+    @cached_property
+    def _harmonics(self) -> tuple[Any, Any]:
+        """Each harmonic's factor from sample to sample, and the differences of the velocity."""
+        count = len(self.velocity)
         forward = np.exp(2j * np.pi * np.arange(count // 2 + 1) / count)
-        response = (forward - 1.0) / (forward - np.exp(-corner_frequency / self.rate))
-        return np.fft.irfft(response * np.fft.rfft(self.velocity), count)
+        return forward, (forward - 1.0) * np.fft.rfft(self.velocity)
 
 
 @dataclass(frozen=True)

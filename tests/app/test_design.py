@@ -1,10 +1,13 @@
 """`stickslip design`: the proposal as a table, as JSON, as a parameter file and as a picture."""
 
 import json
+from functools import cache
 from pathlib import Path
 
 import pytest
 
+from stickslip_ros.physics.simulation import Progress
+from stickslip_ros.studies.design import Design, Task, design
 from tests.app.conftest import Run
 
 LIMIT = ("-p", "washout_controller.force_limit=200")
@@ -54,8 +57,12 @@ def test_it_says_how_to_run_what_it_has_written(stickslip: Run) -> None:
     assert "--out" not in done.stdout
 
 
-def test_no_proposal_is_a_result_with_a_reason(stickslip: Run, tmp_path: Path) -> None:
-    limit = ("-p", "washout_controller.force_limit=5")
+def test_no_proposal_is_a_result_with_a_reason(
+    stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    once = cache(design)
+    monkeypatch.setattr("stickslip_ros.app.design.design", lambda task, _: once(task))
+    limit = ("-p", "washout_controller.force_limit=5", "--belt-speed", "0.04")
     done = stickslip("design", "feed_drive", *limit, "--out", "gains.yaml", "--plot", "map.png")
     assert done.returncode == 0, done.stderr
     assert "force limit of 5 N is too small" in done.stdout
@@ -86,6 +93,8 @@ def test_no_proposal_is_a_result_with_a_reason(stickslip: Run, tmp_path: Path) -
         (("--plot", "map.txt"), ("--plot map.txt", ".png")),
         (("--plot", "nosuch/map.png"), ("nosuch",)),
         (("--out", "nosuch/gains.yaml"), ("nosuch",)),
+        (("--plot", "/proc/map.png"), ("--plot /proc/map.png: cannot be written",)),
+        (("--out", "/proc/gains.yaml"), ("--out /proc/gains.yaml: cannot be written",)),
     ],
 )
 def test_bad_input_is_refused_in_one_line(
@@ -101,12 +110,22 @@ def test_bad_input_is_refused_in_one_line(
 
 
 @pytest.mark.parametrize(("option", "file"), [("--out", "x.yaml"), ("--plot", "x.png")])
-def test_what_cannot_be_written_costs_no_result(stickslip: Run, option: str, file: str) -> None:
-    done = stickslip("design", "feed_drive", "--json", option, f"/proc/{file}")
+def test_what_cannot_be_written_in_the_end_costs_no_result(
+    stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str, file: str
+) -> None:
+    (tmp_path / "below").mkdir()
+
+    def design_while_the_directory_goes(task: Task, progress: Progress) -> Design:
+        (tmp_path / "below").rmdir()
+        return design(task, progress)
+
+    monkeypatch.setattr("stickslip_ros.app.design.design", design_while_the_directory_goes)
+    where = ("--belt-speed", "0.04")
+    done = stickslip("design", "feed_drive", *where, "--json", option, f"below/{file}")
     assert done.returncode == 2
     assert json.loads(done.stdout)["linear_gain"] < 0.0
     (line,) = done.stderr.splitlines()
-    assert f"{option} /proc/{file}: cannot be written" in line
+    assert f"{option} below/{file}: cannot be written" in line
 
 
 def test_without_vibration_nothing_is_simulated(stickslip: Run) -> None:

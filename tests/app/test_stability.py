@@ -124,8 +124,11 @@ def test_the_table_says_why(stickslip: Run) -> None:
     assert "nan" not in done.stdout
 
 
-def test_coexisting_cycles_are_told_apart(stickslip: Run) -> None:
-    law = ("-p", "plant.friction.law=exponential", "-p", "plant.friction.decay_speed=0.05")
+def test_coexisting_cycles_are_told_apart(stickslip: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    overrides = ("plant.friction.law=exponential", "plant.friction.decay_speed=0.05")
+    law = [text for override in overrides for text in ("-p", override)]
+    theory = theory_of(load_scenario("paper", overrides))
+    monkeypatch.setattr("stickslip_ros.app.stability.stability", lambda _: theory)
     found = stability(stickslip, "paper", *law)
     assert found["open_loop"]["stable"] is True
     unstable, stable = found["open_loop"]["limit_cycles"]
@@ -152,12 +155,17 @@ def test_the_map_is_drawn(stickslip: Run, tmp_path: Path) -> None:
         (("--plot", "nowhere/map.png"), ("nowhere",)),
         (("--plot", "map.png", "-p", "plant.belt_speed=0.0"), ("map.png", "the belt rests")),
         (("--plot", "map.png", "--no-control"), ("map.png", "no controller")),
-        (("--plot", "/proc/map.png", "-p", "plant.rate=5"), ("/proc/map.png", "cannot be written")),
+        (("--plot", "/proc/map.png"), ("/proc/map.png", "cannot be written")),
     ],
 )
-def test_what_cannot_be_drawn_is_refused(
-    stickslip: Run, tmp_path: Path, arguments: tuple[str, ...], named: tuple[str, ...]
+def test_what_cannot_be_drawn_is_refused_before_anything_is_computed(
+    stickslip: Run,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    named: tuple[str, ...],
 ) -> None:
+    monkeypatch.delattr("stickslip_ros.app.stability.stability")
     done = stickslip("stability", "paper", *arguments)
     assert done.returncode == 2
     assert done.stdout == ""

@@ -78,7 +78,7 @@ def _check_published(belt_speed: float, count: int) -> None:
 
 @pytest.mark.parametrize("belt_speed", QUICK)
 def test_the_shares_are_the_published_ones(belt_speed: float) -> None:
-    _check_published(belt_speed, 300)
+    _check_published(belt_speed, 150)
 
 
 @pytest.mark.long

@@ -8,11 +8,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
-from math import inf, isfinite, log, pi
+from math import frexp, inf, isfinite, log, pi
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from scipy.linalg import expm
 
 from stickslip_ros.physics.drive import Drive
 from stickslip_ros.physics.equations import WashoutGains
@@ -33,6 +32,9 @@ _BISECTIONS = 60
 
 _ROUNDING = 1e-14
 """Share by which a multiplier is not known better."""
+
+_TERMS = 16
+"""Of the exponential series of a matrix of norm one half, in which rounding hides what is left."""
 
 _SLIDE, _FILTER = slice(0, 2), 2
 """Where X, Y and the filter's z = d w stand in the state; forces under way follow."""
@@ -208,7 +210,7 @@ class LinearSampledLoop:
         block = np.zeros((3, 3))
         block[:2, :2] = self.jacobian
         block[1, 2] = 1.0
-        transition: Any = expm(block * (periods * self.period))
+        transition = _exponential(block * (periods * self.period))
         return transition[:2, :2], transition[:2, 2]
 
     def _radii(self, corner_frequency: float, linear_gains: FloatArray) -> FloatArray:
@@ -326,6 +328,21 @@ class _Boundary:
     def _near(angle: float, width: float) -> FloatArray:
         distances: Any = np.geomspace(1e-3 * max(width, 1e-12), pi, 200)
         return np.concatenate([angle - distances, angle + distances])
+
+
+def _exponential(matrix: FloatArray) -> FloatArray:
+    """Return the exponential of a small matrix: the series of a part of it, squared repeatedly.
+
+    scipy's shares each one among threads, which takes hundreds of times as long.
+    """
+    squarings = max(frexp(float(np.abs(matrix).sum(axis=0).max()))[1] + 1, 0)
+    part, one = matrix * 0.5**squarings, np.eye(len(matrix))
+    found = one
+    for order in range(_TERMS, 0, -1):
+        found = one + part @ found / order
+    for _ in range(squarings):
+        found = found @ found
+    return found
 
 
 def _spectral_radius(matrices: FloatArray) -> Any:

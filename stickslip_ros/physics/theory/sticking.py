@@ -196,8 +196,10 @@ class Release:
 
     def sticks_again(self, drive: Drive) -> bool:
         """Return whether it sticks again, be it that it overtakes the belt before."""
-        *_, knots = self._follow(drive)
-        return bool(np.any(knots.sticking & np.logical_or.accumulate(knots.velocity < 0.0)))
+        return any(
+            np.any(knots.sticking & np.logical_or.accumulate(knots.velocity < 0.0))
+            for knots in self._follow(drive)
+        )
 
     def _follow(self, drive: Drive) -> Iterator[Knots]:
         if self._motion is None:

@@ -305,7 +305,13 @@ SLOW = replace(FEED_DRIVE, normal_force=1e6)
 CREEPING = replace(PAPER, belt_speed=1e-6)
 
 
-@pytest.mark.parametrize("drive", [SLOW, CREEPING], ids=["heavily pressed", "slow belt"])
+@pytest.mark.parametrize(
+    "drive",
+    [
+        pytest.param(SLOW, id="heavily pressed", marks=pytest.mark.long),
+        pytest.param(CREEPING, id="slow belt"),
+    ],
+)
 def test_the_cycle_of_a_slow_belt_is_where_a_run_ends(drive: Drive) -> None:
     (cycle,) = limit_cycles(drive)
     run = limit_cycle_of_run(drive, 0.0)

@@ -1,7 +1,7 @@
 """The linear sampled loop: against the loop itself, against brute force and in its limits."""
 
 from dataclasses import replace
-from math import log, pi
+from math import cos, log, pi, sin
 
 import numpy as np
 import pytest
@@ -65,6 +65,17 @@ LOOPS = [
     (replace(PAPER, friction=Exponential(0.4, 0.25, 0.2, 0.1)), 5.0, 0.5, WashoutGains(1, -0.4, 0)),
     (replace(PAPER, friction=Coulomb(0.4)), 5.0, 0.7, WashoutGains(1.0, 0.1, 0.0)),
 ]
+
+
+@pytest.mark.parametrize("rate", [1e6, 1000.0, 20.0, 1.0, 0.05])
+def test_between_samples_an_undamped_drive_turns(rate: float) -> None:
+    loop = loop_of(replace(FEED_DRIVE, friction=Coulomb(0.4), damping=0.0), rate)
+    angle = FEED_DRIVE.angular_frequency / rate
+    slide, starting, _ = loop.held
+    cosine, sine = cos(angle), sin(angle)
+    near = {"rel": 1e-13 * max(1.0, angle), "abs": 1e-15 * angle}
+    assert slide == pytest.approx(np.array([[cosine, sine], [-sine, cosine]]), **near)
+    assert starting == pytest.approx(np.array([2.0 * sin(angle / 2.0) ** 2, sine]), **near)
 
 
 @pytest.mark.parametrize(("drive", "rate", "force_delay", "gains"), LOOPS)

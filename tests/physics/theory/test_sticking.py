@@ -137,11 +137,15 @@ def test_what_neither_grows_nor_dies_out_has_no_onset(law: FrictionLaw, damping:
     assert "neither grow nor die out" in onset.no_approximate
 
 
-def test_sticking_ends_near_the_minimum_of_friction_where_the_law_is_stiff() -> None:
+@pytest.mark.parametrize("minimum_speed", [3e-3, pytest.param(1e-3, marks=pytest.mark.long)])
+def test_sticking_ends_near_the_minimum_of_friction_where_the_law_is_stiff(
+    minimum_speed: float,
+) -> None:
     """The slide then creeps along the law, and only its falling branch throws it off."""
-    onset = sticking_onset(replace(PAPER, friction=Stribeck(0.4, 0.25, 1e-3)))
-    assert onset.approximate == pytest.approx(sqrt(0.8) * hopf_speed(0.02, 0.4, 0.25, 1e-3))
-    assert onset.exact == pytest.approx(hopf_speed(0.02, 0.4, 0.25, 1e-3), rel=1e-4)
+    onset = sticking_onset(replace(PAPER, friction=Stribeck(0.4, 0.25, minimum_speed)))
+    hopf = hopf_speed(0.02, 0.4, 0.25, minimum_speed)
+    assert onset.approximate == pytest.approx(sqrt(0.8) * hopf)
+    assert onset.exact == pytest.approx(hopf, rel=1e-4)
 
 
 def test_the_speeds_in_a_sentence_are_si() -> None:
