@@ -46,7 +46,7 @@ LARGEST = 1e100
 _RESTING_PART = 10
 """The force at rest is that of the last tenth of the time."""
 
-_HELD_FORCES = 20_000
+HELD_FORCES = 20_000
 """Forces behind which it may still be told of one that it did not act."""
 
 
@@ -371,6 +371,39 @@ class SettledForces(NamedTuple):
     """N"""
     acted: BoolArray
 
+    def select(self, rows: slice) -> Self:
+        """Return some of them."""
+        return type(self)(self.stamp[rows], self.force[rows], self.acted[rows])
+
+
+class DroppedForces:
+    """Forces that are known to have been dropped, each until it is found among those sent."""
+
+    def __init__(self) -> None:
+        self._number: dict[tuple[int, float], int] = {}
+
+    def add(self, stamp: IntArray, force: FloatArray) -> None:
+        """Take forces (ns, N) that were dropped; what is not finite never acts anyway."""
+        for dropped in zip(stamp.tolist(), force.tolist(), strict=True):
+            if isfinite(dropped[1]):
+                self._number[dropped] = self._number.get(dropped, 0) + 1
+        for oldest in list(islice(self._number, max(0, len(self._number) - HELD_FORCES))):
+            del self._number[oldest]
+
+    def among(self, stamp: IntArray, force: FloatArray) -> IntArray:
+        """Return the rows of forces sent (ns, N) that were dropped: as many of equal ones."""
+        if not self._number:
+            return np.empty(0, np.int64)
+        rows: list[int] = []
+        for row in np.flatnonzero(np.isin(stamp, [stamp for stamp, _ in self._number])).tolist():
+            sent = int(stamp[row]), float(force[row])
+            if sent in self._number:
+                rows.append(row)
+                self._number[sent] -= 1
+                if self._number[sent] == 0:
+                    del self._number[sent]
+        return np.array(rows, np.int64)
+
 
 class ForceSettler:
     """Tells which of the forces that were sent acted, from those that were dropped.
@@ -380,7 +413,7 @@ class ForceSettler:
 
     def __init__(self) -> None:
         self._held = SettledForces(np.empty(0, np.int64), np.empty(0), np.empty(0, np.bool_))
-        self._dropped: dict[tuple[int, float], int] = {}
+        self._dropped = DroppedForces()
 
     def feed(
         self,
@@ -390,40 +423,26 @@ class ForceSettler:
         dropped_force: FloatArray,
     ) -> SettledForces:
         """Take forces (ns, N) that were sent, and that were dropped; return what is settled."""
-        finite = np.isfinite(force)
-        new = SettledForces(stamp, force, finite)
-        self._held = SettledForces(*map(np.concatenate, zip(self._held, new, strict=True)))
-        for dropped in zip(dropped_stamp.tolist(), dropped_force.tolist(), strict=True):
-            if isfinite(dropped[1]):  # no other acts
-                self._dropped[dropped] = self._dropped.get(dropped, 0) + 1
-        self._settle()
-        return self._release(len(self._held.stamp) - _HELD_FORCES)
+        held = self._held
+        self._held = SettledForces(
+            np.concatenate([held.stamp, stamp]),
+            np.concatenate([held.force, force]),
+            np.concatenate([held.acted, np.isfinite(force)]),
+        )
+        self._dropped.add(dropped_stamp, dropped_force)
+        undecided = np.where(self._held.acted, self._held.force, np.nan)
+        self._held.acted[self._dropped.among(self._held.stamp, undecided)] = False
+        return self._release(len(self._held.stamp) - HELD_FORCES)
 
     def finish(self) -> SettledForces:
         """Return what was held back: no more is told of it."""
         return self._release(len(self._held.stamp))
 
-    def _settle(self) -> None:
-        """Mark what was dropped of the forces that are held back."""
-        if not self._dropped:
-            return
-        stamp, force, acted = self._held
-        told = np.isin(stamp, [stamp for stamp, _ in self._dropped]) & acted
-        for row in np.flatnonzero(told).tolist():
-            sent = int(stamp[row]), float(force[row])
-            if sent in self._dropped:
-                acted[row] = False
-                self._dropped[sent] -= 1
-                if self._dropped[sent] == 0:
-                    del self._dropped[sent]
-        for sent in list(islice(self._dropped, max(0, len(self._dropped) - _HELD_FORCES))):
-            del self._dropped[sent]
-
     def _release(self, number: int) -> SettledForces:
         number = max(number, 0)
-        settled = SettledForces(*(column[:number] for column in self._held))
-        self._held = SettledForces(*(column[number:] for column in self._held))
-        return settled
+        held = self._held
+        self._held = held.select(slice(number, None))
+        return held.select(slice(number))
 
 
 class RunMeter:

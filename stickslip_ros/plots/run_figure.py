@@ -166,9 +166,7 @@ class _Picture:
             _draw_line(force, pane, friction[0], friction[1], newton, history.gap, **_FRICTION)
             gap = history.control_gap
             _draw_line(force, pane, control[0], control[1], newton, gap, **_CONTROL)
-            self.holds |= _draw_held(
-                force, pane, control[0], control[1], newton, gap, dropped[0]
-            )
+            self.holds |= _draw_held(force, pane, control[0], control[1], newton, gap, dropped[0])
             _draw_line(force, pane, dropped[0], dropped[1], newton, gap, **_DROPPED)
             self._label_time(force, pane)
         labels = self._length[1], self._speed[1], label
