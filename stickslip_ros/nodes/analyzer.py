@@ -51,6 +51,8 @@ ColumnsT = TypeVar("ColumnsT")
 _TAKE_PERIOD = 0.02
 """Time, s, for which messages gather: one by one each would wake a thread and find cold caches."""
 _MEASURE_PERIOD = 0.1
+VERDICT_TIME = 0.05
+"""Time, s, in which a plant that has dropped forces says so of the last ones, too."""
 
 
 class _Heard(NamedTuple):
@@ -107,6 +109,10 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def stop(self) -> None:
         """Measure what is left, close the bag with its report, and log the report."""
         self._take_in()
+        if self._meter.dropped:
+            time.sleep(VERDICT_TIME)
+            for message in self._take(DROPPED_FORCE):
+                self._write(message)
         self._measure()
         self._meter.finish()
         report = self._meter.report()

@@ -460,8 +460,9 @@ class RunMeter:
         self.applied = ForceMeter()
         """The force that acted; one that was dropped counts as none."""
         self.dropped_known = dropped_known
+        self.dropped = 0
+        """Forces that were told to be dropped."""
         self._settler = ForceSettler()
-        self._dropped = 0
 
     def feed_forces(
         self,
@@ -475,7 +476,7 @@ class RunMeter:
         See `ForceMeter` for stamps and forces, and `ForceSettler`.
         """
         self.force.feed(stamp, force)
-        self._dropped += len(dropped_stamp)
+        self.dropped += len(dropped_stamp)
         return self._apply(self._settler.feed(stamp, force, dropped_stamp, dropped_force))
 
     def finish(self) -> SettledForces:
@@ -505,7 +506,7 @@ class RunMeter:
             "resting_force": self.force.resting_force,
             "peak_applied_force": self.applied.peak_force if self.dropped_known else None,
             "resting_applied_force": self.applied.resting_force if self.dropped_known else None,
-            "dropped_forces": self._dropped if self.dropped_known else None,
+            "dropped_forces": self.dropped if self.dropped_known else None,
             "samples": motion.samples,
             "lost_samples": motion.lost_samples,
             "duration": motion.duration,
