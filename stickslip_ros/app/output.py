@@ -27,16 +27,25 @@ _LABELS: dict[str, tuple[str, str]] = {
     "cycles": ("cycles measured", ""),
     "multipliers": ("Floquet multipliers", ""),
     "peak_force": ("peak control force", "N"),
+    "peak_applied_force": ("peak control force acting", "N"),
     "resting_force": ("control force at the end", "N"),
+    "resting_applied_force": ("control force acting at the end", "N"),
     "samples": ("samples", ""),
     "lost_samples": ("lost samples", ""),
     "late_forces": ("late forces", ""),
+    "dropped_forces": ("dropped forces", ""),
     "missed_deadlines": ("missed deadlines", ""),
     "steps_per_second": ("steps per second", ""),
     "duration": ("duration", "s"),
     "complete": ("bag complete", ""),
     "bag": ("bag", ""),
 }
+
+_SENT = {
+    "peak_force": ("peak_applied_force", "peak control force sent"),
+    "resting_force": ("resting_applied_force", "control force sent at the end"),
+}
+"""What of a force that was sent acted, and what it is called where that is not the same."""
 
 _STYLES: dict[str, str] = {
     Regime.label(Regime.EQUILIBRIUM): "green",
@@ -46,7 +55,12 @@ _STYLES: dict[str, str] = {
 }
 """Of what stands out on a terminal."""
 
-_SAME_SCALE = {"amplitude": "midpoint", "midpoint": "amplitude", "resting_force": "peak_force"}
+_SAME_SCALE = {
+    "amplitude": "midpoint",
+    "midpoint": "amplitude",
+    "resting_force": "peak_force",
+    "resting_applied_force": "peak_applied_force",
+}
 """Which other quantity tells how large one is that may be rounding."""
 
 _ALL_SI: Mapping[str, Units] = {}
@@ -79,11 +93,26 @@ def print_figures(
 
     `units` are those of each column, by its name; without it is in SI.
     """
-    rows: list[list[str]] = []
-    for name, (label, unit) in _LABELS.items():
-        if any(name in figures for figures in columns.values()):
-            rows.append([label, *_row(name, unit, columns, units)])
-    print_table(title, ["", *columns], rows)
+    rows = {
+        name: [label, *_row(name, unit, columns, units)]
+        for name, (label, unit) in _LABELS.items()
+        if any(name in figures for figures in columns.values())
+    }
+    _tell_apart(rows, columns)
+    print_table(title, ["", *columns], rows.values())
+
+
+def _tell_apart(rows: dict[str, list[str]], columns: Mapping[str, Mapping[str, Any]]) -> None:
+    """Leave out what acted where it is not known or is what was sent, and drops without any."""
+    for sent, (applied, label) in _SENT.items():
+        known = [figures.get(applied) is not None for figures in columns.values()]
+        cells = zip(known, rows.get(sent, [])[1:], rows.get(applied, [])[1:], strict=False)
+        if any(is_known and of_sent != of_applied for is_known, of_sent, of_applied in cells):
+            rows[sent][0] = label
+        else:
+            rows.pop(applied, None)
+    if not any(figures.get("dropped_forces") for figures in columns.values()):
+        rows.pop("dropped_forces", None)
 
 
 def _row(

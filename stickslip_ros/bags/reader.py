@@ -42,10 +42,12 @@ _LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _JOINT_STATES = "joint_states"
 _CONTROL_FORCE = "control_force"
 _APPLIED_DISTURBANCE = "applied_disturbance"
+_DROPPED_FORCE = "dropped_force"
 _TOPICS = {
     _JOINT_STATES: "sensor_msgs/msg/JointState",
     _CONTROL_FORCE: "geometry_msgs/msg/WrenchStamped",
     _APPLIED_DISTURBANCE: "geometry_msgs/msg/WrenchStamped",
+    _DROPPED_FORCE: "geometry_msgs/msg/WrenchStamped",
 }
 """Types of the topics of a drive, by the last part of their names."""
 
@@ -54,10 +56,11 @@ _Decode = Callable[[bytes, NDArray[np.int64], NDArray[np.int64]], tuple[ColumnsT
 
 
 class RunBlock(NamedTuple):
-    """A stretch of a recorded run, of one chunk of its bag; either part may be empty."""
+    """A stretch of a recorded run, of one chunk of its bag; each part may be empty."""
 
     joint_states: JointStateColumns
     control_forces: WrenchColumns
+    dropped_forces: WrenchColumns
 
 
 class Recording:
@@ -140,24 +143,38 @@ class Recording:
         """All disturbance forces at the samples from which they act; BagError as for `blocks`."""
         return self._whole(WrenchColumns, _APPLIED_DISTURBANCE, wrenches_in)
 
-    def blocks(self, least: int = 1) -> Iterator[RunBlock]:
-        """Yield joint states and control forces, those of a chunk at a time, in the file's order.
+    @cached_property
+    def dropped_forces(self) -> WrenchColumns:
+        """All control forces that did not act, as they were sent; BagError as for `blocks`."""
+        return self._whole(WrenchColumns, _DROPPED_FORCE, wrenches_in)
 
-        Chunks with fewer than `least` of both are joined to ones with more, the last ones excepted.
+    @property
+    def dropped_known(self) -> bool:
+        """Whether the bag tells which control forces did not act; BagError as for `blocks`.
+
+        Bags of older versions do not, nor those of other plants.
+        """
+        return self._topic(_DROPPED_FORCE) != ""
+
+    def blocks(self, least: int = 1) -> Iterator[RunBlock]:
+        """Yield joint states, control forces sent and dropped, a chunk at a time, in file order.
+
+        Chunks with fewer than `least` of all are joined to ones with more, the last ones excepted.
         Messages that cannot be understood are left out, and `missing` then tells of them. Raises
         BagError where the bag holds several drives and no namespace was given, and where the
         operating system fails to read it.
         """
-        states, forces = self._topic(_JOINT_STATES), self._topic(_CONTROL_FORCE)
+        states, forces, dropped = map(self._topic, (_JOINT_STATES, _CONTROL_FORCE, _DROPPED_FORCE))
         gathered: list[RunBlock] = []
         count = 0
-        for messages, channels in self._blocks(states, forces):
+        for messages, channels in self._blocks(states, forces, dropped):
             block = RunBlock(
                 self._decoded(states, messages, channels, joint_states_in),
                 self._decoded(forces, messages, channels, wrenches_in),
+                self._decoded(dropped, messages, channels, wrenches_in),
             )
             gathered.append(block)
-            count += len(block.joint_states.stamp) + len(block.control_forces.stamp)
+            count += sum(len(columns.stamp) for columns in block)
             if count >= least:
                 yield _joined_blocks(gathered)
                 gathered, count = [], 0
@@ -287,8 +304,12 @@ class Recording:
 
 
 def _joined_blocks(blocks: Sequence[RunBlock]) -> RunBlock:
-    states, forces = zip(*blocks, strict=True)
-    return RunBlock(_joined(JointStateColumns, states), _joined(WrenchColumns, forces))
+    states, forces, dropped = zip(*blocks, strict=True)
+    return RunBlock(
+        _joined(JointStateColumns, states),
+        _joined(WrenchColumns, forces),
+        _joined(WrenchColumns, dropped),
+    )
 
 
 def _joined(kind: type[ColumnsT], blocks: Sequence[ColumnsT]) -> ColumnsT:

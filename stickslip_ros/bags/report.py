@@ -11,7 +11,7 @@ from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.physics.knots import BoolArray, FloatArray
 from stickslip_ros.physics.measures import Cycle
-from stickslip_ros.physics.samples import NANOSECONDS, IntArray, RunMeter
+from stickslip_ros.physics.samples import NANOSECONDS, IntArray, RunMeter, SettledForces
 
 _DEFAULT_WINDOW = 20
 """Cycles to average over for a bag of somebody else's."""
@@ -42,8 +42,8 @@ class Spectator(Protocol):
         """Take the joint states that follow, and the cycles completed by them."""
         ...
 
-    def take_control(self, time: FloatArray, force: FloatArray) -> None:
-        """Take the control forces that follow."""
+    def take_control(self, time: FloatArray, force: FloatArray, acted: BoolArray) -> None:
+        """Take the control forces that follow, and whether each acted, as far as it is known."""
         ...
 
 
@@ -71,10 +71,12 @@ def report_of_bag(
     if not start < end:
         raise InvalidInputError(f"the part from {start} s to {end} s is empty")
     with Recording(path, namespace) as recording:
-        meter = RunMeter(window or _window_at_recording(recording))
+        meter = RunMeter(
+            window or _window_at_recording(recording), dropped_known=recording.dropped_known
+        )
         run = _RunReader(meter, start, end, spectator)
         for block in recording.blocks(least=_MEASURED_AT_ONCE):
-            run.feed(block.joint_states, block.control_forces)
+            run.feed(*block)
         run.finish()
         missing = recording.missing
         if run.first is None:
@@ -112,9 +114,11 @@ class _RunReader:
             round(min(instant, _LONGEST) * NANOSECONDS)
             for instant in (start if start > 0.0 else -_LONGEST, end)
         )
-        self._early: list[WrenchColumns] = []
+        self._early: list[tuple[WrenchColumns, WrenchColumns]] = []
 
-    def feed(self, states: JointStateColumns, forces: WrenchColumns) -> None:
+    def feed(
+        self, states: JointStateColumns, forces: WrenchColumns, dropped: WrenchColumns
+    ) -> None:
         if len(states.stamp) > 0:
             self.has_states = True
             first = self._begin(int(states.stamp[0])) if self.first is None else self.first
@@ -123,22 +127,27 @@ class _RunReader:
             for piece in self._pieces(np.flatnonzero(rows)):
                 self._feed_states(states, piece, first)
         if self.first is None:
-            self._early.append(forces)
-            if sum(len(forces.stamp) for forces in self._early) > _MOST_EARLY:
-                self.finish()
+            self._early.append((forces, dropped))
+            if sum(len(forces.stamp) for forces, _ in self._early) > _MOST_EARLY:
+                self._begin_without_states()
         else:
-            self._feed_forces(forces, self.first)
+            self._feed_forces(forces, dropped, self.first)
 
     def finish(self) -> None:
-        """Measure the forces before the first joint state, or without any."""
-        stamps = [forces.stamp[0] for forces in self._early if len(forces.stamp) > 0]
+        """Measure what was kept back: the last forces, or all where there is no joint state."""
+        self._begin_without_states()
+        if self.first is not None:
+            self._show(self.meter.finish(), self.first)
+
+    def _begin_without_states(self) -> None:
+        stamps = [forces.stamp[0] for forces, _ in self._early if len(forces.stamp) > 0]
         if stamps:
             self._begin(int(stamps[0]))
 
     def _begin(self, first: int) -> int:
         self.first = first
-        for forces in self._early:
-            self._feed_forces(forces, first)
+        for forces, dropped in self._early:
+            self._feed_forces(forces, dropped, first)
         self._early.clear()
         return first
 
@@ -159,13 +168,21 @@ class _RunReader:
             time = (stamp - first) / NANOSECONDS
             self._spectator.take_samples(time, *motion, states.effort[rows], cycles)
 
-    def _feed_forces(self, forces: WrenchColumns, first: int) -> None:
-        rows = self._part(forces.stamp, first)
+    def _feed_forces(self, forces: WrenchColumns, dropped: WrenchColumns, first: int) -> None:
+        rows, dropped_rows = self._part(forces.stamp, first), self._part(dropped.stamp, first)
         self.measured += int(rows.sum())
-        stamp, force = forces.stamp[rows], forces.force[rows]
-        self.meter.force.feed(stamp, force)
+        settled = self.meter.feed_forces(
+            forces.stamp[rows],
+            forces.force[rows],
+            dropped.stamp[dropped_rows],
+            dropped.force[dropped_rows],
+        )
+        self._show(settled, first)
+
+    def _show(self, forces: SettledForces, first: int) -> None:
         if self._spectator is not None:
-            self._spectator.take_control((stamp - first) / NANOSECONDS, force)
+            time = (forces.stamp - first) / NANOSECONDS
+            self._spectator.take_control(time, forces.force, forces.acted)
 
     def _part(self, stamp: IntArray, first: int) -> BoolArray:
         since = stamp - first

@@ -33,6 +33,7 @@ from stickslip_ros.nodes.topics import (
     AMPLITUDE,
     CONTROL_FORCE,
     DEEP,
+    DROPPED_FORCE,
     FREQUENCY,
     JOINT_STATES,
     RECORDED,
@@ -50,6 +51,8 @@ ColumnsT = TypeVar("ColumnsT")
 _TAKE_PERIOD = 0.02
 """Time, s, for which messages gather: one by one each would wake a thread and find cold caches."""
 _MEASURE_PERIOD = 0.1
+VERDICT_TIME = 0.05
+"""Time, s, in which a plant that has dropped forces says so of the last ones, too."""
 
 
 class _Heard(NamedTuple):
@@ -96,13 +99,22 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             for node, model in NODE_PARAMETERS.items()
             if node != "analyzer"
         ]
-        self._to_measure: dict[Topic, list[bytes]] = {JOINT_STATES: [], CONTROL_FORCE: []}
+        self._to_measure: dict[Topic, list[bytes]] = {
+            JOINT_STATES: [],
+            CONTROL_FORCE: [],
+            DROPPED_FORCE: [],
+        }
         self._listening = {topic: self.collect(topic) for topic in RECORDED_TOPICS}
 
     def stop(self) -> None:
         """Measure what is left, close the bag with its report, and log the report."""
         self._take_in()
+        if self._meter.dropped:
+            time.sleep(VERDICT_TIME)
+            for message in self._take(DROPPED_FORCE):
+                self._write(message)
         self._measure()
+        self._meter.finish()
         report = self._meter.report()
         for end in (self._recorded, *self._listening.values()):
             self.disconnect(end)
@@ -150,6 +162,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def _take_in(self) -> None:
         """Record what has come since the last time, and keep it to be measured."""
         heard = [self._take(topic) for topic in RECORDED_TOPICS]
+        if not self._meter.dropped_known:
+            self._look_for_dropped_forces(bool(heard[RECORDED_TOPICS.index(DROPPED_FORCE)]))
         states = heard[RECORDED_TOPICS.index(JOINT_STATES)]
         if states and states[-1].stamp != self._told:
             self._told = states[-1].stamp
@@ -176,6 +190,17 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._to_measure[topic] += [message.data for message in heard]
         return heard
 
+    def _look_for_dropped_forces(self, heard: bool) -> None:
+        """Let the bag have their topic where a plant tells of them: without it, it is not known."""
+        self._meter.dropped_known = (
+            heard or self._listening[DROPPED_FORCE].get_publisher_count() > 0
+        )
+        if self._meter.dropped_known and self._recorder is not None:
+            try:
+                self._add_topic(self._recorder, DROPPED_FORCE)
+            except BagError as error:
+                self._give_up_recording(error)
+
     def _measure(self) -> None:
         """Decode and measure what was taken in since the last time."""
         states = self._columns(JOINT_STATES, joint_state_columns)
@@ -190,7 +215,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if self._cycles // self.parameters.window > windows:
             self._log_measures()
         forces = self._columns(CONTROL_FORCE, wrench_columns)
-        self._meter.force.feed(forces.stamp, forces.force)
+        dropped = self._columns(DROPPED_FORCE, wrench_columns)
+        self._meter.feed_forces(forces.stamp, forces.force, dropped.stamp, dropped.force)
         for inquiry in self._inquiries:
             inquiry.pursue()
 
@@ -232,13 +258,17 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         )
         self._bags_opened += 1
         for topic in RECORDED_TOPICS:
-            name = self.resolve_topic_name(topic.name)
-            qos = QosProfile(depth=topic.depth)
-            self._channels[topic.name] = recorder.add_topic(name, topic.type_name, qos)
+            if topic is not DROPPED_FORCE:
+                self._add_topic(recorder, topic)
         self._recorder = recorder
         self._flushed_at = time.monotonic()
         self._keep("versions", versions())
         self._keep("analyzer", self.parameters.flat())
+
+    def _add_topic(self, recorder: Recorder, topic: Topic) -> None:
+        name = self.resolve_topic_name(topic.name)
+        qos = QosProfile(depth=topic.depth)
+        self._channels[topic.name] = recorder.add_topic(name, topic.type_name, qos)
 
     def _keep(self, name: str, values: Mapping[str, Any]) -> None:
         """Put a table into the bag that says how the recording came about, or what it gave."""

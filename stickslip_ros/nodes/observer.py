@@ -40,6 +40,7 @@ from stickslip_ros.nodes.topics import (
     CONTROL_FORCE,
     DIAGNOSTICS,
     DISTURBANCE_FORCE,
+    DROPPED_FORCE,
     FREQUENCY,
     JOINT_STATES,
     STICK_FRACTION,
@@ -94,7 +95,7 @@ class Health:
 
 
 class ObserverNode(Collecting):
-    """Listens to joint_states, control_force, limit_cycle/* and /diagnostics of a namespace.
+    """Listens to states, forces sent and dropped, cycles and /diagnostics of a namespace.
 
     What it has heard may be read from any thread: mappings are replaced as a whole, deques to be
     copied. So may the requests be made.
@@ -103,11 +104,11 @@ class ObserverNode(Collecting):
     def __init__(
         self,
         namespace: str,
-        show: Callable[[JointStateColumns, WrenchColumns], None],
+        show: Callable[[JointStateColumns, WrenchColumns, WrenchColumns], None],
         *,
         context: Context | None = None,
     ) -> None:
-        """Listen in a namespace; states and forces are passed on in blocks, to `show`."""
+        """Listen in a namespace; states, forces, dropped forces go to `show`, in blocks."""
         super().__init__(DASHBOARD, namespace=namespace, context=context)
         self._show = show
         self.health: Mapping[str, Health] = {node: Health() for node in NODE_PARAMETERS}
@@ -128,6 +129,7 @@ class ObserverNode(Collecting):
         self._tap_timer: Timer | None = None
         self._states = self._listen_loosely(JOINT_STATES)
         self._forces = self._listen_loosely(CONTROL_FORCE)
+        self._dropped_forces = self._listen_loosely(DROPPED_FORCE)
         self._disturbance = self.create_publisher(
             DISTURBANCE_FORCE.type, DISTURBANCE_FORCE.name, DISTURBANCE_FORCE.qos()
         )
@@ -266,10 +268,11 @@ class ObserverNode(Collecting):
         """Pass on what has come."""
         states, _ = joint_state_columns(list(take_waiting(self._states)))
         forces, _ = wrench_columns(list(take_waiting(self._forces)))
+        dropped, _ = wrench_columns(list(take_waiting(self._dropped_forces)))
         if len(states.stamp):
             self._newest = int(states.stamp[-1])
-        if len(states.stamp) or len(forces.stamp):
-            self._show(states, forces)
+        if len(states.stamp) or len(forces.stamp) or len(dropped.stamp):
+            self._show(states, forces, dropped)
         if self._tap_timer is not None and self._newest >= self._tap_end:
             self._end_tap()
 

@@ -28,6 +28,7 @@ from stickslip_ros.nodes.topics import (
     CLOCK,
     CONTROL_FORCE,
     DISTURBANCE_FORCE,
+    DROPPED_FORCE,
     JOINT_STATES,
     RECORDED,
 )
@@ -66,6 +67,9 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._connections.append(self._dropped)
         self._state = self.advertise(JOINT_STATES)
         self._applied = self.advertise(APPLIED_DISTURBANCE)
+        self._dropped_force = self.advertise(DROPPED_FORCE)
+        self._answerable = 0
+        """Stamp of the sample that may still be answered while the plant pauses, ns."""
         self._clock_time = self.advertise(CLOCK) if self.parameters.publish_clock else None
         self.subscribe(CONTROL_FORCE, self._on_force)
         self.subscribe(DISTURBANCE_FORCE, self._on_disturbance)
@@ -91,6 +95,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             hold_late=realtime,
             expects_control=parameters.expects_control,
             disturbance=parameters.as_disturbance(),
+            overtaken=self._on_overtaken,
         )
         latest = END_OF_TIME - NANOSECONDS
         stampable = self._loop.number(latest) - 1
@@ -121,8 +126,9 @@ class PlantNode(ManagedNode[PlantParameters]):
         done = self._loop.sample.number * self._loop.period
         self.elapsed = 0.0 if self._pacer.finished else self.elapsed + done
         self._next_start = self._loop.stamp(self._loop.sample.number + 1)
-        self.wait_for_delivery(self._state)
-        self.wait_for_delivery(self._applied)
+        self._answerable = self._loop.sample.stamp
+        for publisher in (self._state, self._applied, self._dropped_force):
+            self.wait_for_delivery(publisher)
 
     def apply_parameters(self) -> None:
         """Go on with the new drive and disturbance from the next sample on."""
@@ -204,18 +210,25 @@ class PlantNode(ManagedNode[PlantParameters]):
             self.trigger_deactivate()
 
     def _on_force(self, message: bytes) -> None:
-        if not self.active:
-            return
         try:
             stamp, force = unpack_wrench(message)
         except BagError as error:
-            self._dropped.add(f"control force: {error}")
+            if self.active:
+                self._dropped.add(f"control force: {error}")
+            return
+        if not self.active:
+            if stamp != self._answerable:
+                self._dropped_force.publish(message)
             return
         with self._lock:
             verdict = self._loop.offer(stamp, force)
         if verdict is not Verdict.ACCEPTED:
             self._dropped.add(f"control force {force} N stamped {stamp} ns: {verdict}")
+            self._dropped_force.publish(message)
         self._pacer.force_came()
+
+    def _on_overtaken(self, stamp: int, force: float) -> None:
+        self._dropped_force.publish(pack_wrench(stamp, force))
 
     def _on_disturbance(self, message: bytes) -> None:
         try:

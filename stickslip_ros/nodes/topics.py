@@ -73,6 +73,14 @@ APPLIED_DISTURBANCE = Topic(
     meaning="All the disturbance that acts, `wrench.force.x` N, at each change, with the stamp of "
     "the sample from which it acts.",
 )
+DROPPED_FORCE = Topic(
+    "dropped_force",
+    WrenchStamped,
+    "geometry_msgs/msg/WrenchStamped",
+    DEEP,
+    meaning="Each `control_force` that did not act, as it was sent: refused, overtaken by a newer "
+    "one, or come while the plant was not active.",
+)
 RECORDED = Topic(
     "recorded",
     Header,
@@ -118,6 +126,7 @@ TOPICS = (
     CONTROL_FORCE,
     DISTURBANCE_FORCE,
     APPLIED_DISTURBANCE,
+    DROPPED_FORCE,
     AMPLITUDE,
     STICK_FRACTION,
     FREQUENCY,
@@ -125,7 +134,7 @@ TOPICS = (
     DIAGNOSTICS,
     CLOCK,
 )
-RECORDED_TOPICS = (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE)
+RECORDED_TOPICS = (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE, DROPPED_FORCE)
 """What the analyzer writes to its bag."""
 
 

@@ -5,6 +5,7 @@ It knows no clock and no messages: whoever drives it decides when to advance. Th
 """
 
 from collections import Counter, deque
+from collections.abc import Callable
 from enum import StrEnum
 from fractions import Fraction
 from math import floor, isfinite
@@ -43,6 +44,8 @@ class Verdict(StrEnum):
     UNKNOWN_STAMP = "stamp of no sample"
     ANSWERED = "already answered stamp"
     TOO_LATE = "answers a sample that has passed"
+    OVERTAKEN = "overtaken by a newer one"
+    """It was accepted, and a newer one came before it could act."""
 
 
 class SampledLoop:
@@ -58,6 +61,9 @@ class SampledLoop:
     So jittered forces arrive at uneven intervals, and may overtake one another: then the newer one
     acts, and the older one, arriving after it, is lost. A jitter of zero is a constant delay: force
     n acts from n T + delay to (n + 1) T + delay.
+
+    A force that was accepted and will never act, because a newer one came or arrived before it, is
+    told to `overtaken`: the stamp (ns) of the sample that it answers, and the force (N).
     """
 
     def __init__(
@@ -73,6 +79,7 @@ class SampledLoop:
         hold_late: bool = False,
         expects_control: bool = True,
         disturbance: Disturbance | None = None,
+        overtaken: Callable[[int, float], None] = lambda stamp, force: None,
     ) -> None:
         """Take sample 0 of `motion` at the stamp `start` (ns); rate in Hz, times in s."""
         self.period = 1.0 / rate
@@ -80,7 +87,7 @@ class SampledLoop:
         self.late_forces = 0
         """Samples whose force had not come when it was due."""
         self.dropped: Counter[Verdict] = Counter()
-        """Forces refused, by reason."""
+        """Forces that did not act, by reason."""
         self.controller_present = expects_control
         """Whether an answer to the present sample may be hoped for: one came since the last gap."""
         self._motion = motion
@@ -97,11 +104,14 @@ class SampledLoop:
         self._force_timeout = force_timeout
         self._hold_late = hold_late
         self._expects_control = expects_control
-        # In the order of arrival: number of the period, the share of it that is over, and force;
-        # before force 0, none in each period.
-        self._under_way = deque((number, rest, 0.0) for number in range(whole))
+        # In the order of arrival: number of the period, the share of it that is over, force, and
+        # number of the sample that it answers, -1 where there is none, as before force 0.
+        self._under_way = deque((number, rest, 0.0, -1) for number in range(whole))
         self._acting = 0.0
+        self._acting_number = -1
         self._newest: tuple[int, float] = (-1, 0.0)
+        self._sent_number = -1
+        self._overtaken = overtaken
         self.scenario_disturbance = disturbance or Disturbance()
         """Disturbance of the scenario; a new one acts from the next sample on."""
         self._asked_disturbance = 0.0
@@ -131,6 +141,8 @@ class SampledLoop:
         number = self.number(stamp)
         refusal = self._refusal(number, stamp, force)
         if refusal is None:
+            if self._newest[0] > self._sent_number:
+                self._lose(*self._newest)
             self._newest = (number, force)
             self.controller_present = self._expects_control
             return Verdict.ACCEPTED
@@ -156,12 +168,14 @@ class SampledLoop:
         motion, period, present = self._motion, self.period, self.sample
         number, force = self._newest
         if number != present.number:
-            force = self._stand_in()
+            number, force = self._stand_in()
+        if number > self._sent_number:
+            self._sent_number = number
         now = 0.0
         if self._immediate:
             self._acting = force
         else:
-            self._send(force)
+            self._send(number, force)
             now = self._deliver()
         motion.force = self._acting + self.disturbance
         motion.advance((1.0 - now) * period)
@@ -177,7 +191,8 @@ class SampledLoop:
         motion, under_way, number = self._motion, self._under_way, self.sample.number
         now = 0.0
         while under_way and under_way[0][0] == number:
-            _, instant, force = under_way.popleft()
+            _, instant, force, answered = under_way.popleft()
+            self._acting_number = max(self._acting_number, answered)
             if instant > now:
                 motion.force = self._acting + self.disturbance
                 motion.advance((instant - now) * self.period)
@@ -185,15 +200,26 @@ class SampledLoop:
             self._acting = force
         return now
 
-    def _send(self, force: float) -> None:
+    def _send(self, answered: int, force: float) -> None:
         """Let the force for the present sample set out; what it overtakes is lost."""
         whole, rest = self._shortest_delay
         number = self.sample.number
         if self._jitter > 0.0:
             whole, rest = whole_and_rest(self._delay + self._jitter * self._random.random())
+            lost: dict[int, float] = {}
             while self._under_way and self._under_way[-1][:2] >= (number + whole, rest):
-                self._under_way.pop()
-        self._under_way.append((number + whole, rest, force))
+                _, _, overtaken, overtaken_number = self._under_way.pop()
+                lost[overtaken_number] = overtaken
+            # A force that stands in for others is under way several times.
+            left = {self._acting_number, answered, *(entry[3] for entry in self._under_way)}
+            for overtaken_number in sorted(lost.keys() - left):
+                if overtaken_number > self._acting_number:
+                    self._lose(overtaken_number, lost[overtaken_number])
+        self._under_way.append((number + whole, rest, force, answered))
+
+    def _lose(self, number: int, force: float) -> None:
+        self.dropped[Verdict.OVERTAKEN] += 1
+        self._overtaken(self.stamp(number), force)
 
     def _take_sample(self, number: int, belt_position: float) -> Sample:
         motion = self._motion
@@ -219,18 +245,21 @@ class SampledLoop:
         scenario = self.scenario_disturbance.force(number, self.period)
         return scenario + self._asked_disturbance
 
-    def _stand_in(self) -> float:
-        """Return what acts in place of the force for the present sample, which has not come."""
+    def _stand_in(self) -> tuple[int, float]:
+        """Return what acts in place of the force for the present sample, which has not come.
+
+        And, before it, the number of the sample that it answers, -1 where no force acts.
+        """
         if self._expects_control:
             self.late_forces += 1
         if not self._hold_late:
             self.controller_present = False
-            return 0.0
+            return -1, 0.0
         number, force = self._newest
         if (self.sample.number - number) * self.period <= self._force_timeout:
-            return force
+            return number, force
         self.controller_present = False
-        return 0.0
+        return -1, 0.0
 
     def _refusal(self, number: int, stamp: int, force: float) -> Verdict | None:
         if not isfinite(force):

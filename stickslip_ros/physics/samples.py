@@ -1,5 +1,7 @@
 """Measures from samples: stamps become time and losses, samples become knots, knots cycles."""
 
+from itertools import islice
+from math import isfinite
 from statistics import median
 from typing import Any, NamedTuple, Self
 
@@ -43,6 +45,9 @@ LARGEST = 1e100
 
 _RESTING_PART = 10
 """The force at rest is that of the last tenth of the time."""
+
+HELD_FORCES = 20_000
+"""Forces behind which it may still be told of one that it did not act."""
 
 
 class _Rows(NamedTuple):
@@ -357,13 +362,130 @@ class ForceMeter:
         return None if self._first is None else float(self._magnitude[0])
 
 
+class SettledForces(NamedTuple):
+    """Forces that were sent, and whether each acted: columns of equal lengths."""
+
+    stamp: IntArray
+    """ns"""
+    force: FloatArray
+    """N"""
+    acted: BoolArray
+
+    def select(self, rows: slice) -> Self:
+        """Return some of them."""
+        return type(self)(self.stamp[rows], self.force[rows], self.acted[rows])
+
+
+class DroppedForces:
+    """Forces that are known to have been dropped, each until it is found among those sent."""
+
+    def __init__(self) -> None:
+        self._number: dict[tuple[int, float], int] = {}
+
+    def add(self, stamp: IntArray, force: FloatArray) -> None:
+        """Take forces (ns, N) that were dropped; what is not finite never acts anyway."""
+        for dropped in zip(stamp.tolist(), force.tolist(), strict=True):
+            if isfinite(dropped[1]):
+                self._number[dropped] = self._number.get(dropped, 0) + 1
+        for oldest in list(islice(self._number, max(0, len(self._number) - HELD_FORCES))):
+            del self._number[oldest]
+
+    def among(self, stamp: IntArray, force: FloatArray) -> IntArray:
+        """Return the rows of forces sent (ns, N) that were dropped: as many of equal ones."""
+        if not self._number:
+            return np.empty(0, np.int64)
+        rows: list[int] = []
+        for row in np.flatnonzero(np.isin(stamp, [stamp for stamp, _ in self._number])).tolist():
+            sent = int(stamp[row]), float(force[row])
+            if sent in self._number:
+                rows.append(row)
+                self._number[sent] -= 1
+                if self._number[sent] == 0:
+                    del self._number[sent]
+        return np.array(rows, np.int64)
+
+
+class ForceSettler:
+    """Tells which of the forces that were sent acted, from those that were dropped.
+
+    A force and the news that it was dropped may come in either order, some 20,000 forces apart.
+    """
+
+    def __init__(self) -> None:
+        self._held = SettledForces(np.empty(0, np.int64), np.empty(0), np.empty(0, np.bool_))
+        self._dropped = DroppedForces()
+
+    def feed(
+        self,
+        stamp: IntArray,
+        force: FloatArray,
+        dropped_stamp: IntArray,
+        dropped_force: FloatArray,
+    ) -> SettledForces:
+        """Take forces (ns, N) that were sent, and that were dropped; return what is settled."""
+        held = self._held
+        self._held = SettledForces(
+            np.concatenate([held.stamp, stamp]),
+            np.concatenate([held.force, force]),
+            np.concatenate([held.acted, np.isfinite(force)]),
+        )
+        self._dropped.add(dropped_stamp, dropped_force)
+        undecided = np.where(self._held.acted, self._held.force, np.nan)
+        self._held.acted[self._dropped.among(self._held.stamp, undecided)] = False
+        return self._release(len(self._held.stamp) - HELD_FORCES)
+
+    def finish(self) -> SettledForces:
+        """Return what was held back: no more is told of it."""
+        return self._release(len(self._held.stamp))
+
+    def _release(self, number: int) -> SettledForces:
+        number = max(number, 0)
+        held = self._held
+        self._held = held.select(slice(number, None))
+        return held.select(slice(number))
+
+
 class RunMeter:
     """Measures a run from what is recorded of it: the samples and the control force."""
 
-    def __init__(self, window: int) -> None:
-        """Average over the last `window` cycles at most."""
+    def __init__(self, window: int, *, dropped_known: bool = False) -> None:
+        """Average over the last `window` cycles at most.
+
+        `dropped_known` says whether it is told which forces were dropped; only then it is known
+        which acted.
+        """
         self.motion = SampleMeter(window)
         self.force = ForceMeter()
+        """The force as it was sent."""
+        self.applied = ForceMeter()
+        """The force that acted; one that was dropped counts as none."""
+        self.dropped_known = dropped_known
+        self.dropped = 0
+        """Forces that were told to be dropped."""
+        self._settler = ForceSettler()
+
+    def feed_forces(
+        self,
+        stamp: IntArray,
+        force: FloatArray,
+        dropped_stamp: IntArray,
+        dropped_force: FloatArray,
+    ) -> SettledForces:
+        """Take the forces that follow, sent and dropped; return those of which it is settled.
+
+        See `ForceMeter` for stamps and forces, and `ForceSettler`.
+        """
+        self.force.feed(stamp, force)
+        self.dropped += len(dropped_stamp)
+        return self._apply(self._settler.feed(stamp, force, dropped_stamp, dropped_force))
+
+    def finish(self) -> SettledForces:
+        """End the run: what was not told to be dropped has acted. Return these forces."""
+        return self._apply(self._settler.finish())
+
+    def _apply(self, settled: SettledForces) -> SettledForces:
+        self.applied.feed(settled.stamp, np.where(settled.acted, settled.force, 0.0))
+        return settled
 
     def report(self) -> dict[str, Any]:
         """Return the measures and counts by name, ready for JSON; SI units.
@@ -382,6 +504,9 @@ class RunMeter:
             **motion.measures().as_dict(),
             "peak_force": self.force.peak_force,
             "resting_force": self.force.resting_force,
+            "peak_applied_force": self.applied.peak_force if self.dropped_known else None,
+            "resting_applied_force": self.applied.resting_force if self.dropped_known else None,
+            "dropped_forces": self.dropped if self.dropped_known else None,
             "samples": motion.samples,
             "lost_samples": motion.lost_samples,
             "duration": motion.duration,

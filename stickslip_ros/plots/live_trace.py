@@ -9,9 +9,10 @@ import numpy as np
 
 from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
 from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.samples import NANOSECONDS, IntArray
+from stickslip_ros.physics.samples import HELD_FORCES, NANOSECONDS, DroppedForces, IntArray
 from stickslip_ros.plots.decimation import LONGEST_GAP, peaks
 
+_NONE = WrenchColumns(np.empty(0, np.int64), np.empty(0))
 _MOST_ROWS = 200_000
 _ORBIT_BUCKETS = 1_000
 _FINE_BUCKETS = 10_000
@@ -35,6 +36,8 @@ class Frame(NamedTuple):
     velocity: Line
     belt_velocity: Line
     force: Line
+    dropped: Line
+    """Forces that were sent and did not act, over time."""
     orbit: Line
     """Velocity over displacement."""
 
@@ -53,8 +56,10 @@ class LiveTrace:
         """How much is kept, s; a frame shows no more."""
         self._begin()
 
-    def feed(self, states: JointStateColumns, forces: WrenchColumns) -> None:
-        """Take in what has come; blocks that are empty are welcome."""
+    def feed(
+        self, states: JointStateColumns, forces: WrenchColumns, dropped: WrenchColumns = _NONE
+    ) -> None:
+        """Take in what has come, `dropped` forces in any order; empty blocks are welcome."""
         longest = round(self.longest * NANOSECONDS)
         with self._lock:
             descents = np.flatnonzero(np.diff(states.stamp) <= 0)
@@ -73,7 +78,13 @@ class LiveTrace:
                 later = forces.stamp > self._forces.newest
                 # One for the far future would hide all others.
                 later &= forces.stamp < max(self._states.newest, 0) + NANOSECONDS
-                self._forces.add(forces.stamp[later], [forces.force[later]], longest)
+                sent = forces.force[later]
+                columns = sent, np.full(len(sent), np.nan)
+                self._forces.add(forces.stamp[later], columns, longest)
+            self._dropped.add(dropped.stamp, dropped.force)
+            stamp, (acted, lost) = self._forces.last(HELD_FORCES)
+            rows = self._dropped.among(stamp, acted)
+            acted[rows], lost[rows] = np.nan, acted[rows]
 
     def frame(self, window: float, orbit: float, buckets: int) -> Frame | None:
         """Return the last `window` s for `buckets` columns of pixels, and the last `orbit` s.
@@ -88,7 +99,9 @@ class LiveTrace:
             # On a fixed grid of times the points of a moving picture keep their places.
             width = max((end - begin) // buckets, 1)
             stamp, columns = self._states.since(begin)
-            force_stamp, (force,) = self._forces.since(begin)
+            force_stamp, (force, lost) = self._forces.since(begin)
+            acted = ~np.isnan(force)
+            lost_stamp = force_stamp[~np.isnan(lost)]
             turning = round(orbit * NANOSECONDS)
             orbit_stamp, (x, v, _) = self._states.since(end - turning)
             rows = peaks(orbit_stamp // max(turning // _ORBIT_BUCKETS, 1), x, v)
@@ -100,14 +113,17 @@ class LiveTrace:
                 position,
                 velocity,
                 belt,
-                _line(force_stamp, force, end, width, self._forces.step),
+                _line(force_stamp[acted], force[acted], end, width, self._forces.step, lost_stamp),
+                _line(lost_stamp, lost[~np.isnan(lost)], end, width, self._forces.step),
                 Line(x[rows], v[rows]),
             )
 
     def _begin(self) -> None:
         self._first: int | None = None
         self._states = _Rolling(3)
-        self._forces = _Rolling(1)
+        self._forces = _Rolling(2)
+        """Those that acted, those that did not; one of them is NaN."""
+        self._dropped = DroppedForces()
 
 
 class _Rolling:
@@ -139,6 +155,11 @@ class _Rolling:
         rows = slice(int(np.searchsorted(self._stamp[: self._size], begin)), self._size)
         return self._stamp[rows], [column[rows] for column in self._columns]
 
+    def last(self, number: int) -> tuple[IntArray, list[FloatArray]]:
+        """Return so many of the last rows, to be changed as long as nothing is added."""
+        rows = slice(max(0, self._size - number), self._size)
+        return self._stamp[rows], [column[rows] for column in self._columns]
+
     def _make_room(self, number: int, longest: int) -> None:
         stamp, columns = self.since(self.newest - longest)
         if len(stamp) + number > _MOST_ROWS:
@@ -151,16 +172,26 @@ class _Rolling:
         self._columns = [np.concatenate([column, np.empty(room)]) for column in columns]
 
 
-def _line(stamp: IntArray, column: FloatArray, end: int, width: int, step: int) -> Line:
+def _line(
+    stamp: IntArray,
+    column: FloatArray,
+    end: int,
+    width: int,
+    step: int,
+    others: IntArray = _NONE.stamp,
+) -> Line:
     """Return the points of a line that is broken, by NaN, where samples are missing.
 
-    Steps of up to `step` (ns) are not for that reason.
+    Steps of up to `step` (ns) are not for that reason. Where there were `others` (ns) instead, it
+    is two NaN.
     """
     rows = peaks(stamp // width, column)
     x, y = (stamp[rows] - end) / NANOSECONDS, column[rows]
     if len(stamp) > 1:
         steps = np.diff(stamp)
         behind = np.flatnonzero(steps > LONGEST_GAP * max(float(np.median(steps)), step)) + 1
+        instead = np.diff(np.searchsorted(others, stamp))[behind - 1] > 0
+        behind = np.repeat(behind, 1 + instead)
         gaps = np.searchsorted(rows, behind)
         x = np.insert(x, gaps, (stamp[behind] - end) / NANOSECONDS)
         y = np.insert(y, gaps, np.nan)

@@ -49,6 +49,7 @@ _REST: Any = {"color": GREEN, "lw": 1.2, "ls": ":", "zorder": 2.5}
 _POINT: Any = {"color": GREEN, "marker": "o", "ms": 6.0, "ls": "", "mec": "white"}
 _CONTROL: Any = {"color": ORANGE, "lw": 1.6, "drawstyle": "steps-post"}
 _HELD: Any = {"color": ORANGE, "lw": 1.2, "ls": ":", "drawstyle": "steps-post"}
+_DROPPED: Any = {"color": ORANGE, "alpha": 0.5, "marker": ".", "ms": 2.0, "ls": ""}
 _FRICTION: Any = {"color": SKY_BLUE, "lw": 0.7}
 _EARLIER: Any = {"color": LIGHT_GREY, "lw": 0.7}
 _STICKS: Any = {"color": GREY, "lw": 5.0, "solid_capstyle": "butt", "zorder": 1.9}
@@ -121,6 +122,8 @@ def run_figure(
         handles.insert(2, Line2D([], [], **_POINT | _REST, label="equilibrium"))
     if picture.holds:
         handles.append(Line2D([], [], **_HELD, label="none came: the last one"))
+    if picture.drops:
+        handles.append(Line2D([], [], **_DROPPED | {"ms": 6.0}, label="sent, did not act"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
 
@@ -132,22 +135,29 @@ class _Picture:
         self.units = units = Units.of(drive)
         self._history, self._drive, self._last = history, drive, last
         motion = history.motion
-        self._run = _Pane.of("the whole run", motion, history.control.columns()[0])
+        self._run = _Pane.of("the whole run", motion, *self._force_times)
         self._length = units.axis("displacement", "m", motion.position)
         self._speed = units.axis("velocity", "m/s", motion.velocity, motion.belt_velocity)
         self.holds = False
         """Whether no force came for a while, and what is drawn is the last one."""
+        self.drops = len(history.dropped.columns()[0]) > 0
+        """Whether forces were sent that did not act."""
+
+    @property
+    def _force_times(self) -> list[FloatArray]:
+        return [trace.columns()[0] for trace in (self._history.control, self._history.dropped)]
 
     def over_time(self, figure: Figure, parts: GridSpecFromSubplotSpec) -> None:
         """Draw displacement, velocity and force, the whole run to the left and its end enlarged."""
         history = self._history
-        others = () if len(self._last.time) else (history.control.columns()[0],)
+        others = [] if len(self._last.time) else self._force_times
         end = _Pane.of("its end, enlarged", self._last, *others)
-        whole = history.friction.columns(), history.control.columns()
-        ending = history.friction.since(end.start), history.control.since(end.start)
-        newton, label = self.units.axis("force", "N", whole[0][1], whole[1][1])
+        traces = history.friction, history.control, history.dropped
+        whole = [trace.columns() for trace in traces]
+        ending = [trace.since(end.start) for trace in traces]
+        newton, label = self.units.axis("force", "N", *(columns[1] for columns in whole))
         panels: Any = parts.subplots(sharex="col", sharey="row")
-        for column, pane, (friction, control) in zip(
+        for column, pane, (friction, control, dropped) in zip(
             panels.T, (self._run, end), (whole, ending), strict=True
         ):
             position, velocity, force = column
@@ -156,7 +166,8 @@ class _Picture:
             _draw_line(force, pane, friction[0], friction[1], newton, history.gap, **_FRICTION)
             gap = history.control_gap
             _draw_line(force, pane, control[0], control[1], newton, gap, **_CONTROL)
-            self.holds |= _draw_held(force, pane, control[0], control[1], newton, gap)
+            self.holds |= _draw_held(force, pane, control[0], control[1], newton, gap, dropped[0])
+            _draw_line(force, pane, dropped[0], dropped[1], newton, gap, **_DROPPED)
             self._label_time(force, pane)
         labels = self._length[1], self._speed[1], label
         for row, of_row in zip(panels, labels, strict=True):
@@ -327,10 +338,21 @@ def _draw_line(
 
 
 def _draw_held(
-    axes: Axes, pane: _Pane, time: FloatArray, force: FloatArray, scale: float, gap: float
+    axes: Axes,
+    pane: _Pane,
+    time: FloatArray,
+    force: FloatArray,
+    scale: float,
+    gap: float,
+    dropped: FloatArray,
 ) -> bool:
-    """Draw the forces behind which none came for a while, up to the next; return if there are."""
+    """Draw the forces behind which none came for a while, up to the next; return if there are.
+
+    Where some came and were `dropped` (s), it is not known what acted.
+    """
     behind = np.flatnonzero(np.diff(time) > max(gap, 2.0 * (pane.end - pane.start) / _PIXELS))
+    came = np.diff(np.searchsorted(dropped, time)) > 0
+    behind = behind[~came[behind]]
     behind = behind[(time[behind + 1] > pane.start) & (time[behind] < pane.end)]
     if len(behind) == 0:
         return False

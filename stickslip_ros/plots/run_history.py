@@ -5,7 +5,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from stickslip_ros.physics.knots import FloatArray, Knots, knots_from_samples
+from stickslip_ros.physics.knots import BoolArray, FloatArray, Knots, knots_from_samples
 from stickslip_ros.physics.measures import Cycle
 from stickslip_ros.physics.samples import LARGEST
 from stickslip_ros.plots.decimation import LONGEST_GAP, Trace
@@ -58,6 +58,8 @@ class RunHistory:
         """Friction force on the slide, N."""
         self.control = Trace(1)
         """Force (N) by the time from which on it acts or is asked for."""
+        self.dropped = Trace(1)
+        """Force (N) that was asked for and did not act, as far as that is known."""
         self._motion, self._cycles = Trace(4), Trace(2)
         self._first: list[Rows] = []
         self._first_rows = 0
@@ -141,13 +143,22 @@ class RunHistory:
         """Take friction forces on the slide (N) that follow."""
         self.friction.add(time, force)
 
-    def take_control(self, time: FloatArray, force: FloatArray) -> None:
-        """Take control forces (N) that follow, by the time from which each acts or is asked for."""
+    def take_control(
+        self, time: FloatArray, force: FloatArray, acted: BoolArray | None = None
+    ) -> None:
+        """Take control forces (N) that follow, by the time from which each acts or is asked for.
+
+        All of them have `acted` unless it is given.
+        """
         before = np.maximum.accumulate(np.append(self._control_time, time))[:-1]
         rows = (time > before) & np.isfinite(force)
-        self.control.add(time[rows], force[rows])
         if self.control_gap == float("inf") and rows.sum() > 1:
             self.control_gap = _gap(time[rows])
+        if acted is not None:
+            dropped = rows & ~acted
+            self.dropped.add(time[dropped], force[dropped])
+            rows &= acted
+        self.control.add(time[rows], force[rows])
         self._control_time = float(max(self._control_time, time.max(initial=self._control_time)))
 
     def _take_cycles(self, time: float, cycles: Sequence[Cycle]) -> None:

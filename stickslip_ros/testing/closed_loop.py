@@ -17,6 +17,7 @@ from rclpy.validate_namespace import validate_namespace
 
 from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.errors import InvalidInputError, RunError
+from stickslip_ros.nodes.analyzer import VERDICT_TIME
 from stickslip_ros.nodes.controllers import find_controllers, find_managed, near_misses
 from stickslip_ros.nodes.managed import ERROR
 from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
@@ -342,6 +343,8 @@ class ClosedLoop:
             for name, node in nodes.nodes.items()
             if node is not nodes.analyzer
         }
+        if diagnostics["plant"].figures["dropped_messages"]:
+            nodes.spin_until(lambda: False, VERDICT_TIME)
         nodes.analyzer.call_soon(nodes.analyzer.trigger_deactivate)
         nodes.spin_until(lambda: not nodes.analyzer.active, _DEACTIVATION_TIMEOUT)
         return diagnostics

@@ -30,13 +30,19 @@ class RunResult:
     """Every sample."""
     forces: WrenchColumns
     """Every control force that was published; its stamp is that of the sample it answers."""
+    dropped_forces: WrenchColumns
+    """Those of them that did not act."""
     disturbances: WrenchColumns
     """The disturbance force at each sample at which it changed."""
     measures: Measures
     """Of the last whole cycles of this run, `analyzer.window` at most."""
     peak_force: float | None
-    """Largest magnitude of the control force, N; None without forces."""
+    """Largest magnitude of the control force, N, as it was published; None without forces."""
     resting_force: float | None
+    """The same over the last tenth of the run."""
+    peak_applied_force: float | None
+    """Largest magnitude of the control force that acted, N; None without forces."""
+    resting_applied_force: float | None
     """The same over the last tenth of the run."""
     late_forces: int
     """Samples whose force had not come when it was due."""
@@ -63,19 +69,23 @@ def result_of(bag: Path, window: int, diagnostics: dict[str, Diagnostics]) -> Ru
     """
     with Recording(bag) as recording:
         states, forces = recording.joint_states, recording.control_forces
-        disturbances = recording.applied_disturbances
+        disturbances, dropped = recording.applied_disturbances, recording.dropped_forces
         if not recording.complete:
             raise RunError(f"the recording of the run failed: {'; '.join(recording.missing)}")
     meter = RunMeter(window)
     meter.motion.feed(states.stamp, states.position, states.velocity, states.belt_velocity)
-    meter.force.feed(forces.stamp, forces.force)
+    meter.feed_forces(forces.stamp, forces.force, dropped.stamp, dropped.force)
+    meter.finish()
     return RunResult(
         states=states,
         forces=forces,
+        dropped_forces=dropped,
         disturbances=disturbances,
         measures=meter.motion.measures(),
         peak_force=meter.force.peak_force,
         resting_force=meter.force.resting_force,
+        peak_applied_force=meter.applied.peak_force,
+        resting_applied_force=meter.applied.resting_force,
         late_forces=diagnostics["plant"].figures["late_forces"],
         lost_samples=meter.motion.lost_samples,
         diagnostics=diagnostics,

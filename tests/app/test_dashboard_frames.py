@@ -46,7 +46,8 @@ def fed(parameters: dict[str, Any], seconds: float, rate: float) -> Frames:
     x = 4e-4 * np.sin(100.0 * time)
     belt = np.full_like(x, 0.04)
     states = JointStateColumns(stamp, x, 100.0 * x, x, belt, belt)
-    frames.feed(states, WrenchColumns(stamp, 1e5 * x))
+    none = WrenchColumns(stamp[:0], x[:0])
+    frames.feed(states, WrenchColumns(stamp, 1e5 * x), none)
     return frames
 
 

@@ -3,10 +3,14 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from geometry_msgs.msg import WrenchStamped
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
 
 from stickslip_ros.app.main import main
 from stickslip_ros.bags.messages import pack_joint_state
 from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.testing import ClosedLoop
 from tests.bags.runs import STAMPS, STATES, motion, record
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
@@ -167,3 +171,80 @@ def test_a_run_that_has_come_to_rest_does_not_read_as_a_regime(command):
     assert "stick-slip, not steady: decaying\n" in out
     found = json.loads(command("report", REFERENCE, "--json")[1])
     assert (found["steady"], found["trend"]) == (False, "decaying")
+
+
+class Refused(Node):
+    """Answers each state with 128.6 N that no plant takes."""
+
+    force, shift = 128.6, 1
+
+    def __init__(self):
+        super().__init__("refused")
+        self.publisher = self.create_publisher(WrenchStamped, "control_force", 10)
+        self.create_subscription(JointState, "joint_states", self.answer, 10)
+
+    def answer(self, state):
+        message = WrenchStamped(header=state.header)
+        message.header.stamp.nanosec += self.shift
+        message.wrench.force.x = self.force
+        self.publisher.publish(message)
+
+
+class NotFinite(Refused):
+    """Answers each state with a force that is not finite."""
+
+    force, shift = float("inf"), 0
+
+
+def recorded(bag, controller, pace="lockstep"):
+    overrides = ("plant.reply_timeout=0.1", f"plant.pace={pace}")
+    with ClosedLoop("feed_drive", *overrides, controller=controller, bag=bag) as loop:
+        return loop.run(0.5)
+
+
+@pytest.mark.parametrize("pace", ["lockstep", "realtime"])
+def test_of_forces_that_were_all_refused_none_acted(command, tmp_path, pace):
+    result = recorded(tmp_path / "bag", Refused, pace)
+    assert (result.peak_force, result.peak_applied_force) == (128.6, 0.0)
+    assert len(result.dropped_forces.stamp) == len(result.forces.stamp) > 1
+    report = json.loads(command("report", tmp_path / "bag", "--json")[1])
+    assert (report["peak_force"], report["resting_force"]) == (128.6, 128.6)
+    assert (report["peak_applied_force"], report["resting_applied_force"]) == (0.0, 0.0)
+    assert report["dropped_forces"] == len(result.forces.stamp)
+    rows = [line.rsplit("  ", 1) for line in command("report", tmp_path / "bag")[1].splitlines()]
+    figures = {row[0].strip(): row[-1].strip() for row in rows}
+    assert figures["peak control force sent"] == "128.6 N"
+    assert figures["peak control force acting"] == "0 N"
+    assert figures["control force acting at the end"] == "0 N"
+    assert figures["dropped forces"] == str(report["dropped_forces"])
+
+
+def test_of_forces_that_are_not_finite_none_acted(command, tmp_path):
+    recorded(tmp_path / "bag", NotFinite)
+    report = json.loads(command("report", tmp_path / "bag", "--json")[1])
+    assert (report["peak_force"], report["peak_applied_force"]) == (None, 0.0)
+
+
+def test_forces_that_all_acted_are_told_once(command, tmp_path):
+    recorded(tmp_path / "bag", "washout")
+    report = json.loads(command("report", tmp_path / "bag", "--json")[1])
+    assert report["peak_applied_force"] == report["peak_force"] is not None
+    assert report["resting_applied_force"] == report["resting_force"]
+    assert report["dropped_forces"] == 0
+    rows = command("report", tmp_path / "bag")[1].splitlines()
+    assert [row.split("  ")[0] for row in rows if "control force" in row] == [
+        "peak control force",
+        "control force at the end",
+    ]
+
+
+def test_a_bag_that_does_not_tell_what_was_dropped_claims_nothing_of_what_acted(command):
+    report = json.loads(command("report", REFERENCE, "--json")[1])
+    assert report["peak_force"] == pytest.approx(114.87062132727189)
+    for name in ("peak_applied_force", "resting_applied_force", "dropped_forces"):
+        assert report[name] is None
+    rows = command("report", REFERENCE)[1].splitlines()
+    assert [row.split("  ")[0] for row in rows if "control force" in row] == [
+        "peak control force",
+        "control force at the end",
+    ]

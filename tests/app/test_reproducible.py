@@ -10,7 +10,7 @@ from tests.nodes.processes import busy_machine
 from tests.nodes.runs import messages_of
 
 SECOND = 1_000_000_000
-TOPICS = {"joint_states", "control_force", "applied_disturbance"}
+TOPICS = {"joint_states", "control_force", "applied_disturbance", "dropped_force"}
 AFTER_STAMP = slice(12, None)
 """Of a serialized message: what follows encapsulation, seconds and nanoseconds."""
 
@@ -57,6 +57,7 @@ def test_lockstep_gives_the_same_bag_composed_in_processes_and_on_a_busy_machine
     assert counts.keys() == TOPICS
     assert counts["joint_states"] == counts["control_force"] == 801
     assert counts["applied_disturbance"] > 400
+    assert counts["dropped_force"] > 100
     for other in ("processes", "composed_busy", "processes_busy"):
         assert messages_of(tmp_path / other) == messages, other
 

@@ -29,10 +29,14 @@ class Shown:
     def __init__(self) -> None:
         self.states: list[JointStateColumns] = []
         self.forces: list[WrenchColumns] = []
+        self.dropped: list[WrenchColumns] = []
 
-    def take(self, states: JointStateColumns, forces: WrenchColumns) -> None:
+    def take(
+        self, states: JointStateColumns, forces: WrenchColumns, dropped: WrenchColumns
+    ) -> None:
         self.states.append(states)
         self.forces.append(forces)
+        self.dropped.append(dropped)
 
     @property
     def stamps(self) -> np.ndarray:

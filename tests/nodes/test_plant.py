@@ -21,6 +21,7 @@ from stickslip_ros.nodes.topics import (
     CONTROL_FORCE,
     DIAGNOSTICS,
     DISTURBANCE_FORCE,
+    DROPPED_FORCE,
     JOINT_STATES,
     RECORDED,
 )
@@ -296,3 +297,39 @@ def test_the_real_time_factor_scales_the_pace(graph: Graph) -> None:
     # It can be slower on a busy machine, never faster.
     assert plant._pacer.steps_per_second <= 100.0 * factor * 1.01
     assert plant._loop.late_forces == 0
+
+
+@pytest.mark.parametrize("pace", ["lockstep", "realtime"])
+def test_forces_that_do_not_act_are_published_as_they_were_sent(graph: Graph, pace: str) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    dropped = graph.listen(DROPPED_FORCE, raw=True)
+    plant = graph.add(PlantNode, pace=pace, wait_for=["observer"], rate=5.0)
+    force = answers(graph)
+    graph.wait_until(lambda: heard, "sample 0")
+    stamp = int(joint_state_columns(heard[:1])[0].stamp[0])
+    sent = [
+        pack_wrench(*given) for given in ((0, 1.0), (stamp + 1, 2.0), (stamp, nan), (stamp, 128.6))
+    ]
+    for message in (*sent, sent[3], sent[1]):
+        force.publish(message)
+    graph.wait_until(lambda: len(dropped) == 5, "all but the one that is taken")
+    assert dropped == [*sent[:3], sent[3], sent[1]]
+    graph.deactivate("plant")
+    last = pack_wrench(plant.diagnose()[2]["newest_stamp"], 3.0)
+    for message in (last, sent[1]):  # the first would act if the motion went on
+        force.publish(message)
+    graph.wait_until(lambda: len(dropped) == 6, "what comes while it pauses")
+    assert dropped[5] == sent[1]
+
+
+def test_forces_that_were_overtaken_are_published(graph: Graph) -> None:
+    dropped = graph.listen(DROPPED_FORCE, raw=True)
+    forces = graph.listen(CONTROL_FORCE, raw=True)
+    graph.add(WashoutControllerNode)
+    listeners = ["observer", "washout_controller"]
+    plant = graph.add(PlantNode, duration=3.0, wait_for=listeners, force_jitter=0.035)
+    graph.wait_until(lambda: len(forces) == 301 and not plant.active, "301 forces")
+    overtaken = plant.diagnose()[2]["dropped: overtaken by a newer one"]
+    graph.wait_until(lambda: len(dropped) == overtaken, "all of them")
+    assert overtaken > 30
+    assert set(dropped) < set(forces)

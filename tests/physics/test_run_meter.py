@@ -1,11 +1,12 @@
 import pickle
+from collections import Counter
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.samples import ForceMeter, RunMeter
+from stickslip_ros.physics.samples import ForceMeter, ForceSettler, RunMeter, SettledForces
 
 PERIOD = 10_000_000  # of 100 Hz, in ns
 
@@ -75,3 +76,62 @@ def test_the_report_of_a_run() -> None:
     assert report["amplitude"] == pytest.approx(1.0, rel=1e-6)
     assert report["frequency"] == pytest.approx(0.75, rel=1e-6)
     assert report["velocity_amplitude"] == pytest.approx(1.5 * np.pi, rel=1e-6)
+
+
+@given(
+    sent=st.lists(st.tuples(st.integers(0, 5), st.sampled_from([0.5, 1.0, np.nan])), max_size=30),
+    data=st.data(),
+)
+def test_as_many_forces_as_were_dropped_are_found_in_whatever_order_they_come(
+    sent: list[tuple[int, float]], data: st.DataObject
+) -> None:
+    dropped = data.draw(st.lists(st.sampled_from(sent), unique_by=id)) if sent else []
+    events = [(True, force) for force in sent] + [(False, force) for force in dropped]
+    settler = ForceSettler()
+    parts: list[SettledForces] = []
+    for is_sent, (stamp, force) in data.draw(st.permutations(events)):
+        columns = np.array([stamp]), np.array([force])
+        none = columns[0][:0], columns[1][:0]
+        parts.append(settler.feed(*(columns if is_sent else none), *(none if is_sent else columns)))
+    parts.append(settler.finish())
+    acted = Counter(
+        force
+        for part in parts
+        for *force_, acted in zip(part.stamp.tolist(), part.force.tolist(), part.acted, strict=True)
+        if acted
+        for force in [tuple(force_)]
+    )
+    finite = Counter(force for force in sent if np.isfinite(force[1]))
+    assert acted == finite - Counter(force for force in dropped if np.isfinite(force[1]))
+
+
+def test_what_was_sent_and_what_acted_are_measured_apart() -> None:
+    meter = RunMeter(window=5, dropped_known=True)
+    stamp, force = decaying(300)
+    meter.feed_forces(stamp, force, stamp[[0, 299]], force[[0, 299]])
+    meter.finish()
+    report = meter.report()
+    assert (report["peak_force"], report["peak_applied_force"]) == (1.0, 0.5)
+    assert report["resting_force"] == report["resting_applied_force"] == pytest.approx(1.0 / 271.0)
+    assert report["dropped_forces"] == 2
+
+
+def test_where_all_forces_were_dropped_none_acted() -> None:
+    meter = RunMeter(window=5, dropped_known=True)
+    stamp, force = decaying(300)
+    meter.feed_forces(stamp, force, stamp, force)
+    meter.finish()
+    report = meter.report()
+    assert (report["peak_force"], report["peak_applied_force"]) == (1.0, 0.0)
+    assert report["resting_applied_force"] == 0.0
+
+
+def test_without_knowing_what_was_dropped_nothing_is_said_of_what_acted() -> None:
+    meter = RunMeter(window=5)
+    none = np.empty(0, np.int64), np.empty(0)
+    meter.feed_forces(*decaying(300), *none)
+    meter.finish()
+    report = meter.report()
+    assert report["peak_force"] == 1.0
+    for name in ("peak_applied_force", "resting_applied_force", "dropped_forces"):
+        assert report[name] is None

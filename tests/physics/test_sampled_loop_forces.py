@@ -102,6 +102,19 @@ def test_lockstep_takes_no_answer_to_a_sample_that_has_passed() -> None:
     assert loop.acting == 0.0
 
 
+def test_a_late_force_that_a_newer_one_replaces_before_it_acts_is_told() -> None:
+    told: list[tuple[int, float]] = []
+    loop = Loop(realtime=True, overtaken=lambda *force: told.append(force))
+    loop.answer(0, 0.5)
+    loop.advance_by(3)
+    for number, force in ((1, 1.5), (2, 2.5), (3, 3.5)):
+        assert loop.answer(number, force) is Verdict.ACCEPTED
+    loop.advance()
+    assert loop.acting == 3.5
+    assert told == [(SECOND + PERIOD, 1.5), (SECOND + 2 * PERIOD, 2.5)]
+    assert dict(loop.dropped) == {Verdict.OVERTAKEN: 2}
+
+
 def test_lockstep_goes_on_without_force_where_none_comes() -> None:
     loop = Loop()
     loop.answer(0, 0.5)
@@ -233,7 +246,10 @@ def test_whatever_is_offered_every_sample_is_finite(
     realtime: bool, events: list[tuple[int, float] | None]
 ) -> None:
     MOTION.restart(0.0, 0.0)
-    loop = SampledLoop(MOTION, 100.0, SECOND, hold_late=realtime)
+    told: list[tuple[int, float]] = []
+    loop = SampledLoop(
+        MOTION, 100.0, SECOND, hold_late=realtime, overtaken=lambda *force: told.append(force)
+    )
     taken = 0
     for event in events:
         if event is None:
@@ -241,4 +257,6 @@ def test_whatever_is_offered_every_sample_is_finite(
         else:
             taken += loop.offer(*event) is Verdict.ACCEPTED
     offered = sum(event is not None for event in events)
-    assert taken + loop.dropped.total() == offered
+    overtaken = loop.dropped[Verdict.OVERTAKEN]
+    assert taken + loop.dropped.total() - overtaken == offered
+    assert overtaken == len(told)

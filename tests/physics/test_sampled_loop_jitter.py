@@ -1,6 +1,6 @@
 """Forces with a jitter: each arrives when it likes, and the newest that has arrived acts."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from itertools import pairwise
 
 import pytest
@@ -52,6 +52,7 @@ def advanced(
     rate: float = 10.0,
     missing: Collection[int] = (),
     realtime: bool = False,
+    overtaken: Callable[[int, float], None] = lambda stamp, force: None,
 ) -> Told:
     """The motion over all samples; delay and jitter in periods, force n being n + 1 units."""
     MOTION.begin()
@@ -63,6 +64,7 @@ def advanced(
         force_jitter=jitter / rate,
         force_jitter_seed=seed,
         hold_late=realtime,
+        overtaken=overtaken,
     )
     for number in range(SAMPLES):
         if number not in missing:
@@ -142,6 +144,28 @@ def test_what_stands_in_for_a_missing_force_arrives_in_its_place(
     wanted = merged([(at, stand_in(number)) for at, number in switches_of(advanced(*delays))])
     assert [number for _, number in found] == [number for _, number in wanted]
     assert [instant for instant, _ in found] == pytest.approx([at for at, _ in wanted], abs=1e-8)
+
+
+@pytest.mark.parametrize("realtime", [False, True])
+@given(delay=thousandths, jitter=thousandths, missing=st.sets(st.integers(0, SAMPLES - 1)))
+def test_a_force_acts_or_is_told_to_be_overtaken_or_is_still_under_way(
+    realtime: bool, delay: int, jitter: int, missing: set[int]
+) -> None:
+    told: list[int] = []
+    motion = advanced(
+        delay / 1000,
+        jitter / 1000,
+        3,
+        missing=missing,
+        realtime=realtime,
+        overtaken=lambda _, force: told.append(round(force / UNIT) - 1),
+    )
+    acted = {round(force / UNIT) - 1 for force, duration in motion.pieces if duration > 0.0}
+    sent = set(range(SAMPLES)) - missing
+    assert sorted(set(told)) == sorted(told)
+    assert set(told).isdisjoint(acted)
+    assert set(told) <= sent
+    assert all(number > max(acted) for number in sent - acted - set(told))
 
 
 @given(thousandths, thousandths, seeds)

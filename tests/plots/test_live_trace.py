@@ -152,3 +152,20 @@ def test_a_force_for_the_far_future_does_not_hide_the_others() -> None:
     assert frame is not None
     assert len(frame.force.x) > 0
     assert frame.force.x.max() < 0.0
+
+
+@pytest.mark.parametrize("told_first", [False, True])
+def test_forces_that_did_not_act_make_a_line_of_their_own(told_first: bool) -> None:
+    trace = LiveTrace(10.0)
+    stamps = range(0, SECOND, 10_000_000)
+    sent = forces(stamps, np.arange(100.0))
+    dropped = forces(stamps[40:60], np.arange(40.0, 60.0))
+    trace.feed(states(stamps, np.zeros(100)), NO_FORCES, dropped if told_first else NO_FORCES)
+    trace.feed(states(range(0), np.empty(0)), sent, NO_FORCES if told_first else dropped)
+    frame = trace.frame(10.0, 1.0, 1000)
+    assert frame is not None
+    assert frame.dropped.y.tolist() == list(range(40, 60))
+    y = frame.force.y
+    assert y[~np.isnan(y)].tolist() == [*range(40), *range(60, 100)]
+    # One NaN would say that none came, and that the last one was held.
+    assert np.flatnonzero(np.isnan(y)).tolist() == [40, 41]

@@ -370,3 +370,23 @@ def test_a_motion_that_runs_away_is_drawn(tmp_path: Path) -> None:
     figure = run_figure(history, meter.measures(), PAPER, title="it")
     assert figure.get_suptitle() == "it\nunbounded"
     save(figure, tmp_path / "away.png")
+
+
+def test_forces_that_did_not_act_are_dots() -> None:
+    history = RunHistory()
+    time = np.arange(0.0, 3.0, 0.01)
+    ones = np.ones(len(time))
+    history.take_samples(time, 0.1 * time, 0.4 * ones, 0.4 * ones, ones, [])
+    acted = (time <= 1.0) | (time >= 1.5)
+    history.take_control(time, 7.0 * time, acted)
+    figure = run_figure(history, CycleMeter(20).measures(), PAPER, title="it")
+    _, sent, dropped = figure.axes[FORCE].lines
+    (x, y), (x_dropped, _) = (np.array(line.get_xydata()).T for line in (sent, dropped))
+    (missing,) = np.flatnonzero(np.isnan(y))
+    assert (x[missing - 1], x[missing + 1]) == pytest.approx((1.0, 1.5))
+    assert dropped.get_linestyle() == "None"
+    assert (x_dropped.min(), x_dropped.max()) == pytest.approx((1.01, 1.49))
+    (legend,) = figure.legends
+    texts = {text.get_text() for text in legend.get_texts()}
+    assert "sent, did not act" in texts
+    assert "none came: the last one" not in texts

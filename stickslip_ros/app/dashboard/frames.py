@@ -54,10 +54,12 @@ class Frames:
         frequencies = list(self._observer.cycles[FREQUENCY])[-1:]
         return next((1.0 / f for f in frequencies if 1e-9 < f < 1e9), _UNKNOWN_PERIOD)
 
-    def feed(self, states: JointStateColumns, forces: WrenchColumns) -> None:
-        """Take in what was heard."""
+    def feed(
+        self, states: JointStateColumns, forces: WrenchColumns, dropped: WrenchColumns
+    ) -> None:
+        """Take in what was heard: states, forces sent, and those of them that were dropped."""
         self._trace.longest = PERIODS[-1] * self.period
-        self._trace.feed(states, forces)
+        self._trace.feed(states, forces, dropped)
 
     def frame(self, periods: int) -> bytes:
         """Return what to draw: the last `periods` natural periods, and the last cycles.
@@ -78,6 +80,7 @@ class Frames:
                 "velocity": _scaled(frame.velocity, 1.0, speed),
                 "belt": _scaled(frame.belt_velocity, 1.0, speed),
                 "force": _scaled(frame.force, 1.0, force),
+                "dropped": _scaled(frame.dropped, 1.0, force),
                 "orbit": _scaled(frame.orbit, length, speed),
             }
             at_rest = drive is not None and drive.belt_speed

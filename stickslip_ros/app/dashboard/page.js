@@ -7,6 +7,7 @@ const CYCLES_INTERVAL = 500;
 const MARGIN = 1.08;
 const LEAST_SPAN = 1e-4; // of an axis, in its units: less is rounding
 const HELD = "dotted: none came, the last one";
+const DROPPED = "dots: sent, did not act";
 const page = window.stickslip;
 const limits = {};
 const shown = {};
@@ -85,13 +86,23 @@ function drawLine(context, scale, { x, y }, colour, { dashed = false, stepped = 
   context.stroke();
 }
 
+// Two NaN stand where forces came and did not act: what acted there is not known.
+const isHeld = (y, i) => Number.isNaN(y[i]) && !Number.isNaN(y[i - 1]) && !Number.isNaN(y[i + 1]);
+
+function drawDots(context, scale, { x, y }, colour) {
+  context.fillStyle = colour;
+  for (let i = 0; i < x.length; i += 1) {
+    if (!Number.isNaN(y[i])) context.fillRect(scale.x0 + x[i] * scale.x1 - 1, scale.y0 + y[i] * scale.y1 - 1, 2, 2);
+  }
+}
+
 // Where no force came the last one is dotted: late ones leave no gap.
 function drawHeld(context, scale, { x, y }, colour) {
   context.strokeStyle = colour;
   context.setLineDash([1.5, 3]);
   context.beginPath();
   for (let i = 1; i + 1 < x.length; i += 1) {
-    if (Number.isNaN(y[i])) {
+    if (isHeld(y, i)) {
       const [held, next] = [scale.y0 + y[i - 1] * scale.y1, scale.x0 + x[i + 1] * scale.x1];
       context.moveTo(scale.x0 + x[i - 1] * scale.x1, held);
       context.lineTo(next, held);
@@ -105,16 +116,18 @@ function drawMotion({ lines, labels, time_label, window: width, end, equilibrium
   const last = page.motion;
   const another = last && (String(last.labels) !== String(labels) || end < last.end);
   if (another) page.fit(); // other units, or another run
-  const { position, velocity, belt, force, orbit } = lines;
+  const { position, velocity, belt, force, dropped, orbit } = lines;
   const [displacement, speed, push] = labels;
   const speeds = range("velocity", [velocity, belt]);
   const positions = range("position", [position]);
+  const held = force.y.some((_, i) => i > 0 && i + 1 < force.y.length && isHeld(force.y, i));
+  const pushes = [push, ...(held ? [HELD] : []), ...(dropped.y.length ? [DROPPED] : [])];
   setChanged("trace", {
     xAxis: ["", "", time_label].map((name) => ({ name, min: -width, max: 0 })),
     yAxis: [
       { name: displacement, ...positions },
       { name: speed, ...speeds },
-      { name: force.y.some(Number.isNaN) ? `${push}, ${HELD}` : push, ...range("force", [force]) },
+      { name: pushes.join(", "), ...range("force", [force, dropped]) },
     ],
   });
   setChanged("portrait", {
@@ -133,6 +146,7 @@ function drawMotion({ lines, labels, time_label, window: width, end, equilibrium
   drawLine(context, scaleOf(trace, 1), belt, GREY, { dashed: true });
   drawLine(context, scaleOf(trace, 2), force, ORANGE, { stepped: true });
   drawHeld(context, scaleOf(trace, 2), force, ORANGE);
+  drawDots(context, scaleOf(trace, 2), dropped, ORANGE);
   const portrait = chartOf("portrait");
   const plane = canvasOn(portrait);
   const scale = scaleOf(portrait, 0);

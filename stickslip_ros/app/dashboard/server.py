@@ -37,7 +37,9 @@ def serve(namespace: str, port: int | None, reach: str) -> None:
         signal.signal(signal.SIGHUP, _exit)
     initialise()
     try:
-        observer = ObserverNode(namespace, lambda states, forces: frames.feed(states, forces))
+        observer = ObserverNode(
+            namespace, lambda states, forces, dropped: frames.feed(states, forces, dropped)
+        )
         frames = Frames(observer)
         with _running(observer):
             app = FastAPI(openapi_url=None)
