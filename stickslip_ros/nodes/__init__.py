@@ -1,21 +1,15 @@
 """The ROS 2 nodes: thin shells around the physics, and their bringup."""
 
 import os
-import signal
 import sys
 from pathlib import Path
 
 from stickslip_ros.errors import RunError
+from stickslip_ros.interrupts import end_quietly_if_interrupted, is_run
 
 SHARED_MEMORY = Path("/dev/shm")
 _TRACING, _TRACING_FILES = "lttng-ust-wait-*", 2
 """A page each, which the tracing library of ROS writes to when it is loaded."""
-
-
-def end_quietly_if_interrupted() -> None:
-    """Let SIGINT end this process without a traceback, until what it runs handles it."""
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def free_shared_memory() -> int:
@@ -46,5 +40,5 @@ def prepare_process() -> None:
         sys.exit(f"stickslip_ros: {error}")
 
 
-if sys.argv[:1] == ["-m"] and any(word.startswith(f"{__name__}.") for word in sys.orig_argv):
-    prepare_process()  # one of the modules here is run
+if is_run(__name__):
+    prepare_process()

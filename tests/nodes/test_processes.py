@@ -120,18 +120,19 @@ def test_bad_parameters_end_the_process_with_one_line(
 
 @pytest.mark.process
 @pytest.mark.parametrize(
-    "command",
+    ("command", "imported"),
     [
-        ["-m", "stickslip_ros.nodes.plant"],
-        ["-m", "stickslip_ros.nodes.replay"],
-        ["-c", "from stickslip_ros.nodes.executables import plant; plant()"],
+        (["-m", "stickslip_ros.nodes.plant"], "rclpy"),
+        (["-m", "stickslip_ros.nodes.replay"], "rclpy"),
+        (["-c", "from stickslip_ros.nodes.executables import plant; plant()"], "rclpy"),
+        (["-m", "stickslip_ros.app.main", "simulate", "paper"], "difflib"),
     ],
 )
-def test_a_node_that_still_imports_ends_quietly(
-    process_environment: dict[str, str], tmp_path: Path, command: list[str]
+def test_what_still_imports_ends_quietly(
+    process_environment: dict[str, str], tmp_path: Path, command: list[str], imported: str
 ) -> None:
     slow = "import signal; print('importing', flush=True); signal.pause()"
-    (tmp_path / "rclpy.py").write_text(slow, encoding="utf-8")
+    (tmp_path / f"{imported}.py").write_text(slow, encoding="utf-8")
     path = [str(tmp_path), *filter(None, [process_environment.get("PYTHONPATH")])]
     process_environment["PYTHONPATH"] = os.pathsep.join(path)
     with subprocess.Popen(
