@@ -11,6 +11,7 @@ from importlib import import_module
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.optional import interrupts_kept
 from stickslip_ros.errors import InvalidInputError, StickslipError
+from stickslip_ros.interrupts import raise_interrupts
 from stickslip_ros.streams import nowhere, open_closed_streams
 from stickslip_ros.suggestions import did_you_mean
 from stickslip_ros.versions import versions
@@ -53,6 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):  # µ is not in every encoding
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
+        raise_interrupts()
         parser = _parser(given)
         if command and not command.startswith("-") and command not in _COMMANDS:
             parser.error(f"unknown command {command!r:.80}; {did_you_mean(command, _COMMANDS)}")

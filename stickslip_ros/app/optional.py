@@ -11,9 +11,13 @@ from stickslip_ros.errors import RunError
 
 
 def ros_nodes(module: str) -> ModuleType:
-    """Return a module of `nodes`; the commands that need no ROS do without."""
+    """Return a module of `nodes`; the commands that need no ROS do without.
+
+    Raises RunError where ROS cannot be loaded.
+    """
     try:
         with interrupts_kept():
+            import_module("stickslip_ros.nodes").check_shared_memory()
             return import_module(f"stickslip_ros.nodes.{module}")
     except ModuleNotFoundError as error:
         raise RunError(

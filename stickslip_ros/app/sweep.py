@@ -27,6 +27,7 @@ from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.settled import Course
 from stickslip_ros.studies.study import Point
 from stickslip_ros.studies.sweep import sweep_study
+from stickslip_ros.studies.transitions import transitions
 
 HELP = "measure what a scenario settles on, over the values of one parameter or two"
 
@@ -92,12 +93,17 @@ def run(arguments: argparse.Namespace) -> int:
     with done(arguments, study, label) as journal:
         if arguments.plot is not None:
             _draw(arguments, journal)
+        theory = transitions(study, plan.axes[0]) if len(plan.axes) == 1 else {}
+        made = {"transitions": {name.lower().replace(" ", "_"): theory[name] for name in theory}}
         if arguments.out is not None:
-            write_table(arguments.out, journal, further)
+            write_table(arguments.out, journal, further, made)
         if arguments.json:
-            write_json(sys.stdout, journal, further, finite(made_of(study.scenario)))
+            write_json(sys.stdout, journal, further, finite({**made_of(study.scenario), **made}))
         else:
             _print(journal, plan)
+            units = _units(journal, plan)
+            for name, values in theory.items():
+                print(f"{name}: {', '.join(units.texts(values, plan.axes[0].unit))}")
     return 0
 
 
@@ -149,8 +155,8 @@ def _print(journal: Journal, plan: Grid) -> None:
 
 
 def _ranges(journal: Journal, plan: Grid) -> Iterator[list[str]]:
-    unit = plan.axes[0].unit
-    units = Units.of(journal.study.scenario.plant.as_drive(), plan.parameters)
+    unit, units = plan.axes[0].unit, _units(journal, plan)
+    largest = max((point.measures.amplitude or 0.0 for point in journal.points()), default=0.0)
     for kind, points in groupby(journal.points(), lambda point: _Kind.of(point, plan)):
         values, amplitudes, stick_fractions = _Extremes(), _Extremes(), _Extremes()
         count = 0
@@ -163,9 +169,13 @@ def _ranges(journal: Journal, plan: Grid) -> Iterator[list[str]]:
             " ".join(filter(None, kind)),
             values.shown(unit, units),
             str(count),
-            amplitudes.shown("m", units),
+            amplitudes.shown("m", units, largest),
             stick_fractions.shown("", units),
         ]
+
+
+def _units(journal: Journal, plan: Grid) -> Units:
+    return Units.of(journal.study.scenario.plant.as_drive(), plan.parameters)
 
 
 class _Extremes:
@@ -179,8 +189,8 @@ class _Extremes:
             low, high = self._ends or (value, value)
             self._ends = min(low, value), max(high, value)
 
-    def shown(self, unit: str, units: Units) -> str:
+    def shown(self, unit: str, units: Units, largest: float = 0.0) -> str:
         if self._ends is None:
             return "-"
-        low, high = units.texts(self._ends, unit)
+        low, high = units.texts(self._ends, unit, largest=largest)
         return low if low == high else f"{low.split()[0]} to {high}"

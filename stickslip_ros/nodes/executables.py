@@ -3,11 +3,11 @@
 from functools import partial
 from importlib import import_module
 
-from stickslip_ros.nodes import end_quietly_if_interrupted
+from stickslip_ros.nodes import prepare_process
 
 
 def _run(node: str) -> None:
-    end_quietly_if_interrupted()  # it imports for a second
+    prepare_process()
     import_module(f"stickslip_ros.nodes.{node}").main()
 
 

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import re
 import signal
 import socket
 import sys
@@ -21,6 +22,15 @@ from rclpy.utilities import remove_ros_args
 
 from stickslip_ros.bags.messages import END_OF_TIME
 from stickslip_ros.errors import InvalidInputError, StickslipError
+from stickslip_ros.nodes import SHARED_MEMORY, free_shared_memory
+from stickslip_ros.nodes.domain_ports import (
+    DISCOVERY,
+    FIRST_PROCESS,
+    LARGEST_PORT,
+    MOST_PROCESSES,
+    is_free,
+    port,
+)
 from stickslip_ros.nodes.lifeline import die_with_parent
 from stickslip_ros.nodes.managed import ManagedNode, first_line
 from stickslip_ros.physics.samples import NANOSECONDS
@@ -37,7 +47,15 @@ _LOCALHOST_ONLY = "ROS_LOCALHOST_ONLY"
 _PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _NO_PROFILES_FROM_HERE = "SKIP_DEFAULT_XML_FILE"
 """Set, it keeps Fast DDS from reading profiles of the working directory, which overrule others."""
+_DOMAIN = "ROS_DOMAIN_ID"
 _LARGEST_DOMAIN = 232
+_DISCOVERY_ADDRESSES = ("127.0.0.1", "239.255.0.1")
+"""On which Fast DDS listens where it is kept on this machine."""
+_TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
+_WITHOUT_SHARED_MEMORY = ("", "NONE", "UDPv4", "UDPv6")
+_LEAST_SHARED_MEMORY = 1 << 20
+"""Bytes that a process of Fast DDS takes at most, rounded up."""
+_DECIMAL = re.compile(r"0|[1-9][0-9]{0,20}")
 _ECHO_TIMEOUT = 1.0
 _SPIN_TIMEOUT = 0.2
 
@@ -47,15 +65,11 @@ def initialise() -> None:
 
     Raises InvalidInputError for what the environment says amiss.
     """
+    check_machine(_domain_of_environment())
     try:
         rclpy.init(args=ROS_ARGUMENTS, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:
         raise InvalidInputError(first_line(error)) from None
-    try:
-        check_machine(rclpy.get_default_context().get_domain_id())
-    except InvalidInputError:
-        rclpy.try_shutdown()
-        raise
 
 
 def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) -> int:
@@ -78,12 +92,12 @@ def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) 
     prefer_prompt_middleware()
     try:
         parser.parse_args(remove_ros_args(sys.argv)[1:])
+        check_machine(_domain_of_environment())
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # what rcl could not parse; its first line names it
         print(f"{parser.prog}: {first_line(error)}", file=sys.stderr)
         return 2
     try:
-        check_machine(rclpy.get_default_context().get_domain_id())
         run_until_stopped(make())
         return 0
     except InvalidInputError as error:
@@ -152,10 +166,7 @@ def check_machine(domain: int) -> None:
     What the middleware itself says of these is no sentence, or nothing.
     """
     if domain > _LARGEST_DOMAIN:
-        raise InvalidInputError(
-            f"ROS_DOMAIN_ID = {domain} is refused: must be at most {_LARGEST_DOMAIN}, the last "
-            "domain that has ports"
-        )
+        raise _domain_refused(domain)
     now = time.time_ns()
     if not 0 < now < END_OF_TIME:
         year = datetime.fromtimestamp(now / NANOSECONDS, UTC).year
@@ -168,6 +179,57 @@ def check_machine(domain: int) -> None:
             "the loopback interface of this machine is down, and nodes that are kept on it need "
             "that: ip link set lo up"
         )
+    if _is_fast_dds():
+        _check_ports(domain)
+        _check_shared_memory()
+
+
+def _check_ports(domain: int) -> None:
+    kept_here = os.environ.get(_PROFILES) == _profile("loopback")
+    shared = port(domain, DISCOVERY)
+    for address in _DISCOVERY_ADDRESSES if kept_here else ("",):
+        if not is_free(shared, address, shared=True):
+            raise InvalidInputError(
+                f"UDP port {shared}, by which the nodes of {_DOMAIN} = {domain} find each other, "
+                "is taken by another program: end that, or choose another domain"
+            )
+    own = range(port(domain, FIRST_PROCESS), LARGEST_PORT, 2)[:MOST_PROCESSES]
+    if not any(is_free(first) and is_free(first + 1) for first in own):
+        raise InvalidInputError(
+            f"{_DOMAIN} = {domain} is refused: of its UDP ports, {own[0]} to {own[-1] + 1}, a node "
+            "needs two that are free, and there are none: choose another domain"
+        )
+
+
+def _check_shared_memory() -> None:
+    transports = os.environ.get(_TRANSPORTS, "")
+    if transports in _WITHOUT_SHARED_MEMORY or not SHARED_MEMORY.is_dir():
+        return
+    free = free_shared_memory()
+    if free < _LEAST_SHARED_MEMORY:
+        raise InvalidInputError(
+            f"{_TRANSPORTS} = {transports} lets Fast DDS use shared memory, and {SHARED_MEMORY} "
+            f"has {free} bytes free, less than {_LEAST_SHARED_MEMORY}: unset it, or remove what is "
+            "left there"
+        )
+
+
+def _domain_of_environment() -> int:
+    """Return the domain that the environment says, without which it is 0.
+
+    rcl would take -1 for 0, 1.5 for 1 and 010 for 8. Raises InvalidInputError.
+    """
+    text = os.environ.get(_DOMAIN, "").strip() or "0"
+    if not _DECIMAL.fullmatch(text):
+        raise _domain_refused(repr(text))
+    return int(text)
+
+
+def _domain_refused(domain: object) -> InvalidInputError:
+    return InvalidInputError(
+        f"{_DOMAIN} = {domain!s:.40} is refused: must be an integer from 0 to {_LARGEST_DOMAIN}, "
+        "the last domain that has ports"
+    )
 
 
 def _reaches_itself() -> bool:
@@ -190,7 +252,7 @@ def prefer_prompt_middleware() -> None:
     half a millisecond each time and by seconds now and then.
     """
     _heed_predecessor()
-    if any(os.environ.get(name) for name in (_PROFILES, "FASTDDS_BUILTIN_TRANSPORTS")):
+    if any(os.environ.get(name) for name in (_PROFILES, _TRANSPORTS)):
         return
     if os.environ.get(_DISCOVERY_RANGE) == "LOCALHOST":
         os.environ.update(this_machine_only())

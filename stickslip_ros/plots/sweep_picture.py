@@ -28,7 +28,7 @@ _FULL: Any = {"mew": 0.0}
 _HOLLOW: Any = {"mfc": "white", "mew": 0.8}
 """Markers of motions that are steady, and of those that are not yet."""
 
-_MOST_SHOWN = 3
+_MOST_SHOWN = 4
 """Values of one transition in the legend."""
 
 _DIFFERENT = 0.02

@@ -1,4 +1,4 @@
-"""Where theory has the Hopf bifurcation and the onset of sticking, over any parameter."""
+"""Where theory has the Hopf bifurcation and the limits of sticking, over any parameter."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,7 +22,8 @@ HOPF_POINT = "Hopf point"
 STABILITY_LIMIT = "limit of stability"
 """Of a sampled loop, a pair of whose multipliers leaves the unit circle there, or one at -1."""
 
-STICKING_ONSET = "onset of sticking"
+STICKING_LIMIT = "limit of sticking"
+"""An end of a range in which a slide that stuck sticks again; there may be several ranges."""
 
 _SCANNED = 201
 """Values of an axis between which sign changes are looked for."""
@@ -61,17 +62,15 @@ def hopf_margin(case: Case, *, coarse: bool = False) -> float:
     return 1.0 - (loop.coarsened() if coarse else loop).spectral_radius(washout.gains)
 
 
-def grazing_margin(case: Case, release: Release) -> float:
-    """Return what is above zero where a slide that sticks comes back to the belt's speed.
+def stick_margin(case: Case, release: Release) -> float:
+    """Return what is above zero where a slide that stuck sticks again, and zero at the limit.
 
-    There it sticks again, unless it comes with forces that friction cannot hold. At zero the cycle
-    grazes the belt's speed: the onset of sticking. NaN on a belt at rest, and under control or a
-    disturbance, for which there is no such theory.
+    NaN on a belt at rest, and under control or a disturbance, for which there is no such theory.
     """
     drive = case.drive
     if case.washout is not None or case.sampled is not None or drive.belt_speed == 0.0:
         return nan
-    return tanh(release.excess(replace(drive, belt_speed=abs(drive.belt_speed))))
+    return tanh(release.stick_margin(replace(drive, belt_speed=abs(drive.belt_speed))))
 
 
 def sign_changes(margin: Callable[[float], float], values: Sequence[float]) -> Iterator[float]:
@@ -118,7 +117,7 @@ def _margins(study: Study, *, coarse: bool = False) -> dict[str, Callable[[Case]
     sampled = study.scenario.plant.expects_control and not study.continuous
     return {
         STABILITY_LIMIT if sampled else HOPF_POINT: lambda case: hopf_margin(case, coarse=coarse),
-        STICKING_ONSET: lambda case: grazing_margin(case, release),
+        STICKING_LIMIT: lambda case: stick_margin(case, release),
     }
 
 

@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from stickslip_ros.errors import RunError
+from stickslip_ros.nodes.domain_ports import FIRST_PROCESS, is_free, port
 from stickslip_ros.nodes.process import check_machine, this_machine_only
 
 DOMAINS = range(1, 102)
@@ -25,12 +26,10 @@ _NO_PEERS = {"ROS_STATIC_PEERS": ""}
 _NO_LOGS_ELSEWHERE = ("--disable-external-lib-logs", "--disable-rosout-logs")
 """No files in the home directory; and no topic, of which a process has one for each node name."""
 
-_FIRST_PORT, _PORTS_OF_A_DOMAIN = 7400, 250
 _FREE_PORT = 5
 """A port of the domain that DDS leaves alone, as are those of TCP."""
 _DISCOVERY_PORTS = (0, 10, 12, 14, 16)
 """What DDS listens on in every process of a domain, and in the first few."""
-_FIRST_PROCESS = 10
 
 _initialising = Lock()
 
@@ -44,9 +43,9 @@ def own_domain() -> Generator[int]:
     """
     for domain in DOMAINS:
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as held:
-            if not _bind(held, "127.0.0.1", _port(domain, _FREE_PORT)):
+            if not _bind(held, "127.0.0.1", port(domain, _FREE_PORT)):
                 continue
-            if all(_is_free(_port(domain, port)) for port in _DISCOVERY_PORTS):
+            if all(is_free(port(domain, number)) for number in _DISCOVERY_PORTS):
                 yield domain
                 return
     raise RunError(f"every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use on this machine")
@@ -101,7 +100,7 @@ def _this_process_only_here() -> Mapping[str, str]:
     with own_domain() as domain, _environment({**variables, _DISCOVERY_RANGE: "OFF"}):
         _initialise(context, domain, ["--ros-args"])
         node = Node("which_addresses", context=context)
-        elsewhere_free = _is_free(_port(domain, _FIRST_PROCESS), "127.0.0.2")
+        elsewhere_free = is_free(port(domain, FIRST_PROCESS), "127.0.0.2")
         node.destroy_node()
         rclpy.shutdown(context=context)
     return variables if elsewhere_free else {_DISCOVERY_RANGE: "LOCALHOST"}
@@ -128,15 +127,6 @@ def _environment(variables: Mapping[str, str]) -> Generator[None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
-
-
-def _port(domain: int, number: int) -> int:
-    return _FIRST_PORT + _PORTS_OF_A_DOMAIN * domain + number
-
-
-def _is_free(port: int, address: str = "") -> bool:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        return _bind(probe, address, port)
 
 
 def _bind(free: socket.socket, address: str, port: int) -> bool:

@@ -1,12 +1,15 @@
 """What came in is refused in one clear line, with status 2, and leaves nothing behind."""
 
-from contextlib import chdir
+import socket
+from collections.abc import Sequence
+from contextlib import ExitStack, chdir
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 from stickslip_ros.app.main import main
+from stickslip_ros.nodes.domain_ports import port
 from tests.app.conftest import Run
 
 
@@ -142,9 +145,10 @@ def test_an_existing_bag_is_left_as_it_is(stickslip: Run, tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("given", "refusal"),
     [
-        ("here", "ROS_DOMAIN_ID is not an integral number"),
-        ("233", "ROS_DOMAIN_ID = 233 is refused: must be at most 232"),
-    ],
+        (text, f"ROS_DOMAIN_ID = {text!r} is refused: must be an integer from 0 to 232")
+        for text in ("here", "-1", "1.5", "010", "5x")
+    ]
+    + [("233", "ROS_DOMAIN_ID = 233 is refused: must be an integer from 0 to 232")],
 )
 def test_an_impossible_domain_is_refused(
     stickslip: Run,
@@ -158,6 +162,36 @@ def test_an_impossible_domain_is_refused(
     assert done.returncode == 2
     assert refusal in done.stderr.splitlines()[-1]
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("numbers", "named"),
+    [
+        ([0], "UDP port {0}, by which the nodes of ROS_DOMAIN_ID = {domain} find each other, is"),
+        (range(10, 210), "of its UDP ports, {0} to {1}, a node needs two that are free"),
+    ],
+)
+def test_a_domain_whose_ports_are_taken_is_refused(
+    stickslip: Run, process_environment: dict[str, str], numbers: Sequence[int], named: str
+) -> None:
+    domain = int(process_environment["ROS_DOMAIN_ID"])
+    ports = [port(domain, number) for number in numbers]
+    with ExitStack() as held:
+        for taken in ports:
+            held.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)).bind(("", taken))
+        done = stickslip("run", "paper", "--duration", "1")
+    assert done.returncode == 2
+    assert named.format(ports[0], ports[-1], domain=domain) in done.stderr.splitlines()[-1]
+
+
+def test_shared_memory_that_is_full_is_told(
+    stickslip: Run, process_environment: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("stickslip_ros.nodes.process.free_shared_memory", lambda: 4096)
+    process_environment["FASTDDS_BUILTIN_TRANSPORTS"] = "DEFAULT"
+    done = stickslip("run", "paper", "--duration", "1")
+    assert done.returncode == 2
+    assert "/dev/shm has 4096 bytes free, less than 1048576" in done.stderr.splitlines()[-1]
 
 
 @pytest.mark.parametrize("year", [1969, 2039])

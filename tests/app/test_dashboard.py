@@ -222,6 +222,63 @@ def test_a_long_event_is_wrapped_within_its_box(
     assert served.end() == 130
 
 
+OVERLAPS = """
+() => ["trace", "portrait", "cycles"].flatMap((name) => {
+  const { chart } = window.getElement(stickslip[name]);
+  const words = chart.getZr().storage.getDisplayList()
+    .filter((part) => part.type === "tspan" && !part.ignore && part.style.text)
+    .map((part) => {
+      const box = part.getBoundingRect().clone();
+      if (part.transform) box.applyTransform(part.transform);
+      return { text: part.style.text, box };
+    });
+  const outside = words.filter(({ box }) => box.x < 0 || box.x + box.width > chart.getWidth());
+  const pairs = words.flatMap((one, place) => words.slice(place + 1)
+    .filter((other) => one.box.intersect(other.box))
+    .map((other) => `${one.text} | ${other.text}`));
+  return [...pairs, ...outside.map(({ text }) => `${text} is cut off`)];
+})
+"""
+
+
+RESIZED = """
+() => ["trace", "portrait", "cycles"].every((name) => {
+  const { chart } = window.getElement(stickslip[name]);
+  return chart.getWidth() === chart.getDom().clientWidth;
+})
+"""
+
+ENOUGH = "() => window.getElement(stickslip.cycles).chart.getOption().series[0].data?.length > 9"
+
+MACHINE = {"mass": 100.0, "stiffness": 1e6, "normal_force": 1000.0, "friction__minimum_speed": 0.05}
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        MACHINE | {"damping": 200.0, "belt_speed": 0.02, "rate": 500.0},
+        {"damping": 0.02, "belt_speed": 0.2, "rate": 20.0, "real_time_factor": 20.0},
+    ],
+    ids=["SI", "dimensionless"],
+)
+def test_no_words_in_the_charts_overlap_in_a_narrow_window(
+    start_stickslip: Start,
+    page: Page,
+    processes: Processes,  # noqa: F811
+    drive: dict[str, object],
+) -> None:
+    served = Served(start_stickslip("dashboard", "--namespace", "/test"))
+    page.goto(served.url)
+    processes.node("analyzer")
+    processes.node("plant", pace="realtime", expects_control="false", **drive)
+    page.wait_for_function(ENOUGH)
+    for width in range(800, 1601, 100):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_function(RESIZED)
+        assert page.evaluate(OVERLAPS) == [], width
+    assert served.end() == 130
+
+
 def test_only_pages_of_this_machine_by_its_own_names_are_answered(
     start_stickslip: Start, page: Page
 ) -> None:

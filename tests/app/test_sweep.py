@@ -58,6 +58,23 @@ def test_json_on_standard_output_and_in_a_file_are_the_same(stickslip: Run, tmp_
     assert len(found["regime"]) == len(found["turning_points"]) == 6
 
 
+def test_the_ends_of_every_range_that_sticks_are_told(stickslip: Run, tmp_path: Path) -> None:
+    stiff = ("-p", "plant.stiffness=1000", "--over", "plant.belt_speed=0.1:0.6:3")
+    done = stickslip(*FREE, *stiff, "--out", "table.json")
+    assert "limit of sticking: 188.9 mm/s, 392.4 mm/s, 437.2 mm/s" in done.stdout
+    assert "Hopf point: 488.8 mm/s" in done.stdout
+    transitions = json.loads((tmp_path / "table.json").read_text())["transitions"]
+    assert transitions["limit_of_sticking"] == pytest.approx([0.18888, 0.39236, 0.43716], abs=1e-5)
+    assert transitions["hopf_point"] == pytest.approx([0.48876], abs=1e-5)
+
+
+def test_rounding_is_shown_as_zero(stickslip: Run) -> None:
+    over = ("--over", "plant.belt_speed=0.002:0.06:3", "--transient", "400")
+    done = stickslip("sweep", "feed_drive", *over)
+    (line,) = (line for line in done.stdout.splitlines() if line.startswith("equilibrium"))
+    assert line.split()[-3:] == ["0", "m", "0"]
+
+
 def test_carried_both_ways_the_table_has_a_direction(stickslip: Run, tmp_path: Path) -> None:
     done = stickslip(*FREE, *SPEEDS, "--carry", "both", "--out", "table.csv")
     assert done.returncode == 0, done.stderr

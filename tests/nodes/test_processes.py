@@ -120,18 +120,19 @@ def test_bad_parameters_end_the_process_with_one_line(
 
 @pytest.mark.process
 @pytest.mark.parametrize(
-    "command",
+    ("command", "imported"),
     [
-        ["-m", "stickslip_ros.nodes.plant"],
-        ["-m", "stickslip_ros.nodes.replay"],
-        ["-c", "from stickslip_ros.nodes.executables import plant; plant()"],
+        (["-m", "stickslip_ros.nodes.plant"], "rclpy"),
+        (["-m", "stickslip_ros.nodes.replay"], "rclpy"),
+        (["-c", "from stickslip_ros.nodes.executables import plant; plant()"], "rclpy"),
+        (["-m", "stickslip_ros.app.main", "simulate", "paper"], "difflib"),
     ],
 )
-def test_a_node_that_still_imports_ends_quietly(
-    process_environment: dict[str, str], tmp_path: Path, command: list[str]
+def test_what_still_imports_ends_quietly(
+    process_environment: dict[str, str], tmp_path: Path, command: list[str], imported: str
 ) -> None:
     slow = "import signal; print('importing', flush=True); signal.pause()"
-    (tmp_path / "rclpy.py").write_text(slow, encoding="utf-8")
+    (tmp_path / f"{imported}.py").write_text(slow, encoding="utf-8")
     path = [str(tmp_path), *filter(None, [process_environment.get("PYTHONPATH")])]
     process_environment["PYTHONPATH"] = os.pathsep.join(path)
     with subprocess.Popen(
@@ -159,3 +160,28 @@ def test_help_names_every_parameter(node: str) -> None:
     ).stdout
     assert "autostart" in shown
     assert "--ros-args" in shown
+
+
+FULL = """
+mount -t tmpfs -o size=64k tmpfs /dev/shm && dd if=/dev/zero of=/dev/shm/full 2>/dev/null
+exec "$@"
+"""
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("code", ["stickslip_ros.nodes.plant", "stickslip_ros.app.main"])
+def test_full_shared_memory_is_a_sentence(
+    process_environment: dict[str, str], tmp_path: Path, code: str
+) -> None:
+    """Loading ROS into a process writes a little of it, and SIGBUS ends the process."""
+    command = [sys.executable, "-m", code, *(["dashboard"] if "app" in code else [])]
+    isolated = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c"]
+    if subprocess.run([*isolated, "mount -t tmpfs tmpfs /dev/shm"], check=False).returncode != 0:
+        pytest.skip("no namespaces here")
+    done = subprocess.run(
+        [*isolated, FULL, "sh", *command],
+        env=process_environment, cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert "shared memory is full: /dev/shm has 0 bytes free, and to be loaded ROS needs" in line

@@ -80,11 +80,11 @@ def test_a_picture_keeps_its_colours_and_is_small(
 def test_a_bifurcation_diagram_names_regimes_and_marks(tmp_path: Path) -> None:
     path = tmp_path / "figure.svg"
     figure = compute_figure(2, points=11)
-    draw_paper_figure(path, figure, {"Hopf point": 0.48876, "onset of sticking": 0.4396})
+    draw_paper_figure(path, figure, {"Hopf point": 0.48876, "limit of sticking": 0.4396})
     picture = path.read_text(encoding="utf-8")
     for text in ("belt speed v0", "turning points of X", "stick-slip", "equilibrium"):
         assert text in picture
-    for text in ("stuck", "Hopf point 0.48876", "onset of sticking 0.4396"):
+    for text in ("stuck", "Hopf point 0.48876", "limit of sticking 0.4396"):
         assert text in picture
     assert "unbounded" not in picture
 

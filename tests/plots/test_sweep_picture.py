@@ -91,7 +91,7 @@ def test_a_diagram_names_axes_regimes_and_transitions(tmp_path: Path, over_speed
         assert f"{name} (dimensionless)" in picture
     for text in ("stick-slip", "equilibrium", "stick fraction", FREE):
         assert text in picture
-    for text in ("Hopf point 0.48876", "onset of sticking 0.43947"):
+    for text in ("Hopf point 0.48876", "limit of sticking 0.43947"):
         assert text in picture
     for text in ("unbounded", "no result", "carried", "hysteresis"):
         assert text not in picture
@@ -160,7 +160,7 @@ def test_a_map_says_what_its_colours_are(
     path = tmp_path / "map.svg"
     draw_map(path, *over_two, colour)
     picture = path.read_text(encoding="utf-8")
-    for text in (label, "no result", "Hopf point", "onset of sticking", "plant.friction.static"):
+    for text in (label, "no result", "Hopf point", "limit of sticking", "plant.friction.static"):
         assert text in picture
 
 

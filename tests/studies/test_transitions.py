@@ -17,7 +17,7 @@ from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.transitions import (
     HOPF_POINT,
     STABILITY_LIMIT,
-    STICKING_ONSET,
+    STICKING_LIMIT,
     hopf_margin,
     sign_changes,
     transition_map,
@@ -44,15 +44,26 @@ def found(over: str, *overrides: str, continuous: bool = False) -> dict[str, lis
 def test_over_the_belt_speed_they_are_those_of_the_paper_s_drive() -> None:
     places = found("plant.belt_speed=0.02:0.6:5", FREE)
     assert places[HOPF_POINT] == pytest.approx([sqrt((0.45 - 0.02) / 1.8)], rel=1e-12)
-    assert places[STICKING_ONSET] == pytest.approx([sticking_onset(PAPER).exact], rel=1e-10)
+    assert places[STICKING_LIMIT] == pytest.approx([sticking_onset(PAPER).exact], rel=1e-10)
 
 
 def test_where_the_hopf_point_is_subcritical_sticking_ends_beyond_it() -> None:
     places = found("plant.belt_speed=0.8:2.2:5", FREE, *EXPONENTIAL)
     drive = replace(PAPER, damping=0.1, friction=Exponential(1.0, 0.5, 0.5, 0.0))
     assert places[HOPF_POINT] == pytest.approx([0.5 * log(10.0)], rel=1e-12)
-    assert places[STICKING_ONSET] == pytest.approx([sticking_onset(drive).exact], rel=1e-10)
-    assert places[STICKING_ONSET] == pytest.approx([1.8366], abs=5e-5)
+    assert places[STICKING_LIMIT] == pytest.approx([sticking_onset(drive).exact], rel=1e-10)
+    assert places[STICKING_LIMIT] == pytest.approx([1.8366], abs=5e-5)
+
+
+def test_the_ends_of_every_range_that_sticks_are_found() -> None:
+    places = found("plant.belt_speed=0.02:0.6:5", FREE, "plant.stiffness=1000")
+    low, high = sticking_onset(replace(PAPER, stiffness=1000.0)).ranges
+    assert places[STICKING_LIMIT] == pytest.approx([low[1], *high], rel=1e-10)
+
+
+def test_enough_stiffness_ends_the_sticking_at_a_lower_belt_speed() -> None:
+    places = found("plant.stiffness=1:2000:5:log", FREE, "plant.belt_speed=0.2")
+    assert places[STICKING_LIMIT] == pytest.approx([838.96], abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +79,7 @@ def test_over_any_parameter_the_belt_then_has_the_speed_of_the_transition(
     parameter: str, ends: str, speed: float
 ) -> None:
     places = found(f"plant.{parameter}={ends}", FREE, f"plant.belt_speed={speed}")
-    (value,) = places[STICKING_ONSET]
+    (value,) = places[STICKING_LIMIT]
     drive = replace(PAPER, belt_speed=speed, **{parameter: value})
     assert sticking_onset(drive).exact == pytest.approx(speed, rel=1e-9)
 
@@ -80,7 +91,7 @@ def test_over_the_damping_the_hopf_point_is_where_the_law_s_slope_is() -> None:
 
 def test_a_reversed_belt_has_the_same_transitions() -> None:
     places = found("plant.belt_speed=-0.6:0.6:5", FREE)
-    for name in (HOPF_POINT, STICKING_ONSET):
+    for name in (HOPF_POINT, STICKING_LIMIT):
         low, high = places[name]
         assert low == pytest.approx(-high, rel=1e-10)
 
@@ -143,8 +154,8 @@ def test_a_sign_change_at_a_value_itself_is_found_once() -> None:
 def test_what_a_release_does_was_not_changed_by_the_drives_before() -> None:
     drives = [replace(PAPER, belt_speed=0.2, stiffness=stiffness) for stiffness in (0.3, 3.0)]
     together = Release()
-    assert [together.excess(drive) for drive in drives] == [
-        Release().excess(drive) for drive in drives
+    assert [together.stick_margin(drive) for drive in drives] == [
+        Release().stick_margin(drive) for drive in drives
     ]
 
 
@@ -155,12 +166,24 @@ def test_a_map_has_the_sides_of_the_transitions() -> None:
     over = transition_map(study, axes)
     speed, damping = over.first[:, np.newaxis], over.second[np.newaxis, :]
     hopf_speed_squared = (0.45 - damping) / 1.8
-    assert over.margins.keys() == {HOPF_POINT, STICKING_ONSET}
+    assert over.margins.keys() == {HOPF_POINT, STICKING_LIMIT}
     assert np.array_equal(over.margins[HOPF_POINT] > 0.0, speed**2 > hopf_speed_squared)
     onsets = np.array(
         [sticking_onset(replace(PAPER, damping=value)).exact or 0.0 for value in over.second]
     )
-    assert np.array_equal(over.margins[STICKING_ONSET] > 0.0, speed < onsets)
+    assert np.array_equal(over.margins[STICKING_LIMIT] > 0.0, speed < onsets)
+
+
+@pytest.mark.usefixtures("coarse_maps")
+def test_a_map_has_the_ends_of_every_range_that_sticks() -> None:
+    axes = Axis.parse("plant.stiffness=800:1200:3"), Axis.parse("plant.belt_speed=0.02:0.6:2")
+    over = transition_map(Study(load_scenario("paper", [FREE]), Grid(axes)), axes)
+    for row in (0, -1):
+        ranges = sticking_onset(replace(PAPER, stiffness=float(over.first[row]))).ranges
+        assert len(ranges) == 2
+        inside = [(low < over.second) & (over.second < high) for low, high in ranges]
+        sticks = np.any(inside, axis=0)
+        assert np.array_equal(over.margins[STICKING_LIMIT][row] > 0.0, sticks)
 
 
 @pytest.mark.usefixtures("coarse_maps")

@@ -12,7 +12,7 @@ HELP = "show a running loop on a web page, live, and act on it"
 DEFAULT_PORT = 8642
 """The first that is tried where none is asked for."""
 
-_LARGEST_PORT = 65_535
+LARGEST_PORT = 65_535
 _NICENESS = 10
 """The simulation goes first."""
 
@@ -48,6 +48,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _port(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= _LARGEST_PORT):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a port, 1 to {_LARGEST_PORT}")
+    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= LARGEST_PORT):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port, 1 to {LARGEST_PORT}")
     return int(text)

@@ -10,9 +10,13 @@ _AXIS: dict[str, Any] = {
     "scale": True,
     "axisLine": {"onZero": False},
     "nameTextStyle": {"align": "left"},
-    "axisLabel": {"showMinLabel": False, "showMaxLabel": False},
+    "axisLabel": {"showMinLabel": False, "showMaxLabel": False, "hideOverlap": True},
 }
-_CENTRED: dict[str, Any] = {"nameLocation": "middle", "nameGap": 28}
+_CENTRED: dict[str, Any] = {
+    "nameLocation": "middle",
+    "nameGap": 28,
+    "nameTextStyle": {"align": "center"},
+}
 
 
 def _line(colour: str, style: str = "solid", **more: Any) -> dict[str, Any]:
@@ -70,7 +74,7 @@ CYCLES: dict[str, Any] = {
     "animation": False,
     "legend": {"top": 0},
     "grid": {"left": 70, "right": 60, "top": 60, "bottom": 45},
-    "xAxis": {"type": "value", "scale": True, "minInterval": 1, "name": "cycle", **_CENTRED},
+    "xAxis": _AXIS | _CENTRED | {"minInterval": 1, "name": "cycle"},
     "yAxis": [
         _AXIS | {"min": 0},
         {
@@ -78,7 +82,8 @@ CYCLES: dict[str, Any] = {
             "name": "stick fraction",
             "position": "right",
             "axisLine": {"onZero": False},
-            "nameTextStyle": {"align": "right"},
+            **_CENTRED,
+            "nameGap": 36,
             "min": 0,
             "max": 1,
         },

@@ -6,7 +6,6 @@ import sys
 import threading
 from collections.abc import Awaitable, Callable, Generator
 from contextlib import contextmanager
-from itertools import count
 
 import rclpy
 import uvicorn
@@ -16,7 +15,7 @@ from nicegui import core, ui
 from rclpy.experimental import EventsExecutor
 from rclpy.task import Future
 
-from stickslip_ros.app.dashboard import DEFAULT_PORT
+from stickslip_ros.app.dashboard import DEFAULT_PORT, LARGEST_PORT
 from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.page import add_page
 from stickslip_ros.errors import InvalidInputError
@@ -79,13 +78,15 @@ def _exit(*_: object) -> None:
 
 def _listen(port: int | None) -> socket.socket:
     """Return a socket that listens at the port, or the first one from the default on."""
-    for number in [port] if port is not None else count(DEFAULT_PORT):
+    ports = range(DEFAULT_PORT, LARGEST_PORT + 1) if port is None else [port]
+    reason = ""
+    for number in ports:
         try:
             return socket.create_server((_HOST, number))
         except OSError as error:
-            if port is not None:
-                raise InvalidInputError(f"--port {port}: {error.strerror}") from None
-    raise AssertionError
+            reason = error.strerror
+    tried = f"--port {port}" if port is not None else f"every port from {ports[0]} to {ports[-1]}"
+    raise InvalidInputError(f"{tried}: {reason}")
 
 
 @contextmanager

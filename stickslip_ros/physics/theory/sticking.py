@@ -1,8 +1,9 @@
 """The belt speeds at which the slide sticks once a cycle, and the highest of them, the onset."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import tanh
 
 import numpy as np
 
@@ -19,8 +20,8 @@ _AVERAGED = np.geomspace(1e-4, 1e4, 200)
 _FOLLOWED = np.geomspace(4.0, 0.02, 100)
 """Belt speeds between which the motion is followed, in averaged onsets, or else in the drive's."""
 
-_RANGE_PRECISION = 1e-9
-"""Share to which the ends of ranges of belt speeds are found."""
+_JUST_BELOW = 1e-9
+"""Share by which a belt speed is below the onset where the slide is taken to stick."""
 
 _ROUNDING = 1e-12
 """Share of the belt speed below which a difference of speeds is rounding."""
@@ -118,7 +119,8 @@ def _followed(drive: Drive, release: "Release", speeds: Sequence[float]) -> floa
     if above is not None:
         return zero_between(lambda speed: np.tanh(excess(speed)), speed, above)
     sticking = next(
-        (speed for speed in speeds if release.sticks_again(replace(drive, belt_speed=speed))), 0.0
+        (speed for speed in speeds if release.stick_margin(replace(drive, belt_speed=speed)) > 0.0),
+        0.0,
     )
     if sticking == speed:
         return f"it still sticks at {speed:.3g} m/s, the highest belt speed tried"
@@ -133,35 +135,26 @@ def _ranges(
 ) -> Iterator[tuple[float, float]]:
     """Yield the ranges of belt speeds, ascending, at which a slide that stuck sticks again."""
 
-    def sticks(speed: float) -> bool:
+    def margin(speed: float) -> float:
         at_speed = replace(drive, belt_speed=speed)
-        return least_cycle(at_speed) is not None and release.sticks_again(at_speed)
+        return -1.0 if least_cycle(at_speed) is None else tanh(release.stick_margin(at_speed))
 
-    tried = [(speed, sticks(speed)) for speed in speeds if onset is None or speed < onset]
+    tried = [(speed, margin(speed)) for speed in speeds if onset is None or speed < onset]
     if onset is not None:  # below it there is a range, be it ever so narrow
-        tried.insert(0, (onset * (1.0 - _RANGE_PRECISION), True))
+        tried.insert(0, (onset * (1.0 - _JUST_BELOW), 1.0))
     tried.reverse()
-    low = tried[0][0] if tried[0][1] else None
+    low = tried[0][0] if tried[0][1] > 0.0 else None
     for (speed, before), (next_speed, now) in pairwise(tried):
-        if before == now:
+        if (before > 0.0) == (now > 0.0):
             continue
-        edge = _edge(sticks, speed, next_speed)
-        if now:
+        edge = zero_between(margin, speed, next_speed)
+        if now > 0.0:
             low = edge
         elif low is not None:
             yield low, edge
             low = None
     if low is not None:
         yield low, tried[-1][0] if onset is None else onset
-
-
-def _edge(sticks: Callable[[float], bool], low: float, high: float) -> float:
-    """Return the belt speed between two at which it changes whether the slide sticks."""
-    at_low = sticks(low)
-    while high - low > _RANGE_PRECISION * high:
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if sticks(middle) == at_low else (low, middle)
-    return (low + high) / 2.0
 
 
 class Release:
@@ -194,12 +187,22 @@ class Release:
         excess = (acceleration / (drive.belt_speed / drive.speed_scale)) ** 2 / 2.0
         return excess if excess > _ROUNDING else 0.0
 
-    def sticks_again(self, drive: Drive) -> bool:
-        """Return whether it sticks again, be it that it overtakes the belt before."""
-        return any(
-            np.any(knots.sticking & np.logical_or.accumulate(knots.velocity < 0.0))
-            for knots in self._follow(drive)
-        )
+    def stick_margin(self, drive: Drive) -> float:
+        """Return what is above zero where the slide sticks again, and below where it does not.
+
+        Zero is where it only just sticks: because it only just comes up to the belt's speed, or
+        because it comes with a force that friction only just holds. A slide that overtakes the belt
+        sticks when it falls back to the belt's speed, or never: in the plane of position and speed
+        its orbit then encloses all those before. Raises RunError like `excess`.
+        """
+        excess = self.excess(drive)
+        if excess <= 0.0:
+            return excess
+        entries = (_entry(knots, drive.belt_speed) for knots in self._follow(drive))
+        position = next((entry for entry in entries if entry is not None), None)
+        if position is None:
+            return -1.0
+        return min(excess, (release_position(drive) - position) / drive.length_scale)
 
     def _follow(self, drive: Drive) -> Iterator[Knots]:
         if self._motion is None:
@@ -228,3 +231,16 @@ def _highest(knots: Knots, belt_speed: float) -> tuple[float, float] | None:
     else:
         return None
     return float(swing.position[row]), float(swing.velocity[row])
+
+
+def _entry(knots: Knots, belt_speed: float) -> float | None:
+    """Return the position where the slide sticks, or falls back to the belt's speed from above.
+
+    That is once it went back; None as long as the motion has not got so far.
+    """
+    level = belt_speed * (1.0 + _ROUNDING)
+    returned = np.logical_or.accumulate(knots.velocity < 0.0)
+    over = np.logical_or.accumulate(returned & (knots.velocity > level))
+    sticks = returned & np.append(knots.sticking[1:], False)
+    rows = np.flatnonzero(sticks | (over & (knots.velocity <= level)))
+    return float(knots.position[rows[0]]) if len(rows) > 0 else None

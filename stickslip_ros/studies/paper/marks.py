@@ -7,10 +7,10 @@ from stickslip_ros.studies.paper.figures import BifurcationFigure, bifurcation_d
 from stickslip_ros.studies.settled import Case
 from stickslip_ros.studies.transitions import (
     HOPF_POINT,
-    STICKING_ONSET,
-    grazing_margin,
+    STICKING_LIMIT,
     hopf_margin,
     sign_changes,
+    stick_margin,
 )
 
 
@@ -19,7 +19,7 @@ def marks(figure: BifurcationFigure) -> dict[str, float]:
     release = Release()
     margins: dict[str, Callable[[Case], float]] = {
         HOPF_POINT: hopf_margin,
-        STICKING_ONSET: lambda case: grazing_margin(case, release),
+        STICKING_LIMIT: lambda case: stick_margin(case, release),
     }
     found: dict[str, float] = {}
     for name, margin in margins.items():

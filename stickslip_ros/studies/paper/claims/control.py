@@ -203,9 +203,12 @@ def _(_: Evidence) -> Observation:
 
 
 def _slow_states() -> FloatArray:
-    """Return deviations from the equilibrium in which the slide is slower than the belt."""
-    states = STATES.copy()
-    states[1] *= 0.4
+    """Return deviations from the equilibrium in which the slide is slower than the belt, up to ten.
+
+    Near it too: half of them are of the size of one.
+    """
+    states = STATES * np.where(np.arange(STATES.shape[1]) % 2, 10.0, 1.0)
+    states[1] = STUDIED_SPEED - np.abs(states[1])
     return states
 
 

@@ -21,6 +21,7 @@ from stickslip_ros.studies.paper.claims.normal_form import Nonlinearity, samples
 from stickslip_ros.studies.paper.claims.reference import (
     BELT_SPEEDS,
     DAMPING,
+    FASTER,
     PRINTED_HOPF_SPEED,
     SLOWER,
     STATES,
@@ -336,20 +337,22 @@ def _real_parts(damping: float) -> FloatArray:
     "beta = sqrt(p^2 - 4) / 2, a real number",
 )
 def _() -> Formula:
-    radicands = np.array([trace(speed) ** 2 - 4.0 for speed in BELT_SPEEDS])
-    frequencies = [float(expansion(speed).eigenvalues[0].imag) for speed in BELT_SPEEDS]
-    real = None if np.all(radicands < 0.0) else np.sqrt(np.maximum(radicands, 0.0)) / 2.0
+    speeds = [*BELT_SPEEDS.tolist(), *FASTER]
+    radicands = np.array([trace(speed) ** 2 - 4.0 for speed in speeds])
+    halves = np.array([np.ptp(expansion(speed).eigenvalues.real) for speed in speeds]) / 2.0
+    frequencies = np.array([np.ptp(expansion(speed).eigenvalues.imag) for speed in speeds]) / 2.0
     return Formula(
-        real,
-        frequencies,
+        None if np.any(radicands < 0.0) else np.sqrt(radicands) / 2.0,
+        halves + 1j * frequencies,
         [
             Correction(
-                "With alpha +- i beta and beta = sqrt(4 - p^2) / 2", np.sqrt(-radicands) / 2.0
+                "With alpha +- i beta and beta = sqrt(4 - p^2) / 2 where p^2 < 4",
+                np.emath.sqrt(radicands) / 2.0,
             )
         ],
-        f"p^2 - 4 is between {radicands.min():.4g} and {radicands.max():.4g} at the belt speeds "
-        "tried, so that the printed root is of a negative number; from v0 = "
-        f"{overdamped_from():.4f} on it is not, and the two eigenvalues are real.",
+        f"Up to v0 = {overdamped_from():.4f} p^2 - 4 is below zero, {radicands.min():.4g} at the "
+        "least, so that the printed root is of a negative number; from there on it is not, and the "
+        f"two eigenvalues are real, as printed (tried up to v0 = {max(speeds):g}).",
     )
 
 
