@@ -76,10 +76,9 @@ bench: setup
 	@mkdir -p build
 	$(BIN)/python -m benchmarks --out build/benchmarks.json || test $$? -eq 77
 
-# The picture of the dashboard in README.md, made by its test.
+# The picture of the dashboard in README.md; needs a browser, and a machine that has time for it.
 screenshot: setup
-	$(BIN)/python -m pytest -q tests/app/test_dashboard.py -k limit_cycle
-	cp build/dashboard.png docs/dashboard.png
+	$(BIN)/python -m tests.app.screenshot docs/dashboard.png
 
 clean:
 	rm -rf .venv .venv-* build install log dist *.egg-info .pytest_cache .ruff_cache .hypothesis

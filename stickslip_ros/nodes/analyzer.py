@@ -2,6 +2,7 @@
 
 import heapq
 import json
+import shutil
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -256,10 +257,14 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             max_bag_size=self.parameters.max_bag_size,
             max_bag_duration=self.parameters.max_bag_duration,
         )
+        try:
+            for topic in RECORDED_TOPICS:
+                if topic is not DROPPED_FORCE:
+                    self._add_topic(recorder, topic)
+        except BagError:  # on a full disk; another attempt may follow at once
+            shutil.rmtree(recorder.directory, ignore_errors=True)
+            raise
         self._bags_opened += 1
-        for topic in RECORDED_TOPICS:
-            if topic is not DROPPED_FORCE:
-                self._add_topic(recorder, topic)
         self._recorder = recorder
         self._flushed_at = time.monotonic()
         self._keep("versions", versions())

@@ -353,10 +353,15 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
         """Set all parameters or none; what is refused is named, with what is allowed.
 
         Whole numbers are taken where numbers are declared, as parameter files and -p do, and text
-        that is a number: `ros2 param load` sends inf and 1e-05 in no other way.
+        that is a number: `ros2 param load` sends inf and 1e-05 in no other way. It also sends back
+        what ROS keeps to itself, which may be as it is.
         """
         given = {parameter.name: parameter for parameter in parameter_list}
-        owned = [parameter for name, parameter in given.items() if name in _OWNED_BY_ROS]
+        owned = [
+            parameter
+            for name, parameter in given.items()
+            if name in _OWNED_BY_ROS and parameter.value != self.get_parameter(name).value
+        ]
         values = {n: self._as_meant(n, p.value) for n, p in given.items() if n not in _OWNED_BY_ROS}
         source = self.get_fully_qualified_name()
         try:

@@ -567,7 +567,7 @@ def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str
         bounds = parameter.limits if _is_extreme(value) else parameter.bounds
         if bounds:
             allowed = bounds if parameter.choices else f"{allowed} {bounds}"
-        unit = f" {parameter.unit}" if parameter.unit else ""
+        unit = f"{'' if bounds else ' in'} {parameter.unit}" if parameter.unit else ""
         text = ", not text" if isinstance(value, str) and parameter.kind is not str else ""
         complaints.append(f"{name} = {shown(value)} is refused: must be {allowed}{unit}{text}")
     return "; ".join(complaints)

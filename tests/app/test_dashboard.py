@@ -24,9 +24,6 @@ pytestmark = pytest.mark.long
 
 Start = Callable[..., subprocess.Popen[str]]
 
-SCREENSHOT = Path(__file__).parents[2] / "build" / "dashboard.png"
-"""Where the picture in the README comes from: `make screenshot` copies it."""
-
 expect.set_options(timeout=PATIENCE * 1000.0)
 
 
@@ -117,8 +114,6 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
     control.click()
     expect(control).to_be_checked()
     wait_for(lambda: last_amplitude(page) < 200.0, "the limit cycle collapses")
-    SCREENSHOT.parent.mkdir(exist_ok=True)
-    page.screenshot(path=SCREENSHOT)
     expect(page.get_by_text("equilibrium", exact=True)).to_be_visible()
     page.get_by_text("10 periods").click()
     wait_for(lambda: 0.0 <= swing(page) < 50.0, "the collapse is drawn")

@@ -112,6 +112,25 @@ def test_activated_again_it_opens_a_further_bag(graph: Graph, tmp_path: Path) ->
         analyzer.trigger_activate()
 
 
+def test_a_disk_that_is_full_before_the_topics_are_in_the_bag_leaves_none(
+    graph: Graph, tmp_path: Path
+) -> None:
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"), autostart=False)
+    analyzer.trigger_configure()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
+    try:
+        for _ in range(3):
+            analyzer.trigger_activate()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert not analyzer.active
+    assert list(tmp_path.iterdir()) == []
+    analyzer.trigger_activate()
+    assert analyzer.active
+    assert [path.name for path in tmp_path.iterdir()] == ["bag"]
+
+
 def test_a_bag_that_exists_is_refused_and_left_alone(graph: Graph, tmp_path: Path) -> None:
     (tmp_path / "bag").mkdir()
     analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))

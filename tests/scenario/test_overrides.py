@@ -82,6 +82,10 @@ def test_an_override_without_a_node_is_guessed() -> None:
             "plant.mass=",
             ["-p plant.mass=", "plant: mass = None", "must be a finite number above 0 kg"],
         ),
+        (
+            "plant.belt_speed=fast",
+            ["plant: belt_speed = 'fast'", "must be a finite number in m/s, not text"],
+        ),
         ("plant.mass=heavy", ["plant: mass = 'heavy'", "must be a finite number above 0 kg"]),
         ("plant.friction=coulomb", ["unknown parameter friction; did you mean plant.friction."]),
         ("analyzer.window=2.5", ["analyzer: window = 2.5", "whole number at least 1"]),

@@ -123,8 +123,8 @@ WHOLE = "must be a whole number"
         # Not finite.
         ("plant", "mass", ".nan", "nan", f"{POSITIVE} kg"),
         ("plant", "mass", ".inf", "inf", f"{POSITIVE} kg"),
-        ("plant", "belt_speed", ".nan", "nan", f"{FINITE} m/s"),
-        ("plant", "belt_speed", "-.inf", "-inf", f"{FINITE} m/s"),
+        ("plant", "belt_speed", ".nan", "nan", f"{FINITE} in m/s"),
+        ("plant", "belt_speed", "-.inf", "-inf", f"{FINITE} in m/s"),
         ("plant", "duration", ".nan", "nan", "at least 0 s"),
         ("plant", "disturbance.duration", ".nan", "nan", "at least 0 s"),
         (
@@ -132,7 +132,7 @@ WHOLE = "must be a whole number"
             "linear_gain",
             ".nan",
             "nan",
-            f"{FINITE} N s/m",
+            f"{FINITE} in N s/m",
         ),
         ("washout_controller", "force_limit", ".nan", "nan", "at least 0 N"),
         (

@@ -1,0 +1,63 @@
+"""The picture of the dashboard for README.md: `python -m tests.app.screenshot FILE`."""
+
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tests.app.browser import headless_browser
+
+# In slow motion a small machine has time for the browser, too, and no deadline is missed.
+_RUN = (
+    *("run", "feed_drive", "--bag", "bag"),
+    *("-p", "plant.real_time_factor=0.025", "-p", "washout_controller.start_after=1.5"),
+)
+_TIMEOUT = 120.0
+_NEWEST_AMPLITUDE = (
+    "window.getElement(stickslip.cycles)?.chart.getOption().series[0].data?.at(-1)?.[1]"
+)
+_LATE = "lower rate or real_time_factor"
+"""What health and events advise where forces or samples are late."""
+
+
+def main(file: Path) -> str | None:
+    """Take the picture while the limit cycle collapses; return what is wrong with it."""
+    with headless_browser() as browser, _started("dashboard") as dashboard:
+        page = browser.new_page(viewport={"width": 1400, "height": 1060})
+        page.goto(_address(dashboard), timeout=_TIMEOUT * 1000.0)
+        with _started(*_RUN):  # once the page is there: to load it takes both cores
+            for reached in ("> 420", "< 200"):  # µm
+                page.wait_for_function(f"{_NEWEST_AMPLITUDE} {reached}", timeout=_TIMEOUT * 1000.0)
+            page.screenshot(path=file, full_page=True)
+            late = page.get_by_text(_LATE).count() > 0
+    return f"{file} shows forces or samples that are late: this machine is busy" if late else None
+
+
+@contextmanager
+def _started(*arguments: str) -> Generator[subprocess.Popen[str]]:
+    """Start a command in a directory of its own, and end it."""
+    with tempfile.TemporaryDirectory() as directory:
+        command = [sys.executable, "-m", "stickslip_ros.app.main", *arguments]
+        process = subprocess.Popen(
+            command, cwd=directory, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        )
+        try:
+            yield process
+        finally:
+            process.terminate()
+            process.communicate()
+
+
+def _address(dashboard: subprocess.Popen[str]) -> str:
+    assert dashboard.stderr is not None
+    for line in dashboard.stderr:
+        if found := re.search(r"http://127\.0\.0\.1:\d+", line):
+            return found[0]
+    raise RuntimeError("the dashboard has ended without a page")
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))
