@@ -222,11 +222,12 @@ def test_where_there_is_nothing_to_propose_it_says_why(task: Task, reason: str) 
     assert reason in (found.remark or "")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "task",
     [
         replace(FEED, force_limit=135.0, force_delay=0.0015, belt_speeds=(0.02, 0.04)),
-        pytest.param(replace(FEED, force_limit=0.0), marks=pytest.mark.long),
+        replace(FEED, force_limit=0.0),
     ],
 )
 def test_the_force_that_it_says_would_do_does(task: Task) -> None:

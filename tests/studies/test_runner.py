@@ -106,8 +106,12 @@ def at_once(study: Study) -> list[Point]:
     return sorted(points, key=lambda point: point.number)
 
 
-@pytest.mark.parametrize("study", STUDIES.values(), ids=STUDIES)
-def test_in_this_process_in_threads_and_in_any_order_the_points_are_the_same(study: Study) -> None:
+@pytest.mark.parametrize(
+    "name",
+    ["each alone", pytest.param("up and down", marks=pytest.mark.long), "running away", "sampled"],
+)
+def test_in_this_process_in_threads_and_in_any_order_the_points_are_the_same(name: str) -> None:
+    study = STUDIES[name]
     expected = at_once(study)
     assert any(point.reason for point in expected)
     assert any(point.reason is None for point in expected)

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stickslip_ros.app.simulate import simulate
@@ -23,7 +23,6 @@ from stickslip_ros.studies.settled import (
     State,
     check_continuous,
 )
-from tests.examples import examples
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, LimitCycle
 from tests.studies.studies import EXPONENTIAL, paper
 
@@ -142,8 +141,9 @@ def alone() -> list[object]:
         return [_found(Settler(), *mixed) for mixed in MIXED]
 
 
+@pytest.mark.long
 @given(order=st.permutations(range(len(MIXED))))
-@examples(quick=2, thorough=4)
+@settings(max_examples=4)
 def test_what_was_followed_before_changes_no_bit(alone: list[object], order: list[int]) -> None:
     settler = Settler()
     with pytest.MonkeyPatch.context() as patch:

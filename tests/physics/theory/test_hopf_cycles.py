@@ -65,6 +65,7 @@ def test_a_stable_cycle_is_the_one_that_a_run_leads_to(corner_frequency: float) 
     assert cycle.period == pytest.approx(by_run.period, rel=1e-9)
 
 
+@pytest.mark.long
 def test_si_units() -> None:
     force, speed = FEED_DRIVE.normal_force, FEED_DRIVE.speed_scale
     gains = WashoutGains(

@@ -105,6 +105,7 @@ def test_over_the_friction_ratio_vibration_and_sticking_begin() -> None:
     assert regimes(bifurcation(5, 3)) == [Regime.EQUILIBRIUM, *[Regime.STICK_SLIP] * 2]
 
 
+@pytest.mark.long
 def test_near_the_hopf_speed_amplitudes_follow_the_averaged_ones() -> None:
     for damping, panel in zip((0.01, 0.02), portraits(12)[1::2], strict=True):
         hopf_squared = (0.45 - damping) / 1.8
