@@ -180,7 +180,7 @@ class Refused(Node):
 
     def __init__(self):
         super().__init__("refused")
-        self.publisher = self.create_publisher(WrenchStamped, "control_force", 10)
+        self.publisher = self.create_publisher(WrenchStamped, "control_force", 1000)
         self.create_subscription(JointState, "joint_states", self.answer, 10)
 
     def answer(self, state):

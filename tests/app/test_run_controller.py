@@ -35,7 +35,7 @@ from sensor_msgs.msg import JointState
 class Answering:
     def connect(self):
         self.gain = self.declare_parameter("gain", 0.1).value
-        self.force = self.create_publisher(WrenchStamped, "control_force", 10)
+        self.force = self.create_publisher(WrenchStamped, "control_force", 1000)
         self.create_subscription(JointState, "joint_states", self.answer, 10)
 
     def answer(self, state):
@@ -83,7 +83,7 @@ class Mortal(Damper):
 class ForceOnly(Node):
     def __init__(self):
         super().__init__("damper")
-        self.force = self.create_publisher(WrenchStamped, "control_force", 10)
+        self.force = self.create_publisher(WrenchStamped, "control_force", 1000)
 
 
 class Deaf(Damper):

@@ -22,7 +22,7 @@ class VelocityFeedback(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__("velocity_feedback", **options)
         self.answered = 0
-        self.force = self.create_publisher(WrenchStamped, "control_force", 10)
+        self.force = self.create_publisher(WrenchStamped, "control_force", 1000)
         self.create_subscription(JointState, "joint_states", self.answer, 10)
 
     def answer(self, state: JointState) -> None:
@@ -79,7 +79,7 @@ class Managed(LifecycleNode):
         super().__init__("managed_feedback")
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self.force = self.create_lifecycle_publisher(WrenchStamped, "control_force", 10)
+        self.force = self.create_lifecycle_publisher(WrenchStamped, "control_force", 1000)
         self.create_subscription(JointState, "joint_states", self.answer, 10)
         return TransitionCallbackReturn.SUCCESS
 
