@@ -23,7 +23,10 @@ from typing import NamedTuple
 
 CHECKOUT = Path(__file__).parents[1]
 PHYSICS = Path("stickslip_ros/physics")
-TIERS = (("tests/physics",), ("tests/studies", "tests/testing", "tests/bags", "tests/app"))
+TIERS = (
+    ("tests/physics",),
+    ("tests/studies", "tests/plots", "tests/testing", "tests/bags", "tests/app"),
+)
 TIMEOUT = 600.0
 
 OPERATORS = {"+": "-", "-": "+", "*": "/", "/": "*", "<": ">=", ">": "<=", "<=": ">", ">=": "<"}

@@ -124,6 +124,7 @@ class ObserverNode(Collecting):
         self._steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._inquiries: list[tuple[Inquiry, float, Callable[[], None]]] = []
         self._asked_parameters: dict[str, Inquiry] = {}
+        self._told_of_parameters = 0
         self._newest = 0
         self._tap_end = 0
         self._tap_timer: Timer | None = None
@@ -137,7 +138,7 @@ class ObserverNode(Collecting):
             self.cycles[topic] = deque(maxlen=_CYCLES_KEPT)
             self._subscribe(topic, partial(self._on_cycle, topic), topic.qos(_CYCLES_KEPT))
         self._subscribe(DIAGNOSTICS, self._on_diagnostics, DIAGNOSTICS.qos())
-        self.create_subscription(
+        self._parameter_events = self.create_subscription(
             ParameterEvent,
             "/parameter_events",
             self._on_parameter_event,
@@ -295,6 +296,11 @@ class ObserverNode(Collecting):
                 self._inquiries.remove(entry)
         for inquiry in self._asked_parameters.values():
             inquiry.pursue()
+        matched = self._parameter_events.get_publisher_count()
+        if matched != self._told_of_parameters:
+            self._told_of_parameters = matched
+            for node in self._asked_parameters:  # what changed before was not told
+                self._ask_parameters(node)
         for node, health in self.health.items():
             if health.heard and health.state != SILENT and now - health.heard > SILENCE:
                 self._update(node, Health(SILENT, 2, "", health.figures, health.heard))
@@ -346,6 +352,9 @@ class ObserverNode(Collecting):
             changed = (*event.new_parameters, *event.changed_parameters)
             values = {p.name: parameter_value_to_python(p.value) for p in changed}
             self._know(node, {name: value for name, value in values.items() if name in known})
+            asked = self._asked_parameters.get(node)
+            if asked is not None and not asked.answered:  # its answer may be from before
+                self._ask_parameters(node)
 
     def _on_cycle(self, topic: Topic, message: Float64) -> None:
         self.cycles[topic].append(message.data)
