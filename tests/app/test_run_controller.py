@@ -351,7 +351,7 @@ def test_an_external_controller_may_die_and_return(
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     graph = Graph(domain)
     health = graph.listen(DIAGNOSTICS)
-    impatient = ("-p", "plant.reply_timeout=0.5", "-p", "analyzer.flush_period=0.2")
+    impatient = ("-p", "plant.reply_timeout=3.0", "-p", "analyzer.flush_period=0.2")
     first = start_damper()
     process = start_stickslip("run", "paper", "--external-controller", "--bag", "bag", *impatient)
     wait_for_samples(process, tmp_path / "bag")
