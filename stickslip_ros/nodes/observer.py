@@ -124,7 +124,7 @@ class ObserverNode(Collecting):
         self._steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._inquiries: list[tuple[Inquiry, float, Callable[[], None]]] = []
         self._asked_parameters: dict[str, Inquiry] = {}
-        self._told_of_parameters = 0
+        self._parameter_writers = 0
         self._newest = 0
         self._tap_end = 0
         self._tap_timer: Timer | None = None
@@ -297,8 +297,8 @@ class ObserverNode(Collecting):
         for inquiry in self._asked_parameters.values():
             inquiry.pursue()
         matched = self._parameter_events.get_publisher_count()
-        if matched != self._told_of_parameters:
-            self._told_of_parameters = matched
+        if matched != self._parameter_writers:
+            self._parameter_writers = matched
             for node in self._asked_parameters:  # what changed before was not told
                 self._ask_parameters(node)
         for node, health in self.health.items():

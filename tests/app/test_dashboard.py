@@ -153,6 +153,35 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
     assert applied[-1] == 0.0
 
 
+# A click is a message to each listener; those to all but the first come later than a refresh.
+DELAYED = """() => {
+    const emit = window.socket.emit.bind(window.socket);
+    const first = {};
+    window.socket.emit = (kind, message, ...rest) => {
+        const listener = kind === "event" ? message.listener_id : null;
+        first[message.id] ??= listener;
+        setTimeout(
+            () => emit(kind, message, ...rest), listener === first[message.id] ? 0 : 500
+        );
+    };
+}"""
+
+
+def test_a_click_that_arrives_in_parts_switches_the_controller(
+    start_stickslip: Start, page: Page
+) -> None:
+    served = Served(start_stickslip("run", "feed_drive", "--dashboard", "--bag", "bag"))
+    page.goto(served.url)
+    control = page.get_by_role("switch", name="washout controller")
+    expect(control).to_be_checked()
+    page.wait_for_function("window.did_handshake")
+    page.evaluate(DELAYED)
+    control.click()
+    expect(page.get_by_text("washout_controller inactive")).to_be_visible()
+    expect(control).not_to_be_checked()
+    assert served.end() == 130
+
+
 def test_a_page_that_comes_and_goes_changes_nothing(
     start_stickslip: Start, browser: Browser, tmp_path: Path
 ) -> None:

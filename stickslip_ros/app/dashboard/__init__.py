@@ -6,13 +6,13 @@ from contextlib import suppress
 
 from stickslip_ros.app.arguments import add_namespace, namespace_of
 from stickslip_ros.app.optional import check_dashboard, ros_nodes
+from stickslip_ros.nodes.domain_ports import LARGEST_PORT
 
 HELP = "show a running loop on a web page, live, and act on it"
 
 DEFAULT_PORT = 8642
 """The first that is tried where none is asked for."""
 
-LARGEST_PORT = 65_535
 _NICENESS = 10
 """The simulation goes first."""
 

@@ -3,13 +3,14 @@
 import asyncio
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 from nicegui import ui
+from nicegui.events import GenericEventArguments
 
 from stickslip_ros.app.dashboard.charts import CYCLES, PORTRAIT, TRACE
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
@@ -125,7 +126,7 @@ class _Page:
     def _add_control(self) -> None:
         with _card("Act"):
             self._switch = ui.switch("washout controller")
-            self._switch.on("update:model-value", self._switch_control)  # by a person only
+            self._switch.on("update:model-value", self._switch_control, [None])  # by a person only
             self._switch_refusal = _refusal()
             with ui.row().classes("items-end"):
                 self._tap_force = ui.number("force (N)", value=None, format="%g").classes("w-24")
@@ -216,12 +217,17 @@ class _Page:
         if not self._busy:
             self._switch.set_value(health.state == "active")
 
-    async def _switch_control(self) -> None:
-        active = bool(self._switch.value)
-        observer = self._observer
-        if self._busy or active == (observer.health[_CONTROLLER].state == "active"):
-            return
+    def _switch_control(self, event: GenericEventArguments) -> Awaitable[None] | None:
+        """Take what the person asked for from the event: a refresh may set the switch back."""
+        active = bool(event.args)
+        if self._busy or active == (self._observer.health[_CONTROLLER].state == "active"):
+            return None
         self._busy = True
+        self._switch.set_value(active)
+        return self._pursue_control(active)
+
+    async def _pursue_control(self, active: bool) -> None:
+        observer = self._observer
         try:
             await _report(observer.set_active(_CONTROLLER, active), self._switch_refusal)
             deadline = time.monotonic() + _STATE_TIMEOUT

@@ -15,10 +15,11 @@ from nicegui import core, ui
 from rclpy.experimental import EventsExecutor
 from rclpy.task import Future
 
-from stickslip_ros.app.dashboard import DEFAULT_PORT, LARGEST_PORT
+from stickslip_ros.app.dashboard import DEFAULT_PORT
 from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.page import add_page
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.nodes.domain_ports import LARGEST_PORT
 from stickslip_ros.nodes.observer import ObserverNode
 from stickslip_ros.nodes.process import initialise, spin
 
