@@ -30,8 +30,8 @@ from rosbags.typesys import Stores, get_typestore
 from benchmarks.slices import Row, by_turns, compare_rates, show
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.definitions import message_definition
-from stickslip_ros.bags.messages import pack_joint_state, pack_wrench
 from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 
 ROUNDS = 60
 SAMPLES = 2000

@@ -5,8 +5,8 @@ from typing import Any
 
 import heyoka as hy
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.motion import UNBOUNDED_SPEED
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.motion.motion import UNBOUNDED_SPEED
 
 
 class BareMotion:

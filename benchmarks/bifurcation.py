@@ -10,8 +10,8 @@ import time
 
 from benchmarks.bare import BareMotion
 from benchmarks.slices import Row, by_turns, compare_times, show
+from stickslip_ros.paper.figures import bifurcation_drives
 from stickslip_ros.studies.bifurcation import COURSE, bifurcation_diagram
-from stickslip_ros.studies.paper.figures import bifurcation_drives
 
 POINTS, ROUNDS = 1000, 3
 PERIODS = COURSE.transient + COURSE.cycles + 2

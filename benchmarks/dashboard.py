@@ -27,7 +27,7 @@ from urllib.error import URLError
 
 from benchmarks.parties import READY_TIMEOUT, ObservedPlant, Slice, closed_loop, party
 from benchmarks.slices import Row, by_turns, compare_rates, lacks, show
-from stickslip_ros.nodes.lifeline import start
+from stickslip_ros.nodes.base.child_process import start
 
 LOCKSTEP_ROUNDS = 9
 LOCKSTEP_TIME = 3.0

@@ -27,13 +27,13 @@ from rclpy.task import Future
 
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.lifeline import start
-from stickslip_ros.nodes.managed import ManagedNode
+from stickslip_ros.nodes.base.child_process import start
+from stickslip_ros.nodes.base.managed import ManagedNode
+from stickslip_ros.nodes.base.process import spin
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.process import spin
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, load_scenario, parameter_file
-from stickslip_ros.testing.domain import domain_variables, own_domain
+from stickslip_ros.running.domain import domain_variables, own_domain
+from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, load_scenario, parameter_file
 
 T = TypeVar("T")
 

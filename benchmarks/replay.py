@@ -23,16 +23,16 @@ from rclpy.experimental import EventsExecutor
 from benchmarks.lateness import SLEEP_LOOP, lateness, lateness_rows, sleep_loop
 from benchmarks.parties import ROS_ARGUMENTS, ros
 from benchmarks.slices import Row, show
-from stickslip_ros.bags.messages import pack_joint_state, pack_wrench
 from stickslip_ros.bags.recorder import QosProfile, Recorder
-from stickslip_ros.nodes.lifeline import start
-from stickslip_ros.nodes.player import Message
-from stickslip_ros.nodes.process import spin
+from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
+from stickslip_ros.messages.topics import CONTROL_FORCE, DEEP, JOINT_STATES
+from stickslip_ros.nodes.base.child_process import start
+from stickslip_ros.nodes.base.process import spin
 from stickslip_ros.nodes.replay import ReplayNode
-from stickslip_ros.nodes.topics import CONTROL_FORCE, DEEP, JOINT_STATES
-from stickslip_ros.physics.samples import NANOSECONDS
-from stickslip_ros.scenario.files import DEFAULT_NAMESPACE
-from stickslip_ros.testing.domain import domain_variables, own_domain
+from stickslip_ros.nodes.replaying.player import Message
+from stickslip_ros.running.domain import domain_variables, own_domain
+from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE
+from stickslip_ros.stamps import NANOSECONDS
 
 SAMPLES = 30_000
 PERIOD = 0.001

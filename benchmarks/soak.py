@@ -29,14 +29,14 @@ import numpy as np
 from numpy.typing import NDArray
 from rclpy.node import Node
 
-from stickslip_ros.bags.messages import unpack_header
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.nodes.topics import JOINT_STATES, RECORDED, Topic
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.samples import NANOSECONDS
-from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, load_scenario
-from stickslip_ros.scenario.parameters import PlantParameters
-from stickslip_ros.testing.domain import domain_variables, own_domain, ros_context
+from stickslip_ros.messages.codec import unpack_header
+from stickslip_ros.messages.topics import JOINT_STATES, RECORDED, Topic
+from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.running.domain import domain_variables, own_domain, ros_context
+from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, load_scenario
+from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.stamps import NANOSECONDS
 
 SCENARIO = "feed_drive"
 OVERRIDES = (

@@ -14,25 +14,25 @@ PUBLIC = {
     },
     "bags": {
         "stickslip_ros.bags": ["Recording", "RunBlock"],
-        "stickslip_ros.bags.messages": ["JointStateColumns", "WrenchColumns"],
+        "stickslip_ros.messages.codec": ["JointStateColumns", "WrenchColumns"],
         "stickslip_ros.bags.report": ["report_of_bag"],
     },
     "scenarios": {
-        "stickslip_ros.scenario.files": ["load_scenario", "Scenario", "parameter_file"],
+        "stickslip_ros.scenarios.files": ["load_scenario", "Scenario", "parameter_file"],
     },
     "physics": {
-        "stickslip_ros.physics.drive": ["Drive"],
-        "stickslip_ros.physics.friction": [
+        "stickslip_ros.physics.model.drive": ["Drive"],
+        "stickslip_ros.physics.model.friction": [
             "FrictionLaw", "Stribeck", "Coulomb", "Linear", "Exponential", "LAWS",
         ],
-        "stickslip_ros.physics.motion": ["Motion"],
-        "stickslip_ros.physics.knots": ["Knots"],
-        "stickslip_ros.physics.washout": ["WashoutParameters", "Washout"],
-        "stickslip_ros.physics.equations": ["WashoutGains"],
-        "stickslip_ros.physics.sampled_loop": ["SampledLoop", "Sample", "Verdict"],
-        "stickslip_ros.physics.disturbance": ["Disturbance"],
-        "stickslip_ros.physics.simulation": ["simulate_sampled", "simulate_continuous"],
-        "stickslip_ros.physics.measures": ["CycleMeter", "Measures", "Cycle", "Regime"],
+        "stickslip_ros.physics.motion.motion": ["Motion"],
+        "stickslip_ros.physics.measures.breakpoints": ["Breakpoints"],
+        "stickslip_ros.physics.loop.washout": ["WashoutParameters", "Washout"],
+        "stickslip_ros.physics.model.equations": ["WashoutGains"],
+        "stickslip_ros.physics.loop.sampled_loop": ["SampledLoop", "Sample", "Verdict"],
+        "stickslip_ros.physics.model.disturbance": ["Disturbance"],
+        "stickslip_ros.physics.loop.simulation": ["simulate_sampled", "simulate_continuous"],
+        "stickslip_ros.physics.measures.cycles": ["CycleMeter", "Measures", "Cycle", "Regime"],
     },
     "theory": {
         "stickslip_ros.physics.theory.linear": ["expand", "Expansion"],
@@ -75,8 +75,8 @@ EXAMPLES = {
         "after from stickslip_ros.bags import Recording",
     ),
     "compute_columns": (
-        "after from stickslip_ros.physics.measures import Regime",
-        "after from stickslip_ros.scenario.files import load_scenario",
+        "after from stickslip_ros.physics.measures.cycles import Regime",
+        "after from stickslip_ros.scenarios.files import load_scenario",
         "after from stickslip_ros.studies.columns import compute_columns",
         "after from stickslip_ros.studies.plan import Axis",
         "after from stickslip_ros.studies.sweep import sweep_study",

@@ -15,10 +15,10 @@ from xml.etree import ElementTree
 from api import PUBLIC, reference
 
 from stickslip_ros.app.stability import stability
-from stickslip_ros.nodes.topics import TOPICS
+from stickslip_ros.messages.topics import TOPICS
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
-from stickslip_ros.scenario.files import load_scenario
-from stickslip_ros.scenario.parameters import (
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.scenarios.parameters import (
     NODE_PARAMETERS,
     NodeParameters,
     Parameter,

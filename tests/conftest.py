@@ -32,7 +32,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 STARTING_FIXTURES = {"cluster", "processes", "recorded", "start", "start_stickslip"}
 
-MIDDLEWARE = {Path(__file__).parent / floor for floor in ("nodes", "bags")}
+MIDDLEWARE = {Path(__file__).parent / floor for floor in ("nodes", "running", "bags")}
 
 _STARTS = {"os.fork", "os.forkpty", "os.posix_spawn", "os.system", "subprocess.Popen"}
 _FOUND_BY_LIBRARIES = {"fc-list", "ldconfig", "/sbin/ldconfig"}
@@ -55,7 +55,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if STARTING_FIXTURES.intersection(getattr(item, "fixturenames", ())):
             item.add_marker("process")
-        if item.path.parent in MIDDLEWARE:
+        if MIDDLEWARE.intersection(item.path.parents):
             item.add_marker("middleware")
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from velocity_feedback import VelocityFeedback
 
-from stickslip_ros.physics.measures import Regime
-from stickslip_ros.plots.controllers import Course, draw_courses
+from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.plots.controller_comparison import Course, draw_courses
 from stickslip_ros.testing import ClosedLoop, RunResult
 
 HERE = Path(__file__).parent

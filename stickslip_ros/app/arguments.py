@@ -11,13 +11,13 @@ from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.printable import printable
-from stickslip_ros.scenario.files import (
+from stickslip_ros.scenarios.files import (
     DEFAULT_NAMESPACE,
     LONGEST_NAMESPACE,
     Scenario,
     load_scenario,
 )
-from stickslip_ros.scenario.parameters import NODE_PARAMETERS, known_parameters, shown
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, known_parameters, shown
 from stickslip_ros.versions import versions
 
 _PICTURES = (".png", ".svg", ".pdf")

@@ -18,9 +18,9 @@ from stickslip_ros.app.arguments import (
 from stickslip_ros.app.output import finite, print_table
 from stickslip_ros.app.studying import add_running, course_of, done, write_table
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures import Regime
+from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.basin import (
     COURSE,
     POSITION,

@@ -10,7 +10,7 @@ from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.plots.run_picture import RunColumns, draw_control_coming_on
-from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.scenarios.files import load_scenario
 
 _SCENARIO = "feed_drive"
 _DURATION = 10.0
@@ -41,7 +41,7 @@ def _demonstrate() -> None:
     scenario = load_scenario(_SCENARIO, ["plant.pace=lockstep", f"plant.duration={_DURATION}"])
     switched_on = scenario.washout_controller.start_after
     bag = default_bag(_SCENARIO)
-    reach = ros_nodes("process").keep_on_this_machine(network=False)
+    reach = ros_nodes("nodes.base.process").keep_on_this_machine(network=False)
     print(
         f"{_DURATION:g} s of {_SCENARIO} in lockstep: plant, washout controller and analyzer as "
         f"ROS 2 nodes, {reach}; the controller acts from {switched_on:g} s on"

@@ -1,6 +1,6 @@
 """Why there is nothing to measure in a motion."""
 
-from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.units import Units
 from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
 

@@ -18,7 +18,7 @@ def ros_nodes(module: str) -> ModuleType:
     try:
         with interrupts_kept():
             import_module("stickslip_ros.nodes").check_shared_memory()
-            return import_module(f"stickslip_ros.nodes.{module}")
+            return import_module(f"stickslip_ros.{module}")
     except ModuleNotFoundError as error:
         raise RunError(
             f"running nodes needs ROS 2, of which {error.name} is not installed: "

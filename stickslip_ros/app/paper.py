@@ -8,16 +8,16 @@ from pathlib import Path
 
 from stickslip_ros.app.arguments import add_json, writing
 from stickslip_ros.app.output import print_json, print_table, progress_bar
-from stickslip_ros.plots.paper_figures import draw_paper_figure
-from stickslip_ros.studies.paper.claims import CLAIMS, Evidence, Finding
-from stickslip_ros.studies.paper.figures import (
+from stickslip_ros.paper.claims import CLAIMS, Evidence, Finding
+from stickslip_ros.paper.figures import (
     NUMBERS,
     BifurcationFigure,
     PaperFigure,
     compute_figure,
 )
-from stickslip_ros.studies.paper.marks import marks
-from stickslip_ros.studies.paper.report import as_markdown, report, verdict_counts
+from stickslip_ros.paper.marks import marks
+from stickslip_ros.paper.pictures import draw_paper_figure
+from stickslip_ros.paper.report import as_markdown, report, verdict_counts
 from stickslip_ros.versions import versions
 
 HELP = "reproduce the paper: its figures 2 to 13, and a report on every number and claim"

@@ -13,11 +13,11 @@ from stickslip_ros.app.output import print_figures, print_json
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.measures import Measures
+from stickslip_ros.physics.measures.cycles import Measures
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.units import Units
 from stickslip_ros.printable import printable
-from stickslip_ros.scenario.parameters import PlantParameters, known_parameters
+from stickslip_ros.scenarios.parameters import PlantParameters, known_parameters
 from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:

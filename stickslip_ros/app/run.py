@@ -31,8 +31,8 @@ from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed import find_executable
 from stickslip_ros.plots.units import Units
 from stickslip_ros.printable import printable
-from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, Scenario
-from stickslip_ros.scenario.parameters import Pace, WashoutControllerParameters
+from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, Scenario
+from stickslip_ros.scenarios.parameters import Pace, WashoutControllerParameters
 
 _PAGE_TIMEOUT = 5.0
 """Time, s, that a dashboard has to end."""
@@ -113,7 +113,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_new_bag(bag)
     if arguments.dashboard:
         check_dashboard()
-    reach = ros_nodes("process").keep_on_this_machine(arguments.network)
+    reach = ros_nodes("nodes.base.process").keep_on_this_machine(arguments.network)
     _tell(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}")
     with _dashboard(namespace) if arguments.dashboard else nullcontext():
         figures, interrupted = record(
@@ -155,7 +155,7 @@ def record(
     total = duration if duration < float("inf") else None
     with progress_bar(f"running {scenario.name}", total) as progress:
         try:
-            outcome = ros_nodes("bringup").run_nodes(
+            outcome = ros_nodes("running.bringup").run_nodes(
                 scenario,
                 namespace=namespace,
                 bag=bag,
@@ -186,7 +186,7 @@ def _dashboard(namespace: str) -> Generator[None]:
         "--namespace",
         namespace,
     ]
-    process = ros_nodes("lifeline").start(command)
+    process = ros_nodes("nodes.base.child_process").start(command)
     try:
         yield
     finally:

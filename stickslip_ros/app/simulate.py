@@ -19,15 +19,15 @@ from stickslip_ros.app.arguments import (
 )
 from stickslip_ros.app.no_cycle import why_no_cycle
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
-from stickslip_ros.physics.disturbance import DisturbanceKind
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.knots import Knots
-from stickslip_ros.physics.measures import Cycle, CycleMeter, Measures
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.simulation import Progress, simulate_continuous, simulate_sampled
-from stickslip_ros.physics.washout import Washout
+from stickslip_ros.physics.loop.simulation import Progress, simulate_continuous, simulate_sampled
+from stickslip_ros.physics.loop.washout import Washout
+from stickslip_ros.physics.measures.breakpoints import Breakpoints
+from stickslip_ros.physics.measures.cycles import Cycle, CycleMeter, Measures
+from stickslip_ros.physics.model.disturbance import DisturbanceKind
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.settled import check_continuous, sampled_loop
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ _DEFAULT_PERIODS = 200.0
 _DRAWN_PER_PERIOD = 64
 """Points in a natural period of what is drawn, at least."""
 _DRAWN_SHARE, _DRAWN_AT_ONCE = 500, 50
-"""Part of the knots so far, and how many at least, within which it is told where a cycle ended."""
+"""Part of the breakpoints so far, and how many at least, between which a cycle's end is told."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -124,7 +124,7 @@ def simulate(
 
 
 class _DrawnMotion(Motion):
-    """A motion whose forces are put down, and whose knots are no further apart than is drawn."""
+    """A motion that notes its forces, its breakpoints no further apart than is drawn."""
 
     def __init__(self, *start: Any, **given: Any) -> None:
         self.forces: list[tuple[float, float, float, float]] = []
@@ -156,16 +156,16 @@ class _DrawingMeter(CycleMeter):
     def __init__(self, window: int, history: "RunHistory", motion: _DrawnMotion) -> None:
         super().__init__(window)
         self._history, self._motion = history, motion
-        self._knots = 0
+        self._breakpoints = 0
 
-    def feed(self, knots: Knots, belt_speed: float) -> list[Cycle]:
+    def feed(self, breakpoints: Breakpoints, belt_speed: float) -> list[Cycle]:
         completed: list[Cycle] = []
-        most = max(_DRAWN_AT_ONCE, self._knots // _DRAWN_SHARE)
-        self._knots += len(knots)
-        for start in range(0, len(knots), most):
-            piece = knots[start : start + most]
+        most = max(_DRAWN_AT_ONCE, self._breakpoints // _DRAWN_SHARE)
+        self._breakpoints += len(breakpoints)
+        for start in range(0, len(breakpoints), most):
+            piece = breakpoints[start : start + most]
             cycles = super().feed(piece, belt_speed)
-            self._history.take_knots(piece, belt_speed, cycles)
+            self._history.take_breakpoints(piece, belt_speed, cycles)
             completed += cycles
         forces = np.array(self._motion.forces).reshape(-1, 4).T
         self._motion.forces.clear()

@@ -25,8 +25,8 @@ from stickslip_ros.app.output import (
     progress_bar,
 )
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
@@ -41,7 +41,7 @@ from stickslip_ros.physics.theory.sampled import (
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.scenarios.files import Scenario
 
 HELP = "equilibrium, Hopf speeds, limit cycles and critical gains of a scenario, by theory"
 

@@ -35,9 +35,10 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 from numpy.typing import NDArray
 
+from stickslip_ros.arrays import IntArray
 from stickslip_ros.bags.compression import LARGEST, ZSTD_MAGIC, unpack, unpack_message
-from stickslip_ros.bags.messages import joined
 from stickslip_ros.errors import BagError
+from stickslip_ros.messages.codec import joined
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE_FIELDS = {
@@ -113,7 +114,7 @@ class MessageBlock:
     The serialized message i is `data[begin[i] : end[i]]`.
     """
 
-    def __init__(self, data: bytes, starts: NDArray[np.int64]) -> None:
+    def __init__(self, data: bytes, starts: IntArray) -> None:
         """Take the message records that start there; raises _DamageError where there is none."""
         if len(starts) > 0 and not 0 <= starts.min() <= starts.max() <= len(data) - _MESSAGE_SIZE:
             raise _DamageError
@@ -139,12 +140,12 @@ class MessageBlock:
         return self._field("sequence")
 
     @property
-    def log_time(self) -> NDArray[np.int64]:
+    def log_time(self) -> IntArray:
         """In ns."""
         return self._field("log_time").astype(np.int64)
 
     @property
-    def publish_time(self) -> NDArray[np.int64]:
+    def publish_time(self) -> IntArray:
         """In ns."""
         return self._field("publish_time").astype(np.int64)
 
@@ -514,7 +515,7 @@ class McapFile:
 
     def _indexed(self, data: bytes, position: int) -> _OpenChunk | None:
         """Find the messages of a chunk by the indexes behind it; None if these are not right."""
-        offsets: list[NDArray[np.int64]] = []
+        offsets: list[IntArray] = []
         room = len(data) // _MESSAGE_SIZE * _INDEX_ENTRY
         while (record := self._record(position)) and record.opcode == Opcode.MESSAGE_INDEX:
             size = record.length - _INDEX_HEAD

@@ -15,19 +15,19 @@ from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
+from stickslip_ros.arrays import IntArray
 from stickslip_ros.bags.compression import unpack_file
 from stickslip_ros.bags.mcap_file import McapFile, MessageBlock
-from stickslip_ros.bags.messages import (
+from stickslip_ros.bags.metadata import METADATA_FILE
+from stickslip_ros.errors import BagError
+from stickslip_ros.messages.codec import (
     JointStateColumns,
     Refused,
     WrenchColumns,
     joint_states_in,
     wrenches_in,
 )
-from stickslip_ros.bags.metadata import METADATA_FILE
-from stickslip_ros.errors import BagError
 from stickslip_ros.printable import printable
 
 _PACKED = ".mcap.zstd"
@@ -52,7 +52,7 @@ _TOPICS = {
 """Types of the topics of a drive, by the last part of their names."""
 
 ColumnsT = TypeVar("ColumnsT", JointStateColumns, WrenchColumns)
-_Decode = Callable[[bytes, NDArray[np.int64], NDArray[np.int64]], tuple[ColumnsT, Refused]]
+_Decode = Callable[[bytes, IntArray, IntArray], tuple[ColumnsT, Refused]]
 
 
 class RunBlock(NamedTuple):

@@ -29,7 +29,7 @@ from stickslip_ros.bags.mcap_file import McapFile
 from stickslip_ros.bags.metadata import BagDescription, opening_information
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError
-from stickslip_ros.physics.samples import NANOSECONDS
+from stickslip_ros.stamps import NANOSECONDS
 
 Compression = Literal["lz4", "zstd", "none"]
 

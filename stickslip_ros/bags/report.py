@@ -6,12 +6,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
+from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.physics.knots import BoolArray, FloatArray
-from stickslip_ros.physics.measures import Cycle
-from stickslip_ros.physics.samples import NANOSECONDS, IntArray, RunMeter, SettledForces
+from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
+from stickslip_ros.physics.measures.cycles import Cycle
+from stickslip_ros.physics.measures.samples import RunMeter, SettledForces
+from stickslip_ros.stamps import NANOSECONDS
 
 _DEFAULT_WINDOW = 20
 """Cycles to average over for a bag of somebody else's."""

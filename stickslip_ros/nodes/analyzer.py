@@ -14,23 +14,16 @@ from typing import Any, NamedTuple, TypeVar
 
 from std_msgs.msg import Float64
 
-from stickslip_ros.bags.messages import (
-    END_OF_TIME,
+from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
+from stickslip_ros.errors import BagError
+from stickslip_ros.messages.codec import (
     Refused,
     joint_state_columns,
     pack_header,
     unpack_header,
     wrench_columns,
 )
-from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
-from stickslip_ros.errors import BagError
-from stickslip_ros.nodes.collecting import take_waiting
-from stickslip_ros.nodes.dropped import Dropped
-from stickslip_ros.nodes.inquiry import ask_parameters
-from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
-from stickslip_ros.nodes.process import run_node
-from stickslip_ros.nodes.rivals import rivals
-from stickslip_ros.nodes.topics import (
+from stickslip_ros.messages.topics import (
     AMPLITUDE,
     CONTROL_FORCE,
     DEEP,
@@ -42,9 +35,16 @@ from stickslip_ros.nodes.topics import (
     STICK_FRACTION,
     Topic,
 )
-from stickslip_ros.physics.samples import RunMeter
+from stickslip_ros.nodes.base.dropped_messages import Dropped
+from stickslip_ros.nodes.base.duplicate_publishers import rivals
+from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Level, ManagedNode
+from stickslip_ros.nodes.base.polling import take_waiting
+from stickslip_ros.nodes.base.process import run_node
+from stickslip_ros.nodes.base.service_call import ask_parameters
+from stickslip_ros.physics.measures.samples import RunMeter
 from stickslip_ros.prefixes import quantity
-from stickslip_ros.scenario.parameters import NODE_PARAMETERS, AnalyzerParameters, known_parameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters, known_parameters
+from stickslip_ros.stamps import END_OF_TIME
 from stickslip_ros.versions import versions
 
 ColumnsT = TypeVar("ColumnsT")

@@ -11,10 +11,10 @@ from threading import TIMEOUT_MAX, Event, Lock, Thread
 from typing import Any
 
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.nodes.managed import ManagedNode
-from stickslip_ros.nodes.topics import RECORDED
-from stickslip_ros.physics.sampled_loop import Sample, SampledLoop
-from stickslip_ros.scenario.parameters import PlantParameters
+from stickslip_ros.messages.topics import RECORDED
+from stickslip_ros.nodes.base.managed import ManagedNode
+from stickslip_ros.physics.loop.sampled_loop import Sample, SampledLoop
+from stickslip_ros.scenarios.parameters import PlantParameters
 
 Publish = Callable[[Sample], None]
 

@@ -9,21 +9,9 @@ from typing import Any
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from stickslip_ros.bags.messages import (
-    END_OF_TIME,
-    pack_joint_state,
-    pack_wrench,
-    unpack_header,
-    unpack_wrench,
-)
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.nodes.dropped import Dropped
-from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
-from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer
-from stickslip_ros.nodes.process import run_node
-from stickslip_ros.nodes.punctuality import Punctuality
-from stickslip_ros.nodes.rivals import rivals
-from stickslip_ros.nodes.topics import (
+from stickslip_ros.messages.codec import pack_joint_state, pack_wrench, unpack_header, unpack_wrench
+from stickslip_ros.messages.topics import (
     APPLIED_DISTURBANCE,
     CLOCK,
     CONTROL_FORCE,
@@ -32,10 +20,16 @@ from stickslip_ros.nodes.topics import (
     JOINT_STATES,
     RECORDED,
 )
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, Sample, SampledLoop, Verdict
-from stickslip_ros.physics.samples import NANOSECONDS
-from stickslip_ros.scenario.parameters import Pace, PlantParameters
+from stickslip_ros.nodes.base.dropped_messages import Dropped
+from stickslip_ros.nodes.base.duplicate_publishers import rivals
+from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Level, ManagedNode
+from stickslip_ros.nodes.base.process import run_node
+from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer
+from stickslip_ros.nodes.punctuality import Punctuality
+from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, Sample, SampledLoop, Verdict
+from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.scenarios.parameters import Pace, PlantParameters
+from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 
 NEWEST_STAMP = "newest_stamp"
 """Key under which the diagnostics tell the stamp of the newest sample, ns."""

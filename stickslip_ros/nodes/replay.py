@@ -18,16 +18,16 @@ from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from stickslip_ros.bags.messages import unpack_header
 from stickslip_ros.errors import RunError, StickslipError
-from stickslip_ros.nodes.excerpt import Excerpt
-from stickslip_ros.nodes.managed import ERROR, OK, WARN, Level, ManagedNode
+from stickslip_ros.messages.codec import unpack_header
+from stickslip_ros.messages.topics import CLOCK, JOINT_STATES, RECORDED
+from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Level, ManagedNode
+from stickslip_ros.nodes.base.process import initialise, run_node, run_until_stopped
 from stickslip_ros.nodes.pacing import FlowWindow
-from stickslip_ros.nodes.player import Message, Player
-from stickslip_ros.nodes.process import initialise, run_node, run_until_stopped
-from stickslip_ros.nodes.topics import CLOCK, JOINT_STATES, RECORDED
-from stickslip_ros.physics.samples import NANOSECONDS
-from stickslip_ros.scenario.parameters import PlantParameters, ReplayParameters
+from stickslip_ros.nodes.replaying.player import Message, Player
+from stickslip_ros.nodes.replaying.selection import Excerpt
+from stickslip_ros.scenarios.parameters import PlantParameters, ReplayParameters
+from stickslip_ros.stamps import NANOSECONDS
 
 _FLOW_WINDOW = PlantParameters().flow_window
 """Joint states that may be on their way to a recorder."""

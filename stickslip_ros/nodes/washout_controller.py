@@ -4,16 +4,16 @@ import sys
 from math import isfinite
 from typing import Any
 
-from stickslip_ros.bags.messages import JointStateSample, pack_wrench, unpack_joint_state
 from stickslip_ros.errors import BagError
-from stickslip_ros.nodes.dropped import Dropped
-from stickslip_ros.nodes.managed import OK, WARN, Level, ManagedNode
-from stickslip_ros.nodes.process import run_node
-from stickslip_ros.nodes.rivals import rivals
-from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
-from stickslip_ros.physics.samples import LARGEST
-from stickslip_ros.physics.washout import Washout
-from stickslip_ros.scenario.parameters import WashoutControllerParameters
+from stickslip_ros.messages.codec import JointStateSample, pack_wrench, unpack_joint_state
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
+from stickslip_ros.nodes.base.dropped_messages import Dropped
+from stickslip_ros.nodes.base.duplicate_publishers import rivals
+from stickslip_ros.nodes.base.managed import OK, WARN, Level, ManagedNode
+from stickslip_ros.nodes.base.process import run_node
+from stickslip_ros.physics.loop.washout import Washout
+from stickslip_ros.physics.measures.samples import LARGEST
+from stickslip_ros.scenarios.parameters import WashoutControllerParameters
 
 
 class WashoutControllerNode(ManagedNode[WashoutControllerParameters]):

@@ -9,8 +9,8 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.measures import Regime
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
 from stickslip_ros.plots.style import (
     AMBER,

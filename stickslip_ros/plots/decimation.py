@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.samples import IntArray
+from stickslip_ros.arrays import FloatArray, IntArray
 
 LONGEST_GAP = 10.0
 """Usual steps beyond which nothing is known of what was between two samples."""

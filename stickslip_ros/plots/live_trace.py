@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
-from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.samples import HELD_FORCES, NANOSECONDS, DroppedForces, IntArray
+from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
+from stickslip_ros.physics.measures.samples import HELD_FORCES, DroppedForces
 from stickslip_ros.plots.decimation import LONGEST_GAP, peaks
+from stickslip_ros.stamps import NANOSECONDS
 
 _NONE = WrenchColumns(np.empty(0, np.int64), np.empty(0))
 _MOST_ROWS = 200_000

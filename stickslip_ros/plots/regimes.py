@@ -9,8 +9,8 @@ from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 
-from stickslip_ros.physics.knots import BoolArray, FloatArray
-from stickslip_ros.physics.measures import Regime
+from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.style import BLUE, GREEN, GREY, LIGHT_GREY, MANY, ORANGE
 
 INK = "#333333"

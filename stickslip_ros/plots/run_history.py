@@ -5,9 +5,10 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from stickslip_ros.physics.knots import BoolArray, FloatArray, Knots, knots_from_samples
-from stickslip_ros.physics.measures import Cycle
-from stickslip_ros.physics.samples import LARGEST
+from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.physics.measures.breakpoints import Breakpoints, breakpoints_from_samples
+from stickslip_ros.physics.measures.cycles import Cycle
+from stickslip_ros.physics.measures.samples import LARGEST
 from stickslip_ros.plots.decimation import LONGEST_GAP, Trace
 
 _FIRST_ROWS = 20_000
@@ -127,15 +128,17 @@ class RunHistory:
         self._take_cycles(float(samples.time[-1]), cycles)
         self._before = _Samples(*(column[-1:] for column in samples))
 
-    def take_knots(self, knots: Knots, belt_speed: float, cycles: Sequence[Cycle]) -> None:
-        """Take the knots that follow, of a motion that is known between them, and its cycles."""
-        if len(knots) == 0:
+    def take_breakpoints(
+        self, breakpoints: Breakpoints, belt_speed: float, cycles: Sequence[Cycle]
+    ) -> None:
+        """Take the breakpoints that follow, of a motion known between them, and its cycles."""
+        if len(breakpoints) == 0:
             return
-        time = knots.time
+        time = breakpoints.time
         steps = np.diff(time, prepend=self._end if self._first else time[0])
         self._add(
-            time, knots.position, knots.velocity, np.full(len(time), belt_speed),
-            np.where(knots.sticking, steps, 0.0),
+            time, breakpoints.position, breakpoints.velocity, np.full(len(time), belt_speed),
+            np.where(breakpoints.sticking, steps, 0.0),
         )  # fmt: skip
         self._take_cycles(float(time[-1]), cycles)
 
@@ -171,16 +174,16 @@ class RunHistory:
     def _add_between(self, samples: _Samples) -> None:
         """Add samples, of which the first may have been added before, and what is between them."""
         with np.errstate(over="ignore", invalid="ignore"):
-            knots = knots_from_samples(*samples, exact_times=False)
-        # Number of the sample that ends the interval in which a knot lies.
-        number = np.searchsorted(samples.time, knots.time)
+            breakpoints = breakpoints_from_samples(*samples, exact_times=False)
+        # Number of the sample that ends the interval in which a breakpoint lies.
+        number = np.searchsorted(samples.time, breakpoints.time)
         unknown = np.append(False, np.diff(samples.time) > self.gap)[number]
-        kept = ~unknown | (knots.time == samples.time[number])
-        steps = np.diff(knots.time, prepend=knots.time[0])
-        sticking = np.where(knots.sticking & ~unknown, steps, 0.0)
+        kept = ~unknown | (breakpoints.time == samples.time[number])
+        steps = np.diff(breakpoints.time, prepend=breakpoints.time[0])
+        sticking = np.where(breakpoints.sticking & ~unknown, steps, 0.0)
         kept[0] &= self._before is None
         self._add(
-            knots.time[kept], knots.position[kept], knots.velocity[kept],
+            breakpoints.time[kept], breakpoints.position[kept], breakpoints.velocity[kept],
             samples.belt_velocity[number][kept], sticking[kept],
         )  # fmt: skip
 

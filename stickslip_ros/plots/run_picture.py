@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, drawing, styled
 from stickslip_ros.plots.units import SI
 

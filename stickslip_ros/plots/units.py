@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.prefixes import prefix_for
 
 NOISE = 1e-9

@@ -6,8 +6,8 @@ from math import sqrt
 from typing import Self
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures import Regime
-from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.plan import Axis, Plan
 from stickslip_ros.studies.settled import CYCLES, Course
 from stickslip_ros.studies.study import Point, Study

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.measures import Measures
-from stickslip_ros.physics.simulation import Progress
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.loop.simulation import Progress
+from stickslip_ros.physics.measures.cycles import Measures
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.studies.settled import Case, Course, Settled, Settler, State
 
 COURSE = Course(transient=300.0, cycles=6)

@@ -14,8 +14,8 @@ from typing import Any, Self, TextIO
 import numpy as np
 import numpy.typing as npt
 
-from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.simulation import Progress
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.loop.simulation import Progress
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Grid, Plan
 from stickslip_ros.studies.runner import IN_FLIGHT, run, run_here

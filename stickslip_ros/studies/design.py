@@ -13,12 +13,13 @@ from typing import Self
 
 import numpy as np
 
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.measures import Regime
-from stickslip_ros.physics.simulation import Progress
+from stickslip_ros.physics.loop.simulation import Progress
+from stickslip_ros.physics.loop.washout import WashoutParameters
+from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.linear import SPEED
 from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.physics.theory.sampled import (
@@ -26,8 +27,7 @@ from stickslip_ros.physics.theory.sampled import (
     settling_time,
     why_no_linear_loop,
 )
-from stickslip_ros.physics.washout import WashoutParameters
-from stickslip_ros.scenario.files import Scenario, parameter_file
+from stickslip_ros.scenarios.files import Scenario, parameter_file
 from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
 from stickslip_ros.studies.trial import FILTER_SETTLED, Bench, Vibration
 

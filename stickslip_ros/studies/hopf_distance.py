@@ -1,6 +1,6 @@
 """How far a belt speed is from the Hopf speed, told to who may have meant another unit."""
 
-from stickslip_ros.physics.drive import Drive
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.hopf import hopf_points
 
 

@@ -9,9 +9,9 @@ from typing import Protocol, Self
 
 import numpy as np
 
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.scenario.parameters import NODE_PARAMETERS, Parameter, known_parameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, Parameter, known_parameters
 from stickslip_ros.suggestions import did_you_mean
 
 MOST_POINTS = 1_000_000_000

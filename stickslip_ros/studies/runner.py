@@ -18,7 +18,7 @@ from threading import Thread
 from typing import Self
 
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.physics.simulation import Progress
+from stickslip_ros.physics.loop.simulation import Progress
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.settled import State
 from stickslip_ros.studies.study import Piece, compute, pieces_of

@@ -5,17 +5,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.knots import FloatArray, Knots
-from stickslip_ros.physics.measures import LEAST_CYCLES, Cycle, CycleMeter, Measures, Regime
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.simulation import simulate_sampled
+from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.physics.loop.simulation import simulate_sampled
+from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
+from stickslip_ros.physics.measures.breakpoints import Breakpoints
+from stickslip_ros.physics.measures.cycles import LEAST_CYCLES, Cycle, CycleMeter, Measures, Regime
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.returns import loading_time, release_position
-from stickslip_ros.physics.washout import Washout, WashoutParameters
-from stickslip_ros.scenario.files import Scenario
-from stickslip_ros.scenario.parameters import PlantParameters
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.scenarios.parameters import PlantParameters
 
 CYCLES = (Regime.STICK_SLIP, Regime.PURE_SLIP)
 """Regimes that have an amplitude to be steady."""
@@ -192,7 +193,7 @@ class Settler:
 
             def advance(duration: float, meter: CycleMeter) -> None:
                 motion.advance(duration)
-                meter.feed(motion.take_knots(), drive.belt_speed)
+                meter.feed(motion.take_breakpoints(), drive.belt_speed)
 
         def observe() -> _SectionMeter:
             motion.recording = False
@@ -269,10 +270,10 @@ class _SectionMeter(CycleMeter):
         self._missing = max(cycles, LEAST_CYCLES)
         self._sections = [np.empty(0)]
 
-    def feed(self, knots: Knots, belt_speed: float) -> list[Cycle]:
-        """Take the knots that follow, as any meter does."""
-        self._sections.append(knots.position[knots.velocity == 0.0])
-        cycles = super().feed(knots, belt_speed)
+    def feed(self, breakpoints: Breakpoints, belt_speed: float) -> list[Cycle]:
+        """Take the breakpoints that follow, as any meter does."""
+        self._sections.append(breakpoints.position[breakpoints.velocity == 0.0])
+        cycles = super().feed(breakpoints, belt_speed)
         self._missing -= len(cycles)
         return cycles
 

@@ -6,8 +6,8 @@ from threading import local
 from typing import Any, NamedTuple, Self
 
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.physics.measures import EQUILIBRIUM_SPEED, Measures, Regime
-from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.physics.measures.cycles import EQUILIBRIUM_SPEED, Measures, Regime
+from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.plan import Plan
 from stickslip_ros.studies.settled import Case, Course, Settled, Settler, State
 

@@ -7,8 +7,8 @@ from math import nan, tanh
 
 import numpy as np
 
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.physics.knots import FloatArray
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
 from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.physics.theory.sampled import LinearSampledLoop

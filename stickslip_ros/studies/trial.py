@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.measures import CycleMeter, Measures, Regime
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.samples import NANOSECONDS
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
+from stickslip_ros.physics.measures.cycles import CycleMeter, Measures, Regime
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.returns import loading_time, release_position
 from stickslip_ros.physics.theory.sampled import SETTLED
-from stickslip_ros.physics.washout import Washout, WashoutParameters
+from stickslip_ros.stamps import NANOSECONDS
 
 _TRANSIENTS, _TRANSIENT_PERIODS, _STEADY = 6, 300, 1e-4
 """How often at most a vibration is given so many natural periods until its amplitude changes no
@@ -130,17 +130,17 @@ class Bench:
         for _ in range(samples):
             states.append((motion.position, motion.velocity))
             motion.advance(1.0 / self._rate)
-        motion.take_knots()
+        motion.take_breakpoints()
         position, velocity = np.array(states).T
         return Vibration(drive, self._rate, found.regime, found.period, position, velocity)
 
     def _measured(self, loading: float) -> Measures:
         """Go on for some cycles, each with `loading` (s) besides its slip, and measure them."""
         motion = self._recording
-        motion.take_knots()
+        motion.take_breakpoints()
         motion.advance((_MEASURED_CYCLES + 2) * (motion.drive.natural_period + loading))
         meter = CycleMeter(_MEASURED_CYCLES)
-        meter.feed(motion.take_knots(), motion.drive.belt_speed)
+        meter.feed(motion.take_breakpoints(), motion.drive.belt_speed)
         if motion.unbounded:
             meter.report_run_away()
         return meter.measures()

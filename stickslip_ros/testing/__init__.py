@@ -1,7 +1,7 @@
 """The closed loop as a test harness, for controllers of one's own."""
 
+from stickslip_ros.running.domain import own_domain
 from stickslip_ros.testing.closed_loop import ClosedLoop, Controller
-from stickslip_ros.testing.domain import own_domain
 from stickslip_ros.testing.result import Diagnostics, RunResult
 
 __all__ = ["ClosedLoop", "Controller", "Diagnostics", "RunResult", "own_domain"]

@@ -17,21 +17,21 @@ from rclpy.validate_namespace import validate_namespace
 
 from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.errors import InvalidInputError, RunError
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.analyzer import VERDICT_TIME
-from stickslip_ros.nodes.controllers import find_controllers, find_managed, near_misses
-from stickslip_ros.nodes.managed import ERROR
-from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
-from stickslip_ros.scenario.files import (
+from stickslip_ros.nodes.base.managed import ERROR
+from stickslip_ros.running.composition import Composition
+from stickslip_ros.running.controller_search import find_controllers, find_managed, near_misses
+from stickslip_ros.running.domain import domain_variables, own_domain, ros_context
+from stickslip_ros.running.foreign_controller import ControllerNode, ControllerProcess
+from stickslip_ros.running.remote import bring_up, greet
+from stickslip_ros.scenarios.files import (
     DEFAULT_NAMESPACE,
     LONGEST_NAMESPACE,
     Scenario,
     load_scenario,
 )
-from stickslip_ros.scenario.parameters import shown
-from stickslip_ros.testing.composition import Composition
-from stickslip_ros.testing.controllers import ControllerNode, ControllerProcess
-from stickslip_ros.testing.domain import domain_variables, own_domain, ros_context
-from stickslip_ros.testing.remote import bring_up, greet
+from stickslip_ros.scenarios.parameters import shown
 from stickslip_ros.testing.result import Diagnostics, RunResult, result_of
 
 Controller = Callable[..., Node] | Sequence[str] | Literal["washout", "external"] | None

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags import Recording
-from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
 from stickslip_ros.errors import RunError
-from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.measures import Measures
-from stickslip_ros.physics.samples import RunMeter
+from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
+from stickslip_ros.physics.measures.cycles import Measures
+from stickslip_ros.physics.measures.samples import RunMeter
 
 
 class Diagnostics(NamedTuple):

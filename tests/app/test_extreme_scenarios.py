@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from stickslip_ros.app.simulate import simulate
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.scenario.files import Scenario, load_scenario
-from stickslip_ros.scenario.parameters import NODE_PARAMETERS, parameters_of
+from stickslip_ros.scenarios.files import Scenario, load_scenario
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, parameters_of
 from tests.examples import examples
-from tests.scenario.values import good_values
+from tests.scenarios.values import good_values
 
 PAPER = load_scenario("paper")
 SAMPLES = 100
@@ -62,7 +62,7 @@ arguments = {
 @pytest.fixture(autouse=True, scope="module")
 def _little_patience() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("stickslip_ros.physics.motion._SPARE_STEPS", 10_000)
+        patch.setattr("stickslip_ros.physics.motion.motion._SPARE_STEPS", 10_000)
         yield
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.studies.paper.claims import CLAIMS, Finding, Verdict
+from stickslip_ros.paper.claims import CLAIMS, Finding, Verdict
 from tests.app.conftest import Run
-from tests.studies.paper.test_claims import KNOWN_SLIPS, check_form
-from tests.studies.paper.test_reproduction import check
+from tests.paper.test_claims import KNOWN_SLIPS, check_form
+from tests.paper.test_reproduction import check
 
 
 @pytest.mark.long

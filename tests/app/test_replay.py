@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from tests.app.conftest import Run
 from tests.nodes.conftest import graph  # noqa: F401 - a fixture used here
 from tests.nodes.graph import PATIENCE, Graph

@@ -8,8 +8,8 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from stickslip_ros.app.main import main
-from stickslip_ros.bags.messages import pack_joint_state
 from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.messages.codec import pack_joint_state
 from stickslip_ros.testing import ClosedLoop
 from tests.bags.runs import STAMPS, STATES, motion, record
 

@@ -13,8 +13,8 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.nodes.managed import STATE
-from stickslip_ros.nodes.topics import DIAGNOSTICS
+from stickslip_ros.messages.topics import DIAGNOSTICS
+from stickslip_ros.nodes.base.managed import STATE
 from tests.app.conftest import Run
 from tests.nodes.graph import PATIENCE, Graph, wait_for
 

@@ -11,7 +11,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.nodes.topics import DIAGNOSTICS
+from stickslip_ros.messages.topics import DIAGNOSTICS
 from tests.app.conftest import Run
 from tests.app.test_run import children, command, is_running, wait_for_samples
 from tests.nodes.graph import PATIENCE, Graph, wait_for
@@ -235,7 +235,7 @@ def test_a_controller_that_does_not_start(
 def test_a_controller_that_never_closes_the_loop(
     stickslip: Run, install: Install, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip_ros.nodes.bringup._READY_TIMEOUT", 10.0)
+    monkeypatch.setattr("stickslip_ros.running.bringup._READY_TIMEOUT", 10.0)
     done = stickslip("run", "paper", "--controller", install(damper("ForceOnly")))
     assert done.returncode == 1
     assert "my_controllers/damper was not ready within 10 s" in done.stderr

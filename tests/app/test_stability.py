@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from stickslip_ros.app.stability import stability as theory_of
-from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.scenarios.files import load_scenario
 from tests.app.conftest import Run
 
 

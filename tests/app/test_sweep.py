@@ -10,7 +10,7 @@ from subprocess import Popen
 
 import pytest
 
-from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.columns import compute_columns
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.settled import Course

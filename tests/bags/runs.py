@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from stickslip_ros.bags.messages import pack_joint_state, pack_wrench
 from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 
 STATES = "/feed_drive/joint_states"
 FORCES = "/feed_drive/control_force"

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from mcap.opcode import Opcode
 
 from stickslip_ros.bags import Recording
-from stickslip_ros.bags.messages import pack_joint_state, pack_wrench
 from stickslip_ros.bags.recorder import QosProfile, Recorder
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import StickslipError
+from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 from tests.examples import examples
 
 STATES = "/feed_drive/joint_states"

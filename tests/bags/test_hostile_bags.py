@@ -17,10 +17,10 @@ from zstandard import ZstdCompressor
 
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.compression import unpack_file
-from stickslip_ros.bags.messages import pack_joint_state
 from stickslip_ros.bags.repair import repair
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError
+from stickslip_ros.messages.codec import pack_joint_state
 
 HUGE = 1 << 30
 MUCH_MEMORY = 400 << 20

@@ -14,10 +14,10 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 from rosbags.typesys import Stores, get_typestore
 
-from stickslip_ros.bags.messages import pack_joint_state, pack_wrench
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import QosProfile, Recorder
 from stickslip_ros.errors import BagError
+from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 
 JOINT_STATES = "/feed_drive/joint_states"
 FORCES = "/feed_drive/control_force"

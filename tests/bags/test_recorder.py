@@ -16,10 +16,10 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
 from stickslip_ros.bags.definitions import message_definition, type_hash
-from stickslip_ros.bags.messages import pack_joint_state, pack_wrench
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
 from stickslip_ros.errors import BagError
+from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 from tests.nodes.graph import wait_for
 
 JOINT_STATES = "/feed_drive/joint_states"

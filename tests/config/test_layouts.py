@@ -12,10 +12,7 @@ import pytest
 import yaml
 from sensor_msgs.msg import JointState
 
-from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.process import this_machine_only
-from stickslip_ros.nodes.topics import (
+from stickslip_ros.messages.topics import (
     AMPLITUDE,
     APPLIED_DISTURBANCE,
     CONTROL_FORCE,
@@ -24,9 +21,12 @@ from stickslip_ros.nodes.topics import (
     JOINT_STATES,
     STICK_FRACTION,
 )
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.base.process import this_machine_only
+from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.physics.measures import Regime
-from stickslip_ros.scenario.files import DEFAULT_NAMESPACE, load_scenario
+from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, load_scenario
 from stickslip_ros.testing import own_domain
 from tests.nodes.graph import Graph
 

@@ -3,7 +3,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from stickslip_ros.nodes.process import this_machine_only
+from stickslip_ros.nodes.base.process import this_machine_only
 from stickslip_ros.testing import own_domain
 from tests.nodes.graph import Graph
 from tests.nodes.processes import Processes
@@ -24,7 +24,7 @@ def domain() -> Iterator[int]:
 @pytest.fixture
 def often_diagnosed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let nodes of this process publish their diagnostics ten times a second."""
-    monkeypatch.setattr("stickslip_ros.nodes.managed._DIAGNOSTICS_PERIOD", 0.1)
+    monkeypatch.setattr("stickslip_ros.nodes.base.managed._DIAGNOSTICS_PERIOD", 0.1)
 
 
 @pytest.fixture

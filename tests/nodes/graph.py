@@ -15,8 +15,8 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from stickslip_ros.nodes.managed import ManagedNode
-from stickslip_ros.nodes.process import spin
+from stickslip_ros.nodes.base.managed import ManagedNode
+from stickslip_ros.nodes.base.process import spin
 
 PATIENCE = 60.0
 """How long a test waits, s, for what should happen at once on an idle machine."""

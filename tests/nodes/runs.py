@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from stickslip_ros.bags.messages import pack_joint_state, pack_wrench
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.testing import own_domain
 from tests.nodes.graph import Graph

@@ -10,13 +10,10 @@ from pathlib import Path
 import pytest
 from rclpy.duration import Duration
 
-from stickslip_ros.bags.messages import joint_state_columns, pack_joint_state, pack_wrench
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_bag
-from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.managed import ERROR
-from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.topics import (
+from stickslip_ros.messages.codec import joint_state_columns, pack_joint_state, pack_wrench
+from stickslip_ros.messages.topics import (
     AMPLITUDE,
     CONTROL_FORCE,
     DIAGNOSTICS,
@@ -24,6 +21,9 @@ from stickslip_ros.nodes.topics import (
     JOINT_STATES,
     STICK_FRACTION,
 )
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.base.managed import ERROR
+from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import PATIENCE, Graph
 

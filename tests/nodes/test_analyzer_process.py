@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.bags.messages import pack_joint_state
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError
-from stickslip_ros.nodes.topics import JOINT_STATES
+from stickslip_ros.messages.codec import pack_joint_state
+from stickslip_ros.messages.topics import JOINT_STATES
 from tests.nodes.graph import PATIENCE, Graph
 
 PERIOD = 1_000_000

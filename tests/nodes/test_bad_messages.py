@@ -16,7 +16,9 @@ from rclpy.publisher import Publisher
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
-from stickslip_ros.bags.messages import (
+from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.errors import BagError
+from stickslip_ros.messages.codec import (
     pack_header,
     pack_joint_state,
     pack_wrench,
@@ -24,12 +26,7 @@ from stickslip_ros.bags.messages import (
     unpack_wrench,
     wrench_columns,
 )
-from stickslip_ros.bags.report import report_of_bag
-from stickslip_ros.errors import BagError
-from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.managed import OK, WARN
-from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.topics import (
+from stickslip_ros.messages.topics import (
     APPLIED_DISTURBANCE,
     CONTROL_FORCE,
     DIAGNOSTICS,
@@ -38,6 +35,9 @@ from stickslip_ros.nodes.topics import (
     RECORDED,
     Topic,
 )
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.base.managed import OK, WARN
+from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import PATIENCE, Graph
 from tests.nodes.processes import Processes

@@ -6,9 +6,9 @@ import pytest
 
 from stickslip_ros.nodes import pacing
 from stickslip_ros.nodes.pacing import RealtimePacer
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.sampled_loop import Sample, SampledLoop
-from stickslip_ros.scenario.parameters import PlantParameters
+from stickslip_ros.physics.loop.sampled_loop import Sample, SampledLoop
+from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.scenarios.parameters import PlantParameters
 from tests.nodes.graph import PATIENCE
 
 MILLISECOND = 1e-3

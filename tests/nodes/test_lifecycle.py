@@ -10,10 +10,10 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.parameter import Parameter
 
 from stickslip_ros.bags.reader import Recording
+from stickslip_ros.messages.topics import CONTROL_FORCE, DISTURBANCE_FORCE, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.managed import ManagedNode
+from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.topics import CONTROL_FORCE, DISTURBANCE_FORCE, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
 from tests.nodes.processes import Processes

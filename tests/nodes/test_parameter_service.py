@@ -21,16 +21,16 @@ from rcl_interfaces.srv import (
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.parameter import parameter_dict_from_yaml_file, parameter_value_to_python
 
-from stickslip_ros.bags.messages import joint_state_columns
+from stickslip_ros.messages.codec import joint_state_columns
+from stickslip_ros.messages.topics import JOINT_STATES
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.managed import ERROR, ManagedNode
+from stickslip_ros.nodes.base.managed import ERROR, ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.replay import ReplayNode
-from stickslip_ros.nodes.topics import JOINT_STATES
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.scenario.parameters import NODE_PARAMETERS, ReplayParameters, parameters_of
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ReplayParameters, parameters_of
 from tests.nodes.graph import Graph
-from tests.scenario.values import UNKNOWN, bad_values, good_values
+from tests.scenarios.values import UNKNOWN, bad_values, good_values
 
 SECOND = 1_000_000_000
 LEFT_OPEN = {
@@ -280,7 +280,7 @@ def test_what_is_set_while_inactive_acts_when_it_is_activated(graph: Graph) -> N
 def test_a_motion_that_has_become_too_stiff_pauses_the_plant(
     graph: Graph, pace: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip_ros.physics.motion._SPARE_STEPS", 1000)
+    monkeypatch.setattr("stickslip_ros.physics.motion.motion._SPARE_STEPS", 1000)
     heard = graph.listen(JOINT_STATES, raw=True)
     plant = graph.add(PlantNode, pace=pace, expects_control=False, wait_for=["observer"])
     graph.wait_until(lambda: plant.active and heard, "samples come")

@@ -8,14 +8,13 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from stickslip_ros.bags.messages import (
+from stickslip_ros.messages.codec import (
     joint_state_columns,
     pack_header,
     pack_wrench,
     unpack_wrench,
 )
-from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.topics import (
+from stickslip_ros.messages.topics import (
     APPLIED_DISTURBANCE,
     CLOCK,
     CONTROL_FORCE,
@@ -25,11 +24,12 @@ from stickslip_ros.nodes.topics import (
     JOINT_STATES,
     RECORDED,
 )
+from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.sampled_loop import SampledLoop
-from stickslip_ros.physics.washout import Washout
-from stickslip_ros.scenario.parameters import PlantParameters, WashoutControllerParameters
+from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+from stickslip_ros.physics.loop.washout import Washout
+from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.scenarios.parameters import PlantParameters, WashoutControllerParameters
 from tests.nodes.graph import Graph
 
 SECOND = 1_000_000_000

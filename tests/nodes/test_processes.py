@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES, Topic
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, Topic
 from tests.nodes.graph import PATIENCE, Graph
 
 Start = Callable[..., subprocess.Popen[str]]

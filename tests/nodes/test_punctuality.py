@@ -5,10 +5,10 @@ from itertools import count
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from stickslip_ros.bags.messages import pack_wrench, unpack_header
+from stickslip_ros.messages.codec import pack_wrench, unpack_header
+from stickslip_ros.messages.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.punctuality import Punctuality
-from stickslip_ros.nodes.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
 from tests.nodes.graph import Graph
 
 

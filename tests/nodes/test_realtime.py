@@ -11,12 +11,12 @@ from threading import Lock
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
-from stickslip_ros.bags.messages import unpack_header
+from stickslip_ros.messages.codec import unpack_header
+from stickslip_ros.messages.topics import DIAGNOSTICS, JOINT_STATES
 from stickslip_ros.nodes.pacing import RealtimePacer
-from stickslip_ros.nodes.topics import DIAGNOSTICS, JOINT_STATES
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.sampled_loop import SampledLoop
-from stickslip_ros.scenario.parameters import PlantParameters
+from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.scenarios.parameters import PlantParameters
 from tests.nodes.graph import Graph
 from tests.nodes.processes import Processes
 

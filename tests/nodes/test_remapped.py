@@ -4,11 +4,11 @@ from pathlib import Path
 
 from std_srvs.srv import Trigger
 
-from stickslip_ros.bags.messages import pack_header, unpack_header
 from stickslip_ros.bags.reader import Recording
+from stickslip_ros.messages.codec import pack_header, unpack_header
+from stickslip_ros.messages.topics import JOINT_STATES, RECORDED
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.topics import JOINT_STATES, RECORDED
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
 

@@ -8,12 +8,12 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
-from stickslip_ros.bags.messages import pack_header, pack_wrench, unpack_header
 from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.messages.codec import pack_header, pack_wrench, unpack_header
+from stickslip_ros.messages.topics import CLOCK, CONTROL_FORCE, JOINT_STATES, RECORDED
 from stickslip_ros.nodes import replay
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.replay import ReplayNode
-from stickslip_ros.nodes.topics import CLOCK, CONTROL_FORCE, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
 from tests.nodes.runs import FORCES, STATES, messages_of, record_run, record_states

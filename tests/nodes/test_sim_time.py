@@ -12,9 +12,9 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from stickslip_ros.bags.messages import unpack_header
+from stickslip_ros.messages.codec import unpack_header
+from stickslip_ros.messages.topics import JOINT_STATES
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.topics import JOINT_STATES
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.soak import lines, soak
-from stickslip_ros.nodes.topics import JOINT_STATES
+from stickslip_ros.messages.topics import JOINT_STATES
 
 MINUTES = 1
 GROWTH = 2e6

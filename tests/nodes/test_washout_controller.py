@@ -5,11 +5,11 @@ from math import nan
 import pytest
 from rclpy.parameter import Parameter
 
-from stickslip_ros.bags.messages import pack_joint_state, unpack_wrench
-from stickslip_ros.nodes.topics import CONTROL_FORCE, JOINT_STATES
+from stickslip_ros.messages.codec import pack_joint_state, unpack_wrench
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.physics.washout import Washout, WashoutParameters
-from stickslip_ros.scenario.parameters import WashoutControllerParameters
+from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
+from stickslip_ros.scenarios.parameters import WashoutControllerParameters
 from tests.nodes.graph import Graph
 
 SECOND = 1_000_000_000

@@ -6,10 +6,10 @@ from math import sqrt
 import numpy as np
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
-from stickslip_ros.physics.knots import Knots
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.measures.breakpoints import Breakpoints
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
+from stickslip_ros.physics.motion.motion import Motion
 
 # Rounding grows without bound where a motion just misses sticking, or just does not. Examples
 # closer to that are left out: by a thousandth in relative speed (of V) and in reaction (of N).
@@ -32,16 +32,16 @@ class Course:
     def motion(self) -> Motion:
         return Motion(self.drive, self.position, self.velocity, record=True)
 
-    def run(self) -> tuple[Motion, list[Knots]] | None:
-        """Return the motion at the end and the knots of each force; None if left out."""
+    def run(self) -> tuple[Motion, list[Breakpoints]] | None:
+        """Return the motion at the end and the breakpoints of each force; None if left out."""
         motion = self.motion()
-        pieces: list[Knots] = []
+        pieces: list[Breakpoints] = []
         for force, duration in zip(self.forces, self.durations, strict=True):
             motion.force = force
             if self._near_the_limit(motion.position, motion.velocity, force):
                 return None
             motion.advance(duration)
-            pieces.append(motion.take_knots())
+            pieces.append(motion.take_breakpoints())
             if motion.unbounded or self._runs_away_or_grazes(pieces[-1], force):
                 return None
         return motion, pieces
@@ -71,17 +71,17 @@ class Course:
         excess = abs(reaction) / drive.normal_force - drive.friction.static
         return velocity == drive.belt_speed and abs(excess) < GRAZING
 
-    def _runs_away_or_grazes(self, knots: Knots, force: float) -> bool:
+    def _runs_away_or_grazes(self, breakpoints: Breakpoints, force: float) -> bool:
         drive = self.drive
-        speed = np.abs(knots.velocity) / drive.speed_scale
+        speed = np.abs(breakpoints.velocity) / drive.speed_scale
         if speed.max() > FASTEST:
             return True
-        relative_speed = np.abs(knots.velocity - drive.belt_speed) / drive.speed_scale
+        relative_speed = np.abs(breakpoints.velocity - drive.belt_speed) / drive.speed_scale
         # A landing is at the belt's speed exactly, save for the rounding of the scale.
         at_belt_speed = relative_speed < 1e-14
         if np.any(~at_belt_speed & (relative_speed < GRAZING)):
             return True
-        landings = knots[at_belt_speed & ~knots.sticking]
+        landings = breakpoints[at_belt_speed & ~breakpoints.sticking]
         return any(
             self._near_the_limit(float(position), drive.belt_speed, force)
             for position in landings.position

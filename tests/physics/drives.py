@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.friction import Stribeck
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import Stribeck
 
 PAPER = Drive(
     mass=1.0,

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.measures import CycleMeter, Measures, Regime
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.measures.cycles import CycleMeter, Measures, Regime
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.motion.motion import Motion
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, LimitCycle
 
 # In natural periods. The slowest transient, at belt speed 0.46, dies out e-fold in four.
@@ -17,10 +17,10 @@ def settled(drive: Drive) -> Measures:
     """The measures of what the drive does from rest, after the transient."""
     motion = Motion(drive, 0.0, 0.0, record=True)
     motion.advance(TRANSIENT * drive.natural_period)
-    motion.take_knots()
+    motion.take_breakpoints()
     motion.advance(MEASURED * drive.natural_period)
     meter = CycleMeter(window=MEASURED)
-    meter.feed(motion.take_knots(), drive.belt_speed)
+    meter.feed(motion.take_breakpoints(), drive.belt_speed)
     return meter.measures()
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
+from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
 from stickslip_ros.plots.live_trace import LiveTrace
 
 NO_FORCES = WrenchColumns(np.empty(0, dtype=np.int64), np.empty(0))

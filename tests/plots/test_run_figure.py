@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_bag
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.measures import Cycle, CycleMeter, Measures
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.samples import SampleMeter
+from stickslip_ros.physics.measures.cycles import Cycle, CycleMeter, Measures
+from stickslip_ros.physics.measures.samples import SampleMeter
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.plots.run_figure import LAST_CYCLES, run_figure
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.style import save
@@ -56,9 +56,9 @@ def moving(drive: Drive, duration: float) -> Drawn:
     step = drive.natural_period / 64.0
     for _ in range(round(duration / step)):
         motion.advance(step)
-        knots = motion.take_knots()
-        done = meter.feed(knots, drive.belt_speed)
-        history.take_knots(knots, drive.belt_speed, done)
+        breakpoints = motion.take_breakpoints()
+        done = meter.feed(breakpoints, drive.belt_speed)
+        history.take_breakpoints(breakpoints, drive.belt_speed, done)
         cycles += done
     measures = meter.measures()
     return Drawn(history, measures, drive, run_figure(history, measures, drive, title="it"), cycles)

@@ -9,7 +9,7 @@ from PIL import Image
 
 from stickslip_ros.plots.style import BLUE, GREEN, LIGHT_GREY, ORANGE
 from stickslip_ros.plots.sweep_picture import diagram_figure, draw_diagram, draw_map, map_figure
-from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid

@@ -1,7 +1,7 @@
 """Scenarios and studies of the tests: short ones, in which everything happens that can."""
 
-from stickslip_ros.physics.simulation import Progress
-from stickslip_ros.scenario.files import Scenario, load_scenario
+from stickslip_ros.physics.loop.simulation import Progress
+from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.settled import Course
 from stickslip_ros.studies.study import Study

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures import Measures, Regime
+from stickslip_ros.physics.measures.cycles import Measures, Regime
 from stickslip_ros.physics.theory.closed_loop import critical_gains
-from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.basin import (
     POSITION,
     VELOCITY,

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.friction import Coulomb, Exponential, Linear
-from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.measures import Regime
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear
 from stickslip_ros.studies.bifurcation import BifurcationDiagram, bifurcation_diagram
 from stickslip_ros.studies.settled import Course
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.measures import Measures, Regime
+from stickslip_ros.physics.measures.cycles import Measures, Regime
 from stickslip_ros.studies.columns import (
     COLUMNS,
     Columns,

@@ -14,7 +14,7 @@ import distributed
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies import dask_cluster
 from stickslip_ros.studies.columns import compute_columns
 from stickslip_ros.studies.dask_cluster import dask_executor

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.friction import Coulomb, Exponential, FrictionLaw, Linear
-from stickslip_ros.physics.measures import CycleMeter, Measures, Regime
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.simulation import simulate_sampled
+from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.physics.loop.simulation import simulate_sampled
+from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
+from stickslip_ros.physics.measures.cycles import CycleMeter, Measures, Regime
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear
+from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.sampled import LinearSampledLoop
-from stickslip_ros.physics.washout import Washout, WashoutParameters
-from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.design import Design, Task, design, margins
 from tests.physics.drives import FEED_DRIVE
-from tests.scenario.files import scenario_file
+from tests.scenarios.files import scenario_file
 
 FEED = Task(FEED_DRIVE, 1000.0, 0.0, inf, (0.036, 0.044))
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from stickslip_ros.physics.friction import Coulomb
+from stickslip_ros.physics.model.friction import Coulomb
 from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
 from tests.physics.drives import FEED_DRIVE, PAPER
 

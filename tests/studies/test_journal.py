@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures import Measures
+from stickslip_ros.physics.measures.cycles import Measures
 from stickslip_ros.studies import runner
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid

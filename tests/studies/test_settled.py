@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from stickslip_ros.app.simulate import simulate
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.friction import Coulomb, Exponential, Linear
-from stickslip_ros.physics.measures import Regime
-from stickslip_ros.physics.washout import WashoutParameters
-from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.physics.loop.washout import WashoutParameters
+from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear
+from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.settled import (
     LONGEST,
     Case,
@@ -137,7 +137,7 @@ def _found(settler: Settler, case: Case, start: State) -> object:
 def alone() -> list[object]:
     """What each of the mixed cases comes to when its settler has done nothing before."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("stickslip_ros.physics.motion._SPARE_STEPS", 1000)
+        patch.setattr("stickslip_ros.physics.motion.motion._SPARE_STEPS", 1000)
         return [_found(Settler(), *mixed) for mixed in MIXED]
 
 
@@ -147,7 +147,7 @@ def alone() -> list[object]:
 def test_what_was_followed_before_changes_no_bit(alone: list[object], order: list[int]) -> None:
     settler = Settler()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("stickslip_ros.physics.motion._SPARE_STEPS", 1000)
+        patch.setattr("stickslip_ros.physics.motion.motion._SPARE_STEPS", 1000)
         for number in order:
             assert _found(settler, *MIXED[number]) == alone[number]
 

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures import Measures, Regime
-from stickslip_ros.scenario.files import Scenario
+from stickslip_ros.physics.measures.cycles import Measures, Regime
+from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.columns import Columns, compute_columns
 from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.settled import Course, State
@@ -39,8 +39,8 @@ MIXED = [
 
 @pytest.fixture(autouse=True)
 def _little_patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stickslip_ros.physics.motion._SPARE_STEPS", 1000)
-    monkeypatch.setattr("stickslip_ros.physics.motion._STEPS_PER_RADIAN", 100)
+    monkeypatch.setattr("stickslip_ros.physics.motion.motion._SPARE_STEPS", 1000)
+    monkeypatch.setattr("stickslip_ros.physics.motion.motion._STEPS_PER_RADIAN", 100)
 
 
 def points(study: Study) -> list[Point]:

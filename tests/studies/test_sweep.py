@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures import Regime
+from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.studies.columns import compute_columns
 from stickslip_ros.studies.plan import Axis, Carry, Grid

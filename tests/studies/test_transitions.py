@@ -6,11 +6,11 @@ from math import log, sqrt
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.friction import Exponential
+from stickslip_ros.physics.model.friction import Exponential
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
 from stickslip_ros.physics.theory.sampled import LinearSampledLoop
 from stickslip_ros.physics.theory.sticking import Release, sticking_onset
-from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.plan import Axis, Grid
 from stickslip_ros.studies.settled import Case
 from stickslip_ros.studies.study import Study

@@ -21,9 +21,9 @@ from stickslip_ros.bags import Recording
 from stickslip_ros.bags.recorder import Recorder
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.scenario.files import load_scenario
+from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.testing import ClosedLoop
 from tests.nodes.graph import PATIENCE
 from tests.testing import controllers

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import orjson
 
-from stickslip_ros.bags.messages import JointStateColumns, WrenchColumns
+from stickslip_ros.app.dashboard.listener import ObserverNode
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.nodes.observer import ObserverNode
-from stickslip_ros.nodes.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
+from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.live_trace import Line, LiveTrace
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenario.parameters import PlantParameters
+from stickslip_ros.scenarios.parameters import PlantParameters
 
 PERIODS = (10, 50, 200)
 """Natural periods that the traces may show."""

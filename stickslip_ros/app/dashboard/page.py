@@ -14,13 +14,13 @@ from nicegui.events import GenericEventArguments
 
 from stickslip_ros.app.dashboard.charts import CYCLES, PORTRAIT, TRACE
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
-from stickslip_ros.nodes.observer import ABSENT, SILENT, Answer, Health, ObserverNode
-from stickslip_ros.nodes.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
-from stickslip_ros.physics.measures import Regime
+from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, Health, ObserverNode
+from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
+from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.style import BLUE, GREY, ORANGE
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenario.parameters import NODE_PARAMETERS, Fixed, known_parameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, Fixed, known_parameters
 
 _CONTROLLER = "washout_controller"
 _FIRST = (

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.drive import Drive
 
 _PHASES = 2.0 * np.pi * np.arange(1024) / 1024
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import Self
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.friction import Stribeck
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import Stribeck
 
 
 @dataclass(frozen=True)

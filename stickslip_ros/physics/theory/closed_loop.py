@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
 

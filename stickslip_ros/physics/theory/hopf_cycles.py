@@ -5,9 +5,9 @@ from math import pi, sqrt
 
 import numpy as np
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.physics.theory.hopf import ComplexPair
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, shoot

@@ -13,11 +13,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.knots import FloatArray, Knots
-from stickslip_ros.physics.measures import EQUILIBRIUM_SPEED, CycleMeter, Measures
-from stickslip_ros.physics.motion import UNBOUNDED_SPEED
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.measures.breakpoints import Breakpoints
+from stickslip_ros.physics.measures.cycles import EQUILIBRIUM_SPEED, CycleMeter, Measures
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.motion.motion import UNBOUNDED_SPEED
 from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.linear import SPEED
 from stickslip_ros.physics.theory.returns import (
@@ -297,7 +298,7 @@ def _outermost(drive: Drive) -> float:
 def _next_turn(motion: SensitiveMotion, state: FloatArray) -> tuple[FloatArray, float] | None:
     """Return state and time (s) of the next upward turn, or None; the motion is left there."""
     motion.start(state)
-    turns = (_first_turn(knots) for knots in follow(motion))
+    turns = (_first_turn(breakpoints) for breakpoints in follow(motion))
     turn = next((turn for turn in turns if turn is not None), None)
     if turn is None:
         return None
@@ -308,10 +309,14 @@ def _next_turn(motion: SensitiveMotion, state: FloatArray) -> tuple[FloatArray, 
     return end, turn
 
 
-def _first_turn(knots: Knots) -> float | None:
-    before, at, after = knots.velocity[:-2], knots.velocity[1:-1], knots.velocity[2:]
+def _first_turn(breakpoints: Breakpoints) -> float | None:
+    before, at, after = (
+        breakpoints.velocity[:-2],
+        breakpoints.velocity[1:-1],
+        breakpoints.velocity[2:],
+    )
     upward = np.flatnonzero((before < 0.0) & (at == 0.0) & (after > 0.0))
-    return float(knots.time[upward[0] + 1]) if len(upward) > 0 else None
+    return float(breakpoints.time[upward[0] + 1]) if len(upward) > 0 else None
 
 
 @dataclass(frozen=True)
@@ -405,7 +410,7 @@ def _cycle(motion: SensitiveMotion, shot: _Shot) -> LimitCycle | None:
     motion.start(start)
     motion.advance(2.25 * period)  # the meter wants to see an upward turn from both sides
     meter = CycleMeter(window=1)
-    meter.feed(motion.take_knots(), drive.belt_speed)
+    meter.feed(motion.take_breakpoints(), drive.belt_speed)
     measures = meter.measures()
     if measures.period is not None and not isclose(measures.period, period, rel_tol=_NEAR):
         return None

@@ -16,10 +16,10 @@ import heyoka as hy
 import numpy as np
 import numpy.typing as npt
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import Equations, W, WashoutGains, X, Y
-from stickslip_ros.physics.friction import FrictionLaw
-from stickslip_ros.physics.knots import FloatArray
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import Equations, W, WashoutGains, X, Y
+from stickslip_ros.physics.model.friction import FrictionLaw
 
 _HIGHEST_ORDER = 3
 

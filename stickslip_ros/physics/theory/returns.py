@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.knots import FloatArray, Knots
-from stickslip_ros.physics.motion import UNBOUNDED_SPEED, Motion
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.measures.breakpoints import Breakpoints
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.motion.motion import UNBOUNDED_SPEED, Motion
 
 _LEAST_SPEED, _SPEEDS = 1e-6, 2048
 """Least speed at which g is looked at, in the smallest that matters, and how many there are."""
@@ -45,16 +46,16 @@ def loading_time(drive: Drive) -> float:
     return 2.0 * drive.friction.static * drive.length_scale / abs(drive.belt_speed)
 
 
-def follow(motion: Motion) -> Iterator[Knots]:
-    """Yield the knots of a recording `motion` from now on, each time further, until it is late."""
+def follow(motion: Motion) -> Iterator[Breakpoints]:
+    """Yield the breakpoints of a recording `motion` from now on, in turns, until it is late."""
     drive = motion.drive
-    knots, now = Knots.empty(), 0.0
+    breakpoints, now = Breakpoints.empty(), 0.0
     while now < longest_return(drive) and not motion.unbounded:
         step = max(now, drive.natural_period) / 4.0
         motion.advance(step)
         now += step
-        knots = Knots.concatenate(knots, motion.take_knots())
-        yield knots
+        breakpoints = Breakpoints.concatenate(breakpoints, motion.take_breakpoints())
+        yield breakpoints
 
 
 def least_cycle(drive: Drive, gains: WashoutGains | None = None) -> float | None:

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.sampled_loop import whole_and_rest
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.loop.sampled_loop import whole_and_rest
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.linear import expand
 
 LONGEST_DELAY = 300

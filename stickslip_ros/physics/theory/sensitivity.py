@@ -5,11 +5,11 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.knots import FloatArray
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.linear import SPEED
 
 _GREATEST_EFFORT = 8e6
@@ -29,8 +29,8 @@ class SensitiveMotion(Motion):
     The state is dimensionless: (X, Y), or (X, Y, W) under continuous control. Within a slip or a
     stick heyoka integrates the variational equations along with the motion. From one to the next
     the derivatives jump by the saltation matrix (Leine and Nijmeijer, Dynamics and Bifurcations of
-    Non-Smooth Mechanical Systems, 2004, ch. 7). Knots are recorded. Raises TooStiffError where the
-    integration becomes too costly, starts counted together.
+    Non-Smooth Mechanical Systems, 2004, ch. 7). Breakpoints are recorded. Raises TooStiffError
+    where the integration becomes too costly, starts counted together.
     """
 
     _more_variables = True
@@ -60,9 +60,9 @@ class SensitiveMotion(Motion):
         return np.array([self._y, self._acceleration(self._sign), filtered][: self.order])
 
     def start(self, state: FloatArray) -> None:
-        """Start again at `state`, at time zero and with no knots."""
-        self.take_knots()
-        self._time = self._knot_time = 0.0
+        """Start again at `state`, at time zero and with no breakpoints."""
+        self.take_breakpoints()
+        self._time = self._breakpoint_time = 0.0
         self.restart(state[0] * self.drive.length_scale, state[SPEED] * self.drive.speed_scale)
         if self._continuous_control:
             self._w = float(state[2])

@@ -7,9 +7,9 @@ from math import tanh
 
 import numpy as np
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.knots import Knots
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.measures.breakpoints import Breakpoints
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.returns import follow, least_cycle, release_position
 from stickslip_ros.physics.theory.roots import zero_between
@@ -175,7 +175,7 @@ class Release:
         per unit of time, as an orbit does that touches. Raises RunError for a motion too stiff to
         be followed.
         """
-        peaks = (_highest(knots, drive.belt_speed) for knots in self._follow(drive))
+        peaks = (_highest(breakpoints, drive.belt_speed) for breakpoints in self._follow(drive))
         peak = next((peak for peak in peaks if peak is not None), None)
         if peak is None:
             return -1.0
@@ -198,30 +198,30 @@ class Release:
         excess = self.excess(drive)
         if excess <= 0.0:
             return excess
-        entries = (_entry(knots, drive.belt_speed) for knots in self._follow(drive))
+        entries = (_entry(breakpoints, drive.belt_speed) for breakpoints in self._follow(drive))
         position = next((entry for entry in entries if entry is not None), None)
         if position is None:
             return -1.0
         return min(excess, (release_position(drive) - position) / drive.length_scale)
 
-    def _follow(self, drive: Drive) -> Iterator[Knots]:
+    def _follow(self, drive: Drive) -> Iterator[Breakpoints]:
         if self._motion is None:
             self._motion = Motion(drive, 0.0, 0.0, record=True)
         self._motion.begin(drive, release_position(drive), drive.belt_speed)
-        self._motion.take_knots()
+        self._motion.take_breakpoints()
         return follow(self._motion)
 
 
-def _highest(knots: Knots, belt_speed: float) -> tuple[float, float] | None:
+def _highest(breakpoints: Breakpoints, belt_speed: float) -> tuple[float, float] | None:
     """Return position and velocity where it is fastest, once it went back and until it does again.
 
     If it comes to the belt's speed: there. None as long as the motion has not got so far.
     """
-    backward = knots.velocity < 0.0
+    backward = breakpoints.velocity < 0.0
     forward = np.flatnonzero(np.logical_or.accumulate(backward) & ~backward)
     if len(forward) == 0:
         return None
-    swing = knots[forward[0] :]
+    swing = breakpoints[forward[0] :]
     over = np.flatnonzero(swing.velocity < 0.0)
     arrived = np.flatnonzero(swing.velocity >= belt_speed * (1.0 - _ROUNDING))
     if len(arrived) > 0 and not np.any(over < arrived[0]):
@@ -233,14 +233,14 @@ def _highest(knots: Knots, belt_speed: float) -> tuple[float, float] | None:
     return float(swing.position[row]), float(swing.velocity[row])
 
 
-def _entry(knots: Knots, belt_speed: float) -> float | None:
+def _entry(breakpoints: Breakpoints, belt_speed: float) -> float | None:
     """Return the position where the slide sticks, or falls back to the belt's speed from above.
 
     That is once it went back; None as long as the motion has not got so far.
     """
     level = belt_speed * (1.0 + _ROUNDING)
-    returned = np.logical_or.accumulate(knots.velocity < 0.0)
-    over = np.logical_or.accumulate(returned & (knots.velocity > level))
-    sticks = returned & np.append(knots.sticking[1:], False)
-    rows = np.flatnonzero(sticks | (over & (knots.velocity <= level)))
-    return float(knots.position[rows[0]]) if len(rows) > 0 else None
+    returned = np.logical_or.accumulate(breakpoints.velocity < 0.0)
+    over = np.logical_or.accumulate(returned & (breakpoints.velocity > level))
+    sticks = returned & np.append(breakpoints.sticking[1:], False)
+    rows = np.flatnonzero(sticks | (over & (breakpoints.velocity <= level)))
+    return float(breakpoints.position[rows[0]]) if len(rows) > 0 else None

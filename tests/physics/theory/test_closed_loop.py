@@ -6,9 +6,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.friction import Exponential, Linear
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.friction import Exponential, Linear
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.physics.theory.linear import expand

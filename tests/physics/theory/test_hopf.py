@@ -8,11 +8,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.friction import Coulomb, Exponential, Linear, Stribeck
-from stickslip_ros.physics.measures import CycleMeter
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.measures.cycles import CycleMeter
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear, Stribeck
+from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.physics.theory.hopf import hopf_points
@@ -115,10 +115,10 @@ def speed_amplitude(drive: Drive, gains: WashoutGains | None, periods: int) -> f
     if gains is not None:
         motion.set_gains(gains.corner_frequency, gains.linear, gains.cubic)
     for _ in range(periods // 100):
-        motion.take_knots()
+        motion.take_breakpoints()
         motion.advance(100 * drive.natural_period)
     meter = CycleMeter(window=20)
-    meter.feed(motion.take_knots(), drive.belt_speed)
+    meter.feed(motion.take_breakpoints(), drive.belt_speed)
     amplitude = meter.measures().velocity_amplitude
     assert amplitude is not None
     return amplitude / drive.speed_scale

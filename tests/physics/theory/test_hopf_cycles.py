@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.measures import CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycles import CycleMeter, Measures, Regime
+from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run
@@ -22,10 +22,10 @@ def settled(gains: WashoutGains, position: float, filter_state: float) -> Measur
     motion = SensitiveMotion(PAPER, gains)
     motion.start(np.array([position, 0.0, filter_state]))
     motion.advance(300.0 * PAPER.natural_period)
-    motion.take_knots()
+    motion.take_breakpoints()
     motion.advance(20.0 * PAPER.natural_period)
     meter = CycleMeter(window=10)
-    meter.feed(motion.take_knots(), PAPER.belt_speed)
+    meter.feed(motion.take_breakpoints(), PAPER.belt_speed)
     return meter.measures()
 
 

@@ -9,12 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
-from stickslip_ros.physics.measures import CycleMeter, Regime
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.simulation import simulate_continuous
+from stickslip_ros.physics.loop.simulation import simulate_continuous
+from stickslip_ros.physics.loop.washout import WashoutParameters
+from stickslip_ros.physics.measures.cycles import CycleMeter, Regime
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
+from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.limit_cycles import (
     LimitCycle,
     limit_cycle_of_run,
@@ -25,7 +26,6 @@ from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.returns import largest_cycle, least_cycle
 from stickslip_ros.physics.theory.sensitivity import SensitiveMotion
 from stickslip_ros.physics.theory.sticking import sticking_onset
-from stickslip_ros.physics.washout import WashoutParameters
 from tests.physics import drives
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
 
@@ -46,10 +46,10 @@ def returns(drive: Drive, cycle: LimitCycle, offset: float = 0.0) -> float:
 def ends_in(drive: Drive, position: float, periods: int = 150) -> Regime | None:
     motion = Motion(drive, position, 0.0, record=True)
     motion.advance(periods * drive.natural_period)
-    motion.take_knots()
+    motion.take_breakpoints()
     motion.advance(3.0 * drive.natural_period)
     meter = CycleMeter(window=1)
-    meter.feed(motion.take_knots(), drive.belt_speed)
+    meter.feed(motion.take_breakpoints(), drive.belt_speed)
     if motion.unbounded:
         meter.report_run_away()
     return meter.measures().regime
@@ -241,9 +241,11 @@ def test_the_run_approaches_the_cycle_as_its_leading_multiplier_says() -> None:
     motion = Motion(PAPER, 0.0, 0.0, continuous_control=True, record=True)
     motion.set_gains(GAINS.corner_frequency, GAINS.linear, GAINS.cubic)
     motion.advance(40.0 * cycle.period)
-    knots = motion.take_knots()
-    turns = np.flatnonzero((knots.velocity[1:-1] == 0.0) & (knots.velocity[2:] > 0.0)) + 1
-    gaps = np.abs(knots.position[turns] - cycle.position)[15:30]
+    breakpoints = motion.take_breakpoints()
+    turns = (
+        np.flatnonzero((breakpoints.velocity[1:-1] == 0.0) & (breakpoints.velocity[2:] > 0.0)) + 1
+    )
+    gaps = np.abs(breakpoints.position[turns] - cycle.position)[15:30]
     assert gaps[1:] / gaps[:-1] == pytest.approx(abs(cycle.multipliers[0]), rel=1e-2)
     assert (gaps[1:] / gaps[:-1])[-4:] == pytest.approx(abs(cycle.multipliers[0]), rel=1e-4)
 
@@ -350,9 +352,9 @@ def test_cycles_keep_within_the_bounds_that_energy_sets(drive: Drive) -> None:
     for distance in (1.01 * largest, 2.0 * largest, 10.0 * largest):
         motion = Motion(drive, drive.equilibrium_position - distance, 0.0, record=True)
         motion.advance(0.25 * drive.natural_period)
-        motion.take_knots()
+        motion.take_breakpoints()
         motion.advance(2.0 * drive.natural_period)
-        assert motion.take_knots().position.min() > drive.equilibrium_position - distance
+        assert motion.take_breakpoints().position.min() > drive.equilibrium_position - distance
 
 
 @pytest.mark.long

@@ -8,11 +8,12 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.equations import WashoutGains
-from stickslip_ros.physics.friction import Coulomb, Exponential, Linear
-from stickslip_ros.physics.motion import Motion
-from stickslip_ros.physics.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear
+from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.sampled import (
@@ -20,7 +21,6 @@ from stickslip_ros.physics.theory.sampled import (
     LinearSampledLoop,
     why_no_linear_loop,
 )
-from stickslip_ros.physics.washout import Washout, WashoutParameters
 from tests.examples import examples
 from tests.physics.drives import FEED_DRIVE, PAPER
 

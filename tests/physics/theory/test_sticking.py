@@ -9,10 +9,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from stickslip_ros.physics.drive import Drive
-from stickslip_ros.physics.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
-from stickslip_ros.physics.measures import Regime
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
+from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.limit_cycles import limit_cycles
 from stickslip_ros.physics.theory.sticking import sticking_onset
@@ -31,9 +31,9 @@ def sticks(drive: Drive) -> bool:
     """Whether the plain motion, left alone from rest on the belt, still sticks at the end."""
     motion = Motion(drive, 0.0, drive.belt_speed, record=True)
     motion.advance(150.0 * drive.natural_period)
-    motion.take_knots()
+    motion.take_breakpoints()
     motion.advance(3.0 * drive.natural_period)
-    return bool(motion.take_knots().sticking.any())
+    return bool(motion.take_breakpoints().sticking.any())
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.01, 0.02, 0.4])
@@ -81,9 +81,9 @@ def test_at_the_exact_onset_the_cycle_touches_the_speed_of_the_belt() -> None:
     (cycle,) = limit_cycles(drive)
     motion = Motion(drive, cycle.position, 0.0, record=True)
     motion.advance(cycle.period)
-    knots = motion.take_knots()
-    assert not knots.sticking.any()
-    assert knots.velocity.max() == pytest.approx(onset, rel=1e-8)
+    breakpoints = motion.take_breakpoints()
+    assert not breakpoints.sticking.any()
+    assert breakpoints.velocity.max() == pytest.approx(onset, rel=1e-8)
 
 
 def test_the_exact_onset_of_the_paper_differs_in_the_third_digit() -> None:

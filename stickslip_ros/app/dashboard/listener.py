@@ -1,0 +1,383 @@
+"""What a dashboard needs of ROS: listens to a running loop like any other node, and acts on it."""
+
+import re
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from functools import partial
+from math import isfinite
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rcl_interfaces.msg import ParameterEvent
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_parameter_events
+from rclpy.timer import Timer
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from stickslip_ros.messages.codec import (
+    JointStateColumns,
+    WrenchColumns,
+    joint_state_columns,
+    pack_wrench,
+    wrench_columns,
+)
+from stickslip_ros.messages.topics import (
+    AMPLITUDE,
+    CONTROL_FORCE,
+    DIAGNOSTICS,
+    DISTURBANCE_FORCE,
+    DROPPED_FORCE,
+    FREQUENCY,
+    JOINT_STATES,
+    STICK_FRACTION,
+    Topic,
+)
+from stickslip_ros.nodes.base.managed import STATE
+from stickslip_ros.nodes.base.polling import Collecting, take_waiting
+from stickslip_ros.nodes.base.service_call import PATIENCE, Inquiry, ask_parameters
+from stickslip_ros.running.controller_search import DASHBOARD
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, known_parameters
+from stickslip_ros.stamps import NANOSECONDS
+
+SILENCE = 2.5
+"""Time, s, without diagnostics, which come each second, after which a node counts as silent."""
+
+SILENT = "silent"
+"""State of a node that was heard of before."""
+ABSENT = "not there"
+"""State of one that was not."""
+
+LONGEST_TAP = 1e6
+"""Simulated time, s, that a push may last."""
+
+_TAKE_PERIOD = 0.02
+_TAP_PERIOD = 0.002
+_WATCH_PERIOD = 0.1
+_ANSWER_TIMEOUT = 10.0
+_TRANSITION_PATIENCE = 80
+"""Times, ten a second, that a transition is pursued before it is asked for again."""
+_CYCLES_KEPT = 200
+_EVENTS_KEPT = 200
+_MOST_NODES = 50
+"""That health is kept of: anybody may publish diagnostics of any name."""
+
+_TRANSITIONS = {
+    True: Transition.TRANSITION_ACTIVATE,
+    False: Transition.TRANSITION_DEACTIVATE,
+}
+
+Answer = Future[str]
+"""What a request comes to: nothing where it was done, else why not, in a sentence."""
+
+
+@dataclass(frozen=True)
+class Health:
+    """What a node's diagnostics said last."""
+
+    state: str = ABSENT
+    """State of its life cycle, or `SILENT` or `ABSENT`."""
+    level: int = 0
+    """0 well, 1 warning, 2 error, as in DiagnosticStatus."""
+    message: str = ""
+    figures: Mapping[str, str] = field(default_factory=dict)
+    heard: float = 0.0
+    """When, on the monotonic clock, s."""
+
+
+class ObserverNode(Collecting):
+    """Listens to states, forces sent and dropped, cycles and /diagnostics of a namespace.
+
+    What it has heard may be read from any thread: mappings are replaced as a whole, deques to be
+    copied. So may the requests be made.
+    """
+
+    def __init__(
+        self,
+        namespace: str,
+        show: Callable[[JointStateColumns, WrenchColumns, WrenchColumns], None],
+        *,
+        context: Context | None = None,
+    ) -> None:
+        """Listen in a namespace; states, forces, dropped forces go to `show`, in blocks."""
+        super().__init__(DASHBOARD, namespace=namespace, context=context)
+        self._show = show
+        self.health: Mapping[str, Health] = {node: Health() for node in NODE_PARAMETERS}
+        """Health by the node's name relative to the namespace."""
+        self.parameters: Mapping[str, Mapping[str, Any]] = {node: {} for node in NODE_PARAMETERS}
+        """Parameters in force by node and flat name, as far as they are known."""
+        self.cycles: dict[Topic, deque[float]] = {}
+        """The measures of the last cycles, each by its topic."""
+        self.cycle_count = 0
+        """How many cycles were heard of in all."""
+        self.events: deque[tuple[float, str]] = deque(maxlen=_EVENTS_KEPT)
+        """When, in s since the epoch, and what happened to the nodes, the newest last."""
+        self._steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
+        self._inquiries: list[tuple[Inquiry, float, Callable[[], None]]] = []
+        self._asked_parameters: dict[str, Inquiry] = {}
+        self._parameter_writers = 0
+        self._newest = 0
+        self._tap_end = 0
+        self._tap_timer: Timer | None = None
+        self._states = self._listen_loosely(JOINT_STATES)
+        self._forces = self._listen_loosely(CONTROL_FORCE)
+        self._dropped_forces = self._listen_loosely(DROPPED_FORCE)
+        self._disturbance = self.create_publisher(
+            DISTURBANCE_FORCE.type, DISTURBANCE_FORCE.name, DISTURBANCE_FORCE.qos()
+        )
+        for topic in (AMPLITUDE, STICK_FRACTION, FREQUENCY):
+            self.cycles[topic] = deque(maxlen=_CYCLES_KEPT)
+            self._subscribe(topic, partial(self._on_cycle, topic), topic.qos(_CYCLES_KEPT))
+        self._subscribe(DIAGNOSTICS, self._on_diagnostics, DIAGNOSTICS.qos())
+        self._parameter_events = self.create_subscription(
+            ParameterEvent,
+            "/parameter_events",
+            self._on_parameter_event,
+            qos_profile_parameter_events,
+        )
+        self._every(_TAKE_PERIOD, self._take)
+        self._every(_WATCH_PERIOD, self._watch)
+
+    def set_parameter(self, node: str, name: str, value: Any) -> Answer:
+        """Set a parameter of a node while it runs."""
+        return self._request(
+            node,
+            SetParametersAtomically,
+            "set_parameters_atomically",
+            SetParametersAtomically.Request(
+                parameters=[Parameter(name, value=value).to_parameter_msg()]
+            ),
+            lambda response: "" if response.result.successful else response.result.reason,
+        )
+
+    def set_active(self, node: str, active: bool) -> Answer:
+        """Activate or deactivate a managed (lifecycle) node."""
+        done = "activated" if active else "deactivated"
+        return self._request(
+            node,
+            ChangeState,
+            "change_state",
+            ChangeState.Request(transition=Transition(id=_TRANSITIONS[active])),
+            lambda response: "" if response.success else f"{node} could not be {done}",
+            _TRANSITION_PATIENCE,
+        )
+
+    def reset(self) -> Answer:
+        """Put the motion back to its initial state."""
+        return self._request(
+            "plant",
+            Trigger,
+            "reset",
+            Trigger.Request(),
+            lambda response: "" if response.success else response.message,
+        )
+
+    def tap(self, force: float, duration: float) -> Answer:
+        """Push the slide with a force (N) for a simulated time (s), then no more."""
+        answer = Answer()
+        if not (isfinite(force) and 0.0 < duration <= LONGEST_TAP):
+            answer.set_result(
+                f"a tap needs a finite force and a time above 0, at most {LONGEST_TAP:g} s"
+            )
+            return answer
+
+        def push() -> None:
+            if not self._disturbance.get_subscription_count():
+                _settle(answer, f"nobody listens to {self._disturbance.topic_name}")
+                return
+            self._take()
+            self._disturbance.publish(pack_wrench(self._newest, force))
+            self._tap_end = self._newest + round(duration * NANOSECONDS)
+            self.events.append((time.time(), f"pushed with {force:g} N for {duration:g} s"))
+            if self._tap_timer is None:
+                self._tap_timer = self._every(_TAP_PERIOD, self._take)
+            _settle(answer, "")
+
+        self._call_soon(push)
+        return answer
+
+    def close(self) -> None:
+        """End what is under way: a push, and questions that were not answered."""
+        if self._tap_timer is not None:
+            self._end_tap()
+            self._disturbance.wait_for_all_acked(Duration(seconds=1.0))
+        for inquiry, _, give_up in self._inquiries:
+            inquiry.close()
+            give_up()
+        self._inquiries.clear()
+
+    def _listen_loosely(self, topic: Topic) -> Any:
+        """Let messages wait, without acknowledging any: the writer has no work with that."""
+        qos = topic.qos()
+        qos.reliability = ReliabilityPolicy.BEST_EFFORT
+        return self.collect_from(topic, qos)
+
+    def _subscribe(self, topic: Topic, callback: Callable[[Any], None], qos: QoSProfile) -> None:
+        self.create_subscription(topic.type, topic.name, callback, qos)
+
+    def _every(self, period: float, callback: Callable[[], None]) -> Timer:
+        return self.create_timer(period, callback, clock=self._steady_clock)
+
+    def _call_soon(self, callback: Callable[[], None]) -> None:
+        def call() -> None:
+            try:
+                callback()
+            except Exception as error:  # the executor would end the process without a word
+                self.get_logger().error(f"{type(error).__name__}: {error}")
+
+        if self.executor is not None:
+            self.executor.create_task(call)
+
+    def _request(
+        self,
+        node: str,
+        kind: Any,
+        service: str,
+        request: Any,
+        outcome: Callable[[Any], str],
+        patience: int = PATIENCE,
+    ) -> Answer:
+        """Call a service of a node; `outcome` says of its response what came of it."""
+        answer = Answer()
+
+        def ask() -> None:
+            inquiry = Inquiry(
+                self,
+                kind,
+                f"{node}/{service}",
+                request,
+                lambda response: _settle(answer, outcome(response)),
+                patience,
+            )
+            inquiry.pursue()
+            give_up = partial(_settle, answer, f"{node} does not answer")
+            self._inquiries.append((inquiry, time.monotonic() + _ANSWER_TIMEOUT, give_up))
+
+        self._call_soon(ask)
+        return answer
+
+    def _take(self) -> None:
+        """Pass on what has come."""
+        states, _ = joint_state_columns(list(take_waiting(self._states)))
+        forces, _ = wrench_columns(list(take_waiting(self._forces)))
+        dropped, _ = wrench_columns(list(take_waiting(self._dropped_forces)))
+        if len(states.stamp):
+            self._newest = int(states.stamp[-1])
+        if len(states.stamp) or len(forces.stamp) or len(dropped.stamp):
+            self._show(states, forces, dropped)
+        if self._tap_timer is not None and self._newest >= self._tap_end:
+            self._end_tap()
+
+    def _end_tap(self) -> None:
+        self._disturbance.publish(pack_wrench(self._newest, 0.0))
+        self.events.append((time.time(), "the push has ended"))
+        if self._tap_timer is not None:
+            self.destroy_timer(self._tap_timer)
+            self._tap_timer = None
+
+    def _watch(self) -> None:
+        """Pursue what was asked; notice who has fallen silent."""
+        now = time.monotonic()
+        for entry in list(self._inquiries):
+            inquiry, deadline, give_up = entry
+            inquiry.pursue()
+            if inquiry.answered or now > deadline:
+                give_up()
+                inquiry.close()
+                self._inquiries.remove(entry)
+        for inquiry in self._asked_parameters.values():
+            inquiry.pursue()
+        matched = self._parameter_events.get_publisher_count()
+        if matched != self._parameter_writers:
+            self._parameter_writers = matched
+            for node in self._asked_parameters:  # what changed before was not told
+                self._ask_parameters(node)
+        for node, health in self.health.items():
+            if health.heard and health.state != SILENT and now - health.heard > SILENCE:
+                self._update(node, Health(SILENT, 2, "", health.figures, health.heard))
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        here = f"{self.get_namespace().rstrip('/')}/"
+        for status in message.status:
+            if status.name.startswith(here):
+                self._on_status(status.name.removeprefix(here), status)
+
+    def _on_status(self, node: str, status: DiagnosticStatus) -> None:
+        figures = {entry.key: entry.value for entry in status.values}
+        state = figures.pop(STATE, "")
+        message = status.message if status.message != state else ""
+        before = self.health.get(node)
+        if before is None and len(self.health) >= _MOST_NODES:
+            return
+        before = before or Health()
+        anew = state == before.state and _began_anew(before.figures, figures)
+        if anew:
+            self.events.append((time.time(), f"{node} was started again"))
+        self._update(node, Health(state, status.level[0], message, figures, time.monotonic()))
+        if node in NODE_PARAMETERS and (anew or state != before.state):
+            self._ask_parameters(node)  # it may be another one of the same name
+
+    def _update(self, node: str, health: Health) -> None:
+        before = self.health.get(node, Health())
+        self.health = {**self.health, node: health}
+        if health.state != before.state:
+            back = "is back, " if before.state == SILENT else ""
+            self.events.append((time.time(), f"{node} {back}{health.state or 'heard'}"))
+        if health.message and _wording(health.message) != _wording(before.message):
+            self.events.append((time.time(), f"{node}: {health.message}"))
+
+    def _ask_parameters(self, node: str) -> None:
+        names = list(known_parameters(NODE_PARAMETERS[node]))
+        if node in self._asked_parameters:
+            self._asked_parameters[node].close()
+        self._asked_parameters[node] = ask_parameters(self, node, names, partial(self._know, node))
+
+    def _know(self, node: str, values: Mapping[str, Any]) -> None:
+        self.parameters = {**self.parameters, node: {**self.parameters[node], **values}}
+
+    def _on_parameter_event(self, event: ParameterEvent) -> None:
+        here = f"{self.get_namespace().rstrip('/')}/"
+        node = event.node.removeprefix(here)
+        if event.node.startswith(here) and node in self.parameters:
+            known = known_parameters(NODE_PARAMETERS[node])
+            changed = (*event.new_parameters, *event.changed_parameters)
+            values = {p.name: parameter_value_to_python(p.value) for p in changed}
+            self._know(node, {name: value for name, value in values.items() if name in known})
+            asked = self._asked_parameters.get(node)
+            if asked is not None and not asked.answered:  # its answer may be from before
+                self._ask_parameters(node)
+
+    def _on_cycle(self, topic: Topic, message: Float64) -> None:
+        self.cycles[topic].append(message.data)
+        if topic is AMPLITUDE:
+            self.cycle_count += 1
+
+
+def _settle(answer: Answer, result: str) -> None:
+    """Give the answer, unless it was given or nobody waits for it any more."""
+    if not answer.done():
+        answer.set_result(result)
+
+
+def _wording(message: str) -> str:
+    """Return a message without its figures, which change all the time."""
+    return re.sub(r"[\d.]+", "", message)
+
+
+def _began_anew(before: Mapping[str, str], figures: Mapping[str, str]) -> bool:
+    """Return whether a node that counts has begun to count again."""
+    return any(
+        figures.get(count, "").isdecimal()
+        and before.get(count, "").isdecimal()
+        and int(figures[count]) < int(before[count])
+        for count in ("samples", "answered")
+    )

@@ -1,0 +1,1 @@
+"""Topics and messages: names, types and byte layouts, without a ROS graph."""

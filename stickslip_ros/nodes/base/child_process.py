@@ -1,0 +1,102 @@
+"""Processes that end with the one that has started them, whatever ends that.
+
+As a program (`python -m stickslip_ros.nodes.base.child_process COMMAND …`) it stands guard over a
+command that knows nothing of this, and over all that the command starts. It needs no ROS, to be
+quick.
+"""
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+
+GUARD_PATIENCE = 3.0
+"""Time, s, that a guarded command has to end after SIGINT, and again after SIGTERM."""
+
+_PARENT_VARIABLE = "STICKSLIP_ROS_PARENT"
+_PR_SET_PDEATHSIG = 1
+
+
+def start(command: Sequence[str], *, guarded: bool = False) -> subprocess.Popen[bytes]:
+    """Start a command that ends with this process; its output goes to standard error.
+
+    Either the command calls `die_with_parent`, or it is guarded: then SIGTERM to the process
+    returned ends the command, and what it has started, by SIGINT, SIGTERM and SIGKILL in turn.
+    """
+    guard = [sys.executable, "-m", __name__] if guarded else []
+    return subprocess.Popen(
+        [*guard, *command],
+        env=os.environ | {_PARENT_VARIABLE: str(os.getpid())},
+        stdin=subprocess.DEVNULL,
+        stdout=2,  # not sys.stderr: what stands in for it need not be a file
+        start_new_session=True,  # Ctrl-C is for this process, which ends them in order
+    )
+
+
+def die_with_parent() -> None:
+    """Be sent SIGTERM when the process that has started this one by `start` is no more.
+
+    Linux only; elsewhere it does nothing.
+    """
+    parent = os.environ.pop(_PARENT_VARIABLE, "")
+    if not parent or sys.platform != "linux":
+        return
+    _signal_at_death_of_parent(signal.SIGTERM)
+    if os.getppid() != int(parent):
+        sys.exit(1)
+
+
+def main() -> None:
+    """Run the command of the arguments; end as it ends, or end it on SIGTERM."""
+    die_with_parent()
+    # The command may be of another Python environment, which has to find its own libraries.
+    os.environ.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
+    awaited = {signal.SIGTERM, signal.SIGCHLD}
+    signal.pthread_sigmask(signal.SIG_BLOCK, awaited)
+
+    def prepare() -> None:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, awaited)
+        if sys.platform == "linux":
+            _signal_at_death_of_parent(signal.SIGKILL)
+
+    try:
+        child = subprocess.Popen(sys.argv[1:], process_group=0, preexec_fn=prepare)
+    except OSError as error:
+        sys.exit(f"{sys.argv[1]} cannot be started: {error.strerror}")
+    while child.poll() is None:
+        if signal.sigwait(awaited) == signal.SIGTERM:
+            _end(child)
+    with suppress(ProcessLookupError):  # what it has left behind
+        os.killpg(child.pid, signal.SIGKILL)
+    if child.returncode < 0:
+        _die_of(-child.returncode)
+    sys.exit(child.returncode)
+
+
+def _end(child: subprocess.Popen[bytes]) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        os.killpg(child.pid, number)
+        with suppress(subprocess.TimeoutExpired):
+            child.wait(GUARD_PATIENCE)
+            return
+    print(f"{sys.argv[1]} ends neither on SIGINT nor on SIGTERM: killed", file=sys.stderr)
+    os.killpg(child.pid, signal.SIGKILL)
+    child.wait()
+
+
+def _die_of(number: int) -> None:
+    with suppress(OSError):  # SIGKILL, which nobody handles
+        signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {number})
+    os.kill(os.getpid(), number)
+
+
+def _signal_at_death_of_parent(number: signal.Signals) -> None:
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
+
+
+if __name__ == "__main__":
+    main()

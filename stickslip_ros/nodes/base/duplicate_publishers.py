@@ -1,0 +1,28 @@
+"""Publishers of a topic that is meant to have one."""
+
+from collections import Counter
+
+from rclpy.node import Node
+
+from stickslip_ros.messages.topics import Topic
+
+
+def rivals(node: Node, *topics: Topic) -> list[str]:
+    """Return a sentence for each topic that several publishers share, with all their nodes.
+
+    One that was killed counts until the middleware gives it up.
+    """
+    sentences: list[str] = []
+    for topic in topics:
+        name = node.resolve_topic_name(topic.name)
+        publishers = Counter(
+            f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
+            for publisher in node.get_publishers_info_by_topic(name)
+            if publisher.topic_type == topic.type_name
+        )
+        if publishers.total() > 1:
+            names = (f"{node} ({n} times)" if n > 1 else node for node, n in publishers.items())
+            sentences.append(
+                f"{publishers.total()} publishers of {name}: {', '.join(sorted(names))}"
+            )
+    return sentences

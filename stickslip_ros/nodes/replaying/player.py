@@ -1,0 +1,230 @@
+"""Sending recorded messages once more: each when it is due, from a thread of its own."""
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from threading import Condition, Thread
+
+from stickslip_ros.errors import BagError, RunError, StickslipError
+from stickslip_ros.messages.codec import unpack_header
+from stickslip_ros.nodes.pacing import FlowWindow, Sleeper
+from stickslip_ros.stamps import NANOSECONDS
+
+JITTER = NANOSECONDS
+"""Time, ns, by which log times may go back without a new segment beginning there."""
+
+_PATIENCE = 10.0
+"""Wall time, s, that is waited for a silent recorder, and in the end for the readers."""
+_LOOK_AGAIN = 0.02
+
+Message = tuple[str, int, bytes]
+"""Topic, log time in ns, and the serialized message."""
+
+
+class Timeline:
+    """Turns log times into absolute deadlines: none drifts, however late the one before was met.
+
+    Nothing waits for the past: what was logged before what came earlier is due along with it. Where
+    log times go back by more than JITTER a new segment begins, one interval behind the old one.
+    """
+
+    def __init__(self, rate: float = 1.0) -> None:
+        """Let recorded time pass `rate` times as fast as wall time."""
+        self._seconds = 1e-9 / rate
+        self._origin = 0.0
+        self._zero: int | None = None
+        self.now = 0
+        """The newest log time of the segment, ns."""
+        self._interval = NANOSECONDS
+        self._begins_anew = False
+        self._paused_at: float | None = None
+
+    @property
+    def deadline(self) -> float:
+        """When what `go_to` went to is due, s of the clock that its `now` was read from."""
+        return self._origin + self.elapsed_at(self.now) * self._seconds
+
+    @property
+    def paused(self) -> bool:
+        """Whether time stands still."""
+        return self._paused_at is not None
+
+    def elapsed_at(self, log_time: int) -> int:
+        """Return the recorded time, ns, from what was first of all to a log time of the segment."""
+        return log_time - (self._zero or 0)
+
+    def go_to(self, log_time: int, now: float = 0.0) -> None:
+        """Go on to what was logged at that time (ns); what is first of all is due `now` (s)."""
+        if self._zero is None:
+            self._origin = now
+            self._zero = self.now = log_time
+        elif self._begins_anew or log_time < self.now - JITTER:
+            self._zero = log_time - self.elapsed_at(self.now) - self._interval
+            self.now = log_time
+        elif log_time > self.now:
+            self._interval = log_time - self.now
+            self.now = log_time
+        self._begins_anew = False
+
+    def begin_anew(self) -> None:
+        """Take what comes next for the begin of a new segment."""
+        self._begins_anew = True
+
+    def pause(self, now: float) -> None:
+        """Let time stand still from `now` (s) on."""
+        if self._paused_at is None:
+            self._paused_at = now
+
+    def resume(self, now: float) -> None:
+        """Let time go on `now` (s); every deadline moves by the length of the pause."""
+        if self._paused_at is not None:
+            self._origin += now - self._paused_at
+            self._paused_at = None
+
+
+class Player:
+    """Sends messages when they are due; after a stall what is overdue follows at once, in order."""
+
+    def __init__(
+        self,
+        messages: Callable[[], Iterable[Message]],
+        send: Callable[[Message, int], None],
+        delivered: Callable[[], bool],
+        end: Callable[[], None],
+        *,
+        rate: float,
+        loop: bool,
+        windows: Mapping[str, FlowWindow],
+    ) -> None:
+        """Send what `messages` gives, over and over if `loop`; call `end` when all is `delivered`.
+
+        `send` gets each message and the recorded time, ns; `windows` bounds by topic how many may
+        be under way. All of these are called from the player's thread.
+        """
+        self.sent = 0
+        """Messages sent."""
+        self.recorded_time = 0
+        """Log time, ns, that the messages sent have come to."""
+        self.worst_lateness = 0.0
+        """Longest time, s, by which a message was sent behind its deadline."""
+        self.complaint = ""
+        """What is wrong, in words."""
+        self.failure: StickslipError | None = None
+        """What ended it before its time."""
+        self._messages = messages
+        self._send = send
+        self._end = end
+        self._delivered = delivered
+        self._loop = loop
+        self._windows = windows
+        self._timeline = Timeline(rate)
+        self._sleeper = Sleeper()
+        self._changed = Condition()
+        self._running = True
+        self._thread = Thread(target=self._run, name="player", daemon=True)
+
+    @property
+    def paused(self) -> bool:
+        """Whether it sends nothing until it is resumed."""
+        return self._timeline.paused
+
+    def start(self) -> None:
+        """Send the first message now."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Send no further message."""
+        with self._changed:
+            self._running = False
+            self._changed.notify()
+        self._sleeper.wake()
+        self._thread.join()
+
+    def pause(self) -> None:
+        """Send nothing from now on."""
+        with self._changed:
+            self._timeline.pause(time.monotonic())
+
+    def resume(self) -> None:
+        """Go on where it was paused."""
+        with self._changed:
+            self._timeline.resume(time.monotonic())
+            self._changed.notify()
+
+    def recorder_came_to(self, topic: str, stamp: int) -> None:
+        """Say that the recorder holds what was sent on a topic up to that stamp (ns)."""
+        with self._changed:
+            self._windows[topic].recorded(stamp)
+            self.complaint = ""
+            self._changed.notify()
+
+    def _run(self) -> None:
+        try:
+            self._play()
+        except StickslipError as error:
+            self.failure = error
+        except Exception as error:  # it would end the thread without a word
+            self.failure = RunError(f"the replay failed: {type(error).__name__}: {error}")
+        if self._running:
+            self._end()
+
+    def _play(self) -> None:
+        while True:
+            # The next message is fetched before its deadline is slept for.
+            for message in self._messages():
+                with self._changed:
+                    self._timeline.go_to(message[1], time.monotonic())
+                self._send_when_due(message)
+                if not self._running:
+                    return
+            if not self._loop:
+                self._await_delivery()
+                return
+            self._timeline.begin_anew()
+
+    def _await_delivery(self) -> None:
+        patience_ends = time.monotonic() + _PATIENCE
+        with self._changed:
+            while self._running and time.monotonic() < patience_ends:
+                behind = [w for w in self._windows.values() if w.under_way > 0]
+                if not behind and self._delivered():
+                    return
+                for window in behind:
+                    window.give_up(patience_ends=False)
+                self._changed.wait(_LOOK_AGAIN)
+            if self._running:
+                self.complaint = "not every reader has taken in all that was sent"
+
+    def _send_when_due(self, message: Message) -> None:
+        topic, _, data = message
+        window = self._windows.get(topic)
+        while True:
+            self._sleeper.sleep_until(self._timeline.deadline)
+            with self._changed:
+                if not self._running:
+                    return
+                if self._timeline.paused:
+                    self._changed.wait()
+                    continue
+                now = time.monotonic()
+                lateness = now - self._timeline.deadline
+                if lateness < 0.0:
+                    continue
+                if window is not None and window.full:
+                    self._await_recorder(window)
+                    continue
+                self.recorded_time = self._timeline.now
+                self._send(message, self.recorded_time)
+                self.sent += 1
+                self.worst_lateness = max(self.worst_lateness, lateness)
+                if window is not None:
+                    with suppress(BagError):  # without a stamp that a recorder could name
+                        window.sent(unpack_header(data))
+                return
+
+    def _await_recorder(self, window: FlowWindow) -> None:
+        since = time.monotonic()
+        while self._running and window.full:
+            self._changed.wait(_LOOK_AGAIN)
+            silence = window.give_up(time.monotonic() - since > _PATIENCE)
+            self.complaint = silence or self.complaint

@@ -1,0 +1,140 @@
+"""What of a bag is to be replayed: which topics, how they are offered, and which messages."""
+
+from collections.abc import Iterator
+from math import inf
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rclpy.exceptions import InvalidTopicNameException
+from rclpy.qos import QoSProfile
+from rclpy.validate_full_topic_name import validate_full_topic_name
+
+from stickslip_ros.bags.reader import Recording
+from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.messages.topics import CLOCK, JOINT_STATES, RECORDED
+from stickslip_ros.nodes.replaying.player import JITTER, Message, Timeline
+from stickslip_ros.nodes.replaying.recorded_qos import message_type, offered_profile
+from stickslip_ros.printable import printable
+from stickslip_ros.scenarios.parameters import ReplayParameters
+from stickslip_ros.stamps import NANOSECONDS
+
+
+class Offer(NamedTuple):
+    """How a topic is offered."""
+
+    message_type: Any
+    profile: QoSProfile
+
+
+class Excerpt:
+    """The part of a bag that is to be replayed.
+
+    Its start and duration count recorded time as it passes in the replay, from the bag's first
+    message on. What was logged earlier than messages before it belongs to the time of its log time,
+    at the begin of the bag to its begin; where log times go back by more than JITTER, recorded time
+    goes on behind what came before. A part without start and duration is the whole bag.
+    """
+
+    def __init__(self, parameters: ReplayParameters, source: str) -> None:
+        """Look into the bag.
+
+        Raises BagError for what is no bag or holds nothing that can be replayed, and
+        InvalidInputError that names `source` and the parameter that asks for what the bag has not.
+        """
+        self.offers: dict[str, Offer] = {}
+        """By topic."""
+        self.left_out: list[str] = []
+        """Topics that cannot be replayed, and why, in sentences."""
+        self.lacking: list[str] = []
+        """What the bag lacks, in sentences, as far as it was read."""
+        self._source = source
+        self._parameters = parameters
+        if not parameters.bag:
+            raise self._refused("bag = ''", "must be the path of a bag")
+        with Recording(Path(parameters.bag)) as recording:
+            first = next(recording.messages(*recording.topics), None)
+            if first is None:
+                raise BagError(f"the bag {recording.path} holds no messages")
+            self.first: int = first[1]
+            """Log time of the bag's first message, ns."""
+            self._find_offers(recording)
+            self._check_part(recording)
+            self.length = self._known_length(recording)
+            """Recorded time from start to end, s; infinite where no account of the bag tells it."""
+
+    def messages(self) -> Iterator[Message]:
+        """Yield the messages to replay as recorded in turn; raises BagError where reading fails."""
+        with Recording(Path(self._parameters.bag)) as recording:
+            yield from self._part(recording)
+            self.lacking = recording.missing
+
+    def _part(self, recording: Recording) -> Iterator[Message]:
+        begin = round(self._parameters.start * NANOSECONDS)
+        end = begin + self._parameters.duration * NANOSECONDS
+        for (topic, log_time, data), elapsed, newest in self._timed(recording, *self.offers):
+            if newest >= end + JITTER:
+                return
+            # An empty message cannot be delivered, and Fast DDS would hold back what follows it.
+            if begin <= elapsed < end and data:
+                yield topic, log_time, data
+
+    def _timed(self, recording: Recording, *topics: str) -> Iterator[tuple[Message, int, int]]:
+        """Yield each message with its recorded time, ns, and the newest one up to there."""
+        timeline = Timeline()
+        timeline.go_to(self.first)
+        for message in recording.messages(*topics):
+            timeline.go_to(message[1])
+            elapsed = max(timeline.elapsed_at(message[1]), 0)
+            yield message, elapsed, timeline.elapsed_at(timeline.now)
+
+    def _find_offers(self, recording: Recording) -> None:
+        asked = self._parameters.topics
+        if any(topic not in recording.topics for topic in asked):
+            known = ", ".join(sorted(recording.topics))
+            raise self._refused(
+                f"topics = {asked}", f"the topics of the bag {recording.path} are {known}"
+            )
+        for topic in asked or self._worth_replaying(recording):
+            try:
+                validate_full_topic_name(topic)
+                kind = message_type(recording.topics[topic])
+            except (BagError, InvalidTopicNameException) as error:
+                reason = str(error).splitlines()[0]
+                self.left_out.append(printable(f"{topic} is left out: {reason}"))
+            else:
+                self.offers[topic] = Offer(kind, offered_profile(recording.offered_qos(topic)))
+        if not self.offers:
+            reasons = "; ".join(self.left_out)
+            raise BagError(f"no topic of the bag {recording.path} can be replayed: {reasons}")
+
+    def _worth_replaying(self, recording: Recording) -> list[str]:
+        """Leave out what a recorder said to the plant of its time, and a second clock."""
+        states = [topic for topic in recording.topics if topic.endswith(f"/{JOINT_STATES.name}")]
+        live = {topic.removesuffix(JOINT_STATES.name) + RECORDED.name for topic in states}
+        if self._parameters.clock:
+            live.add(CLOCK.name)
+        return [topic for topic in recording.topics if topic not in live]
+
+    def _check_part(self, recording: Recording) -> None:
+        if next(self._part(recording), None) is not None:
+            return
+        length = max(elapsed for _, elapsed, _ in self._timed(recording, *recording.topics))
+        raise self._refused(
+            f"start = {self._parameters.start} s, duration = {self._parameters.duration} s",
+            f"nothing was recorded then on {', '.join(self.offers)}; "
+            f"the bag {recording.path} is {length * 1e-9:g} s long",
+        )
+
+    def _known_length(self, recording: Recording) -> float:
+        accounts = [file.statistics for file in recording.files]
+        known = [account for account in accounts if account is not None and account.message_count]
+        rest = inf
+        if known and None not in accounts:
+            earliest = min(account.message_start_time for account in known)
+            latest = max(account.message_end_time for account in known)
+            if earliest >= self.first - JITTER:
+                rest = (latest - self.first) * 1e-9 - self._parameters.start
+        return min(rest if rest >= 0.0 else inf, self._parameters.duration)
+
+    def _refused(self, what: str, why: str) -> InvalidInputError:
+        return InvalidInputError(f"{self._source}: {what} is refused: {why}")

@@ -1,0 +1,330 @@
+"""Sections 1 and 2 up to eq. 5: the model."""
+
+from math import isclose, sqrt
+
+import numpy as np
+
+from stickslip_ros.paper.claims.claim import (
+    Chapter,
+    Correction,
+    Evidence,
+    Formula,
+    Number,
+    Observation,
+)
+from stickslip_ros.paper.claims.reference import (
+    DAMPING,
+    FASTER,
+    STATES,
+    cycles,
+    exact_onset,
+    hopf_point,
+    only_rest_at,
+    rates,
+    time_dependent,
+    trace,
+)
+from stickslip_ros.paper.claims.simulations import listed
+from stickslip_ros.paper.figures import STRIBECK, unit_drive
+from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import Equations
+from stickslip_ros.physics.model.friction import Stribeck
+from stickslip_ros.physics.theory.roots import zero_between
+
+CHAPTER = Chapter("Sections 1 and 2: the model")
+
+_SLIDE = Drive(
+    mass=3.0,
+    damping=25.0,
+    stiffness=5e3,
+    normal_force=200.0,
+    belt_speed=0.7,
+    friction=Stribeck(STRIBECK.static, STRIBECK.minimum, 0.8),
+)
+"""A drive with no scale of one."""
+
+_FASTEST = 2.0
+"""Relative speed up to which the friction law is looked at."""
+
+
+def _kinetic(speed: float) -> float:
+    return float(-STRIBECK.coefficient(speed, 1.0))
+
+
+def _smallest_kinetic() -> tuple[float, float]:
+    """Return the smallest kinetic coefficient, and at which relative speed it is reached."""
+    # Without damping the trace is the friction's slope at the belt's speed.
+    speed = zero_between(lambda v: trace(v, 0.0), 1e-3, _FASTEST)
+    return _kinetic(speed), speed
+
+
+CHAPTER.undecidable(
+    "earlier-work",
+    "section 1",
+    "Earlier papers brought several friction models and studies of frictional vibration",
+    "It is about other papers; nothing of it enters the equations.",
+)
+
+CHAPTER.undecidable(
+    "state-of-research",
+    "section 1",
+    "Trains, wings, cutting and oil whip vibrate by self-excitation, not yet fully understood",
+    "It is about other systems and about the literature.",
+)
+
+CHAPTER.undecidable(
+    "difficulties-of-other-models",
+    "section 2",
+    "Other models are hard to build and to simulate, and few studies look beyond the feed speed",
+    "It is about models that the paper neither names nor writes down.",
+)
+
+
+@CHAPTER.statement(
+    "normal-vibration",
+    "section 2, Fig. 1",
+    "The model takes the vibration normal to the belt into account",
+)
+def _(_: Evidence) -> Observation:
+    return Observation(
+        "depends on time" if time_dependent() else "constant normal force",
+        time_dependent(),
+        remark="Nothing in eq. 1 to 5 but the state changes with time, and the state holds no "
+        "normal motion: N is a constant, and only sets the scales.",
+    )
+
+
+@CHAPTER.formula("eq-1", "eq. 1", "Balance of forces on the slide", "m x'' + c x' + k x - F = 0")
+def _() -> Formula:
+    drive = _SLIDE
+    position, speed = STATES[0] * drive.length_scale, STATES[1] * drive.speed_scale
+    relative_speed = speed - drive.belt_speed
+    friction = drive.normal_force * drive.friction.coefficient(
+        relative_speed, np.sign(relative_speed)
+    )
+    acceleration = (friction - drive.damping * speed - drive.stiffness * position) / drive.mass
+    scale = drive.angular_frequency * drive.speed_scale
+    return Formula(
+        acceleration / scale,
+        rates(drive, STATES[:2])[1],
+        remark="Compared with the dimensionless equations that are integrated, scaled to SI units.",
+    )
+
+
+@CHAPTER.formula("eq-2", "eq. 2", "The balance made dimensionless", "X'' + 2 beta X' + X - mu = 0")
+def _() -> Formula:
+    law = _SLIDE.friction.scaled(_SLIDE.speed_scale)
+    relative_speed = STATES[1] - _SLIDE.belt_speed / _SLIDE.speed_scale
+    coefficient = law.coefficient(relative_speed, np.sign(relative_speed))
+    return Formula(
+        coefficient - _SLIDE.damping_coefficient * STATES[1] - STATES[0],
+        rates(_SLIDE, STATES[:2])[1],
+    )
+
+
+@CHAPTER.formula(
+    "scales",
+    "eq. 2",
+    "Scales that make mass, stiffness and normal force one",
+    "omega_0 = sqrt(k/m), tau = omega_0 t, X = x k / N",
+)
+def _() -> Formula:
+    time, length = (
+        1.0 / sqrt(_SLIDE.stiffness / _SLIDE.mass),
+        _SLIDE.normal_force / _SLIDE.stiffness,
+    )
+    inertia, spring = _SLIDE.mass * length / time**2, _SLIDE.stiffness * length
+    return Formula(
+        np.array([inertia, spring]) / _SLIDE.normal_force,
+        [1.0, 1.0],
+        remark="The coefficients of X'' and X, for a drive without a scale of one.",
+    )
+
+
+@CHAPTER.formula("scaled-damping", "eq. 2", "Damping made dimensionless", "2 beta = c omega / k")
+def _() -> Formula:
+    read = _SLIDE.damping * sqrt(_SLIDE.stiffness / _SLIDE.mass) / _SLIDE.stiffness
+    return Formula(
+        None,
+        _SLIDE.damping_coefficient,
+        [Correction("With omega, which is not defined, read as omega_0", read)],
+        f"The coefficient of X' is c / sqrt(k m) = {_SLIDE.damping_coefficient:.4g} for the drive "
+        "tried.",
+    )
+
+
+@CHAPTER.formula(
+    "scaled-belt-speed", "eq. 2", "Belt speed made dimensionless", "v0 = v0 / (omega_0 L)"
+)
+def _() -> Formula:
+    length = _SLIDE.normal_force / _SLIDE.stiffness
+    read = _SLIDE.belt_speed / (sqrt(_SLIDE.stiffness / _SLIDE.mass) * length)
+    parameters = Equations(Stribeck, continuous_control=False).parameters(_SLIDE)
+    return Formula(
+        None,
+        parameters["belt_speed"],
+        [Correction("With L, which is not defined, read as N/k", read)],
+        "One symbol stands for the speed in m/s and for the dimensionless one.",
+    )
+
+
+@CHAPTER.statement(
+    "excitation-frequency", "eq. 2", "The model has an excitation frequency Omega to be scaled"
+)
+def _(_: Evidence) -> Observation:
+    return Observation(
+        "time-dependent" if time_dependent() else "autonomous",
+        time_dependent(),
+        remark="Omega is scaled but used nowhere: the equations do not contain time.",
+    )
+
+
+@CHAPTER.formula(
+    "eq-3",
+    "eq. 3",
+    "The Stribeck law as a cubic",
+    "-mu_s sgn(v) + 3 (mu_s - mu_m) v / (2 v_m) - (mu_s - mu_m) v^3 / (2 v_m^3)",
+)
+def _() -> Formula:
+    static, minimum, speed = STRIBECK.static, STRIBECK.minimum, STRIBECK.minimum_speed
+    v = np.linspace(-1.0, 1.0, 40)
+    drop = static - minimum
+    printed = -static * np.sign(v) + 3.0 * drop * v / (2.0 * speed) - drop * v**3 / (2.0 * speed**3)
+    # a v - b v^3 with a - 3 b v_m^2 = 0 and a v_m - b v_m^3 = mu_s - mu_m
+    a, b = np.linalg.solve([[1.0, -3.0 * speed**2], [speed, -(speed**3)]], [0.0, drop])
+    return Formula(
+        printed,
+        -static * np.sign(v) + a * v - b * v**3,
+        remark="The odd cubic that begins at mu_s and has its smallest size mu_m at v_m, solved "
+        f"for: a = {a:.4g}, b = {b:.4g}.",
+    )
+
+
+@CHAPTER.number("static-coefficient", "eq. 3", "The static friction coefficient used", 0.4)
+def _(_: Evidence) -> Number:
+    return Number(_kinetic(0.0), remark="The law's size as the relative speed goes to zero.")
+
+
+@CHAPTER.number(
+    "smallest-coefficient", "eq. 3", "mu_m, the smallest coefficient while slipping", 0.25
+)
+def _(_: Evidence) -> Number:
+    return Number(_smallest_kinetic()[0], remark="Where heyoka's derivative of the law is zero.")
+
+
+@CHAPTER.number("smallest-at", "eq. 3", "v_m, the relative speed of the smallest friction", 0.5)
+def _(_: Evidence) -> Number:
+    return Number(_smallest_kinetic()[1], remark="Where heyoka's derivative of the law is zero.")
+
+
+@CHAPTER.statement(
+    "names-of-coefficients", "eq. 3", "mu_s is the dynamic coefficient and mu_m the static one"
+)
+def _(_: Evidence) -> Observation:
+    break_away, (smallest, _speed) = _kinetic(0.0), _smallest_kinetic()
+    return Observation(
+        f"static {break_away:.4g}, smallest kinetic {smallest:.4g}",
+        isclose(STRIBECK.static, smallest, rel_tol=1e-6),
+        isclose(STRIBECK.static, break_away, rel_tol=1e-6)
+        and isclose(STRIBECK.minimum, smallest, rel_tol=1e-6),
+        f"The other way round: the slide breaks away at mu_s = {STRIBECK.static:g}, and "
+        f"mu_m = {STRIBECK.minimum:g} is the smallest coefficient while it slips.",
+    )
+
+
+@CHAPTER.statement("eq-3-range", "eq. 3", "The law describes friction of machine parts in general")
+def _(evidence: Evidence) -> Observation:
+    smallest_at = _smallest_kinetic()[1]
+    end = zero_between(lambda v: _kinetic(v) - STRIBECK.static, smallest_at, _FASTEST)
+    # A slide that sticks comes up to the belt's speed, and its speed spans twice the amplitude.
+    fastest = 2.0 * (cycles(exact_onset() * (1.0 - 1e-6))[0].measures.velocity_amplitude or 0.0)
+    highest = float(evidence.bifurcation(2).values.max())
+    return Observation(
+        f"up to a relative speed of {end:.4g}",
+        end >= max(fastest, highest),
+        end > smallest_at,
+        f"Only below {end:.4g}, where it exceeds the static coefficient; at twice v_m it is "
+        f"{_kinetic(2.0 * smallest_at):.4g} already. The belt of Fig. 2 goes up to {highest:.4g}, "
+        f"and the vibrations, at the onset of sticking, up to {fastest:.4g}.",
+    )
+
+
+@CHAPTER.formula(
+    "eq-4", "eq. 4", "Displacement and speed as the two states", "X = X1, dX/dtau = X2"
+)
+def _() -> Formula:
+    return Formula(rates(unit_drive(0.4), STATES[:2])[0], STATES[1])
+
+
+@CHAPTER.formula(
+    "eq-5",
+    "eq. 5",
+    "The system of first order, while slipping",
+    "X1' = X2, X2' = -2 beta X2 - X1 - mu_s sgn(v_r) + a v_r - b v_r^3",
+)
+def _() -> Formula:
+    relative_speed = STATES[1] - 0.4
+    friction = STRIBECK.coefficient(relative_speed, np.sign(relative_speed))
+    printed = [STATES[1], -DAMPING * STATES[1] - STATES[0] + friction]
+    return Formula(printed, rates(unit_drive(0.4), STATES[:2]))
+
+
+@CHAPTER.formula(
+    "eq-5-origin", "eq. 5", "What is made a system of first order", "eq. 3, the friction law"
+)
+def _() -> Formula:
+    relative_speed = STATES[1] - 0.4
+    law = STRIBECK.coefficient(relative_speed, np.sign(relative_speed))
+    return Formula(
+        law,
+        rates(unit_drive(0.4), STATES[:2])[1],
+        [
+            Correction(
+                "With eq. 2 for eq. 3, which goes into it,", law - DAMPING * STATES[1] - STATES[0]
+            )
+        ],
+    )
+
+
+@CHAPTER.statement("eq-5-stick", "eq. 5", "The system describes sticking too")
+def _(evidence: Evidence) -> Observation:
+    portrait = evidence.portraits(6).portraits[0]
+    cycle = portrait.last_cycles
+    reaction = cycle.position[cycle.stuck] + DAMPING * portrait.drive.belt_speed
+    least, most = float(reaction.min()), float(reaction.max())
+    limit = STRIBECK.static
+    return Observation(
+        f"{least:.4g} to {most:.4g} instead of 0",
+        max(abs(least), abs(most)) < 1e-9,
+        max(abs(least), abs(most)) <= limit * (1.0 + 1e-9),
+        f"At v0 = {portrait.drive.belt_speed:g} a slide that sticks needs a friction of "
+        f"{least:.4g} to {most:.4g}; with sgn(0) = 0 the system gives it none. The rule it "
+        f"lacks: the slide sticks while X + 2 beta v0 is within mu_s = {limit:g}.",
+    )
+
+
+@CHAPTER.statement(
+    "rest-at-high-speed",
+    "section 2",
+    "On a fast belt the slide rests, friction and spring in balance, with sgn(v_r) = -1",
+)
+def _(evidence: Evidence) -> Observation:
+    figure = evidence.bifurcation(2)
+    fast = [
+        (measures, drive)
+        for measures, drive in zip(figure.diagram.measures, figure.diagram.drives, strict=True)
+        if drive.belt_speed > 1.05 * hopf_point().belt_speed
+    ]
+    resting = [measures.regime is Regime.EQUILIBRIUM for measures, _ in fast]
+    off = max(
+        abs((measures.midpoint or 0.0) / drive.equilibrium_position - 1.0)
+        for measures, drive in fast
+    )
+    return Observation(
+        f"at {sum(resting)} of {len(fast)} belt speeds",
+        all(resting) and off < 1e-4 and only_rest_at(FASTER),
+        remark=f"All of Fig. 2 that are 5 percent or more above the Hopf speed of "
+        f"{hopf_point().belt_speed:.5g}; X deviates from mu(-v0) by {off:.4%} at most. At "
+        f"v0 = {listed(FASTER)} too the equilibrium is stable and shooting finds no limit cycle.",
+    )

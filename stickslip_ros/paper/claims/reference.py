@@ -1,0 +1,183 @@
+"""What the claims are judged by: the theory and the motion, at the paper's parameters.
+
+Everything is dimensionless, on the unit drive of `figures`.
+"""
+
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import heyoka as hy
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.paper.figures import unit_drive
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import Equations, W, WashoutGains, X, Y
+from stickslip_ros.physics.model.friction import FrictionLaw
+from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
+from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycles
+from stickslip_ros.physics.theory.linear import Expansion, expand
+from stickslip_ros.physics.theory.returns import follow, release_position
+from stickslip_ros.physics.theory.roots import zero_between
+from stickslip_ros.physics.theory.sticking import StickingOnset, sticking_onset
+
+DAMPING = 0.02
+"""Coefficient 2 beta of X' in eq. 5 for the paper's beta of 0.01."""
+
+TAKEN_DAMPING = 0.01
+"""What stands in its place in eq. 8, and in all that follows from there: beta."""
+
+TAKEN_FOR_DAMPING = f"With the damping coefficient {TAKEN_DAMPING:g} in place of {DAMPING:g}"
+"""The correction that many of the paper's numbers need."""
+
+PRINTED_HOPF_SPEED = 0.4944
+"""v_b1, with which eq. 11 goes on."""
+
+STUDIED_SPEED = 0.49
+"""The belt speed of section 4.1, with which eq. 20 to 30 go on."""
+
+FILTER = WashoutGains(corner_frequency=2.0, linear=0.0, cubic=0.0)
+"""A washout filter with the corner frequency that eq. 20 has; no gain."""
+
+_ROUNDING = 1e-12
+"""Share of the belt's speed within which a speed is that of the belt."""
+
+_LONG = 600.0
+"""Time in which a motion that is going to run away has done so."""
+
+BELT_SPEEDS = np.array([0.1, 0.25, 0.4, STUDIED_SPEED, 0.7, 1.0])
+"""Where formulas in the belt speed are evaluated."""
+
+SLOWER = (0.02, 0.05, 0.1)
+"""Belt speeds down to a tenth of those of the figures."""
+
+FASTER = (1.0, 2.0, 5.0, 10.0)
+"""Belt speeds up to ten times those of the figures."""
+
+STATES: FloatArray = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 40))
+"""Where formulas in the state X, Y, W are evaluated."""
+
+
+def expansion(
+    belt_speed: float, damping: float = DAMPING, gains: WashoutGains | None = None
+) -> Expansion:
+    """Return the derivatives of the right-hand side at the equilibrium."""
+    found = expand(unit_drive(belt_speed, damping=damping), gains)
+    assert found is not None
+    return found
+
+
+def trace(belt_speed: float, damping: float = DAMPING) -> float:
+    """Return p of eq. 8."""
+    return float(np.trace(expansion(belt_speed, damping).jacobian))
+
+
+@cache
+def hopf_point(damping: float = DAMPING) -> HopfPoint:
+    """Return the Hopf point over the belt speed."""
+    (point,) = hopf_points(unit_drive(1.0, damping=damping))
+    return point
+
+
+def overdamped_from() -> float:
+    """Return the belt speed from which on the eigenvalues are real, p = -2."""
+    return zero_between(lambda speed: trace(speed) + 2.0, hopf_point().belt_speed, 2.0)
+
+
+@cache
+def onset(damping: float = DAMPING, stiffness: float = 1.0) -> StickingOnset:
+    """Return the belt speed below which the slide sticks."""
+    return sticking_onset(unit_drive(1.0, damping=damping, stiffness=stiffness))
+
+
+def exact_onset(damping: float = DAMPING, stiffness: float = 1.0) -> float:
+    """Return that of the motion itself."""
+    speed = onset(damping, stiffness).exact
+    assert speed is not None
+    return speed
+
+
+def approximate_onset(damping: float = DAMPING) -> float:
+    """Return that by averaging."""
+    speed = onset(damping).approximate
+    assert speed is not None
+    return speed
+
+
+@cache
+def cycles(
+    belt_speed: float, damping: float = DAMPING, stiffness: float = 1.0
+) -> tuple[LimitCycle, ...]:
+    """Return all limit cycles of the open loop, stable or not."""
+    return tuple(limit_cycles(unit_drive(belt_speed, damping=damping, stiffness=stiffness)))
+
+
+def only_rest_at(belt_speeds: Sequence[float]) -> bool:
+    """Return whether the equilibrium is stable at each of them, and there is no limit cycle."""
+    return all(expansion(speed).stable and not cycles(speed) for speed in belt_speeds)
+
+
+def arrivals(drive: Drive) -> list[float]:
+    """Return the reactions k x + c v0 with which a slide comes to the belt's speed.
+
+    That is after the belt let go of it, up to the first with which friction can hold it.
+    """
+    motion = _motion()
+    motion.begin(drive, release_position(drive), drive.belt_speed)
+    motion.take_breakpoints()
+    *_, breakpoints = follow(motion)
+    arrived = np.abs(breakpoints.velocity - drive.belt_speed) <= _ROUNDING * drive.belt_speed
+    arrived &= np.logical_or.accumulate(breakpoints.velocity < 0.0) & ~breakpoints.sticking
+    reactions = drive.stiffness * breakpoints.position[arrived] + drive.damping * drive.belt_speed
+    held = np.flatnonzero(np.abs(reactions) <= drive.normal_force * drive.friction.static)
+    return reactions[: int(held[0]) + 1 if len(held) > 0 else None].tolist()
+
+
+def stays(drive: Drive) -> bool:
+    """Return whether the motion from rest at X = 0 does not run away."""
+    motion = _motion()
+    motion.begin(drive, 0.0, 0.0)
+    motion.advance(_LONG)
+    return not motion.unbounded
+
+
+def amplitudes(belt_speed: float, damping: float = DAMPING) -> list[float]:
+    """Return the displacement amplitudes of the limit cycles."""
+    found = [cycle.measures.amplitude for cycle in cycles(belt_speed, damping)]
+    return [amplitude for amplitude in found if amplitude is not None]
+
+
+def rates(drive: Drive, states: FloatArray, gains: WashoutGains | None = None) -> FloatArray:
+    """Return the derivatives by time of dimensionless states (n, m) of a slipping slide.
+
+    n is 2, or 3 with `gains` (SI), for eq. 5 and eq. 19.
+    """
+    equations, compiled = _compiled(type(drive.friction), gains is not None)
+    values: dict[str, Any] = equations.parameters(drive)
+    if gains is not None:
+        values |= vars(gains.scaled(drive))
+    values["sign"] = np.sign(states[1] - values["belt_speed"])
+    parameters = np.zeros((len(equations.index), states.shape[1]))
+    for name, value in values.items():
+        parameters[equations.index[name]] = value
+    return compiled(states, pars=parameters[: compiled.nparams])
+
+
+def time_dependent() -> bool:
+    """Return whether anything in the equations changes with time but the state."""
+    _, compiled = _compiled(type(unit_drive(1.0).friction), False)
+    return bool(compiled.is_time_dependent)
+
+
+@cache
+def _motion() -> Motion:
+    return Motion(unit_drive(1.0), 0.0, 0.0, record=True)
+
+
+@cache
+def _compiled(law: type[FrictionLaw], continuous_control: bool) -> tuple[Equations, Any]:
+    equations = Equations(law, continuous_control)
+    state = [X, Y, W] if continuous_control else [X, Y]
+    return equations, hy.cfunc([rate for _, rate in equations.slip], state)

@@ -1,0 +1,668 @@
+"""Section 2 from eq. 6 on: equilibrium, stability and the limit cycle's curvature coefficient."""
+
+from collections.abc import Callable
+from math import log
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.paper.claims.claim import (
+    Chapter,
+    Correction,
+    Evidence,
+    Formula,
+    Number,
+    Observation,
+)
+from stickslip_ros.paper.claims.normal_form import Nonlinearity, samples
+from stickslip_ros.paper.claims.reference import (
+    BELT_SPEEDS,
+    DAMPING,
+    FASTER,
+    PRINTED_HOPF_SPEED,
+    SLOWER,
+    STATES,
+    STUDIED_SPEED,
+    TAKEN_DAMPING,
+    TAKEN_FOR_DAMPING,
+    cycles,
+    expansion,
+    hopf_point,
+    overdamped_from,
+    rates,
+    trace,
+)
+from stickslip_ros.paper.figures import STRIBECK, unit_drive
+from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
+
+CHAPTER = Chapter("Section 2: stability")
+
+
+def _second_order() -> float:
+    """Return the coefficient of v0 X2^2 in X2'."""
+    return float(expansion(1.0).quadratic[1, 1, 1]) / 2.0
+
+
+def _third_order() -> float:
+    """Return the coefficient of X2^3 in X2'."""
+    return float(expansion(1.0).cubic[1, 1, 1, 1]) / 6.0
+
+
+def _growth(damping: float = DAMPING) -> tuple[float, float]:
+    """Return the coefficients c and e of the trace p = c - e v0^2, fitted to the Jacobian's."""
+    traces = [trace(speed, damping) for speed in BELT_SPEEDS]
+    slope, constant = np.polyfit(BELT_SPEEDS**2, traces, 1)
+    return float(constant), float(-slope)
+
+
+def printed_trace(belt_speeds: FloatArray) -> FloatArray:
+    """Return 0.44 - 1.8 v0^2, as eq. 8 has it."""
+    return 0.44 - 1.8 * belt_speeds**2
+
+
+def _jacobians(damping: float) -> FloatArray:
+    return np.array([expansion(speed, damping).jacobian for speed in BELT_SPEEDS])
+
+
+def _printed_jacobians() -> FloatArray:
+    return np.array([[[0.0, 1.0], [-1.0, p]] for p in printed_trace(BELT_SPEEDS)])
+
+
+@CHAPTER.number("linear-coefficient", "eq. 6", "The friction's slope at the belt's speed, a", 0.45)
+def _(_: Evidence) -> Number:
+    return Number(_growth(0.0)[0], remark="From heyoka's derivatives of the equations.")
+
+
+@CHAPTER.number("cubic-coefficient", "eq. 6", "The friction's cubic coefficient, b", 0.6)
+def _(_: Evidence) -> Number:
+    return Number(-_third_order(), remark="From heyoka's derivatives of the equations.")
+
+
+@CHAPTER.formula("eq-6-speed", "eq. 6", "Speed at the equilibrium", "X20 = 0")
+def _() -> Formula:
+    return Formula(0.0, [expansion(speed).equilibrium[1] for speed in BELT_SPEEDS])
+
+
+@CHAPTER.formula(
+    "eq-6-position", "eq. 6", "Displacement at the equilibrium", "X10 = 0.4 - 0.45 v0 + 0.6 v0^3"
+)
+def _() -> Formula:
+    positions = np.array([expansion(speed).equilibrium[0] for speed in BELT_SPEEDS])
+    accelerations = [
+        abs(float(rates(unit_drive(speed), np.array([[x], [0.0]]))[1, 0]))
+        for speed, x in zip(BELT_SPEEDS.tolist(), positions, strict=True)
+    ]
+    return Formula(
+        0.4 - 0.45 * BELT_SPEEDS + 0.6 * BELT_SPEEDS**3,
+        positions,
+        remark=f"The acceleration there is {max(accelerations):.6f}.",
+    )
+
+
+@CHAPTER.formula(
+    "eq-6-friction",
+    "eq. 6",
+    "Friction about the equilibrium, on the left-hand side",
+    "F2 = -0.45 X2 + 0.6 (X2^3 + 3 X2 v_r^2 - 3 X2^2)",
+)
+def _() -> Formula:
+    speed, belt_speed = STATES[1], 1.2  # so high that no state overtakes the belt
+    friction = STRIBECK.coefficient(speed - belt_speed, -1.0)
+    at_rest = STRIBECK.at_rest(belt_speed)
+
+    def printed(last: float) -> FloatArray:
+        return -0.45 * speed + 0.6 * (speed**3 + 3.0 * speed * belt_speed**2 - last * speed**2)
+
+    return Formula(
+        printed(3.0),
+        at_rest - friction,
+        [Correction("With the factor v0 in the last term", printed(3.0 * belt_speed))],
+        "F2 is minus the change of the friction, so that -F stands in eq. 16; v_r is its value "
+        "-v0 at rest. All this while the slide is slower than the belt: beyond, friction changes "
+        "sign.",
+    )
+
+
+@CHAPTER.formula("eq-6-first", "eq. 6", "The first equation has no nonlinear part", "F1 = 0")
+def _() -> Formula:
+    at_rest = expansion(0.4)
+    return Formula(0.0, np.concatenate([at_rest.quadratic[0].ravel(), at_rest.cubic[0].ravel()]))
+
+
+@CHAPTER.statement(
+    "first-approximation", "section 2", "The first approximation decides what small motions do"
+)
+def _(_: Evidence) -> Observation:
+    drive = unit_drive(0.45)
+    motion = Motion(drive, expansion(0.45).equilibrium[0] - 1e-6, 0.0, record=True)
+    motion.advance(20.0 * drive.natural_period)
+    breakpoints = motion.take_breakpoints()
+    turns = np.flatnonzero((breakpoints.velocity[:-1] == 0.0) & (breakpoints.velocity[1:] > 0.0))
+    distance = expansion(0.45).equilibrium[0] - breakpoints.position[turns]
+    growth = log(distance[-1] / distance[0]) / float(
+        breakpoints.time[turns[-1]] - breakpoints.time[turns[0]]
+    )
+    expected = float(expansion(0.45).eigenvalues[0].real)
+    return Observation(
+        f"{growth:.5f} beside {expected:.5f}",
+        abs(growth / expected - 1.0) < 1e-3,
+        remark="Growth rate of a small vibration at v0 = 0.45, from the motion over "
+        f"{len(turns) - 1} cycles, beside the real part of the eigenvalues.",
+    )
+
+
+@CHAPTER.formula("eq-7", "eq. 7", "The Jacobian", "A = [[0, 1], [a21, a22]] = 0")
+def _() -> Formula:
+    jacobians = _jacobians(DAMPING)
+    structure = jacobians.copy()
+    structure[:, 0] = [0.0, 1.0]
+    return Formula(
+        np.zeros_like(jacobians),
+        jacobians,
+        [Correction("Without the = 0, with first row (0, 1) as printed,", structure)],
+    )
+
+
+@CHAPTER.formula(
+    "eq-7-place", "eq. 7", "Where the Jacobian is taken", "X1 = 0 and X2 = 0, not the equilibrium"
+)
+def _() -> Formula:
+    drive, step = unit_drive(0.4), 1e-4
+
+    def jacobian(position: float) -> FloatArray:
+        ahead, behind = (
+            rates(drive, np.array([[position, 0.0], [0.0, 0.0]]) + change * np.eye(2))
+            for change in (step, -step)
+        )
+        return (ahead - behind) / (2.0 * step)
+
+    return Formula(
+        np.round(jacobian(0.0), 6),
+        np.round(jacobian(float(expansion(0.4).equilibrium[0])), 6),
+        remark="Only X2 matters, since X1 enters linearly; central differences, to 6 decimals.",
+    )
+
+
+@CHAPTER.number(
+    "eq-8-constant", "eq. 8", "Constant of the trace p = 0.44 - 1.8 v0^2, beta 0.01", 0.44
+)
+def _(_: Evidence) -> Number:
+    return Number(
+        _growth()[0],
+        [Correction(TAKEN_FOR_DAMPING, _growth(TAKEN_DAMPING)[0])],
+        "Eq. 5 has 2 beta, eq. 8 takes beta once.",
+    )
+
+
+@CHAPTER.number("eq-8-square", "eq. 8", "Coefficient of -v0^2 in the trace p", 1.8)
+def _(_: Evidence) -> Number:
+    return Number(_growth()[1], remark="Three times the cubic coefficient of the law.")
+
+
+@CHAPTER.formula("eq-8-matrix", "eq. 8", "lambda E - A", "[[lambda, 1], [-1, lambda - p]]")
+def _() -> Formula:
+    p = trace(0.4)
+    eigenvalue = 0.3
+    return Formula(
+        [[eigenvalue, 1.0], [-1.0, eigenvalue - p]],
+        eigenvalue * np.eye(2) - expansion(0.4).jacobian,
+        [
+            Correction(
+                "With the signs of 1 and -1 exchanged", [[eigenvalue, -1.0], [1.0, eigenvalue - p]]
+            )
+        ],
+        "The determinant is the same either way.",
+    )
+
+
+@CHAPTER.formula(
+    "eq-8-polynomial", "eq. 8", "The characteristic polynomial", "lambda^2 - p lambda + 1"
+)
+def _() -> Formula:
+    return Formula(
+        [[1.0, -trace(speed), 1.0] for speed in BELT_SPEEDS],
+        [np.poly(expansion(speed).jacobian) for speed in BELT_SPEEDS],
+        remark="With whatever damping p has.",
+    )
+
+
+@CHAPTER.statement("hurwitz", "section 2", "Stability is lost where p = 0")
+def _(_: Evidence) -> Observation:
+    speed = hopf_point().belt_speed
+    below, above = (expansion(speed * factor).stable for factor in (0.999, 1.001))
+    p = trace(speed)
+    return Observation(
+        f"p = {abs(p):.6f}",
+        abs(p) < 1e-12 and above and not below,
+        remark=f"At the Hopf speed {speed:.6f}; unstable below, stable above it.",
+    )
+
+
+@CHAPTER.number("vb1", "section 2", "The critical speed v_b1 for beta = 0.01", PRINTED_HOPF_SPEED)
+def _(_: Evidence) -> Number:
+    return Number(
+        hopf_point().belt_speed,
+        [Correction(TAKEN_FOR_DAMPING, hopf_point(TAKEN_DAMPING).belt_speed)],
+        "The slip of eq. 8: with the damping of eq. 5 the loop is stable above "
+        f"{hopf_point().belt_speed:.5f} already.",
+    )
+
+
+@CHAPTER.statement("vb1-supercritical", "section 2", "The Hopf point at v_b1 is supercritical")
+def _(_: Evidence) -> Observation:
+    sigma = hopf_point().first_lyapunov_coefficient
+    just_below = cycles(hopf_point().belt_speed - 2e-3)
+    stable = [cycle.stable for cycle in just_below]
+    return Observation(
+        f"sigma = {sigma:.6g}",
+        sigma < 0.0 and stable == [True] and not cycles(hopf_point().belt_speed + 2e-3),
+        remark=f"0.002 below v_b1 shooting finds {len(just_below)} limit cycle, of multiplier "
+        f"{abs(just_below[0].multipliers[0]):.5f}; 0.002 above none.",
+    )
+
+
+@CHAPTER.formula("eq-9-matrix", "eq. 9", "The linear part", "A = [[0, 1], [-1, 0.44 - 1.8 v0^2]]")
+def _() -> Formula:
+    return Formula(
+        _printed_jacobians() - _jacobians(DAMPING),
+        0.0,
+        [Correction(TAKEN_FOR_DAMPING, _printed_jacobians() - _jacobians(TAKEN_DAMPING))],
+    )
+
+
+@CHAPTER.number("eq-9-square", "eq. 9", "Q2: the coefficient of v0 y2^2", 1.8)
+def _(_: Evidence) -> Number:
+    return Number(_second_order(), remark="Half the second derivative at v0 = 1.")
+
+
+@CHAPTER.number("eq-9-cube", "eq. 9", "Q2: the coefficient of y2^3", -0.6)
+def _(_: Evidence) -> Number:
+    return Number(_third_order(), remark="A sixth of the third derivative.")
+
+
+@CHAPTER.statement("eq-9-jordan", "eq. 9", "A linear transformation has brought it to Jordan form")
+def _(_: Evidence) -> Observation:
+    def defect(belt_speed: float) -> float:
+        matrix = expansion(belt_speed).jacobian
+        return float(abs(matrix[0, 0] - matrix[1, 1]) + abs(matrix[0, 1] + matrix[1, 0]))
+
+    at_hopf, elsewhere = defect(hopf_point().belt_speed), defect(0.4)
+    return Observation(
+        f"off by {elsewhere:.4g} at v0 = 0.4",
+        max(at_hopf, elsewhere) < 1e-9,
+        at_hopf < 1e-9,
+        f"Only at v_b1 (off by {at_hopf:.6f}), where the untransformed matrix is [[0, 1], [-1, 0]] "
+        "and eq. 12 to 15 use it. No transformation was made.",
+    )
+
+
+@CHAPTER.formula(
+    "eq-9-equilibrium", "eq. 9", "The equilibrium", "(y, y') = (0, 0.4 - 0.45 v0 + 0.6 v0^3)"
+)
+def _() -> Formula:
+    position = 0.4 - 0.45 * BELT_SPEEDS + 0.6 * BELT_SPEEDS**3
+    printed = np.array([np.zeros_like(position), position])
+    return Formula(
+        printed,
+        np.array([expansion(speed).equilibrium for speed in BELT_SPEEDS]).T,
+        [Correction("With the two exchanged", printed[::-1])],
+        "It is displaced and at rest; in the coordinates of eq. 9 it is the origin.",
+    )
+
+
+@CHAPTER.formula(
+    "eq-10-real", "eq. 10", "Real part of the eigenvalues", "alpha = (0.44 - 1.8 v0^2) / 2"
+)
+def _() -> Formula:
+    return Formula(
+        printed_trace(BELT_SPEEDS) / 2.0 - _real_parts(DAMPING),
+        0.0,
+        [
+            Correction(
+                TAKEN_FOR_DAMPING, printed_trace(BELT_SPEEDS) / 2.0 - _real_parts(TAKEN_DAMPING)
+            )
+        ],
+        f"From v0 = {overdamped_from():.4f} on, where both eigenvalues are real, it is their mean.",
+    )
+
+
+def _real_parts(damping: float) -> FloatArray:
+    return np.array([expansion(v, damping).eigenvalues.real.mean() for v in BELT_SPEEDS])
+
+
+@CHAPTER.formula(
+    "eq-10-imaginary",
+    "eq. 10",
+    "Imaginary part, in lambda = alpha +- beta",
+    "beta = sqrt(p^2 - 4) / 2, a real number",
+)
+def _() -> Formula:
+    speeds = [*BELT_SPEEDS.tolist(), *FASTER]
+    radicands = np.array([trace(speed) ** 2 - 4.0 for speed in speeds])
+    halves = np.array([np.ptp(expansion(speed).eigenvalues.real) for speed in speeds]) / 2.0
+    frequencies = np.array([np.ptp(expansion(speed).eigenvalues.imag) for speed in speeds]) / 2.0
+    return Formula(
+        None if np.any(radicands < 0.0) else np.sqrt(radicands) / 2.0,
+        halves + 1j * frequencies,
+        [
+            Correction(
+                "With alpha +- i beta and beta = sqrt(4 - p^2) / 2 where p^2 < 4",
+                np.emath.sqrt(radicands) / 2.0,
+            )
+        ],
+        f"Up to v0 = {overdamped_from():.4f} p^2 - 4 is below zero, {radicands.min():.4g} at the "
+        "least, so that the printed root is of a negative number; from there on it is not, and the "
+        f"two eigenvalues are real, as printed (tried up to v0 = {max(speeds):g}).",
+    )
+
+
+@CHAPTER.number(
+    "eq-11-value", "eq. 11", "Crossing speed alpha' = ((0.44 - 1.8 v0^2) / 2)' at v_b1", -1.7798
+)
+def _(_: Evidence) -> Number:
+    step = 1e-5
+    speed = PRINTED_HOPF_SPEED
+    doubled = (trace(speed + step, TAKEN_DAMPING) - trace(speed - step, TAKEN_DAMPING)) / (
+        2.0 * step
+    )
+    return Number(
+        hopf_point().crossing_speed,
+        [
+            Correction(TAKEN_FOR_DAMPING, hopf_point(TAKEN_DAMPING).crossing_speed),
+            Correction("With p' in place of p'/2, at v0 = 0.4944", doubled),
+        ],
+        "The factor 1/2 of alpha = p/2 got lost, and the 0 in alpha'(0) stands for v_b1: the "
+        f"eigenvalues cross at {hopf_point(TAKEN_DAMPING).crossing_speed:.5f} there.",
+    )
+
+
+@CHAPTER.number("eq-11-product", "eq. 11", "-3.6 times 0.4944", -1.7798)
+def _(_: Evidence) -> Number:
+    return Number(-3.6 * PRINTED_HOPF_SPEED, remark="Only the multiplication.")
+
+
+@CHAPTER.statement("eq-11-sign", "eq. 11", "The crossing speed is negative")
+def _(_: Evidence) -> Observation:
+    crossing = hopf_point().crossing_speed
+    return Observation(f"{crossing:.5f}", crossing < 0.0)
+
+
+def _quadratic_value(coefficient: Callable[[Nonlinearity], complex]) -> Number:
+    """Return four times the imaginary part of g20 or g11, which are imaginary at v_b1."""
+    value, taken = (
+        4.0 * coefficient(Nonlinearity.at(expansion(hopf_point(damping).belt_speed, damping))).imag
+        for damping in (DAMPING, TAKEN_DAMPING)
+    )
+    return Number(
+        value,
+        [Correction(TAKEN_FOR_DAMPING, taken)],
+        f"{taken:.5f} with the damping of eq. 8; a slip of the pen, since eq. 11 prints the same "
+        f"product 3.6 v_b1 with the digits {3.6 * PRINTED_HOPF_SPEED:.4f}.",
+    )
+
+
+@CHAPTER.formula(
+    "eq-12-formula",
+    "eq. 12",
+    "g20 from the derivatives of Q",
+    "g20 = (Q1_11 - Q1_22 + 2 Q1_12 + i (Q2_11 - Q2_22 - 2 Q1_12)) / 4",
+)
+def _() -> Formula:
+    return g20_formula()
+
+
+def g20_formula() -> Formula:
+    """Return what eq. 12 and eq. 23 print alike."""
+
+    def printed(q: Nonlinearity, mixed: int) -> complex:
+        real = q.by(1, 1, 1) - q.by(1, 2, 2) + 2.0 * q.by(mixed, 1, 2)
+        return (real + 1j * (q.by(2, 1, 1) - q.by(2, 2, 2) - 2.0 * q.by(1, 1, 2))) / 4.0
+
+    return Formula(
+        [printed(q, 1) for q in samples(2)],
+        [q.g20 for q in samples(2)],
+        [
+            Correction(
+                "With Q2 in place of Q1 in the real part's last term",
+                [printed(q, 2) for q in samples(2)],
+            )
+        ],
+        "Tried on arbitrary nonlinearities; the derivative in question is zero for the drive.",
+    )
+
+
+@CHAPTER.number("eq-12-value", "eq. 12", "g20 at v_b1: four times its imaginary part", -1.7788)
+def _(_: Evidence) -> Number:
+    return _quadratic_value(lambda q: q.g20)
+
+
+@CHAPTER.formula(
+    "eq-13-formula",
+    "eq. 13",
+    "g11 from the derivatives of Q",
+    "g11 = (Q1_11 + Q1_22 + i (Q2_11 + Q2_22)) / 4",
+)
+def _() -> Formula:
+    return g11_formula()
+
+
+def g11_formula() -> Formula:
+    """Return what eq. 13 and eq. 24 print alike."""
+    return Formula(
+        [
+            (q.by(1, 1, 1) + q.by(1, 2, 2) + 1j * (q.by(2, 1, 1) + q.by(2, 2, 2))) / 4.0
+            for q in samples(2)
+        ],
+        [q.g11 for q in samples(2)],
+        remark="Tried on arbitrary nonlinearities.",
+    )
+
+
+@CHAPTER.number("eq-13-value", "eq. 13", "g11 at v_b1: four times its imaginary part", 1.7788)
+def _(_: Evidence) -> Number:
+    return _quadratic_value(lambda q: q.g11)
+
+
+@CHAPTER.formula(
+    "eq-14-real",
+    "eq. 14",
+    "Real part of G21",
+    "(Q1_111 + Q1_122 + Q2_112 + Q2_222) / 8",
+)
+def _() -> Formula:
+    return Formula(
+        [
+            (q.by(1, 1, 1, 1) + q.by(1, 1, 2, 2) + q.by(2, 1, 1, 2) + q.by(2, 2, 2, 2)) / 8.0
+            for q in samples(2)
+        ],
+        [q.cubic.real for q in samples(2)],
+        remark="Tried on arbitrary nonlinearities.",
+    )
+
+
+@CHAPTER.formula(
+    "eq-14-imaginary",
+    "eq. 14",
+    "Imaginary part of G21",
+    "(Q2_111 - Q2_122 - 2 Q1_112) / 8",
+)
+def _() -> Formula:
+    def corrected(q: Nonlinearity) -> float:
+        return (q.by(2, 1, 1, 1) + q.by(2, 1, 2, 2) - q.by(1, 1, 1, 2) - q.by(1, 2, 2, 2)) / 8.0
+
+    return Formula(
+        [(q.by(2, 1, 1, 1) - q.by(2, 1, 2, 2) - 2.0 * q.by(1, 1, 1, 2)) / 8.0 for q in samples(2)],
+        [q.cubic.imag for q in samples(2)],
+        [
+            Correction(
+                "With (Q2_111 + Q2_122 - Q1_112 - Q1_222) / 8", [corrected(q) for q in samples(2)]
+            )
+        ],
+        "Without consequence for sigma, which is made of the real part.",
+    )
+
+
+@CHAPTER.number("eq-14-value", "eq. 14", "G21, printed as -3.6/8", -0.45)
+def _(_: Evidence) -> Number:
+    speed = hopf_point().belt_speed
+    return Number(Nonlinearity.at(expansion(speed)).cubic.real, remark="Whatever the damping.")
+
+
+@CHAPTER.formula(
+    "eq-15-formula",
+    "eq. 15",
+    "The curvature coefficient sigma from g20, g11 and G21",
+    "sigma = Re{g20 g11 / (2 omega_0)} Re{G21 / 2 + ...}",
+)
+def _() -> Formula:
+    printed = [(q.g20 * q.g11 / (2.0 * q.frequency)).real * q.cubic.real / 2.0 for q in samples(2)]
+    summed = [(q.g20 * q.g11 / (2.0 * q.frequency) + q.cubic / 2.0).real for q in samples(2)]
+    corrected = [
+        (1j * q.g20 * q.g11 / (2.0 * q.frequency) + q.cubic / 2.0).real for q in samples(2)
+    ]
+    at_hopf = Nonlinearity.at(expansion(hopf_point().belt_speed))
+    without = (at_hopf.g20 * at_hopf.g11 / 2.0 + at_hopf.cubic / 2.0).real
+    return Formula(
+        printed,
+        [q.sigma for q in samples(2)],
+        [
+            Correction("With a sum in place of the product", summed),
+            Correction("With i in front of g20 g11, and a sum in place of the product,", corrected),
+        ],
+        f"Compared with the projection method. Without i the sum would be {without:.4g} at v_b1.",
+    )
+
+
+@CHAPTER.number("eq-15-value", "eq. 15", "sigma at v_b1, printed as -3.6/16", -0.225)
+def _(_: Evidence) -> Number:
+    sigma = first_lyapunov_coefficient(expansion(hopf_point().belt_speed))
+    assert sigma is not None
+    return Number(sigma, remark="By the projection method, from heyoka's derivatives.")
+
+
+@CHAPTER.number("eq-15-imaginary", "eq. 15", "Imaginary part beside it, 1.7788^2/16", 0.1978)
+def _(_: Evidence) -> Number:
+    value, taken = (
+        (q.g20 * q.g11 * 0.5j).imag
+        for q in (
+            Nonlinearity.at(expansion(hopf_point(damping).belt_speed, damping))
+            for damping in (DAMPING, TAKEN_DAMPING)
+        )
+    )
+    return Number(
+        value,
+        [Correction(TAKEN_FOR_DAMPING, taken)],
+        f"Of i g20 g11 / 2; even with the damping of eq. 8 it is 3.6^2 v_b1^2 / 32 = {taken:.4f}. "
+        "Without consequence for sigma.",
+    )
+
+
+@CHAPTER.statement(
+    "stable-below", "section 2", "Below v_b1 the limit cycle is stable and the equilibrium is not"
+)
+def _(_: Evidence) -> Observation:
+    speeds = (*SLOWER, 0.2, 0.4, 0.45, 0.48)
+    found = [cycles(speed) for speed in speeds]
+    below = all(
+        len(here) == 1 and here[0].stable and not expansion(speed).stable
+        for speed, here in zip(speeds, found, strict=True)
+    )
+    stable_between = expansion(STUDIED_SPEED).stable
+    return Observation(
+        f"one stable cycle at each of {len(speeds)} belt speeds" if below else "other cycles",
+        below and not stable_between,
+        below,
+        "With v_b1 computed with beta = 0.01 in eq. 5: at "
+        f"v0 = {STUDIED_SPEED:g} < {PRINTED_HOPF_SPEED:g} the equilibrium is stable and there are "
+        f"{len(cycles(STUDIED_SPEED))} cycles. Largest multiplier below: "
+        f"{max(abs(here[0].multipliers[0]) for here in found):.4f}.",
+    )
+
+
+@CHAPTER.statement("low-conditions", "section 2", "At v0 = 0.45: p > 0 and p^2 - 4 q < 0")
+def _(_: Evidence) -> Observation:
+    return _criterion(0.45, 1.0)
+
+
+@CHAPTER.statement("low-focus", "section 2", "At v0 = 0.45 the equilibrium is an unstable focus")
+def _(_: Evidence) -> Observation:
+    upper = expansion(0.45).eigenvalues[0]
+    return Observation(_complex(upper), upper.real > 0.0 and upper.imag > 0.0)
+
+
+@CHAPTER.statement("low-cycle", "section 2", "At v0 = 0.45 the motion ends on a stable limit cycle")
+def _(evidence: Evidence) -> Observation:
+    (portrait,) = [p for p in evidence.portraits(6).portraits if p.drive.belt_speed == 0.45]
+    (cycle,) = cycles(0.45)
+    run, shot = portrait.measures.amplitude or 0.0, cycle.measures.amplitude or 0.0
+    return Observation(
+        f"amplitude {run:.6f}",
+        cycle.stable and abs(run - shot) < 1e-6,
+        remark=f"The run from rest ends on the cycle found by shooting, amplitude {shot:.6f}, "
+        f"multiplier {abs(cycle.multipliers[0]):.4f}.",
+    )
+
+
+@CHAPTER.statement("two-kinds", "section 2", "The vibration is pure slip, or stick-slip")
+def _(evidence: Evidence) -> Observation:
+    measures = evidence.bifurcation(2).diagram.measures
+    speeds = evidence.bifurcation(2).values
+    kinds = {
+        regime: [float(v) for v, m in zip(speeds, measures, strict=True) if m.regime is regime]
+        for regime in (Regime.STICK_SLIP, Regime.PURE_SLIP)
+    }
+    others = {m.regime for m in measures} - {*kinds, Regime.EQUILIBRIUM, Regime.STUCK}
+    return Observation(
+        ", ".join(f"{regime} at {len(found)} belt speeds" for regime, found in kinds.items()),
+        all(kinds.values()) and not others,
+        remark="Of Fig. 2: stick-slip up to "
+        f"{max(kinds[Regime.STICK_SLIP], default=0.0):.4f}, pure slip above; at rest at the rest.",
+    )
+
+
+@CHAPTER.statement("high-conditions", "section 2", "At v0 = 0.495: p < 0 and p^2 - 4 q < 0")
+def _(_: Evidence) -> Observation:
+    return _criterion(0.495, -1.0)
+
+
+@CHAPTER.statement("high-focus", "section 2", "At v0 = 0.495 the equilibrium is a stable focus")
+def _(_: Evidence) -> Observation:
+    upper = expansion(0.495).eigenvalues[0]
+    taken = expansion(0.495, TAKEN_DAMPING).eigenvalues[0]
+    return Observation(
+        _complex(upper),
+        upper.real < 0.0 < upper.imag,
+        remark="A deviation falls to a hundredth in "
+        f"{log(100.0) / -upper.real:.0f}; with the damping of eq. 8 it would take "
+        f"{log(100.0) / -taken.real:.0f}.",
+    )
+
+
+@CHAPTER.statement("high-rest", "section 2", "At v0 = 0.495 the solution dies out to zero")
+def _(evidence: Evidence) -> Observation:
+    (portrait,) = [p for p in evidence.portraits(6).portraits if p.drive.belt_speed == 0.495]
+    midpoint, amplitude = portrait.measures.midpoint or 0.0, portrait.measures.amplitude or 0.0
+    equilibrium = portrait.drive.equilibrium_position
+    return Observation(
+        f"X = {midpoint:.4f}",
+        amplitude < 1e-4 and abs(midpoint) < 1e-4,
+        amplitude < 1e-4 and abs(midpoint - equilibrium) < 1e-4,
+        f"Its deviation does: X ends at the equilibrium {equilibrium:.4f} of eq. 6.",
+    )
+
+
+def _criterion(belt_speed: float, sign: float) -> Observation:
+    matrix = expansion(belt_speed).jacobian
+    p, q = float(np.trace(matrix)), float(np.linalg.det(matrix))
+    discriminant = p**2 - 4.0 * q
+    return Observation(
+        f"p = {p:.5f}, p^2 - 4 q = {discriminant:.4f}",
+        p * sign > 0.0 and discriminant < 0.0,
+        remark=f"q, which is not defined, is the determinant {q:.4g}.",
+    )
+
+
+def _complex(value: complex) -> str:
+    return f"{value.real:.5f} +- {value.imag:.5f} i"

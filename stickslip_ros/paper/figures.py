@@ -1,0 +1,304 @@
+"""The paper's figures 2 to 13 as data, computed from the equations.
+
+All is dimensionless: the drives have mass and normal force 1, so that their SI numbers are those of
+the paper. Where the paper does not print its parameter values, these show what its text is about.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.paper.portraits import Case, Portrait, portraits
+from stickslip_ros.physics.loop.simulation import Progress
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
+from stickslip_ros.studies.bifurcation import (
+    COURSE,
+    BifurcationDiagram,
+    bifurcation_diagram,
+)
+
+STRIBECK = Stribeck(static=0.4, minimum=0.25, minimum_speed=0.5)
+"""The paper's friction law with the paper's constants."""
+
+PRINTED_SLOPE = 3.0 * (STRIBECK.static - STRIBECK.minimum) / STRIBECK.minimum_speed
+"""Slope of the linear law as section 3.3 prints it."""
+
+TANGENT_SLOPE = PRINTED_SLOPE / 2.0
+"""Slope of the cubic law, eq. 3, at zero relative speed."""
+
+POINTS = 1000
+"""Drives in a bifurcation diagram."""
+
+
+def unit_drive(
+    belt_speed: float,
+    *,
+    damping: float = 0.02,
+    stiffness: float = 1.0,
+    friction: FrictionLaw = STRIBECK,
+) -> Drive:
+    """Return a drive whose SI numbers are the paper's: `damping` 2 beta, `stiffness` gamma."""
+    return Drive(1.0, damping, stiffness, 1.0, belt_speed, friction)
+
+
+@dataclass(frozen=True)
+class BifurcationFigure:
+    """A figure of one bifurcation diagram."""
+
+    number: int
+    title: str
+    parameter: str
+    """Name and symbol of the parameter that is varied."""
+    values: FloatArray
+    """Its value for each row of the diagram."""
+    diagram: BifurcationDiagram
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Phase portraits that belong together."""
+
+    title: str
+    """What they have in common."""
+    portraits: tuple[Portrait, ...]
+
+
+@dataclass(frozen=True)
+class PortraitFigure:
+    """A figure of phase portraits."""
+
+    number: int
+    title: str
+    panels: tuple[Panel, ...]
+
+    @property
+    def portraits(self) -> tuple[Portrait, ...]:
+        """The portraits of all panels, in order."""
+        return tuple(portrait for panel in self.panels for portrait in panel.portraits)
+
+
+PaperFigure = BifurcationFigure | PortraitFigure
+
+
+def compute_figure(
+    number: int, progress: Progress = lambda _: None, *, points: int = POINTS
+) -> PaperFigure:
+    """Return the data of figure `number`, one of `NUMBERS`.
+
+    `points` is the number of drives in a bifurcation diagram.
+    """
+    if number in _BIFURCATIONS:
+        return _bifurcation_figure(number, _BIFURCATIONS[number], points, progress)
+    return _portrait_figure(number, _PORTRAITS[number], progress)
+
+
+def bifurcation_drives(number: int, points: int = POINTS) -> tuple[FloatArray, list[Drive]]:
+    """Return the parameter's values in bifurcation diagram `number`, and a drive for each."""
+    plan = _BIFURCATIONS[number]
+    values = np.linspace(plan.start, plan.end, points)
+    return values, [bifurcation_drive(number, value) for value in values.tolist()]
+
+
+def bifurcation_drive(number: int, value: float) -> Drive:
+    """Return the drive of bifurcation diagram `number` with that value of its parameter."""
+    return _BIFURCATIONS[number].drive(value)
+
+
+class _Bifurcation(NamedTuple):
+    title: str
+    parameter: str
+    start: float
+    end: float
+    drive: Callable[[float], Drive]
+
+
+class _Portraits(NamedTuple):
+    title: str
+    panels: Mapping[str, Sequence[Case]]
+
+
+def _bifurcation_figure(
+    number: int, plan: _Bifurcation, points: int, progress: Progress
+) -> BifurcationFigure:
+    values, drives = bifurcation_drives(number, points)
+    diagram = bifurcation_diagram(drives, progress)
+    return BifurcationFigure(number, plan.title, plan.parameter, values, diagram)
+
+
+def _portrait_figure(number: int, plan: _Portraits, progress: Progress) -> PortraitFigure:
+    cases = [case for panel in plan.panels.values() for case in panel]
+    drawn: list[Portrait] = []
+    for portrait in portraits(cases):
+        drawn.append(portrait)
+        progress(len(drawn) / len(cases))
+    of_panel = iter(drawn)
+    panels = (
+        Panel(title, tuple(next(of_panel) for _ in cases)) for title, cases in plan.panels.items()
+    )
+    return PortraitFigure(number, plan.title, tuple(panels))
+
+
+def _belt_speeds(
+    speeds: Sequence[float], *, damping: float = 0.02, duration: float | None = None
+) -> list[Case]:
+    return [
+        Case(f"v0 = {v0:g}", unit_drive(v0, damping=damping), duration=duration) for v0 in speeds
+    ]
+
+
+def _dampings(
+    betas: Sequence[float], belt_speed: float, friction: FrictionLaw = STRIBECK
+) -> list[Case]:
+    return [
+        Case(f"β = {beta:g}", unit_drive(belt_speed, damping=2.0 * beta, friction=friction))
+        for beta in betas
+    ]
+
+
+def _stiffnesses(stiffnesses: Sequence[float], belt_speed: float) -> list[Case]:
+    return [Case(f"stiffness {k:g}", unit_drive(belt_speed, stiffness=k)) for k in stiffnesses]
+
+
+def _minima(minima: Sequence[float], belt_speed: float) -> list[Case]:
+    return [
+        Case(f"μm = {minimum:g}", unit_drive(belt_speed, friction=_stribeck(minimum)))
+        for minimum in minima
+    ]
+
+
+def _stribeck(minimum: float) -> Stribeck:
+    return Stribeck(STRIBECK.static, minimum, STRIBECK.minimum_speed)
+
+
+def _of_damping(beta: float) -> Drive:
+    return unit_drive(0.477, damping=2.0 * beta)
+
+
+def _of_stiffness(stiffness: float) -> Drive:
+    return unit_drive(0.2, stiffness=stiffness)
+
+
+def _of_friction_ratio(ratio: float) -> Drive:
+    return unit_drive(0.4, friction=_stribeck(STRIBECK.static / ratio))
+
+
+def _gains(corner_frequency: float, gains: Sequence[tuple[float, float]]) -> list[Case]:
+    return [
+        Case(
+            f"k1 = {k1:g}, k2 = {k2:g}",
+            unit_drive(0.4),
+            WashoutGains(corner_frequency, k1, k2),
+            duration=_LONG,
+        )
+        for k1, k2 in gains
+    ]
+
+
+_LONG = 3000.0
+"""Time after which a motion has settled that is slow to do so."""
+
+_SETTLED_ON = f"What the motion from rest is after {COURSE.transient:g} natural periods"
+
+_BIFURCATIONS = {
+    2: _Bifurcation(
+        f"{_SETTLED_ON}, over the belt speed: β = 0.01",
+        "belt speed v0",
+        0.0,
+        1.0,
+        unit_drive,
+    ),
+    3: _Bifurcation(
+        f"{_SETTLED_ON}, over the damping: v0 = 0.477",
+        "damping β (the coefficient of dX/dτ is 2β)",
+        0.0,
+        0.05,
+        _of_damping,
+    ),
+    4: _Bifurcation(
+        f"{_SETTLED_ON}, over the stiffness: v0 = 0.2, β = 0.01",
+        "stiffness (at fixed scales)",
+        0.2,
+        5.0,
+        _of_stiffness,
+    ),
+    5: _Bifurcation(
+        f"{_SETTLED_ON}, over the ratio of friction coefficients: v0 = 0.4, β = 0.01, μs = 0.4",
+        "static over smallest kinetic coefficient μs/μm",
+        1.0,
+        2.0,
+        _of_friction_ratio,
+    ),
+}
+
+_PORTRAITS = {
+    6: _Portraits(
+        "Motion from rest at several belt speeds",
+        {"β = 0.01": _belt_speeds((0.2, 0.3, 0.42, 0.45, 0.48, 0.495, 0.6))},
+    ),
+    7: _Portraits(
+        "Motion from rest with several dampings, Stribeck friction",
+        {"v0 = 0.4": _dampings((0.01, 0.03, 0.045, 0.06, 0.09), 0.4)},
+    ),
+    8: _Portraits(
+        "Motion from rest with several dampings, Coulomb friction",
+        {"v0 = 0.2": _dampings((0.0, 0.01, 0.05, 0.1), 0.2, Coulomb(STRIBECK.static))},
+    ),
+    9: _Portraits(
+        "Motion from rest with several dampings, friction falling linearly with speed",
+        {
+            f"v0 = 0.2, slope {TANGENT_SLOPE:g}: that of the Stribeck law at zero speed": (
+                _dampings((0.01, 0.05, 0.1, 0.2, 0.23), 0.2, Linear(STRIBECK.static, TANGENT_SLOPE))
+            ),
+            f"v0 = 0.2, slope {PRINTED_SLOPE:g}: as printed": (
+                _dampings((0.01, 0.1, 0.2, 0.3, 0.44), 0.2, Linear(STRIBECK.static, PRINTED_SLOPE))
+            ),
+            f"v0 = 0.05, slope {PRINTED_SLOPE:g}: as printed": (
+                _dampings((0.01, 0.1, 0.2, 0.3, 0.44), 0.05, Linear(STRIBECK.static, PRINTED_SLOPE))
+            ),
+        },
+    ),
+    10: _Portraits(
+        "Motion from rest with several stiffnesses",
+        {
+            "v0 = 0.2, β = 0.01": _stiffnesses((0.5, 1.0, 2.0, 4.0, 10.0, 50.0), 0.2),
+            "v0 = 0.2, β = 0.01: stiffer": _stiffnesses((100.0, 400.0, 1000.0), 0.2),
+            "v0 = 0.439, β = 0.01": _stiffnesses((1.0, 2.0), 0.439),
+        },
+    ),
+    11: _Portraits(
+        "Motion from rest with several smallest kinetic friction coefficients",
+        {"v0 = 0.4, β = 0.01, μs = 0.4": _minima((0.10, 0.25, 0.35, 0.37, 0.39), 0.4)},
+    ),
+    12: _Portraits(
+        "Motion from rest near the Hopf speed, sooner and later",
+        {
+            f"2β = {damping:g}, up to τ = {duration:g}": (
+                _belt_speeds((0.48, 0.49, 0.492), damping=damping, duration=duration)
+            )
+            for damping in (0.01, 0.02)
+            for duration in (300.0, _LONG)
+        },
+    ),
+    13: _Portraits(
+        "Motion from rest under washout control",
+        {
+            "v0 = 0.4, d = 2: linear gain": _gains(
+                2.0, [(k1, 0.0) for k1 in (0.0, -0.3, -0.5, -0.7, -0.9, -1.0)]
+            ),
+            "v0 = 0.4, d = 2: cubic gain": _gains(
+                2.0, [(0.0, k2) for k2 in (-5.0, -20.0, -50.0, -100.0)]
+            ),
+            "v0 = 0.4, d = 0.2: linear gain": _gains(
+                0.2, [(k1, 0.0) for k1 in (-0.05, -0.1, -0.13, -0.16)]
+            ),
+        },
+    ),
+}
+
+NUMBERS = tuple(sorted([*_BIFURCATIONS, *_PORTRAITS]))
+"""The figures there are; figure 1 is a drawing of the model."""

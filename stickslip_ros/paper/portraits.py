@@ -1,0 +1,152 @@
+"""Phase portraits: motions from rest as finely sampled trajectories, and what they settle on."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from stickslip_ros.physics.measures.breakpoints import Breakpoints
+from stickslip_ros.physics.measures.cycles import Cycle, CycleMeter, Measures, Regime
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.motion.motion import Motion
+
+PERIODS = 300.0
+"""Natural periods that a trajectory covers, unless its case says otherwise."""
+
+SAMPLES_PER_PERIOD = 64
+"""Samples in a natural period."""
+
+LAST_CYCLES = 5
+"""Cycles at the end of a trajectory that are measured."""
+
+SETTLED = 0.01
+"""Share of the belt speed by which the speed amplitude of a settled cycle may still differ."""
+
+
+class Case(NamedTuple):
+    """A motion from rest at X = 0."""
+
+    label: str
+    """What sets it apart from the other cases of its panel."""
+    drive: Drive
+    gains: WashoutGains | None = None
+    """Of a washout controller that acts from the start, without sampling, eq. 19; SI units."""
+    duration: float | None = None
+    """s; None for `PERIODS` natural periods."""
+
+
+@dataclass(frozen=True)
+class Portrait:
+    """The trajectory of a case, and its measures."""
+
+    case: Case
+    trajectory: Breakpoints
+    """The motion from rest, finely sampled, to its end or to where it runs away."""
+    measures: Measures
+    """Means of the last cycles, `LAST_CYCLES` at most."""
+    settling_time: float | None
+    """Start (s) of the first cycle from which on all have the speed amplitude of the last cycles,
+    but for `SETTLED` belt speeds. None where the motion may still be on its way: outside
+    equilibrium that has to have lasted for half of the trajectory."""
+
+    @property
+    def drive(self) -> Drive:
+        """The drive of the case."""
+        return self.case.drive
+
+    @property
+    def runs_away(self) -> bool:
+        """Whether the motion leaves all bounds."""
+        return self.measures.regime is Regime.UNBOUNDED
+
+    @property
+    def last_cycles(self) -> Breakpoints:
+        """The end of the trajectory: `LAST_CYCLES` cycles, or natural periods where none are."""
+        time = self.trajectory.time
+        period = self.measures.period or self.drive.natural_period
+        return self.trajectory[time >= time[-1] - LAST_CYCLES * period]
+
+    @property
+    def least_relative_speed(self) -> float | None:
+        """Smallest |X' - v0| in the last cycles, m/s: 0 where it sticks, None if it runs away."""
+        if self.runs_away:
+            return None
+        return float(np.abs(self.last_cycles.velocity - self.drive.belt_speed).min())
+
+    def time_beyond(self, speed: float) -> float | None:
+        """Return when (s) |X'| first exceeds `speed` (m/s), None if it does not."""
+        speeds = np.abs(self.trajectory.velocity)
+        beyond = np.flatnonzero(speeds > speed)
+        if len(beyond) == 0:
+            return None
+        samples = slice(max(int(beyond[0]) - 1, 0), int(beyond[0]) + 1)
+        return float(np.interp(speed, speeds[samples], self.trajectory.time[samples]))
+
+
+def portraits(cases: Iterable[Case]) -> Iterator[Portrait]:
+    """Yield the portraits of the cases, one after the other.
+
+    Integrators are compiled anew only where the friction law becomes another one.
+    """
+    motions: dict[bool, Motion] = {}
+    for case in cases:
+        controlled = case.gains is not None
+        if controlled not in motions:
+            motions[controlled] = Motion(
+                case.drive, 0.0, 0.0, continuous_control=controlled, record=True
+            )
+        yield _portrait(case, motions[controlled])
+
+
+def _portrait(case: Case, motion: Motion) -> Portrait:
+    drive, gains = case.drive, case.gains
+    motion.drive = drive
+    if gains is not None:
+        motion.set_gains(gains.corner_frequency, gains.linear, gains.cubic)
+    motion.take_breakpoints()
+    motion.restart(0.0, 0.0)
+    duration = PERIODS * drive.natural_period if case.duration is None else case.duration
+    samples = round(duration / drive.natural_period * SAMPLES_PER_PERIOD)
+    for _ in range(samples):
+        motion.advance(duration / samples)
+        if motion.unbounded:
+            break
+    breakpoints = motion.take_breakpoints()
+    trajectory = Breakpoints(
+        breakpoints.time - breakpoints.time[0],
+        breakpoints.position,
+        breakpoints.velocity,
+        breakpoints.sticking,
+    )
+    meter = CycleMeter(LAST_CYCLES)
+    cycles = meter.feed(trajectory, drive.belt_speed)
+    if motion.unbounded:
+        meter.report_run_away()
+    measures = meter.measures()
+    settling_time = None
+    if not motion.unbounded:
+        settling_time = _settling_time(trajectory, cycles, measures, drive)
+    return Portrait(case, trajectory, measures, settling_time)
+
+
+def _settling_time(
+    trajectory: Breakpoints, cycles: Sequence[Cycle], measures: Measures, drive: Drive
+) -> float | None:
+    if not cycles:
+        return None
+    amplitudes = np.array([cycle.velocity_amplitude for cycle in cycles])
+    final = amplitudes[-LAST_CYCLES:].mean()
+    off = np.flatnonzero(np.abs(amplitudes - final) > SETTLED * abs(drive.belt_speed))
+    first = int(off[-1]) + 1 if len(off) > 0 else 0
+    time = _first_rise(trajectory) + sum(cycle.period for cycle in cycles[:first])
+    at_rest = measures.regime is Regime.EQUILIBRIUM
+    return time if at_rest or time <= trajectory.time[-1] / 2.0 else None
+
+
+def _first_rise(trajectory: Breakpoints) -> float:
+    """Return when the velocity first rises through zero: where the first cycle starts."""
+    falling = int(np.argmax(trajectory.velocity < 0.0))
+    rise = falling + int(np.argmax(trajectory.velocity[falling:] >= 0.0))
+    return float(trajectory.time[rise])

@@ -1,0 +1,128 @@
+"""The report on the paper: every claim with its verdict, and the figures, as JSON and Markdown."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from itertools import groupby
+from typing import Any
+
+from stickslip_ros.paper.claims import CHAPTERS, Finding, Verdict
+from stickslip_ros.paper.figures import BifurcationFigure, PaperFigure
+
+Report = Mapping[str, Any]
+"""The report as JSON has it: `claims` and `figures`, a list of objects each."""
+
+_HEAD = """\
+# The paper, reproduced
+
+"Dynamics of mass-spring-belt friction self-excited vibration system" models a mass on a moving belt
+with Stribeck friction, finds the feed speed below which it vibrates by itself, and takes the
+vibration away with a washout filter. This page holds every number, formula and statement of that
+paper against what its own equations give. `stickslip paper --out docs` computed and wrote it, the
+pictures, and `reproduction.json`, which has the same findings in full precision.
+
+Nothing in the column *computed* comes from the paper. It is about the drive with mass, stiffness
+and normal force of one, for which SI and dimensionless numbers are the same, with mu_s = 0.4,
+mu_m = 0.25, v_m = 0.5 and beta = 0.01 in eq. 5 (a damping coefficient 2 beta of 0.02), unless a
+line says otherwise. A number holds if the computed one is it
+when rounded to the last digit that is printed. A correction is another calculation, stated, that
+does give what is printed or that makes a formula right.
+"""
+
+_FIGURES = """\
+## The figures
+
+The paper's figures 2 to 13 again, from the equations. Where the paper does not print the parameter
+values, these are ours, chosen to show what its text is about: those that stand in the pictures,
+and else beta = 0.01, stiffness 1, mu_s = 0.4, mu_m = 0.25 and v_m = 0.5. Everything is
+dimensionless and starts from rest at X = 0. Figure 1 is a drawing of the model.
+"""
+
+_COLUMNS = ("", "claim", "printed", "computed", "difference", "verdict")
+
+
+def report(findings: Mapping[str, Finding], figures: Mapping[str, PaperFigure]) -> Report:
+    """Return the report, ready for JSON.
+
+    `findings` are by the identifier of the claim, `figures` by the path of the picture, seen from
+    the report.
+    """
+    return {
+        "claims": [
+            {
+                "chapter": chapter.title,
+                "identifier": claim.identifier,
+                "place": claim.place,
+                "statement": claim.statement,
+                "printed": claim.printed,
+                **asdict(findings[claim.identifier]),
+            }
+            for chapter in CHAPTERS
+            for claim in chapter.claims
+        ],
+        "figures": [
+            {"number": figure.number, "caption": _caption(figure), "picture": path}
+            for path, figure in figures.items()
+        ],
+    }
+
+
+def verdict_counts(report: Report) -> dict[str, int]:
+    """Return how many claims of a report got each verdict."""
+    counts = Counter(claim["verdict"] for claim in report["claims"])
+    return {str(verdict): counts[verdict] for verdict in Verdict}
+
+
+def as_markdown(report: Report) -> str:
+    """Return the report as a page."""
+    counts = [(verdict, str(count)) for verdict, count in verdict_counts(report).items()]
+    parts = [_HEAD, _table([("verdict", "claims"), ("---", "---:"), *counts])]
+    failing = (claim for claim in report["claims"] if claim["verdict"] == Verdict.FAILS)
+    parts.append(
+        f"What does not hold; the evidence stands below:\n\n{''.join(map(_line, failing))}"
+    )
+    for title, claims in groupby(report["claims"], key=lambda claim: claim["chapter"]):
+        rows = [_COLUMNS, ["---"] * len(_COLUMNS), *map(_cells, claims)]
+        parts.append(f"## {title}\n\n{_table(rows)}")
+    parts.append(_FIGURES)
+    for figure in report["figures"]:
+        number, caption = figure["number"], figure["caption"]
+        picture = f"![Figure {number}]({figure['picture']})"
+        parts.append(f"### Figure {number}\n\n{caption}\n\n{picture}\n")
+    return "\n".join(parts)
+
+
+def _line(claim: Mapping[str, Any]) -> str:
+    printed = f" (printed: {_shown(claim['printed'])})" if claim["printed"] is not None else ""
+    return f"- {claim['place']}: {claim['statement']}{printed}\n"
+
+
+def _cells(claim: Mapping[str, Any]) -> list[str]:
+    verdict = f"**{claim['verdict']}**"
+    return [
+        claim["place"],
+        claim["statement"],
+        _shown(claim["printed"]),
+        _shown(claim["computed"]),
+        _shown(claim["difference"], digits=2),
+        f"{verdict}: {claim['remark']}" if claim["remark"] else verdict,
+    ]
+
+
+def _table(rows: Sequence[Sequence[str]]) -> str:
+    cells = ([cell.replace("|", r"\|") for cell in row] for row in rows)
+    return "".join(f"| {' | '.join(row)} |\n" for row in cells)
+
+
+def _shown(value: float | str | None, digits: int = 6) -> str:
+    if value is None:
+        return ""
+    return value if isinstance(value, str) else f"{value:.{digits}g}"
+
+
+def _caption(figure: PaperFigure) -> str:
+    if isinstance(figure, BifurcationFigure):
+        start, end = figure.values[[0, -1]]
+        values = f"{len(figure.values)} values of {figure.parameter} from {start:g} to {end:g}"
+        return f"{figure.title}; {values}."
+    return f"{figure.title}."

@@ -1,0 +1,1 @@
+"""The sampled loop, the control law in it, and its simulation."""

@@ -1,0 +1,299 @@
+"""The sampled loop: samples out, forces in, with hold, delay and time-outs, as a state machine.
+
+It knows no clock and no messages: whoever drives it decides when to advance. The plant node and
+`simulate` run this same loop.
+"""
+
+from collections import Counter, deque
+from collections.abc import Callable
+from enum import StrEnum
+from fractions import Fraction
+from math import floor, isfinite
+from random import Random
+from typing import NamedTuple
+
+from stickslip_ros.physics.model.disturbance import Disturbance
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.stamps import NANOSECONDS
+
+LOCKSTEP_START = NANOSECONDS
+"""Stamp of the first sample where no clock gives one, ns; ROS takes zero for "not set"."""
+
+
+class Sample(NamedTuple):
+    """State of the drive at a sample instant, SI units."""
+
+    number: int
+    stamp: int
+    """ns"""
+    position: float
+    velocity: float
+    friction_force: float
+    """On the slide, under the force held up to this instant, N."""
+    belt_position: float
+    belt_velocity: float
+
+
+class Verdict(StrEnum):
+    """What became of a force that was offered."""
+
+    ACCEPTED = "accepted"
+    NOT_FINITE = "not finite"
+    NO_STAMP = "zero stamp"
+    UNKNOWN_STAMP = "stamp of no sample"
+    ANSWERED = "already answered stamp"
+    TOO_LATE = "answers a sample that has passed"
+    OVERTAKEN = "overtaken by a newer one"
+    """It was accepted, and a newer one came before it could act."""
+
+
+class SampledLoop:
+    """A motion that is sampled at a fixed rate and driven by forces that answer the samples.
+
+    Force n, the answer to sample n, arrives at n T + delay, T = 1/rate, and acts until the next
+    one arrives. Where it is missing when the loop advances, the newest one is held on if
+    `hold_late` is set (as in real time) and not older than `force_timeout`; otherwise there is no
+    force. What stands in for force n in this way arrives when force n would have.
+
+    The delay of force n is `force_delay` and a share of `force_jitter`, uniformly distributed and
+    independent from sample to sample; it depends on n and `force_jitter_seed`, and on nothing else.
+    So jittered forces arrive at uneven intervals, and may overtake one another: then the newer one
+    acts, and the older one, arriving after it, is lost. A jitter of zero is a constant delay: force
+    n acts from n T + delay to (n + 1) T + delay.
+
+    A force that was accepted and will never act, because a newer one came or arrived before it, is
+    told to `overtaken`: the stamp (ns) of the sample that it answers, and the force (N).
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        rate: float,
+        start: int,
+        *,
+        force_delay: float = 0.0,
+        force_jitter: float = 0.0,
+        force_jitter_seed: int = 0,
+        force_timeout: float = float("inf"),
+        hold_late: bool = False,
+        expects_control: bool = True,
+        disturbance: Disturbance | None = None,
+        overtaken: Callable[[int, float], None] = lambda stamp, force: None,
+    ) -> None:
+        """Take sample 0 of `motion` at the stamp `start` (ns); rate in Hz, times in s."""
+        self.period = 1.0 / rate
+        """T, s."""
+        self.late_forces = 0
+        """Samples whose force had not come when it was due."""
+        self.dropped: Counter[Verdict] = Counter()
+        """Forces that did not act, by reason."""
+        self.controller_present = expects_control
+        """Whether an answer to the present sample may be hoped for: one came since the last gap."""
+        self._motion = motion
+        self._start = start
+        # So many samples take so many ns, exactly.
+        self._nanoseconds, self._samples = (NANOSECONDS / Fraction(rate)).as_integer_ratio()
+        # In periods.
+        self._delay, self._jitter = force_delay / self.period, force_jitter / self.period
+        self._shortest_delay = whole, rest = whole_and_rest(self._delay)
+        # Whether each force acts at once: then none is ever under way.
+        self._immediate = self._shortest_delay == (0, 0.0) and self._jitter == 0.0
+        # Of all generators, the one whose numbers are promised to stay the same.
+        self._random = Random(force_jitter_seed)
+        self._force_timeout = force_timeout
+        self._hold_late = hold_late
+        self._expects_control = expects_control
+        # In the order of arrival: number of the period, the share of it that is over, force, and
+        # number of the sample that it answers, -1 where there is none, as before force 0.
+        self._under_way = deque((number, rest, 0.0, -1) for number in range(whole))
+        self._acting = 0.0
+        self._acting_number = -1
+        self._newest: tuple[int, float] = (-1, 0.0)
+        self._sent_number = -1
+        self._overtaken = overtaken
+        self.scenario_disturbance = disturbance or Disturbance()
+        """Disturbance of the scenario; a new one acts from the next sample on."""
+        self._asked_disturbance = 0.0
+        self.disturbance = self._disturbance_at(0)
+        """Disturbance force that acts from the present sample to the next, N."""
+        self._next_drive: Drive | None = None
+        self._next_start: tuple[float, float] | None = None
+        self.sample = self._take_sample(0, 0.0)
+        """The present sample."""
+
+    @property
+    def answered(self) -> bool:
+        """Whether the force for the present sample has come."""
+        return self._newest[0] == self.sample.number
+
+    @property
+    def unbounded(self) -> bool:
+        """Whether the motion has run away."""
+        return self._motion.unbounded
+
+    def stamp(self, number: int) -> int:
+        """Return the stamp (ns) of sample `number`."""
+        return self._start + _rounded(number * self._nanoseconds, self._samples)
+
+    def offer(self, stamp: int, force: float) -> Verdict:
+        """Take `force` (N) as the answer to the sample of that stamp (ns), if it is one."""
+        number = self.number(stamp)
+        refusal = self._refusal(number, stamp, force)
+        if refusal is None:
+            if self._newest[0] > self._sent_number:
+                self._lose(*self._newest)
+            self._newest = (number, force)
+            self.controller_present = self._expects_control
+            return Verdict.ACCEPTED
+        self.dropped[refusal] += 1
+        if refusal is Verdict.TOO_LATE:
+            self.controller_present = self._expects_control
+        return refusal
+
+    def disturb(self, force: float) -> None:
+        """Add a disturbance of `force` (N) from the next sample on, until it is set again."""
+        self._asked_disturbance = force
+
+    def change_drive(self, drive: Drive) -> None:
+        """Go on with this drive from the next sample on."""
+        self._next_drive = drive
+
+    def reset(self, position: float, velocity: float) -> None:
+        """Put the slide at `position` (m) and `velocity` (m/s) at the next sample."""
+        self._next_start = (position, velocity)
+
+    def advance(self) -> Sample:
+        """Move on to the next sample with the forces that have come, and return it."""
+        motion, period, present = self._motion, self.period, self.sample
+        number, force = self._newest
+        if number != present.number:
+            number, force = self._stand_in()
+        if number > self._sent_number:
+            self._sent_number = number
+        now = 0.0
+        if self._immediate:
+            self._acting = force
+        else:
+            self._send(number, force)
+            now = self._deliver()
+        motion.force = self._acting + self.disturbance
+        motion.advance((1.0 - now) * period)
+        belt_position = present.belt_position + motion.drive.belt_speed * period
+        sample = self.sample = self._take_sample(present.number + 1, belt_position)
+        return sample
+
+    def _deliver(self) -> float:
+        """Let the forces that arrive in the present period act up to the newest; return when.
+
+        In periods from the present sample on.
+        """
+        motion, under_way, number = self._motion, self._under_way, self.sample.number
+        now = 0.0
+        while under_way and under_way[0][0] == number:
+            _, instant, force, answered = under_way.popleft()
+            self._acting_number = max(self._acting_number, answered)
+            if instant > now:
+                motion.force = self._acting + self.disturbance
+                motion.advance((instant - now) * self.period)
+                now = instant
+            self._acting = force
+        return now
+
+    def _send(self, answered: int, force: float) -> None:
+        """Let the force for the present sample set out; what it overtakes is lost."""
+        whole, rest = self._shortest_delay
+        number = self.sample.number
+        if self._jitter > 0.0:
+            whole, rest = whole_and_rest(self._delay + self._jitter * self._random.random())
+            lost: dict[int, float] = {}
+            while self._under_way and self._under_way[-1][:2] >= (number + whole, rest):
+                _, _, overtaken, overtaken_number = self._under_way.pop()
+                lost[overtaken_number] = overtaken
+            # A force that stands in for others is under way several times.
+            left = {self._acting_number, answered, *(entry[3] for entry in self._under_way)}
+            for overtaken_number in sorted(lost.keys() - left):
+                if overtaken_number > self._acting_number:
+                    self._lose(overtaken_number, lost[overtaken_number])
+        self._under_way.append((number + whole, rest, force, answered))
+
+    def _lose(self, number: int, force: float) -> None:
+        self.dropped[Verdict.OVERTAKEN] += 1
+        self._overtaken(self.stamp(number), force)
+
+    def _take_sample(self, number: int, belt_position: float) -> Sample:
+        motion = self._motion
+        friction_force = motion.friction_force
+        if self._next_drive is not None:
+            motion.drive, self._next_drive = self._next_drive, None
+        if self._next_start is not None:
+            start, self._next_start = self._next_start, None
+            motion.restart(*start)
+            friction_force = motion.friction_force
+        self.disturbance = self._disturbance_at(number)
+        return Sample(
+            number,
+            self.stamp(number),
+            motion.position,
+            motion.velocity,
+            friction_force,
+            belt_position,
+            motion.drive.belt_speed,
+        )
+
+    def _disturbance_at(self, number: int) -> float:
+        scenario = self.scenario_disturbance.force(number, self.period)
+        return scenario + self._asked_disturbance
+
+    def _stand_in(self) -> tuple[int, float]:
+        """Return what acts in place of the force for the present sample, which has not come.
+
+        And, before it, the number of the sample that it answers, -1 where no force acts.
+        """
+        if self._expects_control:
+            self.late_forces += 1
+        if not self._hold_late:
+            self.controller_present = False
+            return -1, 0.0
+        number, force = self._newest
+        if (self.sample.number - number) * self.period <= self._force_timeout:
+            return number, force
+        self.controller_present = False
+        return -1, 0.0
+
+    def _refusal(self, number: int, stamp: int, force: float) -> Verdict | None:
+        if not isfinite(force):
+            return Verdict.NOT_FINITE
+        if stamp == 0:
+            return Verdict.NO_STAMP
+        present = self.sample
+        if stamp != present.stamp and (
+            not 0 <= number < present.number or self.stamp(number) != stamp
+        ):
+            return Verdict.UNKNOWN_STAMP
+        if number <= self._newest[0]:
+            return Verdict.ANSWERED
+        if number < present.number and not self._hold_late:
+            return Verdict.TOO_LATE
+        return None
+
+    def number(self, stamp: int) -> int:
+        """Return the number of the sample whose stamp is nearest."""
+        if stamp == self.sample.stamp:
+            return self.sample.number
+        return _rounded((stamp - self._start) * self._samples, self._nanoseconds)
+
+
+def _rounded(numerator: int, denominator: int) -> int:
+    """Return the quotient rounded to the nearest whole number, a half to the even one."""
+    whole, rest = divmod(numerator, denominator)
+    excess = 2 * rest - denominator
+    return whole + (excess > 0 or (excess == 0 and whole % 2))
+
+
+def whole_and_rest(delay: float) -> tuple[int, float]:
+    """Split a delay in periods; what is whole but for rounding counts as whole."""
+    whole = round(delay)
+    if abs(delay - whole) < 1e-9:
+        return whole, 0.0
+    return floor(delay), delay - floor(delay)

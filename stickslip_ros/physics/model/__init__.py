@@ -1,0 +1,1 @@
+"""The drive, its friction laws and what acts on it, as equations."""

@@ -1,0 +1,14 @@
+"""The friction laws: one short file each, and one line in `LAWS`."""
+
+from stickslip_ros.physics.model.friction.base import FrictionLaw
+from stickslip_ros.physics.model.friction.coulomb import Coulomb
+from stickslip_ros.physics.model.friction.exponential import Exponential
+from stickslip_ros.physics.model.friction.linear import Linear
+from stickslip_ros.physics.model.friction.stribeck import Stribeck
+
+LAWS: dict[str, type[FrictionLaw]] = {
+    law.name: law for law in (Stribeck, Coulomb, Linear, Exponential)
+}
+"""Every friction law by the name it has in parameters."""
+
+__all__ = ["LAWS", "Coulomb", "Exponential", "FrictionLaw", "Linear", "Stribeck"]

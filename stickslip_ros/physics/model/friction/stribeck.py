@@ -1,0 +1,28 @@
+"""The cubic Stribeck law of the paper."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from stickslip_ros.physics.model.friction.base import FrictionLaw
+
+
+@dataclass(frozen=True)
+class Stribeck(FrictionLaw):
+    """Cubic Stribeck law, eq. 3: -mu_s s + a v_r - b v_r^3.
+
+    a = 3 (mu_s - mu_m) / (2 v_m) and b = (mu_s - mu_m) / (2 v_m^3).
+    """
+
+    name: ClassVar[str] = "stribeck"
+    inverse_speed_power: ClassVar[dict[str, int]] = {"minimum_speed": -1}
+
+    minimum: Any
+    """Smallest kinetic coefficient mu_m."""
+    minimum_speed: Any
+    """Relative speed v_m at which it is reached, m/s."""
+
+    def coefficient(self, relative_speed: Any, sign: Any) -> Any:
+        """Return mu(v_r), eq. 3."""
+        drop = self.static - self.minimum
+        ratio = relative_speed / self.minimum_speed
+        return -self.static * sign + drop / 2.0 * (3.0 * ratio - ratio * ratio * ratio)

@@ -1,0 +1,115 @@
+"""Controllers in the ROS graph: which nodes close the loop, and which ones nearly do."""
+
+from collections.abc import Callable, Iterable, Iterator
+
+from rclpy.node import Node, NodeNameNonExistentError
+from rclpy.qos import QoSProfile
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, Topic, mismatch
+
+DASHBOARD = "dashboard"
+"""Name of a node that reads joint_states and yet is meant to be no controller."""
+
+_CHANGE_STATE = "lifecycle_msgs/srv/ChangeState"
+
+
+def find_controllers(observer: Node) -> list[str]:
+    """Return the full names of the nodes that read joint_states and publish control_force.
+
+    The topics are those of the observer's namespace; type and quality of service are such that the
+    plant's writer and reader match.
+    """
+    readers = _named(observer.get_subscriptions_info_by_topic(JOINT_STATES.name), _misfit_as_reader)
+    writers = _named(observer.get_publishers_info_by_topic(CONTROL_FORCE.name), _misfit_as_writer)
+    return sorted(readers & writers)
+
+
+def find_managed(observer: Node) -> list[str]:
+    """Return the full names of all managed (lifecycle) nodes."""
+    return [
+        f"{namespace.rstrip('/')}/{name}"
+        for name, namespace in observer.get_node_names_and_namespaces()
+        if _is_managed(observer, name, namespace)
+    ]
+
+
+def near_misses(observer: Node, expected: Iterable[str]) -> list[str]:
+    """Return in a sentence each why nodes that look like controllers are none.
+
+    The nodes of those full names are `expected` to do what they do.
+    """
+    sentences: list[str] = []
+    readers = observer.get_subscriptions_info_by_topic(JOINT_STATES.name)
+    writers = observer.get_publishers_info_by_topic(CONTROL_FORCE.name)
+    reads, writes = _named(readers), _named(writers)
+    joint_states = observer.resolve_topic_name(JOINT_STATES.name)
+    control_force = observer.resolve_topic_name(CONTROL_FORCE.name)
+    here = joint_states.rpartition("/")[0]
+    for node in sorted(reads - writes - {*expected, f"{here}/{DASHBOARD}"}):
+        sentences.append(f"{node} reads {joint_states} but does not publish {control_force}")
+    for node in sorted(writes - reads - set(expected)):
+        sentences.append(f"{node} publishes {control_force} but does not read {joint_states}")
+    for info in readers:
+        if misfit := _misfit_as_reader(info):
+            sentences.append(f"{_full_name(info)} cannot read {joint_states}: {misfit}")
+    for info in writers:
+        if misfit := _misfit_as_writer(info):
+            sentences.append(f"nobody can read {control_force} of {_full_name(info)}: {misfit}")
+    return sentences + list(_elsewhere(observer, joint_states, control_force))
+
+
+def _is_managed(observer: Node, name: str, namespace: str) -> bool:
+    try:
+        services = observer.get_service_names_and_types_by_node(name, namespace)
+    except NodeNameNonExistentError:  # it has gone meanwhile
+        return False
+    return any(_CHANGE_STATE in types for _, types in services)
+
+
+def _elsewhere(observer: Node, joint_states: str, control_force: str) -> Iterator[str]:
+    """Say who uses topics of these names in a namespace in which no plant is."""
+    here = joint_states.rpartition("/")[0]
+    for topic, _ in observer.get_topic_names_and_types():
+        namespace, _, name = topic.rpartition("/")
+        if namespace == here or observer.get_publishers_info_by_topic(
+            f"{namespace}/{JOINT_STATES.name}"
+        ):
+            continue
+        if name == JOINT_STATES.name:
+            for node in sorted(_named(observer.get_subscriptions_info_by_topic(topic))):
+                yield f"{node} reads {topic}, the plant publishes {joint_states}"
+        elif name == CONTROL_FORCE.name:
+            for node in sorted(_named(observer.get_publishers_info_by_topic(topic))):
+                yield f"{node} publishes {topic}, the plant reads {control_force}"
+
+
+def _named(
+    endpoints: Iterable[TopicEndpointInfo],
+    misfit: Callable[[TopicEndpointInfo], str] = lambda _: "",
+) -> set[str]:
+    """Return the names of the nodes of endpoints that fit, as far as they are known already."""
+    return {
+        _full_name(info)
+        for info in endpoints
+        if not info.node_name.startswith("_") and not misfit(info)
+    }
+
+
+def _full_name(info: TopicEndpointInfo) -> str:
+    return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+
+
+def _misfit_as_reader(info: TopicEndpointInfo) -> str:
+    return _misfit(info, JOINT_STATES, JOINT_STATES.qos(), info.qos_profile)
+
+
+def _misfit_as_writer(info: TopicEndpointInfo) -> str:
+    return _misfit(info, CONTROL_FORCE, info.qos_profile, CONTROL_FORCE.qos())
+
+
+def _misfit(info: TopicEndpointInfo, topic: Topic, writer: QoSProfile, reader: QoSProfile) -> str:
+    """Return why an endpoint and the plant's do not match, or nothing."""
+    if info.topic_type != topic.type_name:
+        return f"its type is {info.topic_type}, not {topic.type_name}"
+    return mismatch(writer, reader)

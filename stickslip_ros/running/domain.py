@@ -1,0 +1,137 @@
+"""A ROS domain that nobody else on this machine uses, and ROS in it."""
+
+import gc
+import os
+import socket
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cache
+from threading import Lock
+
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from stickslip_ros.errors import RunError
+from stickslip_ros.nodes.base.domain_ports import FIRST_PROCESS, is_free, port
+from stickslip_ros.nodes.base.process import check_machine, this_machine_only
+
+DOMAINS = range(1, 102)
+"""Domains all ports of which are below those that the system gives away."""
+
+_DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_NO_PEERS = {"ROS_STATIC_PEERS": ""}
+
+_NO_LOGS_ELSEWHERE = ("--disable-external-lib-logs", "--disable-rosout-logs")
+"""No files in the home directory; and no topic, of which a process has one for each node name."""
+
+_FREE_PORT = 5
+"""A port of the domain that DDS leaves alone, as are those of TCP."""
+_DISCOVERY_PORTS = (0, 10, 12, 14, 16)
+"""What DDS listens on in every process of a domain, and in the first few."""
+
+_initialising = Lock()
+
+
+@contextmanager
+def own_domain() -> Generator[int]:
+    """Hold a ROS domain that no other holder on this machine has, whichever process it is in.
+
+    It is free again when its holder ends, in whatever way. Domains in which ROS runs already are
+    left alone. Raises RunError if none is left.
+    """
+    for domain in DOMAINS:
+        with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as held:
+            if not _bind(held, "127.0.0.1", port(domain, _FREE_PORT)):
+                continue
+            if all(is_free(port(domain, number)) for number in _DISCOVERY_PORTS):
+                yield domain
+                return
+    raise RunError(f"every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use on this machine")
+
+
+def domain_variables(domain: int) -> dict[str, str]:
+    """Return the environment variables of a process that is to be in a domain, on this machine."""
+    return {**this_machine_only(), **_NO_PEERS, "ROS_DOMAIN_ID": str(domain)}
+
+
+@contextmanager
+def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
+    """Initialise ROS in a domain, on this machine only, with these global arguments.
+
+    That is rclpy's default context, so that nodes which name none are in it, unless that is in
+    use already.
+    """
+    _collect_before_forks()
+    with _initialising:
+        context = Context() if rclpy.ok() else rclpy.get_default_context()
+        with _environment(this_machine_only()):
+            check_machine(domain)
+        with _environment({**_this_process_only_here(), **_NO_PEERS}):
+            _initialise(context, domain, arguments)
+    try:
+        yield context
+    finally:
+        if context is rclpy.get_default_context():
+            rclpy.try_shutdown()  # with no context named it can be initialised again
+        else:
+            rclpy.try_shutdown(context=context)
+        # What rclpy's destroyed nodes still hold, threads, sockets and shared memory of the
+        # middleware, goes with the last of them, and they refer to each other.
+        gc.collect()
+
+
+@cache
+def _collect_before_forks() -> None:
+    """Leave no nodes for a forked child to collect: it lacks the threads that they end with."""
+    os.register_at_fork(before=gc.collect)
+
+
+@cache
+def _this_process_only_here() -> Mapping[str, str]:
+    """Return the environment variables that keep ROS in this process on this machine.
+
+    Fast DDS reads a profile once per process. Where ROS was in use before ours could be read, it
+    listens on every address, and LOCALHOST, which takes shared memory, has to do.
+    """
+    variables = this_machine_only()
+    context = Context()
+    with own_domain() as domain, _environment({**variables, _DISCOVERY_RANGE: "OFF"}):
+        _initialise(context, domain, ["--ros-args"])
+        node = Node("which_addresses", context=context)
+        elsewhere_free = is_free(port(domain, FIRST_PROCESS), "127.0.0.2")
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+    return variables if elsewhere_free else {_DISCOVERY_RANGE: "LOCALHOST"}
+
+
+def _initialise(context: Context, domain: int, arguments: Sequence[str]) -> None:
+    rclpy.init(
+        args=[*arguments, *_NO_LOGS_ELSEWHERE],
+        context=context,
+        domain_id=domain,
+        signal_handler_options=SignalHandlerOptions.NO,
+    )
+
+
+@contextmanager
+def _environment(variables: Mapping[str, str]) -> Generator[None]:
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _bind(free: socket.socket, address: str, port: int) -> bool:
+    try:
+        free.bind((address, port))
+    except OSError:
+        return False
+    return True

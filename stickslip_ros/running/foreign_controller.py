@@ -1,0 +1,134 @@
+"""Controllers of others, kept running: a node in a thread, or a process."""
+
+import shlex
+import shutil
+from collections.abc import Mapping, Sequence
+from threading import Event, Thread
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from rclpy.node import Node
+
+from stickslip_ros.errors import InvalidInputError, RunError
+from stickslip_ros.nodes.base import child_process
+
+_END_TIMEOUT = 5.0
+_CALLBACK_TIMEOUT = 1.0
+
+
+class ControllerNode:
+    """A node that runs on an executor of its own in a thread of its own.
+
+    On an executor of the usual kind, that is, which runs every kind of callback. A managed
+    (lifecycle) node that is not active is configured and activated.
+    """
+
+    def __init__(self, node: Node) -> None:
+        self.node = node
+        self.unreported = False
+        """Whether the node has failed and nobody was told."""
+        self._failure: BaseException | None = None
+        self._idle = Event()
+        self._closing = False
+        self._executor = SingleThreadedExecutor(context=node.context)
+        self._executor.add_node(node)
+        self._thread = Thread(target=self._run, name=node.get_name(), daemon=True)
+
+    def start(self) -> None:
+        """Bring the node up and run it; raises RunError if it refuses."""
+        if isinstance(self.node, LifecycleNode):
+            _bring_up(self.node)
+        self._thread.start()
+
+    @property
+    def ended(self) -> bool:
+        """Whether the node runs no more."""
+        return self._failure is not None
+
+    def check(self) -> None:
+        """Raise RunError if the node runs no more."""
+        if self._failure is not None:
+            self.unreported = False
+            kind = type(self._failure).__name__
+            raise RunError(
+                f"the controller {self.node.get_name()} raised {kind}: {self._failure}"
+            ) from self._failure
+
+    def settle(self) -> None:
+        """Wait, within bounds, until the callback under way is over."""
+        self._idle.clear()
+        if not self.ended:
+            self._executor.create_task(self._idle.set)
+            self._idle.wait(_CALLBACK_TIMEOUT)
+
+    def close(self) -> None:
+        """End the thread and destroy the node; raises RunError if it does not come back."""
+        self._closing = True
+        self._executor.shutdown(timeout_sec=0.0)
+        if self._thread.ident is not None:
+            self._thread.join(_END_TIMEOUT)
+        if self._thread.is_alive():
+            raise RunError(
+                f"the controller {self.node.get_name()} is still in a callback, {_END_TIMEOUT:g} s "
+                "after it was to end: its thread is left behind"
+            )
+        self.node.destroy_node()
+
+    def _run(self) -> None:
+        try:
+            self._executor.spin()
+            if not self._closing:
+                raise RuntimeError("ROS was shut down while the loop was open")
+        except BaseException as error:
+            if not self._closing:
+                self.unreported = True
+                self._failure = error
+        finally:
+            self._idle.set()
+
+
+class ControllerProcess:
+    """A command and what it starts, ended together, at the latest when this process ends."""
+
+    def __init__(self, command: Sequence[str], variables: Mapping[str, str]) -> None:
+        """Start the command with environment variables of its own.
+
+        Raises InvalidInputError if there is no such command.
+        """
+        self._name = shlex.join(command)
+        if shutil.which(command[0]) is None:
+            raise InvalidInputError(f"the controller {self._name}: no command {command[0]!r}")
+        setting = [f"{name}={value}" for name, value in variables.items()]
+        self._process = child_process.start(["env", *setting, *command], guarded=True)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the process is no more."""
+        return self._process.poll() is not None
+
+    def check(self) -> None:
+        """Raise RunError if the process is no more."""
+        status = self._process.poll()
+        if status is not None:
+            how = f"killed by signal {-status}" if status < 0 else f"exit status {status}"
+            raise RunError(f"the controller {self._name} has ended ({how})")
+
+    def close(self) -> None:
+        """End the process, and what it has started."""
+        self._process.terminate()
+        self._process.wait()
+
+
+def _bring_up(node: LifecycleNode) -> None:
+    for transition, name in (
+        (node.trigger_configure, "configured"),
+        (node.trigger_activate, "activated"),
+    ):
+        try:
+            result = transition()
+        except RuntimeError:  # rcl: not possible in the state that the node has brought itself to
+            continue
+        if result is not TransitionCallbackReturn.SUCCESS:
+            raise RunError(
+                f"the controller {node.get_name()} could not be {name}: {result.name.lower()}"
+            )

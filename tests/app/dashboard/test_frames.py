@@ -1,0 +1,129 @@
+"""What the page gets to draw."""
+
+import json
+import struct
+from collections import deque
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from stickslip_ros.app.dashboard.frames import PERIODS, Frames
+from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
+from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
+from stickslip_ros.scenarios.files import load_scenario
+
+
+class Decoded(NamedTuple):
+    body: dict[str, Any]
+    lines: dict[str, tuple[np.ndarray, np.ndarray]]
+
+
+def decoded(frame: bytes) -> Decoded:
+    """Read a frame as the page does; fail if a byte is left."""
+    (size,) = struct.unpack_from("<I", frame)
+    assert size % 4 == 0
+    body = json.loads(frame[4 : 4 + size])
+    floats = np.frombuffer(frame, "<f4", offset=4 + size)
+    lines = {}
+    for name, count in (body["motion"] or {"counts": {}})["counts"].items():
+        lines[name] = floats[:count], floats[count : 2 * count]
+        floats = floats[2 * count :]
+    assert not len(floats)
+    return Decoded(body, lines)
+
+
+def observed(parameters: dict[str, Any]) -> Any:
+    cycles = {AMPLITUDE: deque([4e-4]), STICK_FRACTION: deque([0.1]), FREQUENCY: deque([8.0])}
+    return SimpleNamespace(parameters={"plant": parameters}, cycles=cycles, cycle_count=7)
+
+
+def fed(parameters: dict[str, Any], seconds: float, rate: float) -> Frames:
+    frames = Frames(observed(parameters))
+    time = np.arange(round(seconds * rate)) / rate
+    stamp = 1_000_000_000 + np.rint(time * 1e9).astype(np.int64)
+    x = 4e-4 * np.sin(100.0 * time)
+    belt = np.full_like(x, 0.04)
+    states = JointStateColumns(stamp, x, 100.0 * x, x, belt, belt)
+    none = WrenchColumns(stamp[:0], x[:0])
+    frames.feed(states, WrenchColumns(stamp, 1e5 * x), none)
+    return frames
+
+
+def test_before_the_first_sample_there_are_only_cycles() -> None:
+    body, lines = decoded(Frames(observed({})).frame(50))
+    assert body["motion"] is None
+    assert not lines
+    assert body["cycles"]["count"] == 7
+
+
+@pytest.mark.parametrize(
+    ("scenario", "labels", "scales"),
+    [
+        (
+            "feed_drive",
+            ["displacement (µm)", "velocity (mm/s)", "control force (N)"],
+            (1e6, 1e3, 1.0),
+        ),
+        (
+            "paper",
+            [f"{name} (dimensionless)" for name in ("displacement", "velocity", "control force")],
+            (1.0, 1.0, 1.0),
+        ),
+    ],
+)
+def test_values_are_in_the_units_of_their_axes(
+    scenario: str, labels: list[str], scales: tuple[float, float, float]
+) -> None:
+    plant = load_scenario(scenario).plant
+    body, lines = decoded(fed(plant.flat(), 5.0, 1000.0).frame(50))
+    motion, drive = body["motion"], plant.as_drive()
+    length, speed, force = scales
+    assert motion["labels"] == labels
+    time_unit = "s" if scenario == "feed_drive" else "dimensionless"
+    assert motion["time_label"] == f"time before now ({time_unit})"
+    assert body["cycles"]["label"] == labels[0].replace("displacement", "amplitude")
+    assert body["cycles"]["amplitude"] == [pytest.approx(4e-4 * length)]
+    assert motion["window"] == pytest.approx(50.0 * drive.natural_period)
+    assert motion["equilibrium"] == pytest.approx(drive.equilibrium_position * length)
+    assert motion["belt_speed"] == pytest.approx(0.04 * speed)
+    for name, largest in (
+        ("position", 4e-4 * length),
+        ("velocity", 4e-2 * speed),
+        ("force", 40.0 * force),
+        ("orbit", 4e-2 * speed),
+    ):
+        assert lines[name][1].max() == pytest.approx(largest, rel=1e-2), name
+    time = lines["position"][0]
+    assert time[-1] == 0.0
+    assert time.min() >= -motion["window"]
+
+
+@pytest.mark.parametrize("parameters", [{}, {"mass": 1.0, "of another version": 2.0}])
+def test_a_drive_that_is_not_known_is_shown_by_its_own_frequency(parameters: Any) -> None:
+    body, _ = decoded(fed(parameters, 5.0, 1000.0).frame(PERIODS[0]))
+    assert body["motion"]["window"] == pytest.approx(PERIODS[0] / 8.0)
+    assert body["motion"]["equilibrium"] is None
+    assert body["motion"]["labels"][0] == "displacement (m)"
+
+
+def test_on_a_belt_at_rest_no_place_is_the_equilibrium() -> None:
+    plant = load_scenario("feed_drive", ["plant.belt_speed=0"]).plant
+    body, _ = decoded(fed(plant.flat(), 1.0, 1000.0).frame(PERIODS[0]))
+    assert body["motion"]["equilibrium"] is None
+
+
+def test_a_frame_stays_small_whatever_the_rate() -> None:
+    plant = load_scenario("feed_drive").plant
+    for rate in (100.0, 1_000.0, 20_000.0):
+        frame = fed(plant.flat(), 13.0, rate).frame(PERIODS[-1])
+        assert len(frame) < 100_000
+
+
+@pytest.mark.parametrize("frequency", [0.0, 1e-300, 1e300, float("inf"), float("nan"), -1.0])
+def test_no_frequency_that_somebody_publishes_does_harm(frequency: float) -> None:
+    frames = fed({}, 5.0, 1000.0)
+    frames._observer.cycles[FREQUENCY].append(frequency)
+    body, _ = decoded(frames.frame(PERIODS[0]))
+    assert body["motion"]["window"] == PERIODS[0]

@@ -1,0 +1,224 @@
+"""What the dashboard hears of a loop, and does to it."""
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.parameter import Parameter
+
+from stickslip_ros.app.dashboard import listener as observer_module
+from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, ObserverNode
+from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
+from stickslip_ros.messages.topics import (
+    AMPLITUDE,
+    APPLIED_DISTURBANCE,
+    DIAGNOSTICS,
+    FREQUENCY,
+    STICK_FRACTION,
+)
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from tests.nodes.graph import Graph
+
+pytestmark = pytest.mark.usefixtures("often_diagnosed")
+
+
+class Shown:
+    """Collects what an observer passes on."""
+
+    def __init__(self) -> None:
+        self.states: list[JointStateColumns] = []
+        self.forces: list[WrenchColumns] = []
+        self.dropped: list[WrenchColumns] = []
+
+    def take(
+        self, states: JointStateColumns, forces: WrenchColumns, dropped: WrenchColumns
+    ) -> None:
+        self.states.append(states)
+        self.forces.append(forces)
+        self.dropped.append(dropped)
+
+    @property
+    def stamps(self) -> np.ndarray:
+        return np.concatenate([states.stamp for states in self.states])
+
+    @property
+    def position(self) -> np.ndarray:
+        return np.concatenate([states.position for states in self.states])
+
+
+@pytest.fixture
+def shown() -> Shown:
+    return Shown()
+
+
+@pytest.fixture
+def observer(graph: Graph, shown: Shown) -> ObserverNode:
+    node = ObserverNode("/test", shown.take, context=graph.context)
+    graph.adopt(node)
+    return node
+
+
+def outcome(graph: Graph, answer: Answer) -> str:
+    graph.wait_until(answer.done, "an answer")
+    return answer.result()
+
+
+def run_loop(graph: Graph, observer: ObserverNode, **plant: object) -> None:
+    """Let all three run, until the observer has heard of them all and knows their parameters."""
+    graph.add(AnalyzerNode)
+    graph.add(WashoutControllerNode)
+    graph.add(PlantNode, **{"pace": "realtime", "belt_speed": 0.2, **plant})
+    graph.wait_until(
+        lambda: (
+            all(health.state == "active" for health in observer.health.values())
+            and all(observer.parameters.values())
+        ),
+        "the observer knows all nodes",
+    )
+
+
+def test_it_hears_states_forces_and_cycles(
+    graph: Graph, observer: ObserverNode, shown: Shown
+) -> None:
+    assert {health.state for health in observer.health.values()} == {ABSENT}
+    run_loop(graph, observer, pace="lockstep", rate=50.0, expects_control=False)
+    graph.wait_until(lambda: observer.cycle_count > 3, "cycles")
+    assert (np.diff(shown.stamps) > 0).all()
+    assert len(shown.stamps) > 300
+    assert max(len(forces.stamp) for forces in shown.forces) > 0
+    assert {len(values) > 3 for values in observer.cycles.values()} == {True}
+    assert observer.cycles[AMPLITUDE][-1] > 0.0
+    assert 0.0 <= observer.cycles[STICK_FRACTION][-1] <= 1.0
+    assert 0.1 < observer.cycles[FREQUENCY][-1] < 0.2
+    assert int(observer.health["plant"].figures["samples"]) > 0
+
+
+def test_a_value_is_taken_or_refused_with_the_reason_of_the_node(
+    graph: Graph, observer: ObserverNode
+) -> None:
+    run_loop(graph, observer)
+    assert observer.parameters["plant"]["belt_speed"] == 0.2
+    assert not outcome(graph, observer.set_parameter("plant", "belt_speed", 0.3))
+    graph.wait_until(lambda: observer.parameters["plant"]["belt_speed"] == 0.3, "the new value")
+    refusal = outcome(graph, observer.set_parameter("washout_controller", "corner_frequency", -1.0))
+    assert "corner_frequency = -1.0 is refused: must be a finite number above 0" in refusal
+    assert observer.parameters["washout_controller"]["corner_frequency"] == 2.0
+    assert "rate cannot be changed" in outcome(graph, observer.set_parameter("plant", "rate", 1.0))
+
+
+def test_what_others_set_is_noticed(graph: Graph, observer: ObserverNode) -> None:
+    plant = graph.add(PlantNode, pace="realtime", expects_control=False)
+    graph.wait_until(lambda: observer.parameters["plant"], "the plant's parameters")
+    plant.set_parameters([Parameter("damping", value=0.5)])
+    graph.wait_until(lambda: observer.parameters["plant"]["damping"] == 0.5, "the new value")
+
+
+def test_the_controller_is_switched_off_and_on(graph: Graph, observer: ObserverNode) -> None:
+    run_loop(graph, observer)
+    for active, state in ((False, "inactive"), (True, "active")):
+        assert not outcome(graph, observer.set_active("washout_controller", active))
+        graph.wait_until(
+            lambda s=state: observer.health["washout_controller"].state == s, f"it is {state}"
+        )
+    assert [what for _, what in observer.events if "inactive" in what] == [
+        "washout_controller inactive"
+    ]
+
+
+def test_reset_puts_the_motion_back(graph: Graph, observer: ObserverNode, shown: Shown) -> None:
+    run_loop(graph, observer, expects_control=False, **{"initial.position": 0.5})
+    graph.wait_until(lambda: abs(shown.position[-1] - 0.5) > 0.05, "the slide has moved")
+    before = len(shown.position)
+    assert not outcome(graph, observer.reset())
+    graph.wait_until(lambda: 0.5 in shown.position[before:], "the initial position again")
+
+
+@pytest.mark.parametrize("pace", ["realtime", "lockstep"])
+def test_a_tap_lasts_for_its_simulated_time_and_ends(
+    graph: Graph, observer: ObserverNode, pace: str
+) -> None:
+    applied = graph.listen(APPLIED_DISTURBANCE)
+    run_loop(graph, observer, pace=pace, rate=1000.0)
+    assert not outcome(graph, observer.tap(0.05, 0.2))
+    graph.wait_until(
+        lambda: [m.wrench.force.x for m in applied][-2:] == [0.05, 0.0], "the force comes and goes"
+    )
+    begin, end = (m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 for m in applied[-2:])
+    assert end - begin > 0.15  # at most what was under way when it began
+
+
+def test_a_tap_that_nobody_feels_is_said(graph: Graph, observer: ObserverNode) -> None:
+    assert outcome(graph, observer.tap(1.0, 0.1)) == "nobody listens to /test/disturbance_force"
+
+
+@pytest.mark.parametrize(
+    ("force", "duration"), [(float("nan"), 1.0), (float("inf"), 1.0), (1.0, 0.0), (1.0, 1e300)]
+)
+def test_an_impossible_tap_is_refused(
+    graph: Graph, observer: ObserverNode, force: float, duration: float
+) -> None:
+    refusal = outcome(graph, observer.tap(force, duration))
+    assert refusal.startswith("a tap needs a finite force and a time above 0, at most")
+
+
+def test_a_node_that_was_started_again_at_once_is_asked_again(
+    graph: Graph, observer: ObserverNode
+) -> None:
+    first = graph.add(PlantNode, pace="realtime", expects_control=False, damping=0.1)
+    graph.wait_until(
+        lambda: int(observer.health["plant"].figures.get("samples", 0)) > 150, "samples"
+    )
+    graph.executor.remove_node(first)
+    first.destroy_node()
+    graph.add(PlantNode, pace="realtime", expects_control=False, damping=0.3)
+    graph.wait_until(
+        lambda: observer.parameters["plant"].get("damping") == 0.3, "the parameters of the other"
+    )
+    assert SILENT not in {what.split()[-1] for _, what in observer.events}
+
+
+def test_health_is_kept_of_few_whatever_somebody_publishes(
+    graph: Graph, observer: ObserverNode
+) -> None:
+    publisher = graph.observer.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, 100)
+    statuses = [DiagnosticStatus(name=f"/test/<b>{number}</b>") for number in range(200)]
+    message = DiagnosticArray(status=[*statuses, DiagnosticStatus(name="/test/plant")])
+    message.status[-1].message = "the last of them"
+
+    def heard() -> bool:
+        publisher.publish(message)
+        return observer.health["plant"].message == "the last of them"
+
+    graph.wait_until(heard, "the diagnostics")
+    assert len(observer.health) == 50
+
+
+def test_a_push_ends_with_the_observer(graph: Graph, observer: ObserverNode) -> None:
+    applied = graph.listen(APPLIED_DISTURBANCE)
+    run_loop(graph, observer)
+    assert not outcome(graph, observer.tap(0.05, 1e6))
+    graph.wait_until(lambda: [m.wrench.force.x for m in applied][-1:] == [0.05], "the force")
+    observer.close()
+    graph.wait_until(lambda: applied[-1].wrench.force.x == 0.0, "no force")
+
+
+def test_a_node_that_is_not_there_does_not_answer(
+    graph: Graph, observer: ObserverNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(observer_module, "_ANSWER_TIMEOUT", 0.3)
+    assert outcome(graph, observer.reset()) == "plant does not answer"
+
+
+def test_a_node_that_falls_silent_and_comes_back_is_shown_as_that(
+    graph: Graph, observer: ObserverNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(observer_module, "SILENCE", 1.0)
+    plant = graph.add(PlantNode, pace="realtime", expects_control=False)
+    graph.wait_until(lambda: observer.health["plant"].state == "active", "the plant")
+    graph.executor.remove_node(plant)
+    graph.wait_until(lambda: observer.health["plant"].state == SILENT, "silence")
+    graph.executor.add_node(plant)
+    graph.wait_until(lambda: observer.health["plant"].state == "active", "the plant again")
+    events = [what for _, what in observer.events]
+    assert events.index("plant silent") < events.index("plant is back, active")

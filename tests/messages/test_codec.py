@@ -1,0 +1,283 @@
+import math
+import struct
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Vector3, Wrench, WrenchStamped
+from hypothesis import given
+from hypothesis import strategies as st
+from rclpy.serialization import deserialize_message, serialize_message
+from rosbags.typesys import Stores, get_typestore
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from stickslip_ros.errors import BagError
+from stickslip_ros.messages.codec import (
+    JointStateSample,
+    joint_state_columns,
+    pack_header,
+    pack_joint_state,
+    pack_wrench,
+    unpack_header,
+    unpack_joint_state,
+    unpack_wrench,
+    wrench_columns,
+)
+
+JOINT_STATE_PADDING = (*range(17, 20), 34, 35, *range(45, 48), *range(72, 76), *range(96, 100))
+WRENCH_PADDING = range(22, 28)
+
+stamps = st.integers(-(2**31) * 10**9, 2**31 * 10**9 - 1)
+numbers = st.floats(allow_nan=False)
+pairs = st.tuples(numbers, numbers)
+frames = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=9)
+
+
+def header(stamp, frame=""):
+    message = Header(frame_id=frame)
+    message.stamp.sec, message.stamp.nanosec = divmod(stamp, 10**9)
+    return message
+
+
+def joint_state(stamp, position, velocity, effort, names=("slide", "belt"), frame=""):
+    return JointState(
+        header=header(stamp, frame),
+        name=list(names),
+        position=list(position),
+        velocity=list(velocity),
+        effort=list(effort),
+    )
+
+
+def wrench(stamp, x, y=0.0, z=0.0, frame="slide"):
+    return WrenchStamped(header=header(stamp, frame), wrench=Wrench(force=Vector3(x=x, y=y, z=z)))
+
+
+def without(padding, data):
+    """Zero the padding, in which Fast DDS leaves whatever was in memory."""
+    return bytes(0 if index in padding else byte for index, byte in enumerate(data))
+
+
+@given(stamps, pairs, pairs, pairs)
+def test_a_joint_state_is_packed_as_rclpy_serializes_it(stamp, position, velocity, effort):
+    message = joint_state(stamp, position, velocity, effort)
+    packed = pack_joint_state(stamp, position, velocity, effort)
+    assert packed == without(JOINT_STATE_PADDING, serialize_message(message))
+    assert deserialize_message(packed, JointState) == message
+
+
+@given(stamps, numbers)
+def test_a_wrench_is_packed_as_rclpy_serializes_it(stamp, force):
+    message = wrench(stamp, force)
+    packed = pack_wrench(stamp, force)
+    assert packed == without(WRENCH_PADDING, serialize_message(message))
+    assert deserialize_message(packed, WrenchStamped) == message
+
+
+@given(stamps)
+def test_a_header_is_packed_as_rclpy_serializes_it(stamp):
+    assert pack_header(stamp) == serialize_message(header(stamp))
+    assert unpack_header(pack_header(stamp)) == stamp
+
+
+@given(stamps, frames)
+def test_the_stamp_of_any_header_is_read(stamp, frame):
+    assert unpack_header(serialize_message(header(stamp, frame))) == stamp
+
+
+@given(stamps, pairs, pairs, pairs)
+def test_what_is_packed_is_unpacked(stamp, position, velocity, effort):
+    assert unpack_joint_state(pack_joint_state(stamp, position, velocity, effort)) == (
+        JointStateSample(stamp, position[0], velocity[0], effort[0], position[1], velocity[1])
+    )
+    assert unpack_wrench(pack_wrench(stamp, effort[0])) == (stamp, effort[0])
+
+
+@st.composite
+def foreign_joint_states(draw):
+    names = draw(st.permutations(["slide", "belt", *draw(st.lists(frames, max_size=3))]))
+    values = st.lists(numbers, min_size=len(names), max_size=len(names))
+    position, velocity = draw(values), draw(values)
+    effort = draw(st.one_of(values, st.just([])))
+    message = joint_state(draw(stamps), position, velocity, effort, names, draw(frames))
+    return message, list(names).index("slide"), list(names).index("belt")
+
+
+@given(foreign_joint_states())
+def test_joint_states_of_other_layouts_are_read(case):
+    message, slide, belt = case
+    sample = unpack_joint_state(serialize_message(message))
+    stamp = message.header.stamp
+    assert sample.stamp == stamp.sec * 10**9 + stamp.nanosec
+    assert sample.position == message.position[slide]
+    assert sample.velocity == message.velocity[slide]
+    assert sample.belt_position == message.position[belt]
+    assert sample.belt_velocity == message.velocity[belt]
+    if message.effort:
+        assert sample.effort == message.effort[slide]
+    else:
+        assert math.isnan(sample.effort)
+
+
+@given(stamps, numbers, numbers, frames)
+def test_wrenches_of_other_layouts_are_read(stamp, force, other, frame):
+    data = serialize_message(wrench(stamp, force, other, other, frame))
+    assert unpack_wrench(data) == (stamp, force)
+
+
+@given(stamps, pairs, pairs, frames)
+def test_big_endian_messages_are_read(stamp, position, velocity, frame):
+    typestore = get_typestore(Stores.ROS2_JAZZY)
+    types = typestore.types
+    time = types["builtin_interfaces/msg/Time"](*divmod(stamp, 10**9))
+    message = types["sensor_msgs/msg/JointState"](
+        header=types["std_msgs/msg/Header"](stamp=time, frame_id=frame),
+        name=["slide", "belt"],
+        position=np.array(position),
+        velocity=np.array(velocity),
+        effort=np.array([]),
+    )
+    data = typestore.serialize_cdr(message, "sensor_msgs/msg/JointState", little_endian=False)
+    assert unpack_joint_state(bytes(data))[:3] == (stamp, position[0], velocity[0])
+
+
+@pytest.mark.parametrize(
+    ("message", "complaint"),
+    [
+        (joint_state(1, [1.0], [1.0], [], ["slide"]), "belt must be among them"),
+        (joint_state(1, [], [], [], []), "slide and belt must be among them"),
+        (joint_state(1, [], [1.0, 2.0], []), "0 positions"),
+        (joint_state(1, [1.0, 2.0], [], []), "0 velocities"),
+        (joint_state(1, [1.0, 2.0], [1.0], []), "1 velocities"),
+        (joint_state(1, [1.0, 2.0], [1.0, 2.0], [1.0]), "1 efforts"),
+        (joint_state(1, [], [], [], ["slide", "belt"] * 501), "1002 joints; at most 1000"),
+        (joint_state(1, [], [], [], ["slide" * 10_000] * 900), "slide and belt|belt must be"),
+    ],
+)
+def test_a_joint_state_that_lacks_something_is_refused_in_a_line(message, complaint):
+    with pytest.raises(BagError, match=complaint) as refusal:
+        unpack_joint_state(serialize_message(message))
+    assert len(str(refusal.value)) < 400
+
+
+@pytest.mark.parametrize("unpack", [unpack_joint_state, unpack_wrench, unpack_header])
+@pytest.mark.parametrize("data", [b"", b"\0", b"\0\1\0\0", b"\0\3\0\0" + bytes(112), bytes(11)])
+def test_what_is_no_message_is_refused(unpack, data):
+    with pytest.raises(BagError):
+        unpack(data)
+
+
+@given(st.integers(0, 115))
+def test_a_cut_message_is_refused(length):
+    with pytest.raises(BagError):
+        unpack_joint_state(pack_joint_state(1, (1.0, 2.0), (3.0, 4.0), (5.0, 6.0))[:length])
+
+
+@given(st.binary(max_size=150), st.integers(0, 116), st.integers(0, 116))
+def test_garbage_is_read_or_refused(garbage, start, end):
+    valid = pack_joint_state(1, (1.0, 2.0), (3.0, 4.0), (5.0, 6.0))
+    for data in (b"\0\1\0\0" + garbage, valid[:start] + garbage + valid[end:]):
+        for unpack in (unpack_joint_state, unpack_wrench, unpack_header):
+            with suppress(BagError):
+                unpack(data)
+
+
+@pytest.mark.parametrize("offset", [12, 20, 24, 36, 48, 68, 92])
+@pytest.mark.parametrize("length", [2**31, 2**32 - 1])
+def test_an_absurd_length_is_refused(offset, length):
+    data = bytearray(pack_joint_state(1, (1.0, 2.0), (3.0, 4.0), (5.0, 6.0)))
+    struct.pack_into("<I", data, offset, length)
+    with pytest.raises(BagError):
+        unpack_joint_state(bytes(data))
+
+
+@pytest.mark.parametrize("stamp", [2**31 * 10**9, -(2**31) * 10**9 - 1])
+def test_a_stamp_beyond_ros_time_is_refused(stamp):
+    for pack in (
+        lambda: pack_header(stamp),
+        lambda: pack_wrench(stamp, 1.0),
+        lambda: pack_joint_state(stamp, (1.0, 2.0), (3.0, 4.0), (5.0, 6.0)),
+    ):
+        with pytest.raises(BagError, match=str(stamp)):
+            pack()
+
+
+def rows(columns):
+    return list(
+        zip(
+            columns.stamp.tolist(),
+            columns.position.tolist(),
+            columns.velocity.tolist(),
+            columns.effort.tolist(),
+            columns.belt_position.tolist(),
+            columns.belt_velocity.tolist(),
+            strict=True,
+        )
+    )
+
+
+# Structures that a publisher may use: joints (further ones may be there), frame, byte order.
+structures = st.tuples(
+    st.lists(st.sampled_from(["slide", "belt", "a", "gripper"]), unique=True, max_size=4),
+    st.sampled_from(["", "world", "slide"]),
+    st.booleans(),
+)
+
+
+@given(
+    st.lists(st.tuples(stamps, pairs, pairs, pairs, st.integers(0, 12)), max_size=40),
+    st.lists(structures, min_size=13, max_size=13),
+)
+def test_columns_hold_what_the_single_messages_say(states, choices):
+    messages = []
+    for *state, choice in states:
+        joints, frame, with_effort = choices[choice]
+        message = joint_state(*state, joints, frame=frame) if joints else joint_state(*state)
+        if joints:
+            surplus = [float(n) for n in range(len(joints))]
+            for name in ("position", "velocity", "effort"):
+                setattr(message, name, (list(getattr(message, name)) + surplus)[: len(joints)])
+            if not with_effort:
+                message.effort = []
+        messages.append(serialize_message(message) if choice else pack_joint_state(*state))
+    expected, refusals = [], []
+    for message in messages:
+        try:
+            expected.append(unpack_joint_state(message))
+        except BagError as error:
+            refusals.append(str(error))
+    columns, refused = joint_state_columns(messages)
+    assert str(rows(columns)) == str([tuple(sample) for sample in expected])  # NaN is NaN
+    assert columns.stamp.dtype == np.int64
+    assert refused == (len(refusals), refusals[0] if refusals else "")
+
+
+@given(st.lists(st.tuples(stamps, numbers, st.integers(0, 20)), max_size=40))
+def test_wrench_columns_hold_what_the_single_messages_say(forces):
+    messages = [
+        serialize_message(wrench(stamp, force, frame="f" * frame))
+        if frame
+        else pack_wrench(stamp, force)
+        for stamp, force, frame in forces
+    ]
+    columns, refused = wrench_columns(messages)
+    assert refused.number == 0
+    assert columns.stamp.tolist() == [stamp for stamp, _, _ in forces]
+    assert columns.force.tolist() == [force for _, force, _ in forces]
+
+
+def test_columns_see_that_a_message_of_the_same_length_has_other_joints():
+    names = ["glide", "belt"]
+    other = serialize_message(joint_state(1, (1.0, 2.0), (3.0, 4.0), (5.0, 6.0), names))
+    valid = pack_joint_state(1, (1.0, 2.0), (3.0, 4.0), (5.0, 6.0))
+    assert len(other) == len(valid)
+    columns, refused = joint_state_columns([valid, other, valid])
+    assert rows(columns) == [(1, 1.0, 3.0, 5.0, 2.0, 4.0)] * 2
+    assert refused.number == 1
+    assert "glide" in refused.reason
+
+
+def test_columns_take_the_joints_in_the_other_order():
+    other = serialize_message(joint_state(1, (1.0, 2.0), (3.0, 4.0), (5.0, 6.0), ["belt", "slide"]))
+    assert rows(joint_state_columns([other])[0]) == [(1, 2.0, 4.0, 6.0, 1.0, 3.0)]

@@ -1,0 +1,55 @@
+"""Asking another node for its parameters, where the middleware does not do its part at once."""
+
+from typing import Any
+
+import pytest
+from rclpy.client import Client
+from rclpy.node import Node
+
+from stickslip_ros.nodes.base.service_call import ask_parameters
+from stickslip_ros.nodes.plant import PlantNode
+from tests.nodes.graph import Graph
+
+
+class _Unlucky(Node):
+    """A node whose first client never matches, although the service is there."""
+
+    def __init__(self, graph: Graph) -> None:
+        super().__init__("unlucky", context=graph.context, namespace="/test")
+        self.clients_made = 0
+
+    def create_client(self, srv_type: Any, srv_name: str, **options: Any) -> Client:
+        self.clients_made += 1
+        name = srv_name if self.clients_made > 1 else "nowhere/to_be_found"
+        return super().create_client(srv_type, name, **options)
+
+
+@pytest.fixture
+def unlucky(graph: Graph) -> _Unlucky:
+    node = _Unlucky(graph)
+    graph.adopt(node)
+    return node
+
+
+@pytest.mark.parametrize(
+    ("names", "known"),
+    [(["mass", "rate"], {"mass": 3.0, "rate": 10.0}), (["no_such_parameter"], {})],
+)
+def test_another_client_asks_where_one_does_not_match(
+    graph: Graph, unlucky: _Unlucky, names: list[str], known: dict[str, Any]
+) -> None:
+    graph.add(PlantNode, autostart=False, mass=3.0, rate=10.0)
+    answers: list[dict[str, Any]] = []
+    inquiry = ask_parameters(unlucky, "plant", names, answers.append)
+    graph.wait_until(lambda: inquiry.pursue() or answers, "the plant answers")
+    assert answers == [known]
+    assert unlucky.clients_made > 1
+    inquiry.close()
+
+
+def test_for_a_node_that_is_not_there_one_client_is_enough(graph: Graph, unlucky: _Unlucky) -> None:
+    inquiry = ask_parameters(unlucky, "plant", ["mass"], lambda _: None)
+    rounds = iter(range(30))
+    graph.wait_until(lambda: inquiry.pursue() or next(rounds, None) is None, "many rounds")
+    assert unlucky.clients_made == 1
+    inquiry.close()

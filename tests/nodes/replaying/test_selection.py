@@ -1,0 +1,157 @@
+"""What of a bag is to be replayed, and what is refused."""
+
+from math import inf
+from pathlib import Path
+
+import pytest
+from mcap.writer import Writer
+
+from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.messages.codec import pack_header
+from stickslip_ros.nodes.replaying.player import JITTER
+from stickslip_ros.nodes.replaying.selection import Excerpt
+from stickslip_ros.scenarios.parameters import ReplayParameters
+
+SECOND = 1_000_000_000
+STATES = "/drive/joint_states"
+FORCES = "/drive/control_force"
+RECORDED = "/drive/recorded"
+TYPES = {
+    STATES: "sensor_msgs/msg/JointState",
+    FORCES: "geometry_msgs/msg/WrenchStamped",
+    RECORDED: "std_msgs/msg/Header",
+    "/other/recorded": "std_msgs/msg/Header",
+    "/clock": "rosgraph_msgs/msg/Clock",
+}
+
+
+def record(bag: Path, *messages: tuple[str, float]) -> str:
+    """Write messages of a topic and a log time (s) to a bag; return its path."""
+    with Recorder(bag) as recorder:
+        channels = {
+            topic: recorder.add_topic(topic, kind, QosProfile(depth=10))
+            for topic, kind in TYPES.items()
+        }
+        for topic, time in messages:
+            stamp = round(time * SECOND)
+            recorder.write(channels[topic], pack_header(stamp), stamp)
+    return str(bag)
+
+
+def excerpt(bag: str, **parameters: object) -> Excerpt:
+    return Excerpt(ReplayParameters.validated({"bag": bag, **parameters}, "/replay"), "/replay")
+
+
+def heard(bag: str, **parameters: object) -> list[tuple[str, float]]:
+    """Return topic and log time (s) of what is to be replayed."""
+    messages = excerpt(bag, **parameters).messages()
+    return [(topic, log_time / SECOND) for topic, log_time, _ in messages]
+
+
+def test_a_part_begins_and_ends_at_recorded_times(tmp_path: Path) -> None:
+    run = [(topic, 5.0 + n) for n in range(10) for topic in (STATES, FORCES)]
+    bag = record(tmp_path / "bag", *run)
+    assert heard(bag) == run
+    assert heard(bag, start=2.0, duration=3.0) == run[4:10]
+    assert heard(bag, start=2.5, duration=1.0, topics=[FORCES]) == [(FORCES, 8.0)]
+    assert heard(bag, start=2.0, duration=1e300) == run[4:]
+    assert excerpt(bag).length == 9.0
+    assert excerpt(bag, start=2.0).length == 7.0
+    assert excerpt(bag, start=2.0, duration=3.0).length == 3.0
+
+
+def test_what_comes_late_still_belongs_to_the_part(tmp_path: Path) -> None:
+    end = 7.0 + JITTER / SECOND
+    run = [(STATES, 5.0), (STATES, 7.5), (FORCES, 6.9), (STATES, end), (FORCES, 6.8)]
+    bag = record(tmp_path / "bag", *run)
+    assert heard(bag, duration=2.0) == [(STATES, 5.0), (FORCES, 6.9)]
+
+
+def test_the_first_message_need_not_be_the_earliest(tmp_path: Path) -> None:
+    run = [(STATES, 5.0), (FORCES, 4.9), (STATES, 6.0), (FORCES, 5.9), (STATES, 7.0)]
+    bag = record(tmp_path / "bag", *run)
+    assert heard(bag) == run
+    assert heard(bag, duration=1.0) == [*run[:2], run[3]]
+    assert heard(bag, start=0.5) == run[2:]
+    assert excerpt(bag).length == 2.0
+
+
+def test_a_segment_of_earlier_log_times_follows_the_one_before(tmp_path: Path) -> None:
+    times = (11.0, 12.0, 13.0, 1.0, 2.0, 3.0)
+    run = [(STATES, time) for time in times]
+    bag = record(tmp_path / "bag", *run)
+    assert heard(bag) == run
+    assert heard(bag, start=1.0, duration=3.0) == run[1:4]
+    assert heard(bag, start=4.0) == run[4:]
+    assert excerpt(bag).length == inf
+    with pytest.raises(InvalidInputError, match="is 5 s long"):
+        excerpt(bag, start=6.0)
+
+
+def test_what_only_the_living_say_is_left_out_unless_asked_for(tmp_path: Path) -> None:
+    bag = record(tmp_path / "bag", (STATES, 1.0), (RECORDED, 1.0))
+    assert set(excerpt(bag).offers) == set(TYPES) - {RECORDED}
+    assert set(excerpt(bag, clock=True).offers) == set(TYPES) - {RECORDED, "/clock"}
+    assert set(excerpt(bag, topics=[RECORDED]).offers) == {RECORDED}
+
+
+def foreign_bag(file: Path, types: dict[str, str]) -> str:
+    """Write one message on each topic to a file as a recorder with other message types would."""
+    with file.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        for topic, kind in types.items():
+            schema = writer.register_schema(kind, "ros2msg", b"")
+            writer.add_message(writer.register_channel(topic, "cdr", schema), 5, bytes(12), 5)
+        writer.finish()
+    return str(file)
+
+
+def test_what_cannot_be_published_is_left_out_with_the_reason(tmp_path: Path) -> None:
+    types = {STATES: TYPES[STATES], "/thing": "nosuch_msgs/msg/Thing", "/a b": TYPES[FORCES]}
+    part = excerpt(foreign_bag(tmp_path / "bag.mcap", types))
+    assert part.offers.keys() == {STATES}
+    assert [topic for topic, _, _ in part.messages()] == [STATES]
+    thing, name = sorted(part.left_out, reverse=True)
+    assert "/thing is left out: the message type 'nosuch_msgs/msg/Thing' is not installed" in thing
+    assert "/a b is left out" in name
+    del types[STATES]
+    with pytest.raises(BagError, match=r"no topic of the bag .* can be replayed: .*nosuch_msgs"):
+        excerpt(foreign_bag(tmp_path / "other.mcap", types))
+
+
+def test_what_the_bag_lacks_is_known_when_it_was_read(tmp_path: Path) -> None:
+    bag = record(tmp_path / "bag", (STATES, 1.0), (STATES, 2.0))
+    (tmp_path / "bag" / "metadata.yaml").unlink()
+    part = excerpt(bag)
+    assert len(list(part.messages())) == 2
+    assert "metadata.yaml" in " ".join(part.lacking)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "named"),
+    [
+        ({"bag": ""}, ("/replay: bag = ''", "path of a bag")),
+        ({"bag": "nosuch"}, ("nosuch", "does not exist")),
+        ({"start": 5.0}, ("/replay: start = 5.0 s", "nothing was recorded", "4 s long")),
+        ({"start": 1e300}, ("/replay: start = 1e+300", "at most 1e+10 s")),
+        ({"start": 1.5, "duration": 1.0}, ("duration = 1.0 s", "nothing was recorded")),
+        ({"topics": [RECORDED]}, ("nothing was recorded then on /drive/recorded",)),
+        ({"topics": ["/nosuch"]}, ("/replay: topics = ['/nosuch']", STATES, FORCES)),
+        ({"topics": ["joint_states"]}, ("topics = ['joint_states']", STATES)),
+    ],
+)
+def test_what_cannot_be_is_refused(
+    tmp_path: Path, parameters: dict[str, object], named: tuple[str, ...]
+) -> None:
+    bag = record(tmp_path / "bag", (STATES, 1.0), (STATES, 2.0), (STATES, 5.0))
+    with pytest.raises(InvalidInputError) as refusal:
+        excerpt(**{"bag": bag, **parameters})
+    for text in named:
+        assert text in str(refusal.value)
+
+
+def test_an_empty_bag_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError, match="no messages"):
+        excerpt(record(tmp_path / "bag"))

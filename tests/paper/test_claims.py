@@ -1,0 +1,337 @@
+"""The paper's claims: that all are there, and that the verdicts follow from the computation."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isfinite
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stickslip_ros.paper.claims import CHAPTERS, CLAIMS, Claim, Evidence, Finding, Verdict
+from stickslip_ros.paper.claims.claim import (
+    Chapter,
+    Correction,
+    Formula,
+    Number,
+    Observation,
+    agrees,
+)
+from stickslip_ros.paper.claims.normal_form import Nonlinearity, samples
+from stickslip_ros.paper.claims.reference import FILTER, arrivals, expansion, hopf_point
+from stickslip_ros.paper.figures import (
+    NUMBERS,
+    PRINTED_SLOPE,
+    STRIBECK,
+    BifurcationFigure,
+    Panel,
+    PaperFigure,
+    PortraitFigure,
+    bifurcation_drive,
+    unit_drive,
+)
+from stickslip_ros.paper.portraits import Case, portraits
+from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.model.friction import Linear
+from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
+from stickslip_ros.physics.theory.limit_cycles import limit_cycles
+from stickslip_ros.studies.bifurcation import bifurcation_diagram
+
+HOLDS, CORRECTED, FAILS = Verdict.HOLDS, Verdict.CORRECTED, Verdict.FAILS
+
+KNOWN_SLIPS = {
+    "vb1": CORRECTED,
+    "eq-8-constant": CORRECTED,
+    "vb0": CORRECTED,
+    "vb0-and-vb1": FAILS,
+    "names-of-coefficients": CORRECTED,
+    "eq-21-c2": FAILS,
+    "eq-21-gain": CORRECTED,
+    "eq-30-criterion": FAILS,
+    "linear-slope": FAILS,
+    "fig-9-vibration": CORRECTED,
+    "fig-12-subcritical": FAILS,
+    "jump-subcritical": FAILS,
+}
+"""What is known of the paper's slips, and what therefore must come out."""
+
+
+class NoFigureError(Exception):
+    pass
+
+
+def no_figure(number: int) -> PaperFigure:
+    raise NoFigureError(number)
+
+
+def findings(claims: Sequence[Claim]) -> dict[str, Finding]:
+    """Return the findings of those claims that need no figure."""
+    found: dict[str, Finding] = {}
+    for claim in claims:
+        try:
+            found[claim.identifier] = claim.check(Evidence(no_figure))
+        except NoFigureError:
+            continue
+    return found
+
+
+@pytest.fixture(scope="module")
+def without_figures() -> dict[str, Finding]:
+    return findings(CLAIMS)
+
+
+def check_form(claim: Claim, finding: Finding) -> None:
+    numbers = [finding.computed, finding.difference]
+    assert all(isfinite(number) for number in numbers if isinstance(number, float))
+    for text in (claim.statement, finding.remark, str(claim.printed), str(finding.computed)):
+        assert "\n" not in text
+        assert not re.search(r"\b(nan|inf)\b", text)
+        assert "  " not in text
+    undecidable = finding.verdict is Verdict.UNDECIDABLE
+    assert (finding.computed is None) == undecidable
+    if finding.verdict is not HOLDS:
+        assert finding.remark
+    if isinstance(claim.printed, float):
+        assert isinstance(finding.computed, float)
+        assert finding.difference == pytest.approx(finding.computed - claim.printed, abs=1e-9)
+        assert (finding.verdict is HOLDS) == agrees(claim.printed, finding.computed)
+
+
+def test_claims_have_an_identifier_of_their_own() -> None:
+    identifiers = [claim.identifier for claim in CLAIMS]
+    assert len(set(identifiers)) == len(identifiers)
+    assert all(re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", identifier) for identifier in identifiers)
+    assert sum(len(chapter.claims) for chapter in CHAPTERS) == len(CLAIMS)
+
+
+@pytest.mark.parametrize("number", range(1, 31))
+def test_every_equation_has_a_claim(number: int) -> None:
+    assert any(re.search(rf"eq\. {number}\b", claim.place) for claim in CLAIMS)
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_every_figure_has_a_claim(number: int) -> None:
+    assert any(re.search(rf"Fig\. ({number}|8 and {number})\b", claim.place) for claim in CLAIMS)
+
+
+def test_claims_about_equations_need_no_figure(without_figures: dict[str, Finding]) -> None:
+    assert len(without_figures) > 100
+    for claim in CLAIMS:
+        if claim.identifier in without_figures:
+            check_form(claim, without_figures[claim.identifier])
+
+
+def test_known_slips_are_found(without_figures: dict[str, Finding]) -> None:
+    found = {name: without_figures[name].verdict for name in KNOWN_SLIPS if name in without_figures}
+    assert len(found) >= 10
+    assert found == {name: KNOWN_SLIPS[name] for name in found}
+
+
+@pytest.mark.parametrize(
+    ("identifier", "value"),
+    [
+        ("vb1", 0.48876261),
+        ("vb0", 0.43947190),
+        ("eq-15-value", -0.225),
+        ("eq-11-value", -1.8 * 0.48876261),
+        ("eq-20-trace", 0.43 - 1.8 * 0.49**2),
+        ("smallest-at", 0.5),
+        ("eq-15-imaginary", (3.6 * 0.48876261) ** 2 / 32.0),
+        ("linear-slope", 0.45),
+    ],
+)
+def test_computed_numbers(
+    identifier: str, value: float, without_figures: dict[str, Finding]
+) -> None:
+    assert without_figures[identifier].computed == pytest.approx(value, rel=1e-7)
+
+
+def test_another_printed_number_gets_another_verdict(without_figures: dict[str, Finding]) -> None:
+    tried = 0
+    for claim in CLAIMS:
+        if isinstance(claim.printed, float) and claim.identifier in without_figures:
+            finding = without_figures[claim.identifier]
+            assert isinstance(finding.computed, float)
+            confirmed = replace(claim, printed=round(finding.computed, 6))
+            assert confirmed.check(Evidence(no_figure)).verdict is HOLDS
+            wrong = replace(claim, printed=round(claim.printed + 0.0371, 4))
+            assert wrong.check(Evidence(no_figure)).verdict is FAILS
+            tried += 1
+    assert tried > 20
+
+
+@given(
+    st.integers(-(10**6), 10**6).filter(lambda n: n % 10 != 0),
+    st.integers(1, 8),
+    st.floats(-0.49, 0.49),
+)
+def test_a_number_agrees_with_what_it_rounds_to(units: int, digits: int, rest: float) -> None:
+    unit = 10.0**-digits
+    printed = round(units * unit, digits)
+    assert agrees(printed, printed + rest * unit)
+    assert not agrees(printed, printed + (rest + 1.0) * unit)
+
+
+def judged(chapter: Chapter) -> Finding:
+    (claim,) = chapter.claims
+    return claim.check(Evidence(no_figure))
+
+
+@pytest.mark.parametrize(
+    ("value", "corrected", "verdict"),
+    [(0.4944, 0.1, HOLDS), (0.48876, 0.49441, CORRECTED), (0.48876, 0.4943, FAILS)],
+)
+def test_verdict_on_a_number(value: float, corrected: float, verdict: Verdict) -> None:
+    chapter = Chapter("")
+    number = Number(value, [Correction("With x", corrected)], "So it is.")
+    chapter.number("a", "eq. 1", "a number", 0.4944)(lambda _: number)
+    finding = judged(chapter)
+    assert finding.verdict is verdict
+    assert finding.computed == value
+    assert finding.remark.startswith("With x: 0.49441.") == (verdict is CORRECTED)
+    assert finding.remark.endswith("So it is.")
+
+
+@pytest.mark.parametrize(
+    ("printed", "corrected", "verdict", "difference"),
+    [
+        ([1.0, 2.0 + 1e-12], [0.0, 0.0], HOLDS, 0.0),
+        ([1.0, 2.5], [1.0, 2.0], CORRECTED, 0.5),
+        (None, [1.0, 2.0], CORRECTED, None),
+        ([1.0, 2.5], [1.0, 2.1], FAILS, 0.5),
+        (None, [1.0, 2.1], FAILS, None),
+    ],
+)
+def test_verdict_on_a_formula(
+    printed: list[float] | None,
+    corrected: list[float],
+    verdict: Verdict,
+    difference: float | None,
+) -> None:
+    chapter = Chapter("")
+    formula = Formula(printed, [1.0, 2.0], [Correction("With x", corrected)])
+    chapter.formula("a", "eq. 1", "a formula", "a = b")(lambda: formula)
+    finding = judged(chapter)
+    assert (finding.verdict, finding.difference) == (verdict, difference)
+
+
+@pytest.mark.parametrize(
+    ("holds", "corrected", "verdict"),
+    [(True, False, HOLDS), (True, True, HOLDS), (False, True, CORRECTED), (False, False, FAILS)],
+)
+def test_verdict_on_a_statement(holds: bool, corrected: bool, verdict: Verdict) -> None:
+    chapter = Chapter("")
+    chapter.statement("a", "eq. 1", "so it is")(lambda _: Observation("", holds, corrected))
+    assert judged(chapter).verdict is verdict
+
+
+def sigma_of_coefficients(q: Nonlinearity) -> float:
+    """Hassard, Kazarinoff and Wan, ch. 2: Re c1(0)."""
+    sigma = 1j * q.g20 * q.g11 / (2.0 * q.frequency) + q.cubic / 2.0
+    if len(q.second) == 3:
+        sigma += (2.0 * q.g110 * q.w11 + q.g101 * q.w20) / 2.0
+    return sigma.real
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_the_coefficients_make_up_the_first_lyapunov_coefficient(order: int) -> None:
+    for q in samples(order):
+        assert sigma_of_coefficients(q) == pytest.approx(q.sigma, rel=1e-9)
+
+
+def test_the_nonlinearity_of_the_open_loop() -> None:
+    speed = hopf_point().belt_speed
+    q = Nonlinearity.at(expansion(speed))
+    assert q.g20 == pytest.approx(-0.9j * speed, rel=1e-9)
+    assert q.g11 == pytest.approx(0.9j * speed, rel=1e-9)
+    assert q.cubic == pytest.approx(-0.45, rel=1e-9)
+
+
+@pytest.mark.parametrize("cubic", [0.0, -3.0])
+def test_the_nonlinearity_of_the_closed_loop(cubic: float) -> None:
+    d, p = 2.0, 0.43 - 1.8 * 0.4**2
+    gains = replace(FILTER, linear=d - p - d / (1.0 - p * d), cubic=cubic)
+    at_critical_gain = expansion(0.4, gains=gains)
+    q = Nonlinearity.at(at_critical_gain)
+    assert q.frequency == pytest.approx(np.sqrt(1.0 - p * d), rel=1e-9)
+    assert sigma_of_coefficients(q) == pytest.approx(
+        first_lyapunov_coefficient(at_critical_gain), rel=1e-9
+    )
+
+
+def verdict(identifier: str, figure: PaperFigure | None = None) -> Finding:
+    (claim,) = (claim for claim in CLAIMS if claim.identifier == identifier)
+    return claim.check(Evidence(lambda number: figure or no_figure(number)))
+
+
+def test_enough_stiffness_ends_the_sticking(without_figures: dict[str, Finding]) -> None:
+    finding = without_figures["fig-10-end"]
+    assert finding.verdict is HOLDS
+    overruns, never = 43.12, 839.0
+    assert f"Above stiffness {overruns:g} " in finding.remark
+    assert finding.computed == f"from stiffness {never:g} on"
+    # From rest, without shooting: what the slide does on either side of these stiffnesses.
+    stiffnesses = (overruns - 0.1, overruns + 0.1, never - 1.0, never + 1.0)
+    ends = list(portraits(Case("", unit_drive(0.2, stiffness=k)) for k in stiffnesses))
+    fastest = [float(end.last_cycles.velocity.max()) for end in ends]
+    assert fastest[0] == pytest.approx(0.2, rel=1e-12)
+    assert all(speed > 0.2 * (1.0 + 1e-9) for speed in fastest[1:])
+    assert [end.measures.regime for end in ends] == [Regime.STICK_SLIP] * 3 + [Regime.PURE_SLIP]
+
+
+def test_the_friction_of_a_stick_is_that_from_the_landing_on() -> None:
+    only = PortraitFigure(6, "", (Panel("", tuple(portraits([Case("", unit_drive(0.2))]))),))
+    finding = verdict("eq-5-stick", only)
+    # A stick ends at mu_s = 0.4. It takes 0.285506954 of a period of 7.06772953, at the speed 0.2.
+    landing = 0.4 - 0.2 * 0.285506954 * 7.06772953
+    assert finding.computed == f"{landing:.4g} to 0.4 instead of 0"
+
+
+def test_a_slide_that_overruns_the_belt_sticks_less_with_a_larger_gap() -> None:
+    minima = (0.03, 0.02, 0.01, 0.001)
+    drives = [unit_drive(0.15, friction=replace(STRIBECK, minimum=m)) for m in minima]
+    fractions = [limit_cycles(drive)[0].measures.stick_fraction for drive in drives]
+    assert fractions == pytest.approx([0.53172, 0.53729, 0.52423, 0.50925], abs=1e-5)
+    assert [len(arrivals(drive)) for drive in drives] == [1, 1, 2, 2]
+
+
+def test_under_the_printed_slope_the_stick_fraction_rises_with_the_damping_and_falls() -> None:
+    law = Linear(STRIBECK.static, PRINTED_SLOPE)
+    betas = (0.12, 0.15, 0.17, 0.18, 0.2, 0.3)
+    drives = [unit_drive(0.2, damping=2.0 * beta, friction=law) for beta in betas]
+    ends = [portrait.measures.stick_fraction for portrait in portraits(Case("", d) for d in drives)]
+    assert ends == sorted(ends[:4]) + sorted(ends[4:], reverse=True)
+    assert [len(arrivals(drive)) for drive in drives] == [2, 2, 2, 1, 1, 1]
+
+
+def _diagram(number: int, values: Sequence[float]) -> BifurcationFigure:
+    drives = [bifurcation_drive(number, value) for value in values]
+    return BifurcationFigure(number, "", "", np.array(values), bifurcation_diagram(drives))
+
+
+def test_verdicts_survive_ten_times_the_range() -> None:
+    speeds = _diagram(2, [0.02, 0.05, 0.2, 0.34, 0.6, 1.0, 3.0, 10.0])
+    assert verdict("rest-at-high-speed", speeds).verdict is HOLDS
+    assert verdict("eq-3-range", speeds).verdict is CORRECTED
+    stiffnesses = _diagram(4, [0.02, 0.2, 1.0, 5.0, 50.0])
+    assert verdict("fig-4-influence", stiffnesses).verdict is CORRECTED
+    minima = (0.001, 0.01, 0.1, 0.25, 0.37, 0.39, 0.399)
+    drives = [unit_drive(0.4, friction=replace(STRIBECK, minimum=m)) for m in minima]
+    gaps = tuple(portraits(Case("", drive) for drive in drives))
+    figure = PortraitFigure(11, "", (Panel("", gaps),))
+    assert verdict("fig-11-amplitude", figure).verdict is HOLDS
+    wide = {
+        2: speeds,
+        3: _diagram(3, [0.0, 0.01, 0.05, 0.5]),
+        5: _diagram(5, [1.0, 1.1, 2.0, 11.0]),
+    }
+    (claim,) = (claim for claim in CLAIMS if claim.identifier == "what-inhibits")
+    assert claim.check(Evidence(wide.__getitem__)).verdict is HOLDS
+
+
+def test_the_amplitude_goes_to_zero_as_a_root(without_figures: dict[str, Finding]) -> None:
+    for identifier in ("fig-12-sudden", "jump"):
+        assert without_figures[identifier].verdict is FAILS
+        assert "power 0.500 " in without_figures[identifier].remark

@@ -1,0 +1,154 @@
+"""The data of the paper's figures: parameters, and what they show."""
+
+import pickle
+from math import sqrt
+
+import numpy as np
+import pytest
+
+from stickslip_ros.paper.figures import (
+    NUMBERS,
+    PRINTED_SLOPE,
+    STRIBECK,
+    TANGENT_SLOPE,
+    BifurcationFigure,
+    PortraitFigure,
+    bifurcation_drives,
+    compute_figure,
+    unit_drive,
+)
+from stickslip_ros.paper.portraits import Portrait
+from stickslip_ros.physics.measures.cycles import Regime
+
+
+def bifurcation(number: int, points: int) -> BifurcationFigure:
+    figure = compute_figure(number, points=points)
+    assert isinstance(figure, BifurcationFigure)
+    return figure
+
+
+def portraits(number: int) -> list[list[Portrait]]:
+    figure = compute_figure(number)
+    assert isinstance(figure, PortraitFigure)
+    assert figure.number == number
+    assert figure.portraits == tuple(p for panel in figure.panels for p in panel.portraits)
+    return [list(panel.portraits) for panel in figure.panels]
+
+
+def regimes(figure: BifurcationFigure) -> list[Regime | None]:
+    return [measures.regime for measures in figure.diagram.measures]
+
+
+def stick_fractions(panel: list[Portrait]) -> list[float]:
+    return [portrait.measures.stick_fraction or 0.0 for portrait in panel]
+
+
+def falls(values: list[float]) -> bool:
+    return bool(np.all(np.diff(values) < 0.0))
+
+
+def test_there_are_figures_2_to_13() -> None:
+    assert list(range(2, 14)) == list(NUMBERS)
+
+
+@pytest.mark.parametrize("stiffness", [0.2, 1.0, 5.0])
+def test_si_numbers_of_a_unit_drive_are_the_paper_s(stiffness: float) -> None:
+    drive = unit_drive(0.3, damping=0.05, stiffness=stiffness)
+    assert (drive.mass, drive.normal_force, drive.damping) == (1.0, 1.0, 0.05)
+    assert drive.natural_period == pytest.approx(2.0 * np.pi / sqrt(stiffness))
+
+
+def test_slopes_of_the_linear_law() -> None:
+    step = 1e-6
+    cubic = STRIBECK.coefficient(np.array([-step, step]), -1.0)
+    assert pytest.approx((cubic[1] - cubic[0]) / (2.0 * step), rel=1e-9) == TANGENT_SLOPE
+    assert pytest.approx(3.0 * (0.4 - 0.25) / 0.5) == PRINTED_SLOPE
+
+
+@pytest.mark.parametrize("number", [2, 3, 4, 5])
+def test_the_parameter_of_a_bifurcation_diagram_is_all_that_varies(number: int) -> None:
+    values, drives = bifurcation_drives(number, 5)
+    varied = {
+        2: [drive.belt_speed for drive in drives],
+        3: [drive.damping / 2.0 for drive in drives],
+        4: [drive.stiffness for drive in drives],
+        5: [drive.friction.static / getattr(drive.friction, "minimum", 0.0) for drive in drives],
+    }
+    for name, column in varied.items():
+        assert column == pytest.approx(values if name == number else [column[0]] * 5)
+
+
+def test_over_the_belt_speed_sticking_ends_and_then_the_vibration() -> None:
+    figure = bifurcation(2, 11)
+    assert figure.values.tolist() == pytest.approx(np.linspace(0.0, 1.0, 11).tolist())
+    assert regimes(figure) == [
+        Regime.STUCK,
+        *[Regime.STICK_SLIP] * 4,
+        *[Regime.EQUILIBRIUM] * 6,
+    ]
+
+
+def test_over_the_damping_the_vibration_ends_at_the_hopf_point() -> None:
+    figure = bifurcation(3, 11)
+    hopf = (0.45 - 1.8 * 0.477**2) / 2.0
+    vibrates = [regime is Regime.PURE_SLIP for regime in regimes(figure)]
+    # Close to the Hopf point the motion is slow to settle.
+    clear = np.abs(figure.values - hopf) > 0.003
+    assert np.array(vibrates)[clear].tolist() == (figure.values < hopf)[clear].tolist()
+
+
+def test_over_the_stiffness_sticking_does_not_end() -> None:
+    assert set(regimes(bifurcation(4, 5))) == {Regime.STICK_SLIP}
+
+
+def test_over_the_friction_ratio_vibration_and_sticking_begin() -> None:
+    assert regimes(bifurcation(5, 3)) == [Regime.EQUILIBRIUM, *[Regime.STICK_SLIP] * 2]
+
+
+@pytest.mark.long
+def test_near_the_hopf_speed_amplitudes_follow_the_averaged_ones() -> None:
+    for damping, panel in zip((0.01, 0.02), portraits(12)[1::2], strict=True):
+        hopf_squared = (0.45 - damping) / 1.8
+        for portrait in panel:
+            assert portrait.drive.damping == damping
+            square = hopf_squared - portrait.drive.belt_speed**2
+            averaged = 2.0 * sqrt(max(square, 0.0))
+            assert portrait.measures.velocity_amplitude == pytest.approx(averaged, abs=0.005)
+
+
+def test_a_figure_can_be_sent_to_another_process() -> None:
+    shares: list[float] = []
+    figure = compute_figure(11, shares.append)
+    assert isinstance(figure, PortraitFigure)
+    copy = pickle.loads(pickle.dumps(figure))
+    assert copy.portraits[0].measures == figure.portraits[0].measures
+    assert shares == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
+    assert falls(stick_fractions(copy.panels[0].portraits)[:4])
+
+
+@pytest.mark.long
+def test_what_the_other_portraits_show() -> None:
+    (speeds,) = portraits(6)
+    assert [p.measures.regime for p in speeds[3:]] == [Regime.PURE_SLIP] * 2 + [
+        Regime.EQUILIBRIUM
+    ] * 2
+    assert falls(stick_fractions(speeds[:4]))
+    (dampings,) = portraits(7)
+    assert falls(stick_fractions(dampings[:4]))
+    (coulomb,) = portraits(8)
+    assert all(p.measures.regime is Regime.EQUILIBRIUM for p in coulomb[1:])
+    assert falls([p.settling_time or 0.0 for p in coulomb[1:]])
+    tangent, printed, printed_slow = portraits(9)
+    assert falls(stick_fractions(tangent))
+    assert printed[0].runs_away
+    assert falls(stick_fractions(printed_slow))
+    stiffnesses, stiffer, faster = portraits(10)
+    assert falls([p.measures.amplitude or 0.0 for p in [*stiffnesses, *stiffer]])
+    assert all(fraction > 0.0 for fraction in stick_fractions([*stiffnesses, *stiffer[:-1]]))
+    assert stiffer[-1].measures.regime is Regime.PURE_SLIP
+    assert [p.measures.regime for p in faster] == [Regime.STICK_SLIP, Regime.PURE_SLIP]
+    linear, cubic, low_corner = portraits(13)
+    assert all(p.case.gains is not None for p in [*linear, *cubic, *low_corner])
+    assert linear[0].measures.amplitude == pytest.approx(0.434086183, rel=1e-8)
+    assert falls([p.measures.amplitude or 0.0 for p in cubic])
+    assert low_corner[-1].measures.regime is Regime.EQUILIBRIUM

@@ -1,0 +1,94 @@
+"""The report that is kept in docs/: what it holds is what the code computes today."""
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from stickslip_ros.paper.claims import CLAIMS, Claim, Evidence, Finding
+from stickslip_ros.paper.figures import NUMBERS, PaperFigure
+from stickslip_ros.paper.report import as_markdown
+
+DOCS = Path(__file__).parents[2] / "docs"
+KEPT: Mapping[str, Any] = json.loads((DOCS / "reproduction.json").read_text(encoding="utf-8"))
+BY_IDENTIFIER = {claim["identifier"]: claim for claim in KEPT["claims"]}
+
+NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+
+class FigureWantedError(Exception):
+    """A claim asked for a figure, which takes long to compute."""
+
+
+def without_figures(number: int) -> PaperFigure:
+    raise FigureWantedError(number)
+
+
+def same_text(now: str, kept: str) -> bool:
+    """Whether texts are the same but for numbers that differ in their last digits."""
+    if NUMBER.sub("#", now) != NUMBER.sub("#", kept):
+        return False
+    numbers = zip(NUMBER.findall(now), NUMBER.findall(kept), strict=True)
+    return all(float(a) == pytest.approx(float(b), rel=2e-3, abs=2e-4) for a, b in numbers)
+
+
+def check(claim: Claim, finding: Finding) -> None:
+    kept = BY_IDENTIFIER[claim.identifier]
+    assert (claim.place, claim.statement, claim.printed) == (
+        kept["place"],
+        kept["statement"],
+        kept["printed"],
+    )
+    assert finding.verdict == kept["verdict"]
+    for now, then in ((finding.computed, kept["computed"]), (finding.remark, kept["remark"])):
+        if isinstance(now, str):
+            assert same_text(now, then), f"{claim.identifier}: {now!r} was {then!r}"
+        elif now is None:
+            assert then is None
+        else:
+            assert now == pytest.approx(then, rel=1e-6, abs=1e-9)
+    if finding.difference is not None:
+        assert finding.difference == pytest.approx(kept["difference"], rel=1e-5, abs=1e-8)
+
+
+def test_it_holds_every_claim_once() -> None:
+    assert [claim["identifier"] for claim in KEPT["claims"]] == [c.identifier for c in CLAIMS]
+
+
+def test_the_page_is_made_of_the_findings() -> None:
+    assert (DOCS / "reproduction.md").read_text(encoding="utf-8") == as_markdown(KEPT)
+
+
+def test_the_pictures_are_there() -> None:
+    assert tuple(figure["number"] for figure in KEPT["figures"]) == NUMBERS
+    for figure in KEPT["figures"]:
+        assert (DOCS / figure["picture"]).read_bytes().startswith(b"\x89PNG")
+
+
+def test_claims_that_need_no_figure_are_found_as_kept() -> None:
+    evidence = Evidence(without_figures)
+    checked = 0
+    for claim in CLAIMS:
+        try:
+            finding = claim.check(evidence)
+        except FigureWantedError:
+            continue
+        check(claim, finding)
+        checked += 1
+    assert checked > len(CLAIMS) / 2
+
+
+@pytest.mark.parametrize(
+    ("now", "same"),
+    [
+        ("amplitude 0.3928, k = -2e-05", True),
+        ("amplitude 0.3929, k = 2e-05", True),
+        ("amplitude 0.4028, k = -2e-05", False),
+        ("amplitude of 0.3928, k = -2e-05", False),
+    ],
+)
+def test_texts_are_compared_by_their_words_and_numbers(now: str, same: bool) -> None:
+    assert same_text(now, "amplitude 0.3928, k = -2e-05") is same

@@ -1,0 +1,173 @@
+"""The closed loop: sampled as the nodes do it, and continuous as in the paper."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+from stickslip_ros.physics.loop.simulation import simulate_continuous, simulate_sampled
+from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
+from stickslip_ros.physics.measures.cycles import CycleMeter, Measures, Regime
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import Linear
+from stickslip_ros.physics.motion.motion import Motion
+from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
+
+SECOND = 10**9
+Simulate = Callable[..., tuple[Measures, Motion]]
+PAPER_GAINS = WashoutParameters(corner_frequency=2.0, linear_gain=-1.0, cubic_gain=-1.0)
+
+
+def sampled(
+    washout: WashoutParameters | None,
+    duration: float,
+    rate: float = 100.0,
+    drive: Drive = PAPER,
+    position: float = 0.0,
+) -> tuple[Measures, Motion]:
+    motion = Motion(drive, position, 0.0, record=True)
+    loop = SampledLoop(motion, rate, SECOND)
+    controller = Washout(washout) if washout is not None else None
+    return simulate_sampled(loop, motion, controller, duration, CycleMeter(20)), motion
+
+
+def continuous(
+    washout: WashoutParameters | None,
+    duration: float,
+    drive: Drive = PAPER,
+    position: float = 0.0,
+) -> tuple[Measures, Motion]:
+    motion = Motion(drive, position, 0.0, continuous_control=True, record=True)
+    return simulate_continuous(motion, washout, duration, CycleMeter(20)), motion
+
+
+@pytest.mark.parametrize("simulate", [sampled, continuous])
+def test_without_control_it_is_the_motion_alone(simulate: Simulate) -> None:
+    measures, motion = simulate(None, 400.0)
+    alone = Motion(PAPER, 0.0, 0.0)
+    alone.advance(400.0)
+    assert motion.position == pytest.approx(alone.position, abs=1e-10)
+    assert motion.velocity == pytest.approx(alone.velocity, abs=1e-10)
+    (cycle,) = (cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.4)
+    assert measures.regime is Regime.STICK_SLIP
+    assert measures.cycles == 20
+    assert measures.amplitude == pytest.approx(cycle.amplitude, rel=1e-8)
+    assert measures.period == pytest.approx(cycle.period, rel=1e-8)
+    assert measures.stick_fraction == pytest.approx(cycle.stick_fraction, abs=1e-8)
+
+
+@pytest.mark.parametrize("simulate", [sampled, continuous])
+def test_enough_gain_brings_the_slide_to_rest(simulate: Simulate) -> None:
+    measures, motion = simulate(replace(PAPER_GAINS, linear_gain=-1.5), 500.0)
+    assert measures.regime is Regime.EQUILIBRIUM
+    # The filter leaves the equilibrium where it is: mu(-0.4).
+    assert motion.position == pytest.approx(0.2584, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("corner_frequency", "linear_gain", "rests"),
+    [(2.0, -1.0, True), (2.0, -0.9, False), (0.2, -0.16, True), (0.2, -0.13, False)],
+)
+def test_the_critical_gain_of_the_continuous_loop(
+    corner_frequency: float, linear_gain: float, rests: bool
+) -> None:
+    """By Routh and Hurwitz it is -0.935 at d = 2 and -0.148 at d = 0.2."""
+    washout = WashoutParameters(corner_frequency, linear_gain, cubic_gain=0.0)
+    # Next to the equilibrium, so that it grows if it does.
+    measures, motion = continuous(washout, 2000.0, position=0.2584 + 0.01)
+    swing = abs(motion.position - 0.2584) + abs(motion.velocity)
+    if rests:
+        assert measures.regime is Regime.EQUILIBRIUM
+        assert swing < 1e-3
+    else:
+        assert measures.regime in (Regime.STICK_SLIP, Regime.PURE_SLIP)
+        assert swing > 0.02
+
+
+def test_the_faster_it_is_sampled_the_nearer_it_is_to_the_continuous_loop() -> None:
+    _, reference = continuous(PAPER_GAINS, 20.0)
+    errors = []
+    for rate in (50.0, 200.0, 800.0):
+        _, motion = sampled(PAPER_GAINS, 20.0, rate)
+        errors.append(
+            abs(motion.position - reference.position) + abs(motion.velocity - reference.velocity)
+        )
+    # A held force is late by half a period: the error is of first order.
+    assert errors[0] > 1e-3
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.1)
+
+
+def test_the_controller_comes_on_after_a_while() -> None:
+    washout = replace(PAPER_GAINS, start_after=30.0)
+    for simulate in (sampled, continuous):
+        _, before = simulate(washout, 30.0)
+        alone = Motion(PAPER, 0.0, 0.0)
+        alone.advance(30.0)
+        assert before.position == pytest.approx(alone.position, abs=1e-10)
+        _, after = simulate(washout, 35.0)
+        alone.advance(5.0)
+        assert abs(after.position - alone.position) > 1e-2
+
+
+def test_the_filter_runs_before_the_controller_comes_on() -> None:
+    """Both see the same past: with start_after the two loops still agree, to first order."""
+    washout = replace(PAPER_GAINS, start_after=10.0)
+    _, reference = continuous(washout, 20.0)
+    _, motion = sampled(washout, 20.0, rate=1000.0)
+    assert motion.position == pytest.approx(reference.position, abs=1e-3)
+    assert motion.velocity == pytest.approx(reference.velocity, abs=1e-3)
+
+
+def test_si_units_give_the_paper_in_other_units() -> None:
+    """The feed drive has scales of 100 rad/s, 0.1 m/s and 1000 N."""
+    washout = WashoutParameters(200.0, linear_gain=-1e4, cubic_gain=-1e6)
+    _, unit = continuous(PAPER_GAINS, 20.0)
+    _, si = continuous(washout, 0.2, drive=FEED_DRIVE)
+    assert si.position == pytest.approx(unit.position * 1e-3, rel=1e-9)
+    _, unit = sampled(PAPER_GAINS, 20.0, rate=100.0)
+    _, si = sampled(washout, 0.2, rate=10_000.0, drive=FEED_DRIVE)
+    assert si.position == pytest.approx(unit.position * 1e-3, rel=1e-9)
+
+
+def test_the_feed_drive_comes_to_rest_once_its_controller_is_on() -> None:
+    washout = WashoutParameters(20.0, linear_gain=-3000.0, cubic_gain=0.0, start_after=5.0)
+    measures, _ = sampled(washout, 5.0, rate=1000.0, drive=FEED_DRIVE)
+    assert measures.regime is Regime.STICK_SLIP
+    measures, motion = sampled(washout, 10.0, rate=1000.0, drive=FEED_DRIVE)
+    assert measures.regime is Regime.EQUILIBRIUM
+    assert motion.position == pytest.approx(0.2584e-3, rel=1e-6)
+
+
+@pytest.mark.parametrize("simulate", [sampled, continuous])
+def test_a_motion_that_runs_away_ends_early_as_unbounded(simulate: Simulate) -> None:
+    drive = replace(PAPER, friction=Linear(static=0.4, slope=0.9))
+    measures, motion = simulate(None, 1e4, drive=drive)
+    assert motion.unbounded
+    assert measures.regime is Regime.UNBOUNDED
+    assert measures.frequency is None
+
+
+def test_a_positive_cubic_gain_escapes_from_large_speeds() -> None:
+    """Beyond the law's own cubic coefficient of 0.6, though the equilibrium is stable."""
+    washout = replace(PAPER_GAINS, cubic_gain=2.0)
+    measures, _ = continuous(washout, 200.0, position=100.0)
+    assert measures.regime is Regime.UNBOUNDED
+    measures, _ = continuous(washout, 2000.0, position=0.2584 + 0.01)
+    assert measures.regime is Regime.EQUILIBRIUM
+
+
+@pytest.mark.parametrize("simulate", [sampled, continuous])
+def test_progress_rises_to_one(simulate: Simulate) -> None:
+    shares: list[float] = []
+    motion = Motion(PAPER, 0.0, 0.0, continuous_control=simulate is continuous, record=True)
+    if simulate is sampled:
+        loop = SampledLoop(motion, 100.0, SECOND)
+        simulate_sampled(loop, motion, Washout(PAPER_GAINS), 300.0, CycleMeter(20), shares.append)
+    else:
+        simulate_continuous(motion, PAPER_GAINS, 300.0, CycleMeter(20), shares.append)
+    assert len(shares) > 3
+    assert np.all(np.diff(shares) > 0.0)
+    assert shares[-1] == pytest.approx(1.0)

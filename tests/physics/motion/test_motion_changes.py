@@ -1,0 +1,150 @@
+"""What may be changed while a drive is in motion."""
+
+from dataclasses import replace
+
+import pytest
+
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import Coulomb, Exponential
+from stickslip_ros.physics.motion.motion import Motion
+from tests.physics.drives import FEED_DRIVE, PAPER
+
+CHANGES = {
+    "heavier": replace(FEED_DRIVE, mass=250.0),
+    "stiffer": replace(FEED_DRIVE, stiffness=3e6),
+    "pressed harder": replace(FEED_DRIVE, normal_force=2000.0),
+    "more damped": replace(FEED_DRIVE, damping=500.0),
+    "slower belt": replace(FEED_DRIVE, belt_speed=0.03),
+    "reversed belt": replace(FEED_DRIVE, belt_speed=-0.04),
+    "another law": replace(FEED_DRIVE, friction=Exponential(0.3, 0.2, 0.02, 0.0)),
+    "all at once": Drive(10.0, 3.0, 2e5, 500.0, 0.1, Coulomb(0.5)),
+}
+changes = pytest.mark.parametrize("changed", CHANGES.values(), ids=CHANGES.keys())
+
+
+@changes
+def test_a_new_drive_takes_over_position_velocity_and_force(changed: Drive) -> None:
+    motion = Motion(FEED_DRIVE, 0.0, 0.0)
+    motion.force = 30.0
+    motion.advance(0.05)
+    position, velocity = motion.position, motion.velocity
+    motion.drive = changed
+    assert motion.position == pytest.approx(position, rel=1e-14)
+    assert motion.velocity == pytest.approx(velocity, rel=1e-14)
+    assert motion.force == pytest.approx(30.0, rel=1e-14)
+
+
+@changes
+def test_from_then_on_it_moves_as_the_new_drive(changed: Drive) -> None:
+    motion = Motion(FEED_DRIVE, 0.0, 0.0)
+    motion.force = 30.0
+    motion.advance(0.05)
+    fresh = Motion(changed, motion.position, motion.velocity)
+    fresh.force = 30.0
+    motion.drive = changed
+    motion.advance(0.2)
+    fresh.advance(0.2)
+    assert motion.position == pytest.approx(fresh.position, rel=1e-9)
+    assert motion.velocity == pytest.approx(fresh.velocity, rel=1e-9)
+    assert motion.friction_force == pytest.approx(fresh.friction_force, rel=1e-9)
+
+
+def test_a_belt_that_changes_speed_leaves_the_slide_behind() -> None:
+    motion = Motion(FEED_DRIVE, 0.0, 0.04)
+    motion.advance(0.001)
+    assert motion.sticking
+    motion.drive = replace(FEED_DRIVE, belt_speed=0.05)
+    assert motion.velocity == pytest.approx(0.04, rel=1e-14)
+    assert not motion.sticking
+    motion.drive = FEED_DRIVE
+    assert motion.sticking
+    assert motion.velocity == 0.04
+
+
+def test_a_larger_mass_leaves_a_stuck_slide_stuck() -> None:
+    motion = Motion(FEED_DRIVE, 0.0, 0.04)
+    motion.drive = replace(FEED_DRIVE, mass=333.0)
+    motion.advance(0.001)
+    assert motion.sticking
+    assert motion.velocity == 0.04
+
+
+def test_restart_puts_the_slide_somewhere_else_and_keeps_the_force() -> None:
+    motion = Motion(PAPER, 0.0, 0.0)
+    motion.force = 0.2
+    motion.advance(3.0)
+    motion.restart(0.3, -0.1)
+    fresh = Motion(PAPER, 0.3, -0.1)
+    fresh.force = 0.2
+    assert (motion.position, motion.velocity) == (0.3, -0.1)
+    motion.advance(2.0)
+    fresh.advance(2.0)
+    assert motion.position == fresh.position
+    assert motion.velocity == fresh.velocity
+
+
+def test_restart_puts_the_filter_of_the_continuous_controller_to_rest() -> None:
+    motion = Motion(FEED_DRIVE, 0.0, 0.0, continuous_control=True)
+    motion.set_gains(20.0, -3000.0, 0.0)
+    motion.advance(0.3)
+    assert abs(control_force(motion)) > 1.0
+    motion.restart(1e-4, -0.08)
+    # It has let nothing through of the constant speed that it is taken to have seen.
+    assert control_force(motion) == pytest.approx(0.0, abs=1e-2)
+
+
+def test_friction_is_that_under_the_force_held_up_to_now() -> None:
+    """Stuck at x = 0.2, friction balances spring, damper and force."""
+    motion = Motion(PAPER, 0.0, 0.4)
+    motion.force = 0.1
+    motion.advance(0.5)
+    assert motion.friction_force == pytest.approx(0.2 + 0.02 * 0.4 - 0.1, rel=1e-12)
+
+
+def test_friction_while_slipping_is_that_of_the_law() -> None:
+    motion = Motion(FEED_DRIVE, 0.0, 0.0)
+    # At rest the belt slips past at 0.8 v_m: mu = 0.4 - 0.45 0.4 + 0.6 0.4^3.
+    assert motion.friction_force == pytest.approx(1000.0 * 0.2584, rel=1e-12)
+
+
+@changes
+def test_a_new_drive_takes_over_the_gains_of_the_continuous_controller(changed: Drive) -> None:
+    motion = Motion(FEED_DRIVE, 0.0, 0.0, continuous_control=True)
+    motion.set_gains(20.0, -3000.0, -1e4)
+    motion.drive = changed
+    fresh = Motion(changed, 0.0, 0.0, continuous_control=True)
+    fresh.set_gains(20.0, -3000.0, -1e4)
+    motion.advance(0.1)
+    fresh.advance(0.1)
+    assert motion.position == pytest.approx(fresh.position, rel=1e-9)
+    assert motion.velocity == pytest.approx(fresh.velocity, rel=1e-9)
+
+
+@changes
+def test_a_new_drive_takes_over_the_filter_of_the_continuous_controller(changed: Drive) -> None:
+    motion = Motion(FEED_DRIVE, 3e-4, -0.05, continuous_control=True)
+    motion.set_gains(20.0, -3000.0, -1e4)
+    motion.advance(0.01)
+    before = control_force(motion)
+    motion.drive = changed
+    assert abs(before) > 10.0
+    assert control_force(motion) == pytest.approx(before, rel=1e-3)
+
+
+def test_the_filter_goes_on_without_a_jump_when_its_corner_frequency_changes() -> None:
+    motion = Motion(FEED_DRIVE, 3e-4, -0.05, continuous_control=True)
+    motion.set_gains(20.0, -3000.0, -1e4)
+    motion.advance(0.01)
+    before = control_force(motion)
+    motion.set_gains(50.0, -3000.0, -1e4)
+    assert abs(before) > 10.0
+    assert control_force(motion) == pytest.approx(before, rel=1e-3)
+
+
+def control_force(motion: Motion) -> float:
+    """What is left of mass times acceleration, over a time in which nothing else changes."""
+    drive, velocity = motion.drive, motion.velocity
+    motion.advance(1e-7)
+    acceleration = (motion.velocity - velocity) / 1e-7
+    others = drive.damping * motion.velocity + drive.stiffness * motion.position
+    return drive.mass * acceleration + others - motion.friction_force

@@ -1,0 +1,94 @@
+"""A motion that would take for ever is refused within bounded work."""
+
+from dataclasses import replace
+
+import pytest
+
+from stickslip_ros.errors import RunError
+from stickslip_ros.physics.model.friction import Coulomb
+from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.theory.sensitivity import SensitiveMotion, TooStiffError
+from tests.physics.drives import PAPER
+
+STIFF = replace(PAPER, damping=1e9)
+
+
+@pytest.fixture(autouse=True)
+def _little_patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stickslip_ros.physics.motion.motion._SPARE_STEPS", 1000)
+
+
+def test_it_is_refused() -> None:
+    motion = Motion(STIFF, 0.0, 0.0)
+    with pytest.raises(RunError, match="too stiff"):
+        motion.advance(0.1)
+    assert not motion.unbounded
+
+
+def test_with_another_drive_it_goes_on_where_it_was() -> None:
+    motion = Motion(PAPER, 0.3, 0.1)
+    motion.drive = STIFF
+    with pytest.raises(RunError):
+        motion.advance(0.1)
+    position, velocity = motion.position, motion.velocity
+    motion.drive = PAPER
+    assert motion.position == position
+    assert motion.velocity == pytest.approx(velocity, rel=1e-12)
+    motion.advance(1.0)
+    fresh = Motion(PAPER, position, velocity)
+    fresh.advance(1.0)
+    assert motion.position == pytest.approx(fresh.position, rel=1e-9)
+
+
+def test_a_long_motion_that_is_not_stiff_is_followed_to_its_end() -> None:
+    motion = Motion(PAPER, 0.0, 0.0)
+    motion.advance(20_000.0)
+    assert not motion.unbounded
+
+
+def test_a_motion_sampled_often_is_followed_to_its_end() -> None:
+    often, once = Motion(PAPER, 0.0, 0.0), Motion(PAPER, 0.0, 0.0)
+    for _ in range(1000):
+        often.advance(1e-6)
+    once.advance(1e-3)
+    assert often.velocity == pytest.approx(once.velocity, rel=1e-11)
+
+
+def test_a_stick_however_long_is_followed_to_its_end() -> None:
+    motion = Motion(replace(PAPER, belt_speed=1e-20), 0.0, 1e-20)
+    motion.advance(1e19)
+    assert motion.sticking
+    assert motion.position == pytest.approx(0.1)
+
+
+def test_theory_takes_it_for_too_stiff() -> None:
+    motion = SensitiveMotion(STIFF)
+    with pytest.raises(TooStiffError):
+        motion.advance(0.1)
+
+
+def test_a_law_that_was_used_before_is_as_it_was() -> None:
+    changed, steady = Motion(PAPER, 0.0, 0.0), Motion(PAPER, 0.0, 0.0)
+    for drive in (replace(PAPER, friction=Coulomb(0.4)), PAPER) * 2:
+        changed.drive = drive
+    for motion in (changed, steady):
+        motion.advance(30.0)
+    assert changed.position == pytest.approx(steady.position, rel=1e-11)
+
+
+def test_begun_anew_it_records_nothing_of_what_was_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    motion = Motion(PAPER, 0.0, 0.0, record=True)
+    motion.begin(replace(PAPER, belt_speed=1.0), 0.1, 0.0)
+    for budget, steps in (("_SPARE_STEPS", 0), ("_STEPS_PER_RADIAN", 0.01)):
+        monkeypatch.setattr(f"stickslip_ros.physics.motion.motion.{budget}", steps)
+    monkeypatch.setattr("stickslip_ros.physics.motion.motion._STEPS_PER_ADVANCE", 10)
+    with pytest.raises(RunError):
+        motion.advance(100.0)
+    monkeypatch.undo()
+    fresh = Motion(PAPER, 0.0, 0.0, record=True)
+    motion.begin(PAPER, 0.0, 0.0)
+    for one in (motion, fresh):
+        one.advance(5.0)
+    assert motion.take_breakpoints().time.tolist() == fresh.take_breakpoints().time.tolist()

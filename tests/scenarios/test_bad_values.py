@@ -1,0 +1,100 @@
+"""Every parameter of every node refuses every bad value, and takes every good one as it is."""
+
+import struct
+from typing import Any
+
+import pytest
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.scenarios.files import load_scenario, parameter_file
+from stickslip_ros.scenarios.parameters import (
+    NODE_PARAMETERS,
+    NodeParameters,
+    Parameter,
+    ReplayParameters,
+    parameters_of,
+)
+from tests.scenarios.files import refusal, scenario_file
+from tests.scenarios.values import UNKNOWN, bad_values, good_values
+
+MODELS = {**NODE_PARAMETERS, "replay": ReplayParameters}
+TEXTS = ["1" + 400 * "0", 5000 * "9", "0x" + 5000 * "f", "1e400", "[[1]]", "[~]"]
+models = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
+
+
+def taken_or_refused(model: type[NodeParameters], name: str, value: Any) -> Any:
+    try:
+        return model.validated({name: value}, "test").flat()[name]
+    except InvalidInputError as error:
+        return str(error)
+
+
+def does_not_go_with_others(message: str) -> bool:
+    return "must not exceed" in message or "at least a thousandth" in message
+
+
+def bits(value: Any) -> Any:
+    """What tells -0.0 from 0.0."""
+    return struct.pack("d", value) if isinstance(value, float) else value
+
+
+@models
+def test_bad_values_are_refused_with_name_value_and_what_is_allowed(
+    model: type[NodeParameters],
+) -> None:
+    for parameter in parameters_of(model):
+        for value in bad_values(parameter):
+            with pytest.raises(InvalidInputError) as caught:
+                model.validated({parameter.name: value}, "test")
+            message = str(caught.value)
+            assert message.startswith(f"test: {parameter.name} = {value!r:.80}")
+            assert " is refused: must be " in message
+            assert parameter.bounds in message or parameter.limits in message
+            assert len(message) < 300
+
+
+@models
+def test_good_values_are_taken_as_they_are(model: type[NodeParameters]) -> None:
+    for parameter in parameters_of(model):
+        for value in good_values(parameter):
+            taken = taken_or_refused(model, parameter.name, value)
+            assert bits(taken) == bits(value) or does_not_go_with_others(taken)
+
+
+@models
+def test_unknown_names_are_refused(model: type[NodeParameters]) -> None:
+    for name, value in UNKNOWN.items():
+        if name not in {parameter.name for parameter in parameters_of(model)}:
+            with pytest.raises(InvalidInputError, match="unknown parameter") as caught:
+                model.validated({name: value}, "test")
+            assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize("node", NODE_PARAMETERS)
+def test_so_are_they_in_a_file_and_as_an_override(tmp_path: Any, node: str) -> None:
+    def check(parameter: Parameter, message: str) -> None:
+        assert "\n" not in message
+        assert f"{parameter.name} = " in message
+        assert " is refused: must be " in message
+        assert len(message) < 500
+
+    for number, parameter in enumerate(parameters_of(NODE_PARAMETERS[node])):
+        values = [value for value in bad_values(parameter) if value != [b"\1"]]
+        value = values[number % len(values)]
+        path = scenario_file(tmp_path, parameter_file({node: {parameter.name: value}}))
+        check(parameter, refusal(path))
+        text = TEXTS[number % len(TEXTS)]
+        if parameter.kind is not str or parameter.choices:
+            check(parameter, refusal("paper", f"{node}.{parameter.name}={text}"))
+
+
+@pytest.mark.parametrize("text", ["5e-324", "1e-400", "-1e-310", "1e309", "-1e999"])
+def test_numbers_that_ros_does_not_read_are_refused_here_too(text: str) -> None:
+    """What `stickslip run` takes, the nodes must be able to read from the file they get."""
+    assert f"damping = '{text}' is refused" in refusal("paper", f"plant.damping={text}")
+
+
+@pytest.mark.parametrize("text", ["0e-400", "0.0", "-0.0", "2.2250738585072014e-308"])
+def test_the_smallest_numbers_that_ros_reads_are_taken(text: str) -> None:
+    scenario = load_scenario("paper", [f"plant.belt_speed={text}"])
+    assert bits(scenario.plant.belt_speed) == bits(float(text))

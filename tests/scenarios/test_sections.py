@@ -1,0 +1,95 @@
+"""To which nodes the sections of a file apply: as ROS has it."""
+
+from pathlib import Path
+
+import pytest
+
+from stickslip_ros.scenarios.files import load_scenario
+from tests.scenarios.conftest import ReadByRos
+from tests.scenarios.files import refusal, scenario_file, section
+
+# By namespace: patterns that match its plant, and that do not.
+MATCHES = {
+    "/feed_drive": (
+        ["/**", "/**/plant", "/*/plant", "/feed_drive/plant", "/feed_drive/*", "/*/*", "/**/*",
+         "/feed_drive/**", "/**/feed_drive/plant", "feed_drive/plant", "**/plant",
+         "/feed_drive/**/plant", "/**/**/plant"],
+        ["plant", "/plant", "/*", "/*/*/plant", "/other/plant", "/feed_drive/*/plant"],
+    ),
+    "/a/b": (
+        ["/**", "/**/plant", "/a/b/plant", "/*/*/plant", "/a/*/plant", "/a/**/plant",
+         "/**/b/plant"],
+        ["plant", "/*/plant", "/b/plant", "/a/plant"],
+    ),
+    "/": (
+        ["/**", "/**/plant", "/plant", "plant", "/*", "**"],
+        ["/*/plant", "/feed_drive/plant"],
+    ),
+}  # fmt: skip
+matching = [(namespace, p) for namespace, (these, _) in MATCHES.items() for p in these]
+not_matching = [(namespace, p) for namespace, (_, others) in MATCHES.items() for p in others]
+
+
+@pytest.mark.parametrize(("namespace", "pattern"), matching)
+def test_a_section_applies_to_the_nodes_it_matches(
+    tmp_path: Path, namespace: str, pattern: str
+) -> None:
+    path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))
+    assert load_scenario(path, namespace=namespace).plant.mass == 7.0
+
+
+@pytest.mark.parametrize(("namespace", "pattern"), not_matching)
+def test_a_section_that_matches_no_node_is_refused(
+    tmp_path: Path, namespace: str, pattern: str
+) -> None:
+    path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))
+    message = refusal(path, namespace=namespace)
+    assert message.startswith(f"{path}: section /{pattern.strip('/')} matches no node")
+    assert f"in namespace {namespace} there are plant, washout_controller, analyzer" in message
+
+
+def test_sections_of_other_nodes_are_left_alone_where_there_may_be_some(tmp_path: Path) -> None:
+    text = section("/**/plant", "{mass: 7.0}") + section("/**/damper", "{gain: 0.5}")
+    scenario = load_scenario(scenario_file(tmp_path, text), other_nodes=True)
+    assert (scenario.plant.mass, scenario.other_sections) == (7.0, ("/**/damper",))
+    assert str(scenario.path) == str(tmp_path / "scenario.yaml")
+
+
+def test_ros_agrees(tmp_path: Path, read_by_ros: ReadByRos) -> None:
+    for namespace, pattern in matching + not_matching:
+        path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))
+        expected = {"mass": 7.0} if (namespace, pattern) in matching else {}
+        assert read_by_ros(path, namespace) == expected, (namespace, pattern)
+
+
+def test_a_section_for_all_gives_to_each_what_it_has(tmp_path: Path) -> None:
+    parameters = "{use_sim_time: true, mass: 7.0, window: 5}"
+    scenario = load_scenario(scenario_file(tmp_path, section("/**", parameters)))
+    assert scenario.plant.use_sim_time
+    assert scenario.washout_controller.use_sim_time
+    assert scenario.analyzer.use_sim_time
+    assert (scenario.plant.mass, scenario.analyzer.window) == (7.0, 5)
+
+
+in_turn = pytest.mark.parametrize("patterns", [("/**", "/**/plant"), ("/**/plant", "/**")])
+
+
+@in_turn
+def test_the_later_section_counts(tmp_path: Path, patterns: tuple[str, str]) -> None:
+    text = section(patterns[0], "{mass: 7.0, rate: 50.0}") + section(patterns[1], "{mass: 8.0}")
+    path = scenario_file(tmp_path, text)
+    plant = load_scenario(path).plant
+    assert (plant.mass, plant.rate) == (8.0, 50.0)
+
+
+@in_turn
+def test_ros_lets_the_later_section_count_too(
+    tmp_path: Path, patterns: tuple[str, str], read_by_ros: ReadByRos
+) -> None:
+    text = section(patterns[0], "{mass: 7.0, rate: 50.0}") + section(patterns[1], "{mass: 8.0}")
+    assert read_by_ros(scenario_file(tmp_path, text)) == {"mass": 8.0, "rate": 50.0}
+
+
+def test_names_may_be_nested(tmp_path: Path) -> None:
+    text = "feed_drive:\n  plant:\n    ros__parameters:\n      friction: {static: 0.5}\n"
+    assert load_scenario(scenario_file(tmp_path, text)).plant.friction.static == 0.5
