@@ -14,7 +14,7 @@ PUBLIC = {
     },
     "bags": {
         "stickslip_ros.bags": ["Recording", "RunBlock"],
-        "stickslip_ros.messages.codec": ["JointStateColumns", "WrenchColumns"],
+        "stickslip_ros.samples": ["SampleColumns", "ForceColumns"],
         "stickslip_ros.bags.report": ["report_of_bag"],
     },
     "scenarios": {

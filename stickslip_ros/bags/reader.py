@@ -21,14 +21,9 @@ from stickslip_ros.bags.compression import unpack_file
 from stickslip_ros.bags.mcap_file import McapFile, MessageBlock
 from stickslip_ros.bags.metadata import METADATA_FILE
 from stickslip_ros.errors import BagError
-from stickslip_ros.messages.codec import (
-    JointStateColumns,
-    Refused,
-    WrenchColumns,
-    joint_states_in,
-    wrenches_in,
-)
+from stickslip_ros.messages.codec import Refused, joint_states_in, wrenches_in
 from stickslip_ros.printable import printable
+from stickslip_ros.samples import ForceColumns, SampleColumns
 
 _PACKED = ".mcap.zstd"
 """Ending of the files that rosbag2 packs as a whole."""
@@ -51,16 +46,16 @@ _TOPICS = {
 }
 """Types of the topics of a drive, by the last part of their names."""
 
-ColumnsT = TypeVar("ColumnsT", JointStateColumns, WrenchColumns)
+ColumnsT = TypeVar("ColumnsT", SampleColumns, ForceColumns)
 _Decode = Callable[[bytes, IntArray, IntArray], tuple[ColumnsT, Refused]]
 
 
 class RunBlock(NamedTuple):
     """A stretch of a recorded run, of one chunk of its bag; each part may be empty."""
 
-    joint_states: JointStateColumns
-    control_forces: WrenchColumns
-    dropped_forces: WrenchColumns
+    joint_states: SampleColumns
+    control_forces: ForceColumns
+    dropped_forces: ForceColumns
 
 
 class Recording:
@@ -129,24 +124,24 @@ class Recording:
         return [printable(sentence) for sentence in sentences]
 
     @cached_property
-    def joint_states(self) -> JointStateColumns:
+    def joint_states(self) -> SampleColumns:
         """All joint states; BagError as for `blocks`."""
-        return self._whole(JointStateColumns, _JOINT_STATES, joint_states_in)
+        return self._whole(SampleColumns, _JOINT_STATES, joint_states_in)
 
     @cached_property
-    def control_forces(self) -> WrenchColumns:
+    def control_forces(self) -> ForceColumns:
         """All control forces; BagError as for `blocks`."""
-        return self._whole(WrenchColumns, _CONTROL_FORCE, wrenches_in)
+        return self._whole(ForceColumns, _CONTROL_FORCE, wrenches_in)
 
     @cached_property
-    def applied_disturbances(self) -> WrenchColumns:
+    def applied_disturbances(self) -> ForceColumns:
         """All disturbance forces at the samples from which they act; BagError as for `blocks`."""
-        return self._whole(WrenchColumns, _APPLIED_DISTURBANCE, wrenches_in)
+        return self._whole(ForceColumns, _APPLIED_DISTURBANCE, wrenches_in)
 
     @cached_property
-    def dropped_forces(self) -> WrenchColumns:
+    def dropped_forces(self) -> ForceColumns:
         """All control forces that did not act, as they were sent; BagError as for `blocks`."""
-        return self._whole(WrenchColumns, _DROPPED_FORCE, wrenches_in)
+        return self._whole(ForceColumns, _DROPPED_FORCE, wrenches_in)
 
     @property
     def dropped_known(self) -> bool:
@@ -306,9 +301,9 @@ class Recording:
 def _joined_blocks(blocks: Sequence[RunBlock]) -> RunBlock:
     states, forces, dropped = zip(*blocks, strict=True)
     return RunBlock(
-        _joined(JointStateColumns, states),
-        _joined(WrenchColumns, forces),
-        _joined(WrenchColumns, dropped),
+        _joined(SampleColumns, states),
+        _joined(ForceColumns, forces),
+        _joined(ForceColumns, dropped),
     )
 
 

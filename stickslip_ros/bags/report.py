@@ -9,9 +9,9 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
 from stickslip_ros.physics.measures.cycles import Cycle
 from stickslip_ros.physics.measures.samples import RunMeter, SettledForces
+from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
 _DEFAULT_WINDOW = 20
@@ -115,11 +115,9 @@ class _RunReader:
             round(min(instant, _LONGEST) * NANOSECONDS)
             for instant in (start if start > 0.0 else -_LONGEST, end)
         )
-        self._early: list[tuple[WrenchColumns, WrenchColumns]] = []
+        self._early: list[tuple[ForceColumns, ForceColumns]] = []
 
-    def feed(
-        self, states: JointStateColumns, forces: WrenchColumns, dropped: WrenchColumns
-    ) -> None:
+    def feed(self, states: SampleColumns, forces: ForceColumns, dropped: ForceColumns) -> None:
         if len(states.stamp) > 0:
             self.has_states = True
             first = self._begin(int(states.stamp[0])) if self.first is None else self.first
@@ -161,15 +159,15 @@ class _RunReader:
         if self._spectator is None:
             yield rows
 
-    def _feed_states(self, states: JointStateColumns, rows: IntArray, first: int) -> None:
+    def _feed_states(self, states: SampleColumns, rows: IntArray, first: int) -> None:
         stamp = states.stamp[rows]
         motion = states.position[rows], states.velocity[rows], states.belt_velocity[rows]
         cycles = self.meter.motion.feed(stamp, *motion)
         if self._spectator is not None:
             time = (stamp - first) / NANOSECONDS
-            self._spectator.take_samples(time, *motion, states.effort[rows], cycles)
+            self._spectator.take_samples(time, *motion, states.friction_force[rows], cycles)
 
-    def _feed_forces(self, forces: WrenchColumns, dropped: WrenchColumns, first: int) -> None:
+    def _feed_forces(self, forces: ForceColumns, dropped: ForceColumns, first: int) -> None:
         rows, dropped_rows = self._part(forces.stamp, first), self._part(dropped.stamp, first)
         self.measured += int(rows.sum())
         settled = self.meter.feed_forces(

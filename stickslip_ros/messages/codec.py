@@ -13,7 +13,6 @@ import math
 import reprlib
 import struct
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import BagError
+from stickslip_ros.samples import ForceColumns, Sample, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
 SLIDE = "slide"
@@ -35,43 +35,6 @@ _MOST_JOINTS = 1000
 """More are not looked through: that might take longer than the message stands for."""
 _STRUCTURES = 8
 """Different structures that are looked for in a block of messages."""
-
-
-class JointStateSample(NamedTuple):
-    """What one joint state says of slide and belt."""
-
-    stamp: int
-    """Header stamp in ns."""
-    position: float
-    """Displacement of the slide in m."""
-    velocity: float
-    """Velocity of the slide in m/s."""
-    effort: float
-    """Friction force on the slide in N; NaN where the message has no efforts."""
-    belt_position: float
-    """Displacement of the belt in m."""
-    belt_velocity: float
-    """Velocity of the belt in m/s."""
-
-
-@dataclass(frozen=True, eq=False)
-class JointStateColumns:
-    """A block of joint states: the fields of `JointStateSample` as arrays of shape (messages,)."""
-
-    stamp: IntArray
-    position: FloatArray
-    velocity: FloatArray
-    effort: FloatArray
-    belt_position: FloatArray
-    belt_velocity: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class WrenchColumns:
-    """A block of wrenches: header stamp in ns and `force.x` in N, arrays of shape (messages,)."""
-
-    stamp: IntArray
-    force: FloatArray
 
 
 class Refused(NamedTuple):
@@ -166,7 +129,7 @@ def pack_header(stamp: int) -> bytes:
         raise _unpackable("header", stamp, error) from error
 
 
-def unpack_joint_state(data: bytes) -> JointStateSample:
+def unpack_joint_state(data: bytes) -> Sample:
     """Read slide and belt out of a serialized sensor_msgs/msg/JointState.
 
     Any frame, byte order and order of the joints will do, and further joints may be there. Raises
@@ -199,7 +162,7 @@ def unpack_joint_state(data: bytes) -> JointStateSample:
             velocity_count,
             effort_count,
         ) == _JOINT_STATE_CONSTANTS:
-            return JointStateSample(
+            return Sample(
                 sec * NANOSECONDS + nanosec,
                 position,
                 velocity,
@@ -208,7 +171,7 @@ def unpack_joint_state(data: bytes) -> JointStateSample:
                 belt_velocity,
             )
     stamp, values = _joint_state_layout(data).read(data)
-    return JointStateSample(stamp, *values)
+    return Sample(stamp, *values)
 
 
 def unpack_wrench(data: bytes) -> tuple[int, float]:
@@ -235,28 +198,26 @@ def unpack_header(data: bytes) -> int:
     return _header_layout(data).read(data)[0]
 
 
-def joint_state_columns(messages: Sequence[bytes]) -> tuple[JointStateColumns, Refused]:
+def joint_state_columns(messages: Sequence[bytes]) -> tuple[SampleColumns, Refused]:
     """Decode serialized joint states; say which `unpack_joint_state` would refuse."""
     return joint_states_in(*joined(messages))
 
 
-def joint_states_in(
-    data: bytes, begin: IntArray, end: IntArray
-) -> tuple[JointStateColumns, Refused]:
+def joint_states_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[SampleColumns, Refused]:
     """Decode the serialized joint states `data[begin[i] : end[i]]`, as `joint_state_columns`."""
     stamp, values, refused = _decode(data, begin, end, _joint_state_layout, _JOINT_STATE_VALUES)
-    return JointStateColumns(stamp, *values), refused
+    return SampleColumns(stamp, *values), refused
 
 
-def wrench_columns(messages: Sequence[bytes]) -> tuple[WrenchColumns, Refused]:
+def wrench_columns(messages: Sequence[bytes]) -> tuple[ForceColumns, Refused]:
     """Decode serialized wrenches; say which `unpack_wrench` would refuse."""
     return wrenches_in(*joined(messages))
 
 
-def wrenches_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[WrenchColumns, Refused]:
+def wrenches_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[ForceColumns, Refused]:
     """Decode the serialized wrenches `data[begin[i] : end[i]]`, as `wrench_columns`."""
     stamp, values, refused = _decode(data, begin, end, _wrench_layout, _WRENCH_VALUES)
-    return WrenchColumns(stamp, *values), refused
+    return ForceColumns(stamp, *values), refused
 
 
 def rows(data: bytes, starts: IntArray, size: int) -> NDArray[np.void]:

@@ -5,7 +5,7 @@ from math import isfinite
 from typing import Any
 
 from stickslip_ros.errors import BagError
-from stickslip_ros.messages.codec import JointStateSample, pack_wrench, unpack_joint_state
+from stickslip_ros.messages.codec import pack_wrench, unpack_joint_state
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.base.dropped_messages import Dropped
 from stickslip_ros.nodes.base.duplicate_publishers import rivals
@@ -13,6 +13,7 @@ from stickslip_ros.nodes.base.managed import OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.physics.loop.washout import Washout
 from stickslip_ros.physics.measures.samples import LARGEST
+from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import WashoutControllerParameters
 
 
@@ -60,7 +61,7 @@ class WashoutControllerNode(ManagedNode[WashoutControllerParameters]):
         except BagError as error:
             self._dropped.add(str(error))
 
-    def _answer(self, sample: JointStateSample) -> None:
+    def _answer(self, sample: Sample) -> None:
         stamp, velocity = sample.stamp, sample.velocity
         if not abs(velocity) <= LARGEST:
             self._dropped.add(f"a joint state stamped {stamp} ns with the velocity {velocity} m/s")

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
-from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
 from stickslip_ros.physics.measures.samples import HELD_FORCES, DroppedForces
 from stickslip_ros.plots.decimation import LONGEST_GAP, peaks
+from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
-_NONE = WrenchColumns(np.empty(0, np.int64), np.empty(0))
+_NONE = ForceColumns(np.empty(0, np.int64), np.empty(0))
 _MOST_ROWS = 200_000
 _ORBIT_BUCKETS = 1_000
 _FINE_BUCKETS = 10_000
@@ -58,7 +58,7 @@ class LiveTrace:
         self._begin()
 
     def feed(
-        self, states: JointStateColumns, forces: WrenchColumns, dropped: WrenchColumns = _NONE
+        self, states: SampleColumns, forces: ForceColumns, dropped: ForceColumns = _NONE
     ) -> None:
         """Take in what has come, `dropped` forces in any order; empty blocks are welcome."""
         longest = round(self.longest * NANOSECONDS)
@@ -199,5 +199,5 @@ def _line(
     return Line(x, y)
 
 
-def _rows(states: JointStateColumns, rows: slice) -> JointStateColumns:
-    return JointStateColumns(*(getattr(states, field.name)[rows] for field in fields(states)))
+def _rows(states: SampleColumns, rows: slice) -> SampleColumns:
+    return SampleColumns(*(getattr(states, field.name)[rows] for field in fields(states)))

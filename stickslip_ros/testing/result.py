@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags import Recording
 from stickslip_ros.errors import RunError
-from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
 from stickslip_ros.physics.measures.cycles import Measures
 from stickslip_ros.physics.measures.samples import RunMeter
+from stickslip_ros.samples import ForceColumns, SampleColumns
 
 
 class Diagnostics(NamedTuple):
@@ -26,13 +26,13 @@ class Diagnostics(NamedTuple):
 class RunResult:
     """One run: what was recorded in it, and what that comes to; SI units, stamps in ns."""
 
-    states: JointStateColumns
+    states: SampleColumns
     """Every sample."""
-    forces: WrenchColumns
+    forces: ForceColumns
     """Every control force that was published; its stamp is that of the sample it answers."""
-    dropped_forces: WrenchColumns
+    dropped_forces: ForceColumns
     """Those of them that did not act."""
-    disturbances: WrenchColumns
+    disturbances: ForceColumns
     """The disturbance force at each sample at which it changed."""
     measures: Measures
     """Of the last whole cycles of this run, `analyzer.window` at most."""

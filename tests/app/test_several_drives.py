@@ -74,7 +74,7 @@ def motion_of(bag: Path) -> np.ndarray:
     """Return the joint states but for their stamps, which in real time are those of the clock."""
     with Recording(bag) as recording:
         states = recording.joint_states
-    return np.stack([states.position, states.velocity, states.effort, states.belt_position])
+    return np.stack([states.position, states.velocity, states.friction_force, states.belt_position])
 
 
 def test_a_second_run_in_the_same_namespace_is_refused(

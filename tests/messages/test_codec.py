@@ -14,7 +14,6 @@ from std_msgs.msg import Header
 
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import (
-    JointStateSample,
     joint_state_columns,
     pack_header,
     pack_joint_state,
@@ -24,6 +23,7 @@ from stickslip_ros.messages.codec import (
     unpack_wrench,
     wrench_columns,
 )
+from stickslip_ros.samples import Sample
 
 JOINT_STATE_PADDING = (*range(17, 20), 34, 35, *range(45, 48), *range(72, 76), *range(96, 100))
 WRENCH_PADDING = range(22, 28)
@@ -89,7 +89,7 @@ def test_the_stamp_of_any_header_is_read(stamp, frame):
 @given(stamps, pairs, pairs, pairs)
 def test_what_is_packed_is_unpacked(stamp, position, velocity, effort):
     assert unpack_joint_state(pack_joint_state(stamp, position, velocity, effort)) == (
-        JointStateSample(stamp, position[0], velocity[0], effort[0], position[1], velocity[1])
+        Sample(stamp, position[0], velocity[0], effort[0], position[1], velocity[1])
     )
     assert unpack_wrench(pack_wrench(stamp, effort[0])) == (stamp, effort[0])
 
@@ -115,9 +115,9 @@ def test_joint_states_of_other_layouts_are_read(case):
     assert sample.belt_position == message.position[belt]
     assert sample.belt_velocity == message.velocity[belt]
     if message.effort:
-        assert sample.effort == message.effort[slide]
+        assert sample.friction_force == message.effort[slide]
     else:
-        assert math.isnan(sample.effort)
+        assert math.isnan(sample.friction_force)
 
 
 @given(stamps, numbers, numbers, frames)
@@ -209,7 +209,7 @@ def rows(columns):
             columns.stamp.tolist(),
             columns.position.tolist(),
             columns.velocity.tolist(),
-            columns.effort.tolist(),
+            columns.friction_force.tolist(),
             columns.belt_position.tolist(),
             columns.belt_velocity.tolist(),
             strict=True,

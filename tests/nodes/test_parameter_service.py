@@ -268,7 +268,7 @@ def test_what_is_set_while_inactive_acts_when_it_is_activated(graph: Graph) -> N
     columns, _ = joint_state_columns(heard)
     assert np.diff(columns.stamp).tolist() == [SECOND // 10] * 10
     assert columns.position[0] == 0.25
-    assert columns.effort[0] == 0.4
+    assert columns.friction_force[0] == 0.4
     assert set_all(graph, "plant", **{"initial.position": -1.0}) == ""
     plant.trigger_activate()
     graph.wait_until(lambda: len(heard) == 22, "it goes on")
@@ -354,7 +354,7 @@ def test_thousands_of_changes_leave_the_motion_continuous(graph: Graph, pace: st
     assert refused.number == 0
     assert columns.belt_velocity[-1] == plant.parameters.belt_speed
     position, velocity = columns.position, columns.velocity
-    assert np.isfinite([position, velocity, columns.effort]).all()
+    assert np.isfinite([position, velocity, columns.friction_force]).all()
     next_to_each_other = np.diff(columns.stamp) == round(period * SECOND)
     assert next_to_each_other.mean() > 0.9
     fastest = np.maximum(np.abs(velocity[1:]), np.abs(velocity[:-1]))

@@ -56,7 +56,7 @@ def test_without_control_the_samples_are_those_of_the_loop(graph: Graph) -> None
     assert columns.stamp.tolist() == [sample.stamp for sample in samples]
     assert columns.position.tolist() == [sample.position for sample in samples]
     assert columns.velocity.tolist() == [sample.velocity for sample in samples]
-    assert columns.effort.tolist() == [sample.friction_force for sample in samples]
+    assert columns.friction_force.tolist() == [sample.friction_force for sample in samples]
     assert columns.belt_velocity.tolist() == [0.4] * 301
 
 

@@ -7,21 +7,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
 from stickslip_ros.plots.live_trace import LiveTrace
+from stickslip_ros.samples import ForceColumns, SampleColumns
 
-NO_FORCES = WrenchColumns(np.empty(0, dtype=np.int64), np.empty(0))
+NO_FORCES = ForceColumns(np.empty(0, dtype=np.int64), np.empty(0))
 SECOND = 1_000_000_000
 
 
-def states(stamps: range, position: np.ndarray) -> JointStateColumns:
+def states(stamps: range, position: np.ndarray) -> SampleColumns:
     stamp = np.asarray(stamps, dtype=np.int64)
     ones = np.ones(len(stamp))
-    return JointStateColumns(stamp, position, 2.0 * position, ones, ones, 0.5 * ones)
+    return SampleColumns(stamp, position, 2.0 * position, ones, ones, 0.5 * ones)
 
 
-def forces(stamps: range, force: np.ndarray) -> WrenchColumns:
-    return WrenchColumns(np.asarray(stamps, dtype=np.int64), force)
+def forces(stamps: range, force: np.ndarray) -> ForceColumns:
+    return ForceColumns(np.asarray(stamps, dtype=np.int64), force)
 
 
 def test_before_the_first_sample_there_is_nothing_to_show() -> None:

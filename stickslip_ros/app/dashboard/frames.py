@@ -10,11 +10,11 @@ import orjson
 from stickslip_ros.app.dashboard.listener import ObserverNode
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.live_trace import Line, LiveTrace
 from stickslip_ros.plots.units import Units
+from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.parameters import PlantParameters
 
 PERIODS = (10, 50, 200)
@@ -54,9 +54,7 @@ class Frames:
         frequencies = list(self._observer.cycles[FREQUENCY])[-1:]
         return next((1.0 / f for f in frequencies if 1e-9 < f < 1e9), _UNKNOWN_PERIOD)
 
-    def feed(
-        self, states: JointStateColumns, forces: WrenchColumns, dropped: WrenchColumns
-    ) -> None:
+    def feed(self, states: SampleColumns, forces: ForceColumns, dropped: ForceColumns) -> None:
         """Take in what was heard: states, forces sent, and those of them that were dropped."""
         self._trace.longest = PERIODS[-1] * self.period
         self._trace.feed(states, forces, dropped)

@@ -24,13 +24,7 @@ from rclpy.timer import Timer
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from stickslip_ros.messages.codec import (
-    JointStateColumns,
-    WrenchColumns,
-    joint_state_columns,
-    pack_wrench,
-    wrench_columns,
-)
+from stickslip_ros.messages.codec import joint_state_columns, pack_wrench, wrench_columns
 from stickslip_ros.messages.topics import (
     AMPLITUDE,
     CONTROL_FORCE,
@@ -46,6 +40,7 @@ from stickslip_ros.nodes.base.managed import STATE
 from stickslip_ros.nodes.base.polling import Collecting, take_waiting
 from stickslip_ros.nodes.base.service_call import PATIENCE, Inquiry, ask_parameters
 from stickslip_ros.running.controller_search import DASHBOARD
+from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, known_parameters
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -104,7 +99,7 @@ class ObserverNode(Collecting):
     def __init__(
         self,
         namespace: str,
-        show: Callable[[JointStateColumns, WrenchColumns, WrenchColumns], None],
+        show: Callable[[SampleColumns, ForceColumns, ForceColumns], None],
         *,
         context: Context | None = None,
     ) -> None:

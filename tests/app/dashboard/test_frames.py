@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
-from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
+from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.files import load_scenario
 
 
@@ -45,9 +45,9 @@ def fed(parameters: dict[str, Any], seconds: float, rate: float) -> Frames:
     stamp = 1_000_000_000 + np.rint(time * 1e9).astype(np.int64)
     x = 4e-4 * np.sin(100.0 * time)
     belt = np.full_like(x, 0.04)
-    states = JointStateColumns(stamp, x, 100.0 * x, x, belt, belt)
-    none = WrenchColumns(stamp[:0], x[:0])
-    frames.feed(states, WrenchColumns(stamp, 1e5 * x), none)
+    states = SampleColumns(stamp, x, 100.0 * x, x, belt, belt)
+    none = ForceColumns(stamp[:0], x[:0])
+    frames.feed(states, ForceColumns(stamp, 1e5 * x), none)
     return frames
 
 

@@ -7,7 +7,6 @@ from rclpy.parameter import Parameter
 
 from stickslip_ros.app.dashboard import listener as observer_module
 from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, ObserverNode
-from stickslip_ros.messages.codec import JointStateColumns, WrenchColumns
 from stickslip_ros.messages.topics import (
     AMPLITUDE,
     APPLIED_DISTURBANCE,
@@ -18,6 +17,7 @@ from stickslip_ros.messages.topics import (
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.samples import ForceColumns, SampleColumns
 from tests.nodes.graph import Graph
 
 pytestmark = pytest.mark.usefixtures("often_diagnosed")
@@ -27,13 +27,11 @@ class Shown:
     """Collects what an observer passes on."""
 
     def __init__(self) -> None:
-        self.states: list[JointStateColumns] = []
-        self.forces: list[WrenchColumns] = []
-        self.dropped: list[WrenchColumns] = []
+        self.states: list[SampleColumns] = []
+        self.forces: list[ForceColumns] = []
+        self.dropped: list[ForceColumns] = []
 
-    def take(
-        self, states: JointStateColumns, forces: WrenchColumns, dropped: WrenchColumns
-    ) -> None:
+    def take(self, states: SampleColumns, forces: ForceColumns, dropped: ForceColumns) -> None:
         self.states.append(states)
         self.forces.append(forces)
         self.dropped.append(dropped)
