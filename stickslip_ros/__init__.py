@@ -1,8 +1,11 @@
 """Stick-slip vibration of a feed drive: simulated, controlled and measured as ROS 2 nodes."""
 
 from stickslip_ros.interrupts import end_quietly_if_interrupted, is_run
+from stickslip_ros.moved import find_moved_modules
 
 _SCRIPTS = ("stickslip", "plant_node", "washout_controller_node", "analyzer_node", "replay_node")
 
 if is_run(__name__, *_SCRIPTS):
     end_quietly_if_interrupted()
+
+find_moved_modules()

@@ -122,8 +122,10 @@ def test_the_test_may_start_a_controller_by_itself() -> None:
     with ClosedLoop("paper", controller="external") as loop:
         command = [*process(WithoutArguments), *loop.ros_arguments]
         with subprocess.Popen(command, env=loop.environment) as controller:
-            result = loop.run(0.5)
-            controller.terminate()
+            try:
+                result = loop.run(0.5)
+            finally:
+                controller.kill()
     assert result.late_forces == 0
     assert result.forces.stamp.tolist() == result.states.stamp.tolist()
 

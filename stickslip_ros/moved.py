@@ -1,0 +1,88 @@
+"""Public names where they were in version 0.1: importable from there until 0.2, with a warning.
+
+`MOVED` is the whole of it: by the old module, each name and where it is now. A module that is no
+more is found by the finder here; one that is still there takes its `__getattr__` from `moved_from`.
+"""
+
+import sys
+import warnings
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Any
+
+_MODEL = "stickslip_ros.physics.model"
+_LOOP = "stickslip_ros.physics.loop"
+
+MOVED: dict[str, dict[str, str]] = {
+    "stickslip_ros.bags.messages": {
+        "JointStateColumns": "stickslip_ros.samples.SampleColumns",
+        "WrenchColumns": "stickslip_ros.samples.ForceColumns",
+    },
+    "stickslip_ros.scenario": {},
+    "stickslip_ros.scenario.files": {
+        name: f"stickslip_ros.scenarios.files.{name}"
+        for name in ("load_scenario", "Scenario", "parameter_file")
+    },
+    "stickslip_ros.physics.drive": {"Drive": f"{_MODEL}.drive.Drive"},
+    "stickslip_ros.physics.friction": {
+        name: f"{_MODEL}.friction.{name}"
+        for name in ("FrictionLaw", "Stribeck", "Coulomb", "Linear", "Exponential", "LAWS")
+    },
+    "stickslip_ros.physics.knots": {
+        "Knots": "stickslip_ros.physics.measures.breakpoints.Breakpoints",
+    },
+    "stickslip_ros.physics.washout": {
+        name: f"{_LOOP}.washout.{name}" for name in ("WashoutParameters", "Washout")
+    },
+    "stickslip_ros.physics.equations": {"WashoutGains": f"{_MODEL}.equations.WashoutGains"},
+    "stickslip_ros.physics.sampled_loop": {
+        "SampledLoop": f"{_LOOP}.sampled_loop.SampledLoop",
+        "Sample": "stickslip_ros.samples.Sample",
+        "Verdict": f"{_LOOP}.sampled_loop.Verdict",
+    },
+    "stickslip_ros.physics.disturbance": {"Disturbance": f"{_MODEL}.disturbance.Disturbance"},
+    "stickslip_ros.physics.simulation": {
+        name: f"{_LOOP}.simulation.{name}" for name in ("simulate_sampled", "simulate_continuous")
+    },
+}
+
+
+def moved_from(module: str) -> Callable[[str], Any]:
+    """Return the `__getattr__` of a module that names of `MOVED` have left."""
+
+    def get(name: str) -> Any:
+        now = MOVED[module].get(name)
+        if now is None:
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        home, _, new_name = now.rpartition(".")
+        warnings.warn(
+            f"{module}.{name} is now {now}; the old name goes in version 0.2",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        return getattr(import_module(home), new_name)
+
+    return get
+
+
+class _MovedModules(MetaPathFinder, Loader):
+    """Finds the modules of `MOVED` that are no more."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        if fullname not in MOVED:
+            return None
+        is_package = any(name.startswith(f"{fullname}.") for name in MOVED)
+        return ModuleSpec(fullname, self, is_package=is_package)
+
+    def exec_module(self, module: ModuleType) -> None:
+        vars(module)["__getattr__"] = moved_from(module.__name__)
+
+
+def find_moved_modules() -> None:
+    """Let the modules of `MOVED` that are no more be imported."""
+    sys.meta_path.append(_MovedModules())

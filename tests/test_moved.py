@@ -1,0 +1,67 @@
+"""Names that a program of version 0.1 imports: all of docs/reference.md of then."""
+
+import warnings
+from importlib import import_module
+
+import pytest
+
+from stickslip_ros.moved import MOVED
+
+PUBLIC = {
+    "stickslip_ros.testing": "ClosedLoop RunResult Diagnostics own_domain",
+    "stickslip_ros.bags": "Recording RunBlock",
+    "stickslip_ros.bags.messages": "JointStateColumns WrenchColumns",
+    "stickslip_ros.bags.report": "report_of_bag",
+    "stickslip_ros.scenario.files": "load_scenario Scenario parameter_file",
+    "stickslip_ros.physics.drive": "Drive",
+    "stickslip_ros.physics.friction": "FrictionLaw Stribeck Coulomb Linear Exponential LAWS",
+    "stickslip_ros.physics.motion": "Motion",
+    "stickslip_ros.physics.knots": "Knots",
+    "stickslip_ros.physics.washout": "WashoutParameters Washout",
+    "stickslip_ros.physics.equations": "WashoutGains",
+    "stickslip_ros.physics.sampled_loop": "SampledLoop Sample Verdict",
+    "stickslip_ros.physics.disturbance": "Disturbance",
+    "stickslip_ros.physics.simulation": "simulate_sampled simulate_continuous",
+    "stickslip_ros.physics.measures": "CycleMeter Measures Cycle Regime",
+    "stickslip_ros.physics.theory.linear": "expand Expansion",
+    "stickslip_ros.physics.theory.hopf": (
+        "hopf_points HopfPoint first_lyapunov_coefficient crossing_speed"
+    ),
+    "stickslip_ros.physics.theory.closed_forms": "CubicLoop",
+    "stickslip_ros.physics.theory.sticking": "sticking_onset StickingOnset",
+    "stickslip_ros.physics.theory.limit_cycles": "limit_cycles limit_cycle_of_run shoot LimitCycle",
+    "stickslip_ros.physics.theory.hopf_cycles": "limit_cycle_from_hopf",
+    "stickslip_ros.physics.theory.closed_loop": "critical_gains CriticalGains",
+    "stickslip_ros.physics.theory.sampled": "LinearSampledLoop GainInterval",
+    "stickslip_ros.studies.plan": "Axis Grid Sample Carry",
+    "stickslip_ros.studies.settled": "Course",
+    "stickslip_ros.studies.sweep": "sweep_study",
+    "stickslip_ros.studies.basin": "basin_study default_axes Basins Attractor",
+    "stickslip_ros.studies.columns": "compute_columns Columns",
+    "stickslip_ros.studies.journal": "Journal",
+    "stickslip_ros.studies.runner": "run",
+    "stickslip_ros.studies.design": "Task design Design Check Margins",
+    "stickslip_ros.errors": "StickslipError InvalidInputError BagError RunError",
+}
+NAMES = [(module, name) for module, names in PUBLIC.items() for name in names.split()]
+
+
+@pytest.mark.parametrize(("module", "name"), NAMES)
+def test_what_was_public_is_importable_from_where_it_was(module: str, name: str) -> None:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = getattr(import_module(module), name)
+    now = MOVED.get(module, {}).get(name)
+    told = [str(w.message) for w in caught if w.category is DeprecationWarning]
+    if now is None:
+        assert told == []
+    else:
+        assert told == [f"{module}.{name} is now {now}; the old name goes in version 0.2"]
+        home, _, new_name = now.rpartition(".")
+        assert getattr(import_module(home), new_name) is found
+
+
+@pytest.mark.parametrize("module", MOVED)
+def test_what_was_not_public_is_no_attribute(module: str) -> None:
+    with pytest.raises(AttributeError, match=f"'{module}' has no attribute 'nothing'"):
+        _ = import_module(module).nothing
