@@ -63,7 +63,7 @@ def close_the_loop(graph: Graph, bag: Path, **plant_parameters: object) -> tuple
     controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
     listeners = ["analyzer", "washout_controller"]
     plant = graph.add(PlantNode, wait_for=listeners, reply_timeout=0.5, **plant_parameters)
-    graph.wait_until(lambda: plant.active and plant._loop.sample.number > 10, "the loop runs")
+    graph.wait_until(lambda: plant.active and plant._loop.sample_number > 10, "the loop runs")
     return analyzer, controller, plant
 
 

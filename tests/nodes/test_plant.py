@@ -111,8 +111,8 @@ def test_a_missing_controller_is_given_up_and_taken_back(graph: Graph) -> None:
     controller = graph.add(WashoutControllerNode)
     graph.wait_until(lambda: plant._loop.controller_present, "the controller is taken back")
     late = plant._loop.late_forces
-    reached = plant._loop.sample.number
-    graph.wait_until(lambda: plant._loop.sample.number > reached + 500, "500 samples more")
+    reached = plant._loop.sample_number
+    graph.wait_until(lambda: plant._loop.sample_number > reached + 500, "500 samples more")
     assert plant._loop.late_forces == late
     assert controller.active
     assert "no control" not in plant.diagnose()[1]
