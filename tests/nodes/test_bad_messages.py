@@ -156,7 +156,7 @@ def test_of_two_controllers_the_first_answer_counts_and_both_are_named(graph: Gr
     second.publish(pack_wrench(SECOND, 99.0))
     graph.wait_until(lambda: plant.diagnose()[2]["dropped_messages"] == 1, "one is dropped")
     assert plant.diagnose()[2]["dropped: already answered stamp"] == 1
-    assert plant._loop._newest == (0, 0.25)
+    assert plant._motion.force == 0.25
     level, sentence, _ = plant.diagnose()
     assert level == WARN
     assert "2 publishers of /test/control_force: /test/observer (2 times)" in sentence

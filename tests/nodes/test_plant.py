@@ -205,7 +205,7 @@ def test_a_disturbance_acts_from_the_next_sample_and_is_told(graph: Graph) -> No
     graph.wait_until(lambda: tap.get_subscription_count() == 1, "plant listens to disturbances")
     graph.wait_until(lambda: len(heard) == 1, "sample 0")
     tap.publish(pack_wrench(0, 0.5))
-    graph.wait_until(lambda: plant._loop._asked_disturbance == 0.5, "the disturbance came")
+    graph.wait_until(lambda: plant._loop.asked_disturbance == 0.5, "the disturbance came")
     force.publish(pack_wrench(SECOND, 0.0))
     graph.wait_until(lambda: applied, "the disturbance is told")
     assert unpack_wrench(applied[0]) == (SECOND + SECOND // 100, 0.5)

@@ -100,8 +100,9 @@ class SampledLoop:
         self._overtaken = overtaken
         self.scenario_disturbance = disturbance or Disturbance()
         """Disturbance of the scenario; a new one acts from the next sample on."""
-        self._asked_disturbance = 0.0
-        self.disturbance = self._disturbance_at(0)
+        self.asked_disturbance = 0.0
+        """What `disturb` has asked for, N; acts from the next sample on."""
+        self.disturbance = 0.0
         """Disturbance force that acts from the present sample to the next, N."""
         self._next_drive: Drive | None = None
         self._next_start: tuple[float, float] | None = None
@@ -141,7 +142,7 @@ class SampledLoop:
 
     def disturb(self, force: float) -> None:
         """Add a disturbance of `force` (N) from the next sample on, until it is set again."""
-        self._asked_disturbance = force
+        self.asked_disturbance = force
 
     def change_drive(self, drive: Drive) -> None:
         """Go on with this drive from the next sample on."""
@@ -219,7 +220,8 @@ class SampledLoop:
             start, self._next_start = self._next_start, None
             motion.restart(*start)
             friction_force = motion.friction_force
-        self.disturbance = self._disturbance_at(number)
+        scenario = self.scenario_disturbance.force(number, self.period)
+        self.disturbance = scenario + self.asked_disturbance
         return Sample(
             self.stamp(number),
             motion.position,
@@ -228,10 +230,6 @@ class SampledLoop:
             belt_position,
             motion.drive.belt_speed,
         )
-
-    def _disturbance_at(self, number: int) -> float:
-        scenario = self.scenario_disturbance.force(number, self.period)
-        return scenario + self._asked_disturbance
 
     def _stand_in(self) -> tuple[int, float]:
         """Return what acts in place of the force for the present sample, which has not come.

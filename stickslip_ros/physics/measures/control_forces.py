@@ -111,7 +111,7 @@ class ForceSettler:
     def feed(self, sent: ForceColumns, dropped: ForceColumns) -> SettledForces:
         """Take forces that were sent, and that were dropped; return what is settled."""
         self._held = self._held.followed_by(sent)
-        self._acted = np.append(self._acted, np.isfinite(sent.force))
+        self._acted = np.concatenate([self._acted, np.isfinite(sent.force)])
         self._dropped.add(dropped)
         undecided = ForceColumns(self._held.stamp, np.where(self._acted, self._held.force, np.nan))
         self._acted[self._dropped.among(undecided)] = False

@@ -41,7 +41,7 @@ class SampleMeter:
             samples = self._last.followed_by(samples)
         if len(samples) == 0:
             return []
-        self.steps_back += int((np.diff(samples.stamp) <= 0).sum())
+        self.steps_back += np.count_nonzero(samples.stamp[1:] <= samples.stamp[:-1])
         cycles: list[Cycle] = []
         segments = self._grid.segments(samples.stamp)
         ends = [*(segment.start for segment in segments[1:]), len(samples)]
@@ -90,5 +90,5 @@ class SampleMeter:
     def _look_for_run_away(self, samples: SampleColumns) -> None:
         belt_speed = np.abs(samples.belt_velocity)
         fast = np.abs(samples.velocity) > UNBOUNDED_BELT_SPEEDS * belt_speed
-        if np.any(fast) and belt_speed.all():
+        if fast.any() and belt_speed.all():
             self._meter.report_run_away()
