@@ -19,7 +19,7 @@ class BagError(InvalidInputError):
 
 
 class MessageError(BagError):
-    """A message that cannot be packed, or understood; it says what is wrong with it."""
+    """A message that cannot be packed, or cannot be understood; it says why."""
 
 
 class RunError(StickslipError):

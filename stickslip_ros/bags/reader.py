@@ -169,7 +169,7 @@ class Recording:
                 self._decoded(dropped, messages, channels, wrenches_in),
             )
             gathered.append(block)
-            count += sum(len(columns.stamp) for columns in block)
+            count += sum(map(len, block))
             if count >= least:
                 yield _joined_blocks(gathered)
                 gathered, count = [], 0

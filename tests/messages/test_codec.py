@@ -12,7 +12,7 @@ from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from stickslip_ros.errors import MessageError
+from stickslip_ros.errors import BagError, MessageError
 from stickslip_ros.messages.codec import (
     joint_state_columns,
     pack_header,
@@ -166,6 +166,10 @@ def test_a_joint_state_that_lacks_something_is_refused_in_a_line(message, compla
 def test_what_is_no_message_is_refused(unpack, data):
     with pytest.raises(MessageError):
         unpack(data)
+
+
+def test_who_catches_the_errors_of_bags_catches_those_of_messages():
+    assert issubclass(MessageError, BagError)
 
 
 @given(st.integers(0, 115))
