@@ -238,11 +238,9 @@ class SampledLoop:
         """
         if self._expects_control:
             self.late_forces += 1
-        if not self._hold_late:
-            self.controller_present = False
-            return -1, 0.0
         number, force = self._newest
-        if (self.sample_number - number) * self.period <= self._force_timeout:
+        age = (self.sample_number - number) * self.period
+        if self._hold_late and age <= self._force_timeout:
             return number, force
         self.controller_present = False
         return -1, 0.0

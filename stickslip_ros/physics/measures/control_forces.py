@@ -81,7 +81,7 @@ class DroppedForces:
             del self._number[oldest]
 
     def among(self, sent: ForceColumns) -> IntArray:
-        """Return the rows of forces sent that were dropped: as many of equal ones."""
+        """Return the rows of forces sent that were dropped, and forget these: each counts once."""
         if not self._number:
             return np.empty(0, np.int64)
         rows: list[int] = []

@@ -28,11 +28,11 @@ class RunMeter:
         """Forces that were told to be dropped."""
         self._settler = ForceSettler()
 
-    def feed_forces(self, sent: ForceColumns, dropped: ForceColumns) -> SettledForces:
+    def feed_forces(self, forces: ForceColumns, dropped: ForceColumns) -> SettledForces:
         """Take the forces that follow, sent and dropped; return those of which it is settled."""
-        self.force.feed(sent)
+        self.force.feed(forces)
         self.dropped += len(dropped)
-        return self._apply(self._settler.feed(sent, dropped))
+        return self._apply(self._settler.feed(forces, dropped))
 
     def finish(self) -> SettledForces:
         """End the run: what was not told to be dropped has acted. Return these forces."""

@@ -22,7 +22,7 @@ _LONGEST_LOSS = 10**7
 
 
 class Segment(NamedTuple):
-    """What of a block belongs together: all from `start` up to the next one's."""
+    """A part of a block without a cut: from the row `start` to the next one's."""
 
     start: int
     jittered: bool
