@@ -33,7 +33,7 @@ from benchmarks.lateness import SLEEP_LOOP, lateness, lateness_rows, sleep_loop,
 from benchmarks.parties import ObservedPlant, Slice, closed_loop, party, ros
 from benchmarks.slices import Row, by_turns, compare_times, show
 from stickslip_ros.messages.codec import unpack_header
-from stickslip_ros.physics.loop.sampled_loop import Sample
+from stickslip_ros.samples import Sample
 
 RATE = 1000.0
 PERIOD = 1.0 / RATE
@@ -75,8 +75,9 @@ class TimedPlant(ObservedPlant):
         super().start()
 
     def _publish(self, sample: Sample) -> None:
-        self.times[sample.number] = time.monotonic()
-        self.ages[sample.number] = sample.number - 1 - self._answered
+        number = self._loop.sample_number
+        self.times[number] = time.monotonic()
+        self.ages[number] = number - 1 - self._answered
         super()._publish(sample)
 
     def _on_force(self, message: bytes) -> None:

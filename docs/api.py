@@ -14,7 +14,8 @@ PUBLIC = {
     },
     "bags": {
         "stickslip_ros.bags": ["Recording", "RunBlock"],
-        "stickslip_ros.samples": ["SampleColumns", "ForceColumns"],
+        "stickslip_ros.samples": ["Sample", "SampleColumns", "ForceColumns"],
+        "stickslip_ros.arrays": ["Table"],
         "stickslip_ros.bags.report": ["report_of_bag"],
     },
     "scenarios": {
@@ -29,7 +30,7 @@ PUBLIC = {
         "stickslip_ros.physics.measures.breakpoints": ["Breakpoints"],
         "stickslip_ros.physics.loop.washout": ["WashoutParameters", "Washout"],
         "stickslip_ros.physics.model.equations": ["WashoutGains"],
-        "stickslip_ros.physics.loop.sampled_loop": ["SampledLoop", "Sample", "Verdict"],
+        "stickslip_ros.physics.loop.sampled_loop": ["SampledLoop", "Verdict"],
         "stickslip_ros.physics.model.disturbance": ["Disturbance"],
         "stickslip_ros.physics.loop.simulation": ["simulate_sampled", "simulate_continuous"],
         "stickslip_ros.physics.measures.cycles": ["CycleMeter", "Measures", "Cycle", "Regime"],
@@ -59,7 +60,9 @@ PUBLIC = {
         "stickslip_ros.studies.design": ["Task", "design", "Design", "Check", "Margins"],
     },
     "errors": {
-        "stickslip_ros.errors": ["StickslipError", "InvalidInputError", "BagError", "RunError"],
+        "stickslip_ros.errors": [
+            "StickslipError", "InvalidInputError", "BagError", "MessageError", "RunError",
+        ],
     },
 }  # fmt: skip
 """The public Python API: what a program may rely on, by section of reference.md and module."""

@@ -18,5 +18,9 @@ class BagError(InvalidInputError):
     """A bag that cannot be written where asked, or cannot be read; it names the path."""
 
 
+class MessageError(BagError):
+    """A message that cannot be packed, or cannot be understood; it says why."""
+
+
 class RunError(StickslipError):
     """A run that was started properly but failed: a node died or never became ready."""

@@ -1,11 +1,14 @@
 """Samples of the motion and control forces, one at a time and as columns; SI units."""
 
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
-from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
+from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, Table
+
+LARGEST = 1e100
+"""Magnitude up to which positions (m) and speeds (m/s) are believed, and nothing overflows."""
 
 
 class Sample(NamedTuple):
@@ -26,7 +29,7 @@ class Sample(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class SampleColumns:
+class SampleColumns(Table):
     """Samples that follow each other: the fields of `Sample` as arrays of shape (samples,)."""
 
     stamp: IntArray
@@ -36,29 +39,20 @@ class SampleColumns:
     belt_position: FloatArray
     belt_velocity: FloatArray
 
-    def __len__(self) -> int:
-        return len(self.stamp)
-
-    def __getitem__(self, rows: slice | BoolArray | IntArray) -> Self:
-        return type(self)(*(column[rows] for column in vars(self).values()))
-
-    def followed_by(self, others: Self) -> Self:
-        """Return these samples and those behind them as one."""
-        pairs = zip(vars(self).values(), vars(others).values(), strict=True)
-        return type(self)(*(np.concatenate(pair) for pair in pairs))
+    @property
+    def believed(self) -> BoolArray:
+        """Which of them are measured: those that are finite, up to 1e100 m and m/s."""
+        believed = np.abs(self.position) <= LARGEST
+        for column in (self.velocity, self.belt_velocity):
+            believed &= np.abs(column) <= LARGEST
+        return believed
 
 
 @dataclass(frozen=True, eq=False)
-class ForceColumns:
+class ForceColumns(Table):
     """Control or disturbance forces that follow each other: arrays of shape (forces,)."""
 
     stamp: IntArray
     """ns"""
     force: FloatArray
     """N"""
-
-    def __len__(self) -> int:
-        return len(self.stamp)
-
-    def __getitem__(self, rows: slice | BoolArray | IntArray) -> Self:
-        return type(self)(self.stamp[rows], self.force[rows])

@@ -28,7 +28,7 @@ from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.settled import check_continuous, sampled_loop
+from stickslip_ros.studies.settled import check_continuous
 
 if TYPE_CHECKING:
     from stickslip_ros.plots.run_history import RunHistory
@@ -119,7 +119,7 @@ def simulate(
         meter = _DrawingMeter(scenario.analyzer.window, history, motion)
     if not continuous:
         law = Washout(controlled) if controlled else None
-        return simulate_sampled(sampled_loop(plant, motion), motion, law, duration, meter, progress)
+        return simulate_sampled(plant.as_loop(motion), motion, law, duration, meter, progress)
     return simulate_continuous(motion, controlled, duration, meter, progress)
 
 

@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.bags.compression import LARGEST, ZSTD_MAGIC, unpack, unpack_message
 from stickslip_ros.errors import BagError
-from stickslip_ros.messages.codec import joined
+from stickslip_ros.messages.cdr import joined
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE_FIELDS = {

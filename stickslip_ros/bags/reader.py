@@ -6,7 +6,6 @@ import tempfile
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import fields
 from functools import cached_property
 from itertools import pairwise, takewhile
 from pathlib import Path
@@ -21,7 +20,8 @@ from stickslip_ros.bags.compression import unpack_file
 from stickslip_ros.bags.mcap_file import McapFile, MessageBlock
 from stickslip_ros.bags.metadata import METADATA_FILE
 from stickslip_ros.errors import BagError
-from stickslip_ros.messages.codec import Refused, joint_states_in, wrenches_in
+from stickslip_ros.messages.cdr import Refused
+from stickslip_ros.messages.codec import joint_states_in, wrenches_in
 from stickslip_ros.printable import printable
 from stickslip_ros.samples import ForceColumns, SampleColumns
 
@@ -126,22 +126,22 @@ class Recording:
     @cached_property
     def joint_states(self) -> SampleColumns:
         """All joint states; BagError as for `blocks`."""
-        return self._whole(SampleColumns, _JOINT_STATES, joint_states_in)
+        return self._whole(_JOINT_STATES, joint_states_in)
 
     @cached_property
     def control_forces(self) -> ForceColumns:
         """All control forces; BagError as for `blocks`."""
-        return self._whole(ForceColumns, _CONTROL_FORCE, wrenches_in)
+        return self._whole(_CONTROL_FORCE, wrenches_in)
 
     @cached_property
     def applied_disturbances(self) -> ForceColumns:
         """All disturbance forces at the samples from which they act; BagError as for `blocks`."""
-        return self._whole(ForceColumns, _APPLIED_DISTURBANCE, wrenches_in)
+        return self._whole(_APPLIED_DISTURBANCE, wrenches_in)
 
     @cached_property
     def dropped_forces(self) -> ForceColumns:
         """All control forces that did not act, as they were sent; BagError as for `blocks`."""
-        return self._whole(ForceColumns, _DROPPED_FORCE, wrenches_in)
+        return self._whole(_DROPPED_FORCE, wrenches_in)
 
     @property
     def dropped_known(self) -> bool:
@@ -169,7 +169,7 @@ class Recording:
                 self._decoded(dropped, messages, channels, wrenches_in),
             )
             gathered.append(block)
-            count += sum(len(columns.stamp) for columns in block)
+            count += sum(map(len, block))
             if count >= least:
                 yield _joined_blocks(gathered)
                 gathered, count = [], 0
@@ -288,31 +288,23 @@ class Recording:
             self._reasons.setdefault(topic, refused.reason)
         return columns
 
-    def _whole(self, kind: type[ColumnsT], name: str, decode: _Decode[ColumnsT]) -> ColumnsT:
-        """Return all columns of a topic, dataclasses of arrays, as one."""
+    def _whole(self, name: str, decode: _Decode[ColumnsT]) -> ColumnsT:
+        """Return all columns of a topic as one."""
         topic = self._topic(name)
         blocks = [self._decoded(topic, block, ids, decode) for block, ids in self._blocks(topic)]
         if not blocks:
             nothing = np.empty(0, np.int64)
             blocks = [decode(b"", nothing, nothing)[0]]
-        return _joined(kind, blocks)
+        return blocks[0].followed_by(*blocks[1:])
 
 
 def _joined_blocks(blocks: Sequence[RunBlock]) -> RunBlock:
     states, forces, dropped = zip(*blocks, strict=True)
     return RunBlock(
-        _joined(SampleColumns, states),
-        _joined(ForceColumns, forces),
-        _joined(ForceColumns, dropped),
+        states[0].followed_by(*states[1:]),
+        forces[0].followed_by(*forces[1:]),
+        dropped[0].followed_by(*dropped[1:]),
     )
-
-
-def _joined(kind: type[ColumnsT], blocks: Sequence[ColumnsT]) -> ColumnsT:
-    """Return columns, dataclasses of arrays, end to end."""
-    if len(blocks) == 1:
-        return blocks[0]
-    names = [field.name for field in fields(kind)]
-    return kind(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
 
 
 def _mcap_files(path: Path) -> list[Path]:

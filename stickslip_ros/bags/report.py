@@ -9,8 +9,9 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.physics.measures.control_forces import SettledForces
 from stickslip_ros.physics.measures.cycles import Cycle
-from stickslip_ros.physics.measures.samples import RunMeter, SettledForces
+from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -160,28 +161,27 @@ class _RunReader:
             yield rows
 
     def _feed_states(self, states: SampleColumns, rows: IntArray, first: int) -> None:
-        stamp = states.stamp[rows]
-        motion = states.position[rows], states.velocity[rows], states.belt_velocity[rows]
-        cycles = self.meter.motion.feed(stamp, *motion)
+        states = states[rows]
+        cycles = self.meter.motion.feed(states)
         if self._spectator is not None:
-            time = (stamp - first) / NANOSECONDS
-            self._spectator.take_samples(time, *motion, states.friction_force[rows], cycles)
+            self._spectator.take_samples(
+                (states.stamp - first) / NANOSECONDS,
+                states.position,
+                states.velocity,
+                states.belt_velocity,
+                states.friction_force,
+                cycles,
+            )
 
     def _feed_forces(self, forces: ForceColumns, dropped: ForceColumns, first: int) -> None:
         rows, dropped_rows = self._part(forces.stamp, first), self._part(dropped.stamp, first)
         self.measured += int(rows.sum())
-        settled = self.meter.feed_forces(
-            forces.stamp[rows],
-            forces.force[rows],
-            dropped.stamp[dropped_rows],
-            dropped.force[dropped_rows],
-        )
-        self._show(settled, first)
+        self._show(self.meter.feed_forces(forces[rows], dropped[dropped_rows]), first)
 
-    def _show(self, forces: SettledForces, first: int) -> None:
+    def _show(self, settled: SettledForces, first: int) -> None:
         if self._spectator is not None:
-            time = (forces.stamp - first) / NANOSECONDS
-            self._spectator.take_control(time, forces.force, forces.acted)
+            time = (settled.sent.stamp - first) / NANOSECONDS
+            self._spectator.take_control(time, settled.sent.force, settled.acted)
 
     def _part(self, stamp: IntArray, first: int) -> BoolArray:
         since = stamp - first

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple, TypeVar
 from std_msgs.msg import Float64
 
 from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
-from stickslip_ros.errors import BagError
+from stickslip_ros.errors import BagError, MessageError
+from stickslip_ros.messages.cdr import Refused
 from stickslip_ros.messages.codec import (
-    Refused,
     joint_state_columns,
     pack_header,
     unpack_header,
@@ -41,7 +41,7 @@ from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.base.polling import take_waiting
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.base.service_call import ask_parameters
-from stickslip_ros.physics.measures.samples import RunMeter
+from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.prefixes import quantity
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters, known_parameters
 from stickslip_ros.stamps import END_OF_TIME
@@ -180,7 +180,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         for data in islice(take_waiting(self._listening[topic]), DEEP):
             try:
                 stamp = unpack_header(data)
-            except BagError as error:
+            except MessageError as error:
                 self._dropped.add(f"{topic.name}: {error}")
                 continue
             if not 0 < stamp < END_OF_TIME:
@@ -206,9 +206,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         """Decode and measure what was taken in since the last time."""
         states = self._columns(JOINT_STATES, joint_state_columns)
         windows = self._cycles // self.parameters.window
-        for cycle in self._meter.motion.feed(
-            states.stamp, states.position, states.velocity, states.belt_velocity
-        ):
+        for cycle in self._meter.motion.feed(states):
             figures = (cycle.amplitude, cycle.stick_fraction, cycle.frequency)
             for publisher, figure in zip(self._limit_cycle, figures, strict=True):
                 publisher.publish(Float64(data=figure))
@@ -217,7 +215,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._log_measures()
         forces = self._columns(CONTROL_FORCE, wrench_columns)
         dropped = self._columns(DROPPED_FORCE, wrench_columns)
-        self._meter.feed_forces(forces.stamp, forces.force, dropped.stamp, dropped.force)
+        self._meter.feed_forces(forces, dropped)
         for inquiry in self._inquiries:
             inquiry.pursue()
 

@@ -13,7 +13,8 @@ from typing import Any
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.messages.topics import RECORDED
 from stickslip_ros.nodes.base.managed import ManagedNode
-from stickslip_ros.physics.loop.sampled_loop import Sample, SampledLoop
+from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import PlantParameters
 
 Publish = Callable[[Sample], None]
@@ -136,7 +137,7 @@ class Pacer:
     def steps_per_second(self) -> float:
         """Samples per second of wall time since the start."""
         until = time.monotonic() if self._running else self._stopped
-        return self._loop.sample.number / max(until - self._started, 1e-9)
+        return self._loop.sample_number / max(until - self._started, 1e-9)
 
     def force_came(self) -> None:
         """Say that a force was offered to the loop."""
@@ -198,7 +199,7 @@ class LockstepPacer(Pacer):
             if not self._running:
                 return
             held_up = self._awaits_force or self._flow.full
-            if loop.unbounded or (loop.sample.number >= self._last and not held_up):
+            if loop.unbounded or (loop.sample_number >= self._last and not held_up):
                 self.stop()
                 self._finish()
                 return
@@ -232,8 +233,8 @@ class LockstepPacer(Pacer):
     def _watch(self) -> None:
         """Give up whoever has held up the loop for too long."""
         now = time.monotonic()
-        if self._loop.sample.number != self._seen:
-            self._seen, self._seen_at = self._loop.sample.number, now
+        if self._loop.sample_number != self._seen:
+            self._seen, self._seen_at = self._loop.sample_number, now
             return
         patience_ends = now - self._seen_at >= self._reply_timeout
         if self._flow.full and (silence := self._flow.give_up(patience_ends)):
@@ -295,10 +296,10 @@ class RealtimePacer(Pacer):
     def _keep_deadlines(self) -> None:
         loop = self._loop
         while self._running:
-            if loop.sample.number >= self._last or loop.unbounded:
+            if loop.sample_number >= self._last or loop.unbounded:
                 self._finish()
                 return
-            deadline = self.deadline(loop.sample.number + 1)
+            deadline = self.deadline(loop.sample_number + 1)
             self._sleeper.sleep_until(deadline)
             if not self._running:
                 return

@@ -9,7 +9,7 @@ from typing import Any
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.errors import InvalidInputError, MessageError
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench, unpack_header, unpack_wrench
 from stickslip_ros.messages.topics import (
     APPLIED_DISTURBANCE,
@@ -26,8 +26,9 @@ from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer
 from stickslip_ros.nodes.punctuality import Punctuality
-from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, Sample, SampledLoop, Verdict
+from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, Verdict
 from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import Pace, PlantParameters
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 
@@ -78,17 +79,10 @@ class PlantNode(ManagedNode[PlantParameters]):
             self._disturbance = nan
         parameters = self.parameters
         realtime = parameters.pace is Pace.REALTIME
-        self._loop = SampledLoop(
+        self._loop = parameters.as_loop(
             self._motion,
-            parameters.rate,
             time.time_ns() if realtime else self._next_start,
-            force_delay=parameters.force_delay,
-            force_jitter=parameters.force_jitter,
-            force_jitter_seed=parameters.force_jitter_seed,
-            force_timeout=parameters.force_timeout,
             hold_late=realtime,
-            expects_control=parameters.expects_control,
-            disturbance=parameters.as_disturbance(),
             overtaken=self._on_overtaken,
         )
         latest = END_OF_TIME - NANOSECONDS
@@ -117,9 +111,9 @@ class PlantNode(ManagedNode[PlantParameters]):
         """Pause the motion, once the states sent have arrived."""
         self._pacer.stop()
         self._moved = True
-        done = self._loop.sample.number * self._loop.period
+        done = self._loop.sample_number * self._loop.period
         self.elapsed = 0.0 if self._pacer.finished else self.elapsed + done
-        self._next_start = self._loop.stamp(self._loop.sample.number + 1)
+        self._next_start = self._loop.stamp(self._loop.sample_number + 1)
         self._answerable = self._loop.sample.stamp
         for publisher in (self._state, self._applied, self._dropped_force):
             self.wait_for_delivery(publisher)
@@ -142,7 +136,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             return OK, "", {}
         loop, pacer = self._loop, self._pacer
         figures = {
-            "samples": loop.sample.number + 1,
+            "samples": loop.sample_number + 1,
             NEWEST_STAMP: loop.sample.stamp,
             FINISHED: pacer.finished,
             "late_forces": loop.late_forces,
@@ -162,7 +156,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             complaints.append(NO_FORCE)
         complaints.append(
             self._punctuality.look(
-                loop.sample.number + 1,
+                loop.sample_number + 1,
                 loop.late_forces,
                 pacer.missed_deadlines,
                 controlled=controlled,
@@ -206,7 +200,7 @@ class PlantNode(ManagedNode[PlantParameters]):
     def _on_force(self, message: bytes) -> None:
         try:
             stamp, force = unpack_wrench(message)
-        except BagError as error:
+        except MessageError as error:
             if self.active:
                 self._dropped.add(f"control force: {error}")
             return
@@ -227,7 +221,7 @@ class PlantNode(ManagedNode[PlantParameters]):
     def _on_disturbance(self, message: bytes) -> None:
         try:
             _, force = unpack_wrench(message)
-        except BagError as error:
+        except MessageError as error:
             self._dropped.add(f"disturbance force: {error}")
             return
         if not self.active or not isfinite(force):
@@ -242,7 +236,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             return
         try:
             stamp = unpack_header(message)
-        except BagError as error:
+        except MessageError as error:
             self._dropped.add(f"{RECORDED.name}: {error}")
             return
         self._pacer.recorder_came_to(stamp)

@@ -4,7 +4,7 @@ import sys
 from math import isfinite
 from typing import Any
 
-from stickslip_ros.errors import BagError
+from stickslip_ros.errors import MessageError
 from stickslip_ros.messages.codec import pack_wrench, unpack_joint_state
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.base.dropped_messages import Dropped
@@ -12,8 +12,7 @@ from stickslip_ros.nodes.base.duplicate_publishers import rivals
 from stickslip_ros.nodes.base.managed import OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.physics.loop.washout import Washout
-from stickslip_ros.physics.measures.samples import LARGEST
-from stickslip_ros.samples import Sample
+from stickslip_ros.samples import LARGEST, Sample
 from stickslip_ros.scenarios.parameters import WashoutControllerParameters
 
 
@@ -58,7 +57,7 @@ class WashoutControllerNode(ManagedNode[WashoutControllerParameters]):
             return
         try:
             self._answer(unpack_joint_state(message))
-        except BagError as error:
+        except MessageError as error:
             self._dropped.add(str(error))
 
     def _answer(self, sample: Sample) -> None:

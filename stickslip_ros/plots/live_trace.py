@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
-from stickslip_ros.physics.measures.samples import HELD_FORCES, DroppedForces
+from stickslip_ros.physics.measures.control_forces import HELD_FORCES, DroppedForces
 from stickslip_ros.plots.decimation import LONGEST_GAP, peaks
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
@@ -82,9 +82,9 @@ class LiveTrace:
                 sent = forces.force[later]
                 columns = sent, np.full(len(sent), np.nan)
                 self._forces.add(forces.stamp[later], columns, longest)
-            self._dropped.add(dropped.stamp, dropped.force)
+            self._dropped.add(dropped)
             stamp, (acted, lost) = self._forces.last(HELD_FORCES)
-            rows = self._dropped.among(stamp, acted)
+            rows = self._dropped.among(ForceColumns(stamp, acted))
             acted[rows], lost[rows] = np.nan, acted[rows]
 
     def frame(self, window: float, orbit: float, buckets: int) -> Frame | None:

@@ -8,8 +8,8 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints, breakpoints_from_samples
 from stickslip_ros.physics.measures.cycles import Cycle
-from stickslip_ros.physics.measures.samples import LARGEST
 from stickslip_ros.plots.decimation import LONGEST_GAP, Trace
+from stickslip_ros.samples import LARGEST
 
 _FIRST_ROWS = 20_000
 """Rows of the beginning that are kept as they are, for a phase portrait."""

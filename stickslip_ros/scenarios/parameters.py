@@ -5,7 +5,7 @@ models. A nested field `friction.static` is the ROS parameter of that name.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from functools import cache
@@ -16,10 +16,12 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from pydantic.fields import FieldInfo
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
+from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.suggestions import did_you_mean
 
 
@@ -312,6 +314,29 @@ class PlantParameters(NodeParameters):
     def as_disturbance(self) -> Disturbance:
         """Return the disturbance of the scenario."""
         return Disturbance(**dict(self.disturbance))
+
+    def as_loop(
+        self,
+        motion: Motion,
+        start: int = LOCKSTEP_START,
+        *,
+        hold_late: bool = False,
+        overtaken: Callable[[int, float], None] = lambda stamp, force: None,
+    ) -> SampledLoop:
+        """Return the sampled loop over `motion`; see there for `start` (ns) and the others."""
+        return SampledLoop(
+            motion,
+            self.rate,
+            start,
+            force_delay=self.force_delay,
+            force_jitter=self.force_jitter,
+            force_jitter_seed=self.force_jitter_seed,
+            force_timeout=self.force_timeout,
+            hold_late=hold_late,
+            expects_control=self.expects_control,
+            disturbance=self.as_disturbance(),
+            overtaken=overtaken,
+        )
 
 
 class WashoutControllerParameters(NodeParameters):

@@ -7,7 +7,6 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.loop.simulation import simulate_sampled
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
@@ -119,20 +118,6 @@ def check_continuous(scenario: Scenario) -> None:
             )
 
 
-def sampled_loop(plant: PlantParameters, motion: Motion) -> SampledLoop:
-    """Return the loop over `motion` as the plant node has it in lockstep."""
-    return SampledLoop(
-        motion,
-        plant.rate,
-        LOCKSTEP_START,
-        force_delay=plant.force_delay,
-        force_jitter=plant.force_jitter,
-        force_jitter_seed=plant.force_jitter_seed,
-        expects_control=plant.expects_control,
-        disturbance=plant.as_disturbance(),
-    )
-
-
 class Settled(NamedTuple):
     """What is left of a motion after its transient."""
 
@@ -179,7 +164,7 @@ class Settler:
         block = cycles * drive.natural_period
         law = loop = None
         if case.sampled is not None:
-            loop = sampled_loop(case.sampled, motion)
+            loop = case.sampled.as_loop(motion)
             block = max(block, loop.period)
             if washout is not None:
                 law = Washout(washout, start.low_passed)

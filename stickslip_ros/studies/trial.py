@@ -209,20 +209,20 @@ class Bench:
         peak, last, recent = 0.0, 0, 0.0
         samples = max(ceil(patience * self._rate), calm)
         while True:
-            sample = loop.sample
+            sample, number = loop.sample, loop.sample_number
             distance = hypot(omega * (sample.position - equilibrium), sample.velocity)
             if distance > SETTLED * size:
-                last = sample.number
-            if sample.number > samples - calm:
+                last = number
+            if number > samples - calm:
                 recent = max(recent, distance)
-            if loop.unbounded or sample.number - last > calm or sample.number >= samples:
+            if loop.unbounded or number - last > calm or number >= samples:
                 break
             force = law.answer(sample.stamp, sample.velocity)
             assert force is not None
             peak = max(peak, abs(force))
             loop.offer(sample.stamp, force)
             loop.advance()
-        settled = loop.sample.number - last > calm and not loop.unbounded
+        settled = loop.sample_number - last > calm and not loop.unbounded
         return Outcome(
             peak,
             last / self._rate if settled else None,

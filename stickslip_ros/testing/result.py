@@ -8,7 +8,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags import Recording
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.measures.cycles import Measures
-from stickslip_ros.physics.measures.samples import RunMeter
+from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.samples import ForceColumns, SampleColumns
 
 
@@ -73,8 +73,8 @@ def result_of(bag: Path, window: int, diagnostics: dict[str, Diagnostics]) -> Ru
         if not recording.complete:
             raise RunError(f"the recording of the run failed: {'; '.join(recording.missing)}")
     meter = RunMeter(window)
-    meter.motion.feed(states.stamp, states.position, states.velocity, states.belt_velocity)
-    meter.feed_forces(forces.stamp, forces.force, dropped.stamp, dropped.force)
+    meter.motion.feed(states)
+    meter.feed_forces(forces, dropped)
     meter.finish()
     return RunResult(
         states=states,

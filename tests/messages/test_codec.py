@@ -12,7 +12,7 @@ from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from stickslip_ros.errors import BagError
+from stickslip_ros.errors import BagError, MessageError
 from stickslip_ros.messages.codec import (
     joint_state_columns,
     pack_header,
@@ -156,7 +156,7 @@ def test_big_endian_messages_are_read(stamp, position, velocity, frame):
     ],
 )
 def test_a_joint_state_that_lacks_something_is_refused_in_a_line(message, complaint):
-    with pytest.raises(BagError, match=complaint) as refusal:
+    with pytest.raises(MessageError, match=complaint) as refusal:
         unpack_joint_state(serialize_message(message))
     assert len(str(refusal.value)) < 400
 
@@ -164,13 +164,17 @@ def test_a_joint_state_that_lacks_something_is_refused_in_a_line(message, compla
 @pytest.mark.parametrize("unpack", [unpack_joint_state, unpack_wrench, unpack_header])
 @pytest.mark.parametrize("data", [b"", b"\0", b"\0\1\0\0", b"\0\3\0\0" + bytes(112), bytes(11)])
 def test_what_is_no_message_is_refused(unpack, data):
-    with pytest.raises(BagError):
+    with pytest.raises(MessageError):
         unpack(data)
+
+
+def test_who_catches_the_errors_of_bags_catches_those_of_messages():
+    assert issubclass(MessageError, BagError)
 
 
 @given(st.integers(0, 115))
 def test_a_cut_message_is_refused(length):
-    with pytest.raises(BagError):
+    with pytest.raises(MessageError):
         unpack_joint_state(pack_joint_state(1, (1.0, 2.0), (3.0, 4.0), (5.0, 6.0))[:length])
 
 
@@ -179,7 +183,7 @@ def test_garbage_is_read_or_refused(garbage, start, end):
     valid = pack_joint_state(1, (1.0, 2.0), (3.0, 4.0), (5.0, 6.0))
     for data in (b"\0\1\0\0" + garbage, valid[:start] + garbage + valid[end:]):
         for unpack in (unpack_joint_state, unpack_wrench, unpack_header):
-            with suppress(BagError):
+            with suppress(MessageError):
                 unpack(data)
 
 
@@ -188,7 +192,7 @@ def test_garbage_is_read_or_refused(garbage, start, end):
 def test_an_absurd_length_is_refused(offset, length):
     data = bytearray(pack_joint_state(1, (1.0, 2.0), (3.0, 4.0), (5.0, 6.0)))
     struct.pack_into("<I", data, offset, length)
-    with pytest.raises(BagError):
+    with pytest.raises(MessageError):
         unpack_joint_state(bytes(data))
 
 
@@ -199,7 +203,7 @@ def test_a_stamp_beyond_ros_time_is_refused(stamp):
         lambda: pack_wrench(stamp, 1.0),
         lambda: pack_joint_state(stamp, (1.0, 2.0), (3.0, 4.0), (5.0, 6.0)),
     ):
-        with pytest.raises(BagError, match=str(stamp)):
+        with pytest.raises(MessageError, match=str(stamp)):
             pack()
 
 
@@ -245,7 +249,7 @@ def test_columns_hold_what_the_single_messages_say(states, choices):
     for message in messages:
         try:
             expected.append(unpack_joint_state(message))
-        except BagError as error:
+        except MessageError as error:
             refusals.append(str(error))
     columns, refused = joint_state_columns(messages)
     assert str(rows(columns)) == str([tuple(sample) for sample in expected])  # NaN is NaN

@@ -63,7 +63,7 @@ def close_the_loop(graph: Graph, bag: Path, **plant_parameters: object) -> tuple
     controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
     listeners = ["analyzer", "washout_controller"]
     plant = graph.add(PlantNode, wait_for=listeners, reply_timeout=0.5, **plant_parameters)
-    graph.wait_until(lambda: plant.active and plant._loop.sample.number > 10, "the loop runs")
+    graph.wait_until(lambda: plant.active and plant._loop.sample_number > 10, "the loop runs")
     return analyzer, controller, plant
 
 
@@ -156,7 +156,7 @@ def test_of_two_controllers_the_first_answer_counts_and_both_are_named(graph: Gr
     second.publish(pack_wrench(SECOND, 99.0))
     graph.wait_until(lambda: plant.diagnose()[2]["dropped_messages"] == 1, "one is dropped")
     assert plant.diagnose()[2]["dropped: already answered stamp"] == 1
-    assert plant._loop._newest == (0, 0.25)
+    assert plant._motion.force == 0.25
     level, sentence, _ = plant.diagnose()
     assert level == WARN
     assert "2 publishers of /test/control_force: /test/observer (2 times)" in sentence

@@ -6,8 +6,9 @@ import pytest
 
 from stickslip_ros.nodes import pacing
 from stickslip_ros.nodes.pacing import RealtimePacer
-from stickslip_ros.physics.loop.sampled_loop import Sample, SampledLoop
+from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import PlantParameters
 from tests.nodes.graph import PATIENCE
 
@@ -47,7 +48,7 @@ def test_a_deadline_is_missed_when_the_next_one_has_passed(
     ended = Event()
 
     def publish(sample: Sample) -> None:
-        clock.now += stalls.get(sample.number, 0.0) * MILLISECOND
+        clock.now += stalls.get(loop.sample_number, 0.0) * MILLISECOND
 
     motion = Motion(PlantParameters().as_drive(), 0.0, 0.0)
     loop = SampledLoop(motion, 1000.0, 1_000_000_000)
@@ -55,6 +56,6 @@ def test_a_deadline_is_missed_when_the_next_one_has_passed(
     pacer.start(100)
     assert ended.wait(PATIENCE)
     pacer.stop()
-    assert loop.sample.number == 100
+    assert loop.sample_number == 100
     assert pacer.missed_deadlines == missed
     assert pacer.largest_lateness == pytest.approx(largest_lateness * MILLISECOND, abs=1e-9)

@@ -111,8 +111,8 @@ def test_a_missing_controller_is_given_up_and_taken_back(graph: Graph) -> None:
     controller = graph.add(WashoutControllerNode)
     graph.wait_until(lambda: plant._loop.controller_present, "the controller is taken back")
     late = plant._loop.late_forces
-    reached = plant._loop.sample.number
-    graph.wait_until(lambda: plant._loop.sample.number > reached + 500, "500 samples more")
+    reached = plant._loop.sample_number
+    graph.wait_until(lambda: plant._loop.sample_number > reached + 500, "500 samples more")
     assert plant._loop.late_forces == late
     assert controller.active
     assert "no control" not in plant.diagnose()[1]
@@ -205,7 +205,7 @@ def test_a_disturbance_acts_from_the_next_sample_and_is_told(graph: Graph) -> No
     graph.wait_until(lambda: tap.get_subscription_count() == 1, "plant listens to disturbances")
     graph.wait_until(lambda: len(heard) == 1, "sample 0")
     tap.publish(pack_wrench(0, 0.5))
-    graph.wait_until(lambda: plant._loop._asked_disturbance == 0.5, "the disturbance came")
+    graph.wait_until(lambda: plant._loop.asked_disturbance == 0.5, "the disturbance came")
     force.publish(pack_wrench(SECOND, 0.0))
     graph.wait_until(lambda: applied, "the disturbance is told")
     assert unpack_wrench(applied[0]) == (SECOND + SECOND // 100, 0.5)

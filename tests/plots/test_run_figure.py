@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.physics.measures.cycles import Cycle, CycleMeter, Measures
-from stickslip_ros.physics.measures.samples import SampleMeter
+from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.plots.run_figure import LAST_CYCLES, run_figure
@@ -155,9 +155,7 @@ def test_each_cycle_is_a_point(limit_cycle: Drawn) -> None:
 
 def test_a_bags_cycles_are_those_of_the_report(reference: Drawn) -> None:
     with Recording(REFERENCE) as recording:
-        states = recording.joint_states
-    motion = states.stamp, states.position, states.velocity, states.belt_velocity
-    cycles = SampleMeter(20).feed(*motion)
+        cycles = SampleMeter(20).feed(recording.joint_states)
     _, amplitude = reference.line(AMPLITUDE, 0)
     assert amplitude * 1e-6 == pytest.approx([cycle.amplitude for cycle in cycles], rel=1e-9)
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from threading import Condition, Thread
 
-from stickslip_ros.errors import BagError, RunError, StickslipError
+from stickslip_ros.errors import MessageError, RunError, StickslipError
 from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.nodes.pacing import FlowWindow, Sleeper
 from stickslip_ros.stamps import NANOSECONDS
@@ -218,7 +218,7 @@ class Player:
                 self.sent += 1
                 self.worst_lateness = max(self.worst_lateness, lateness)
                 if window is not None:
-                    with suppress(BagError):  # without a stamp that a recorder could name
+                    with suppress(MessageError):  # without a stamp that a recorder could name
                         window.sent(unpack_header(data))
                 return
 

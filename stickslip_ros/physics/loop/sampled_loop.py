@@ -10,29 +10,15 @@ from enum import StrEnum
 from fractions import Fraction
 from math import floor, isfinite
 from random import Random
-from typing import NamedTuple
 
 from stickslip_ros.physics.model.disturbance import Disturbance
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.samples import Sample
 from stickslip_ros.stamps import NANOSECONDS
 
 LOCKSTEP_START = NANOSECONDS
 """Stamp of the first sample where no clock gives one, ns; ROS takes zero for "not set"."""
-
-
-class Sample(NamedTuple):
-    """State of the drive at a sample instant, SI units."""
-
-    number: int
-    stamp: int
-    """ns"""
-    position: float
-    velocity: float
-    friction_force: float
-    """On the slide, under the force held up to this instant, N."""
-    belt_position: float
-    belt_velocity: float
 
 
 class Verdict(StrEnum):
@@ -114,18 +100,21 @@ class SampledLoop:
         self._overtaken = overtaken
         self.scenario_disturbance = disturbance or Disturbance()
         """Disturbance of the scenario; a new one acts from the next sample on."""
-        self._asked_disturbance = 0.0
-        self.disturbance = self._disturbance_at(0)
+        self.asked_disturbance = 0.0
+        """What `disturb` has asked for, N; acts from the next sample on."""
+        self.disturbance = 0.0
         """Disturbance force that acts from the present sample to the next, N."""
         self._next_drive: Drive | None = None
         self._next_start: tuple[float, float] | None = None
-        self.sample = self._take_sample(0, 0.0)
+        self.sample_number = 0
+        """Number of the present sample."""
+        self.sample = self._take_sample(0.0)
         """The present sample."""
 
     @property
     def answered(self) -> bool:
         """Whether the force for the present sample has come."""
-        return self._newest[0] == self.sample.number
+        return self._newest[0] == self.sample_number
 
     @property
     def unbounded(self) -> bool:
@@ -153,7 +142,7 @@ class SampledLoop:
 
     def disturb(self, force: float) -> None:
         """Add a disturbance of `force` (N) from the next sample on, until it is set again."""
-        self._asked_disturbance = force
+        self.asked_disturbance = force
 
     def change_drive(self, drive: Drive) -> None:
         """Go on with this drive from the next sample on."""
@@ -165,9 +154,9 @@ class SampledLoop:
 
     def advance(self) -> Sample:
         """Move on to the next sample with the forces that have come, and return it."""
-        motion, period, present = self._motion, self.period, self.sample
+        motion, period = self._motion, self.period
         number, force = self._newest
-        if number != present.number:
+        if number != self.sample_number:
             number, force = self._stand_in()
         if number > self._sent_number:
             self._sent_number = number
@@ -179,8 +168,9 @@ class SampledLoop:
             now = self._deliver()
         motion.force = self._acting + self.disturbance
         motion.advance((1.0 - now) * period)
-        belt_position = present.belt_position + motion.drive.belt_speed * period
-        sample = self.sample = self._take_sample(present.number + 1, belt_position)
+        belt_position = self.sample.belt_position + motion.drive.belt_speed * period
+        self.sample_number += 1
+        sample = self.sample = self._take_sample(belt_position)
         return sample
 
     def _deliver(self) -> float:
@@ -188,7 +178,7 @@ class SampledLoop:
 
         In periods from the present sample on.
         """
-        motion, under_way, number = self._motion, self._under_way, self.sample.number
+        motion, under_way, number = self._motion, self._under_way, self.sample_number
         now = 0.0
         while under_way and under_way[0][0] == number:
             _, instant, force, answered = under_way.popleft()
@@ -203,7 +193,7 @@ class SampledLoop:
     def _send(self, answered: int, force: float) -> None:
         """Let the force for the present sample set out; what it overtakes is lost."""
         whole, rest = self._shortest_delay
-        number = self.sample.number
+        number = self.sample_number
         if self._jitter > 0.0:
             whole, rest = whole_and_rest(self._delay + self._jitter * self._random.random())
             lost: dict[int, float] = {}
@@ -221,8 +211,8 @@ class SampledLoop:
         self.dropped[Verdict.OVERTAKEN] += 1
         self._overtaken(self.stamp(number), force)
 
-    def _take_sample(self, number: int, belt_position: float) -> Sample:
-        motion = self._motion
+    def _take_sample(self, belt_position: float) -> Sample:
+        motion, number = self._motion, self.sample_number
         friction_force = motion.friction_force
         if self._next_drive is not None:
             motion.drive, self._next_drive = self._next_drive, None
@@ -230,9 +220,9 @@ class SampledLoop:
             start, self._next_start = self._next_start, None
             motion.restart(*start)
             friction_force = motion.friction_force
-        self.disturbance = self._disturbance_at(number)
+        scenario = self.scenario_disturbance.force(number, self.period)
+        self.disturbance = scenario + self.asked_disturbance
         return Sample(
-            number,
             self.stamp(number),
             motion.position,
             motion.velocity,
@@ -241,10 +231,6 @@ class SampledLoop:
             motion.drive.belt_speed,
         )
 
-    def _disturbance_at(self, number: int) -> float:
-        scenario = self.scenario_disturbance.force(number, self.period)
-        return scenario + self._asked_disturbance
-
     def _stand_in(self) -> tuple[int, float]:
         """Return what acts in place of the force for the present sample, which has not come.
 
@@ -252,11 +238,9 @@ class SampledLoop:
         """
         if self._expects_control:
             self.late_forces += 1
-        if not self._hold_late:
-            self.controller_present = False
-            return -1, 0.0
         number, force = self._newest
-        if (self.sample.number - number) * self.period <= self._force_timeout:
+        age = (self.sample_number - number) * self.period
+        if self._hold_late and age <= self._force_timeout:
             return number, force
         self.controller_present = False
         return -1, 0.0
@@ -266,21 +250,21 @@ class SampledLoop:
             return Verdict.NOT_FINITE
         if stamp == 0:
             return Verdict.NO_STAMP
-        present = self.sample
-        if stamp != present.stamp and (
-            not 0 <= number < present.number or self.stamp(number) != stamp
+        present = self.sample_number
+        if stamp != self.sample.stamp and (
+            not 0 <= number < present or self.stamp(number) != stamp
         ):
             return Verdict.UNKNOWN_STAMP
         if number <= self._newest[0]:
             return Verdict.ANSWERED
-        if number < present.number and not self._hold_late:
+        if number < present and not self._hold_late:
             return Verdict.TOO_LATE
         return None
 
     def number(self, stamp: int) -> int:
         """Return the number of the sample whose stamp is nearest."""
         if stamp == self.sample.stamp:
-            return self.sample.number
+            return self.sample_number
         return _rounded((stamp - self._start) * self._samples, self._nanoseconds)
 
 

@@ -7,8 +7,6 @@ from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycles import CycleMeter, Measures
 from stickslip_ros.physics.motion.motion import Motion
 
-BLOCK_SAMPLES = 1000
-
 Progress = Callable[[float], None]
 """Told now and then what share (0 to 1) of the work is done."""
 
@@ -33,7 +31,7 @@ def simulate_sampled(
             if force is not None:
                 loop.offer(sample.stamp, force)
         sample = loop.advance()
-        if number % BLOCK_SAMPLES == 0 or number == samples or motion.unbounded:
+        if number % 1000 == 0 or number == samples or motion.unbounded:
             meter.feed(motion.take_breakpoints(), motion.drive.belt_speed)
             progress(number / samples)
             if motion.unbounded:

@@ -11,11 +11,11 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.arrays import BoolArray, FloatArray, Table
 
 
 @dataclass(frozen=True)
-class Breakpoints:
+class Breakpoints(Table):
     """A stretch of motion as columns of equal length, in order of time."""
 
     time: FloatArray
@@ -27,28 +27,10 @@ class Breakpoints:
     sticking: BoolArray
     """Whether the slide stuck to the belt since the breakpoint before."""
 
-    def __len__(self) -> int:
-        return len(self.time)
-
     @property
     def stuck(self) -> BoolArray:
         """Whether the slide stuck at each: since the one before, or from there to the next."""
         return self.sticking | np.append(self.sticking[1:], False)[: len(self)]
-
-    def __getitem__(self, rows: slice | BoolArray) -> Self:
-        return type(self)(
-            self.time[rows], self.position[rows], self.velocity[rows], self.sticking[rows]
-        )
-
-    @classmethod
-    def concatenate(cls, first: Self, second: Self) -> Self:
-        """Return the rows of `first`, then those of `second`."""
-        return cls(
-            np.concatenate([first.time, second.time]),
-            np.concatenate([first.position, second.position]),
-            np.concatenate([first.velocity, second.velocity]),
-            np.concatenate([first.sticking, second.sticking]),
-        )
 
     @classmethod
     def empty(cls) -> Self:

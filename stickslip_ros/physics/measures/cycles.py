@@ -211,7 +211,7 @@ class CycleMeter:
             return []
         self._belt_speed = belt_speed
         first = len(self._last)
-        breakpoints = Breakpoints.concatenate(self._last, breakpoints)
+        breakpoints = self._last.followed_by(breakpoints)
         if self._open is None:
             self._open = _Stretch.from_breakpoint(breakpoints, 0)
             first = 1

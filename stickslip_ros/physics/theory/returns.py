@@ -54,7 +54,7 @@ def follow(motion: Motion) -> Iterator[Breakpoints]:
         step = max(now, drive.natural_period) / 4.0
         motion.advance(step)
         now += step
-        breakpoints = Breakpoints.concatenate(breakpoints, motion.take_breakpoints())
+        breakpoints = breakpoints.followed_by(motion.take_breakpoints())
         yield breakpoints
 
 

@@ -116,7 +116,7 @@ def test_a_reset_puts_the_slide_back_at_the_next_sample_while_time_goes_on() -> 
     loop.reset(0.3, -0.1)
     assert (loop.sample.position, loop.sample.velocity) != (0.3, -0.1)
     sample = loop.advance()
-    assert (sample.number, sample.stamp) == (4, SECOND + 4 * SECOND // 10)
+    assert (loop.sample_number, sample.stamp) == (4, SECOND + 4 * SECOND // 10)
     assert (sample.position, sample.velocity) == (0.3, -0.1)
     assert sample.belt_position == pytest.approx(belt_position + 0.04)
     sample = loop.advance()

@@ -36,12 +36,13 @@ def test_samples_are_a_period_apart(rate: float) -> None:
     motion, free = Motion(PAPER, 0.0, 0.0), Motion(PAPER, 0.0, 0.0)
     loop = SampledLoop(motion, rate, SECOND)
     first = loop.sample
-    assert (first.number, first.stamp, first.position, first.velocity) == (0, SECOND, 0.0, 0.0)
+    assert loop.sample_number == 0
+    assert (first.stamp, first.position, first.velocity) == (SECOND, 0.0, 0.0)
     for number in range(1, 40):
         sample = loop.advance()
         free.advance(1.0 / rate)
         assert sample == loop.sample
-        assert sample.number == number
+        assert loop.sample_number == number
         assert sample.stamp == loop.stamp(number)
         assert (sample.position, sample.velocity) == (free.position, free.velocity)
 

@@ -316,7 +316,7 @@ def test_a_cycle_that_only_touches_the_belts_speed_slips_all_the_time() -> None:
             breakpoints.velocity[touching],
             np.ones(int(touching.sum()), dtype=bool),
         )
-        joined = Breakpoints.concatenate(breakpoints, behind)
+        joined = breakpoints.followed_by(behind)
         measures = measured(joined[np.argsort(joined.time, kind="stable")], 1.0)
         assert measures.regime is regime
         assert measures.stick_fraction == pytest.approx(stick if stick > 1e-8 else 0.0, rel=1e-6)

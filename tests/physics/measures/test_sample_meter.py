@@ -1,6 +1,5 @@
 from dataclasses import replace
 from functools import cache
-from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -9,28 +8,32 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.measures.cycles import Regime
-from stickslip_ros.physics.measures.samples import RunMeter, SampleMeter
+from stickslip_ros.physics.measures.run_meter import RunMeter
+from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.samples import SampleColumns
 from tests.physics.drives import LIMIT_CYCLES, PAPER
 
 SECOND = 10**9
 
 
-class Samples(NamedTuple):
-    stamp: npt.NDArray[np.int64]
-    position: npt.NDArray[np.float64]
-    velocity: npt.NDArray[np.float64]
-    belt_velocity: npt.NDArray[np.float64]
+def columns(
+    stamp: npt.NDArray[np.int64],
+    position: npt.NDArray[np.float64],
+    velocity: npt.NDArray[np.float64],
+    belt_velocity: npt.NDArray[np.float64],
+) -> SampleColumns:
+    """Nothing is known of the rest."""
+    unknown = np.full(len(stamp), np.nan)
+    return SampleColumns(stamp, position, velocity, unknown, unknown, belt_velocity)
 
-    def rows(self, rows: slice | npt.NDArray[np.intp] | npt.NDArray[np.bool_]) -> Self:
-        return type(self)(*(column[rows] for column in self))
 
-    def later(self, nanoseconds: int) -> Self:
-        return self._replace(stamp=self.stamp + nanoseconds)
+def later(samples: SampleColumns, nanoseconds: int) -> SampleColumns:
+    return replace(samples, stamp=samples.stamp + nanoseconds)
 
 
 @cache
-def limit_cycle(belt_speed: float = 0.2) -> Samples:
+def limit_cycle(belt_speed: float = 0.2) -> SampleColumns:
     """The paper's drive at 100 Hz from 1 s on, on its limit cycle."""
     drive = replace(PAPER, belt_speed=belt_speed)
     motion = Motion(drive, 0.0, 0.0)
@@ -40,29 +43,29 @@ def limit_cycle(belt_speed: float = 0.2) -> Samples:
         motion.advance(0.01)
         rows.append((motion.position, motion.velocity))
     position, velocity = np.array(rows).T
-    return Samples(stamps(100, len(rows)), position, velocity, np.full(len(rows), belt_speed))
+    return columns(stamps(100, len(rows)), position, velocity, np.full(len(rows), belt_speed))
 
 
 def stamps(rate: int, count: int, start: int = SECOND) -> npt.NDArray[np.int64]:
     return np.array([start + (n * SECOND + rate // 2) // rate for n in range(count)])
 
 
-def still(stamp: npt.NDArray[np.int64]) -> Samples:
+def still(stamp: npt.NDArray[np.int64]) -> SampleColumns:
     """A slide that rests while the belt moves, at those stamps."""
     rest = np.zeros(len(stamp))
-    return Samples(stamp, rest, rest, rest + 1.0)
+    return columns(stamp, rest, rest, rest + 1.0)
 
 
-def in_blocks(first: Samples, second: Samples, blocks: int) -> list[Samples]:
+def in_blocks(first: SampleColumns, second: SampleColumns, blocks: int) -> list[SampleColumns]:
     """One after the other, as one block or as two."""
     if blocks == 2:
         return [first, second]
-    return [Samples(*map(np.concatenate, zip(first, second, strict=True)))]
+    return [first.followed_by(second)]
 
 
 def test_measures_of_a_limit_cycle() -> None:
     meter = SampleMeter(window=20)
-    cycles = meter.feed(*limit_cycle())
+    cycles = meter.feed(limit_cycle())
     measures = meter.measures()
     (expected,) = (cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.2)
     assert len(cycles) == measures.cycles == 9  # of 7.07 s in 70 s
@@ -81,10 +84,10 @@ def test_measures_of_a_limit_cycle() -> None:
 def test_the_size_of_the_blocks_does_not_matter(starts: list[int]) -> None:
     whole, in_blocks = SampleMeter(window=20), SampleMeter(window=20)
     samples = limit_cycle()
-    expected = whole.feed(*samples)
+    expected = whole.feed(samples)
     cycles = []
     for start, end in zip([0, *starts], [*starts, 7001], strict=True):
-        cycles += in_blocks.feed(*samples.rows(slice(start, end)))
+        cycles += in_blocks.feed(samples[start:end])
     assert len(cycles) == len(expected)
     for cycle, expected_cycle in zip(cycles, expected, strict=True):
         # Time is counted from the start of a block; adding it up rounds.
@@ -102,18 +105,18 @@ rates = st.sampled_from([3, 7, 30, 100, 1000, 100_000])
 def test_what_is_lost_is_counted_exactly(rate: int, lost: set[int], starts: list[int]) -> None:
     """From the stamps alone; the first two samples came, so that the period is known."""
     kept = np.array([n for n in range(200) if n not in lost])
-    samples = still(stamps(rate, 200)).rows(kept)
+    samples = still(stamps(rate, 200))[kept]
     meter = SampleMeter(window=20)
     for start, end in zip([0, *starts], [*starts, 200], strict=True):
-        meter.feed(*samples.rows((kept >= start) & (kept < end)))
+        meter.feed(samples[(kept >= start) & (kept < end)])
     assert meter.samples == len(kept)
     assert meter.lost_samples == len(lost)
 
 
 def test_a_loss_at_the_start_is_counted_once_the_period_is_known() -> None:
     meter = SampleMeter(window=20)
-    meter.feed(*still(stamps(1000, 10)).rows(np.array([0, 2])))
-    meter.feed(*still(stamps(1000, 10)).rows(np.array([3, 4, 5])))
+    meter.feed(still(stamps(1000, 10))[np.array([0, 2])])
+    meter.feed(still(stamps(1000, 10))[np.array([3, 4, 5])])
     assert meter.lost_samples == 1
 
 
@@ -122,8 +125,8 @@ def test_measures_bridge_what_was_lost() -> None:
     kept = np.random.default_rng(1).random(len(samples.stamp)) > 0.1
     kept[:2] = True
     whole, holed = SampleMeter(window=20), SampleMeter(window=20)
-    whole.feed(*samples)
-    holed.feed(*samples.rows(kept))
+    whole.feed(samples)
+    holed.feed(samples[kept])
     assert holed.lost_samples == np.count_nonzero(~kept[: np.flatnonzero(kept)[-1]])
     expected, measures = whole.measures(), holed.measures()
     assert measures.cycles == expected.cycles
@@ -135,8 +138,8 @@ def test_measures_bridge_what_was_lost() -> None:
 def test_no_cycle_spans_a_long_gap() -> None:
     samples = limit_cycle()
     meter = SampleMeter(window=20)
-    meter.feed(*samples.rows(slice(0, 3000)))
-    cycles = meter.feed(*samples.rows(slice(3300, 7001)))
+    meter.feed(samples[:3000])
+    cycles = meter.feed(samples[3300:7001])
     assert meter.lost_samples == 300
     assert [cycle.period for cycle in cycles] == pytest.approx([7.06772953] * len(cycles), rel=1e-6)
 
@@ -146,8 +149,8 @@ def test_a_new_segment_is_no_loss(gap: float) -> None:
     """The gap is no whole number of periods of 1 ms, as after a pause in real time."""
     first = still(stamps(1000, 5000))
     meter = SampleMeter(window=20)
-    meter.feed(*first)
-    meter.feed(*first.later(4_999_000_000 + round(gap * SECOND)))
+    meter.feed(first)
+    meter.feed(later(first, 4_999_000_000 + round(gap * SECOND)))
     assert meter.samples == 10_000
     assert meter.lost_samples == 0
     assert meter.duration == pytest.approx(2 * 4.999, rel=1e-15)
@@ -160,7 +163,7 @@ def test_a_new_segment_may_have_another_rate(rates: tuple[int, int], blocks: int
     second = still(stamps(rates[1], 100, start=int(first.stamp[-1]) + 1_234_567_800))
     meter = SampleMeter(window=20)
     for part in in_blocks(first, second, blocks):
-        meter.feed(*part)
+        meter.feed(part)
     assert meter.samples == 200
     assert meter.lost_samples == 0
 
@@ -168,9 +171,9 @@ def test_a_new_segment_may_have_another_rate(rates: tuple[int, int], blocks: int
 @pytest.mark.parametrize("blocks", [1, 2])
 def test_stamps_that_go_back_start_a_new_segment(blocks: int) -> None:
     samples = limit_cycle()
-    twice = samples.rows(slice(0, 5000)), samples.rows(slice(1000, 6000))
+    twice = samples[:5000], samples[1000:6000]
     meter = SampleMeter(window=20)
-    cycles = [cycle for part in in_blocks(*twice, blocks) for cycle in meter.feed(*part)]
+    cycles = [cycle for part in in_blocks(*twice, blocks) for cycle in meter.feed(part)]
     assert meter.samples == 10_000
     assert meter.lost_samples == 0
     assert [cycle.period for cycle in cycles] == pytest.approx([7.06772953] * len(cycles), rel=1e-6)
@@ -183,7 +186,7 @@ def test_rows_that_are_not_finite_are_lost(column: str) -> None:
     values = getattr(samples, column).copy()
     values[[10, 500, 501, 3000]] = [np.nan, np.inf, -np.inf, np.nan]
     meter = SampleMeter(window=20)
-    cycles = meter.feed(*samples._replace(**{column: values}))
+    cycles = meter.feed(replace(samples, **{column: values}))
     assert meter.samples == 6997
     assert meter.lost_samples == 4
     assert len(cycles) == 9
@@ -192,34 +195,34 @@ def test_rows_that_are_not_finite_are_lost(column: str) -> None:
 
 def test_nothing_but_rows_that_are_not_finite() -> None:
     meter = SampleMeter(window=20)
-    samples = limit_cycle().rows(slice(0, 3))
-    assert meter.feed(*samples._replace(velocity=np.full(3, np.nan))) == []
+    samples = limit_cycle()[:3]
+    assert meter.feed(replace(samples, velocity=np.full(3, np.nan))) == []
     assert meter.samples == 0
     assert meter.measures().regime is None
 
 
 @pytest.mark.parametrize(("speed", "regime"), [(999.0, None), (1001.0, Regime.UNBOUNDED)])
 def test_a_thousand_belt_speeds_are_running_away(speed: float, regime: Regime | None) -> None:
-    samples = still(stamps(100, 3))._replace(velocity=np.array([0.0, -speed, speed]))
+    samples = replace(still(stamps(100, 3)), velocity=np.array([0.0, -speed, speed]))
     meter = SampleMeter(window=20)
-    meter.feed(*samples)
+    meter.feed(samples)
     assert meter.measures().regime is regime
 
 
 def test_no_speed_is_running_away_over_a_belt_at_rest() -> None:
-    samples = still(stamps(100, 3))._replace(
-        velocity=np.array([0.0, 5.0, 6.0]), belt_velocity=np.zeros(3)
+    samples = replace(
+        still(stamps(100, 3)), velocity=np.array([0.0, 5.0, 6.0]), belt_velocity=np.zeros(3)
     )
     meter = SampleMeter(window=20)
-    meter.feed(*samples)
+    meter.feed(samples)
     assert meter.measures().regime is None
 
 
-def read_late(samples: Samples, latest: float, seed: int = 1) -> Samples:
+def read_late(samples: SampleColumns, latest: float, seed: int = 1) -> SampleColumns:
     """With stamps of a clock that is read late, by the share `latest` of a period at most."""
     period = int(samples.stamp[1] - samples.stamp[0])
     late = np.random.default_rng(seed).random(len(samples.stamp)) * latest * period
-    return samples._replace(stamp=samples.stamp + late.astype(np.int64))
+    return replace(samples, stamp=samples.stamp + late.astype(np.int64))
 
 
 @given(
@@ -231,8 +234,8 @@ def test_jittered_stamps_are_measured(latest: float, seed: int, starts: list[int
     """However they are cut into blocks."""
     samples = read_late(limit_cycle(), latest, seed)
     whole, in_blocks, exact = (SampleMeter(window=20) for _ in range(3))
-    cycles = whole.feed(*samples)
-    exact.feed(*limit_cycle())
+    cycles = whole.feed(samples)
+    exact.feed(limit_cycle())
     measures, expected = whole.measures(), exact.measures()
     assert measures.cycles == expected.cycles
     assert measures.amplitude == pytest.approx(expected.amplitude, rel=1e-4)
@@ -241,7 +244,7 @@ def test_jittered_stamps_are_measured(latest: float, seed: int, starts: list[int
     assert measures.stick_fraction == pytest.approx(expected.stick_fraction, abs=2e-3)
     same = []
     for start, end in zip([0, *starts], [*starts, 7001], strict=True):
-        same += in_blocks.feed(*samples.rows(slice(start, end)))
+        same += in_blocks.feed(samples[start:end])
     assert len(same) == len(cycles)
     for cycle, expected_cycle in zip(same, cycles, strict=True):
         assert cycle == pytest.approx(expected_cycle, rel=1e-9)
@@ -252,9 +255,9 @@ def test_jittered_stamps_are_measured(latest: float, seed: int, starts: list[int
 def test_states_that_were_really_taken_at_jittered_stamps_are_measured() -> None:
     samples = read_late(still(stamps(100, 7001)), 0.5)
     time = samples.stamp * 1e-9
-    samples = samples._replace(position=np.sin(time), velocity=np.cos(time))
+    samples = replace(samples, position=np.sin(time), velocity=np.cos(time))
     meter = SampleMeter(window=20)
-    meter.feed(*samples)
+    meter.feed(samples)
     measures = meter.measures()
     assert meter.lost_samples == 0
     assert measures.cycles == 10
@@ -268,7 +271,7 @@ def test_what_is_lost_of_jittered_samples_is_counted(lost: set[int], seed: int) 
     lost = {number for number in lost if number % 10}  # never over the longest gap
     kept = np.array([number for number in range(200) if number not in lost])
     meter = SampleMeter(window=20)
-    meter.feed(*read_late(still(stamps(1000, 200)), 0.2, seed).rows(kept))
+    meter.feed(read_late(still(stamps(1000, 200)), 0.2, seed)[kept])
     assert meter.samples == len(kept)
     assert meter.lost_samples == len(lost)
 
@@ -277,7 +280,7 @@ def test_a_stamp_now_and_then_off_the_grid_does_not_cut_the_motion() -> None:
     samples = limit_cycle()
     off_grid = np.where(np.arange(7001) % 50 == 7, 200_000, 0)
     meter = SampleMeter(window=20)
-    meter.feed(*samples._replace(stamp=samples.stamp + off_grid))
+    meter.feed(replace(samples, stamp=samples.stamp + off_grid))
     assert meter.lost_samples == 0
     assert meter.measures().cycles == 9
 
@@ -285,8 +288,8 @@ def test_a_stamp_now_and_then_off_the_grid_does_not_cut_the_motion() -> None:
 def test_a_long_gap_between_jittered_samples_starts_a_new_segment() -> None:
     samples = read_late(limit_cycle(), 0.2)
     meter = SampleMeter(window=20)
-    meter.feed(*samples.rows(slice(0, 3000)))
-    cycles = meter.feed(*samples.rows(slice(3300, 7001)))
+    meter.feed(samples[:3000])
+    cycles = meter.feed(samples[3300:7001])
     assert meter.lost_samples == 0
     assert meter.duration == pytest.approx(67.0, abs=0.1)
     assert [cycle.period for cycle in cycles] == pytest.approx([7.06772953] * len(cycles), rel=1e-3)
@@ -295,9 +298,9 @@ def test_a_long_gap_between_jittered_samples_starts_a_new_segment() -> None:
 def test_many_samples_off_every_grid_take_no_longer_than_on_one() -> None:
     """With time that grew as the square of their number this would take minutes."""
     time = 1e-3 * np.arange(200_000)
-    samples = Samples(stamps(1000, len(time)), np.sin(time), np.cos(time), np.full(len(time), 2.0))
+    samples = columns(stamps(1000, len(time)), np.sin(time), np.cos(time), np.full(len(time), 2.0))
     meter = SampleMeter(window=20)
-    meter.feed(*read_late(samples, 0.2))
+    meter.feed(read_late(samples, 0.2))
     assert meter.lost_samples == 0
     assert meter.measures().cycles == 20
 
@@ -305,7 +308,7 @@ def test_many_samples_off_every_grid_take_no_longer_than_on_one() -> None:
 def test_many_segments_in_one_block_take_time_in_proportion() -> None:
     """Each looks only a little ahead: seen from every one to the end it would be 4e8 steps."""
     meter = SampleMeter(window=20)
-    meter.feed(*still(np.full(20_000, SECOND)))
+    meter.feed(still(np.full(20_000, SECOND)))
     assert meter.samples == 20_000
     assert meter.lost_samples == 0
     assert meter.duration == 0.0
@@ -314,10 +317,10 @@ def test_many_segments_in_one_block_take_time_in_proportion() -> None:
 @pytest.mark.parametrize("number", [0, 1, 3000, 7000])
 @pytest.mark.parametrize("wild", [0, (2**31 - 1) * SECOND])
 def test_a_stamp_of_another_time_is_no_loss(number: int, wild: int) -> None:
-    samples = limit_cycle().later(1_700_000_000 * SECOND)
+    samples = later(limit_cycle(), 1_700_000_000 * SECOND)
     samples.stamp[number] = wild
     meter = SampleMeter(window=20)
-    meter.feed(*samples)
+    meter.feed(samples)
     assert meter.samples == 7001
     assert meter.lost_samples == 0
     assert meter.duration == pytest.approx(70.0, abs=0.03)
@@ -328,7 +331,7 @@ def test_time_that_adds_up_beyond_all_stamps_is_no_error() -> None:
     days = still(np.arange(0, 2**31, 86_400 // 2) * SECOND)
     meter = SampleMeter(window=20)
     for _ in range(6):
-        meter.feed(*days)
+        meter.feed(days)
     assert meter.duration > 2**63 / SECOND
 
 
@@ -341,7 +344,7 @@ def test_no_value_overflows(column: str, value: float, latest: float) -> None:
     values = getattr(samples, column).copy()
     values[100:7000:3] = value
     meter = SampleMeter(window=20)
-    meter.feed(*samples._replace(**{column: values}))
+    meter.feed(replace(samples, **{column: values}))
     measured = meter.measures().as_dict().values()
     assert np.isfinite([figure for figure in measured if isinstance(figure, float)]).all()
     too_large = abs(value) > 1e100
@@ -350,15 +353,16 @@ def test_no_value_overflows(column: str, value: float, latest: float) -> None:
 
 
 def test_a_leap_onto_the_belt_hides_no_extremes() -> None:
-    samples = still(stamps(10, 4))._replace(
+    samples = replace(
+        still(stamps(10, 4)),
         position=np.array([0.0, -0.1, 0.2, 0.22]),
         velocity=np.array([-1.0, -1.0, 0.2, 0.2]),
         belt_velocity=np.full(4, 0.2),
     )
     meter = SampleMeter(window=20)
     cycles = []
-    for part in (samples, samples.later(400_000_000)):
-        cycles += meter.feed(*part)
+    for part in (samples, later(samples, 400_000_000)):
+        cycles += meter.feed(part)
     assert [cycle.amplitude for cycle in cycles] == pytest.approx([0.16], rel=1e-3)
 
 
@@ -379,7 +383,7 @@ def test_no_samples_are_an_error(rows: list[tuple[int, float, float, float]], si
     meter = SampleMeter(window=20)
     for first in range(0, len(rows), size):
         stamp, *values = zip(*rows[first : first + size], strict=True)
-        meter.feed(np.array(stamp), *map(np.array, values))
+        meter.feed(columns(np.array(stamp), *map(np.array, values)))
     measured = meter.measures().as_dict().values()
     assert np.isfinite([figure for figure in measured if isinstance(figure, float)]).all()
 
@@ -390,7 +394,7 @@ def test_two_publishers_on_one_topic_are_noted(size: int) -> None:
     both = still(np.stack([stamp, stamp - SECOND // 2]).T.ravel())
     meter = RunMeter(window=20)
     for first in range(0, len(both.stamp), size):
-        meter.motion.feed(*both.rows(slice(first, first + size)))
+        meter.motion.feed(both[first : first + size])
     (note,) = meter.report()["notes"]
     assert "200 of 400 samples" in note
     assert "several nodes publish joint_states" in note

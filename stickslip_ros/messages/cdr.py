@@ -1,0 +1,188 @@
+"""CDR, the byte layout of ROS messages: single messages field by field, blocks of them as tables.
+
+CDR aligns every number to its own size, counted from behind a four-byte encapsulation header.
+Where one message has its values, all have them that are equal but for the values, so that a block
+of messages is a table. Padding is never looked at: Fast DDS leaves in it, and behind the last
+field, whatever was in memory.
+"""
+
+import itertools
+import math
+import struct
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
+from stickslip_ros.errors import MessageError
+from stickslip_ros.stamps import NANOSECONDS
+
+LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+"""The encapsulation header that this package writes."""
+
+_ENCAPSULATION = len(LITTLE_ENDIAN)
+
+_STRUCTURES = 8
+"""Different structures that are looked for in a block of messages."""
+
+
+class Refused(NamedTuple):
+    """Messages that could not be read."""
+
+    number: int
+    reason: str
+    """Why the first could not; empty where there is none."""
+
+
+def joined(messages: Sequence[bytes]) -> tuple[bytes, IntArray, IntArray]:
+    """Return messages as one, and where each of them begins and ends in it."""
+    size = np.array([len(message) for message in messages], np.int64)
+    end = np.cumsum(size)
+    return b"".join(messages), end - size, end
+
+
+class Decoder:
+    """Finds the fields of one CDR message; bytes behind the last field are left alone."""
+
+    def __init__(self, data: bytes, kind: str) -> None:
+        if data[:2] not in (b"\x00\x00", b"\x00\x01"):
+            raise MessageError(
+                f"a {kind} message begins with the bytes '{data[:2].hex()}'; "
+                "CDR begins with 0000 (big endian) or 0001 (little endian)"
+            )
+        self.data = data
+        self.byte_order = "<" if data[1] else ">"
+        self.structure = [slice(0, 2)]
+        """What is no value and no padding so far."""
+        self._place = _ENCAPSULATION
+        self._kind = kind
+
+    def header_stamp(self) -> int:
+        """Step over a std_msgs/msg/Header and return where its stamp is."""
+        stamp = self._advance(alignment=4, size=8)
+        self.string()
+        return stamp
+
+    def count(self) -> int:
+        """Read an unsigned 32-bit number, the length of what follows."""
+        start = self._advance(alignment=4, size=4)
+        self.structure.append(slice(start, start + 4))
+        (count,) = struct.unpack_from(f"{self.byte_order}I", self.data, start)
+        return count
+
+    def string(self) -> str:
+        """Read a string."""
+        length = self.count()
+        start = self._advance(alignment=1, size=length)
+        self.structure.append(slice(start, start + length))
+        return self.data[start : start + length].rstrip(b"\x00").decode(errors="replace")
+
+    def doubles(self, count: int) -> tuple[int, int]:
+        """Step over so many numbers; return where they are, and how many."""
+        if count == 0:
+            return 0, 0  # nothing follows an empty sequence, not even the padding
+        return self._advance(alignment=8, size=8 * count), count
+
+    def _advance(self, alignment: int, size: int) -> int:
+        """Step over the next field and return where it starts."""
+        offset = -(-(self._place - _ENCAPSULATION) // alignment) * alignment
+        start = _ENCAPSULATION + offset
+        if start + size > len(self.data):
+            raise MessageError(
+                f"a {self._kind} message ends after {len(self.data) - _ENCAPSULATION} bytes, "
+                f"within a field of {size} bytes that starts at byte {offset}"
+            )
+        self._place = start + size
+        return start
+
+
+class Layout:
+    """Where the values of one message stand, and of all that have its structure."""
+
+    def __init__(self, message: Decoder, stamp: int, values: Sequence[int | None]) -> None:
+        """Take the places of the stamp and of the values, None for one that is not there."""
+        order = message.byte_order
+        places = {str(name): place for name, place in enumerate(values) if place is not None}
+        self._table = np.dtype(
+            {
+                "names": ["sec", "nanosec", *places],
+                "formats": [f"{order}i4", f"{order}u4", *[f"{order}f8"] * len(places)],
+                "offsets": [stamp, stamp + 4, *places.values()],
+                "itemsize": len(message.data),
+            }
+        )
+        self._values = [str(name) if str(name) in places else None for name in range(len(values))]
+        self._mask = np.zeros(len(message.data), np.uint8)
+        for stretch in message.structure:
+            self._mask[stretch] = 0xFF
+        self._structure = np.frombuffer(message.data, np.uint8) & self._mask
+
+    @property
+    def size(self) -> int:
+        """Of a message, in bytes."""
+        return len(self._mask)
+
+    def fits(self, messages: NDArray[np.void]) -> BoolArray:
+        """Return which messages of this size have this structure."""
+        content = messages.view(np.uint8).reshape(len(messages), self.size)
+        same = (content & self._mask) == self._structure
+        return np.ones(len(messages), bool) if same.all() else same.all(axis=1)
+
+    def table(self, messages: NDArray[np.void]) -> tuple[IntArray, FloatArray]:
+        """Return stamps (ns) of shape (messages,) and values of shape (values, messages)."""
+        table = messages.view(self._table)
+        values = np.full((len(self._values), len(table)), math.nan)
+        for row, name in zip(values, self._values, strict=True):
+            if name is not None:
+                row[:] = table[name]
+        return table["sec"].astype(np.int64) * NANOSECONDS + table["nanosec"], values
+
+    def read(self, message: bytes) -> tuple[int, list[float]]:
+        """Return stamp (ns) and values of the message that the layout was taken from."""
+        stamp, values = self.table(np.frombuffer(message, self._table))
+        return int(stamp[0]), values[:, 0].tolist()
+
+
+def decode(
+    data: bytes,
+    begin: IntArray,
+    end: IntArray,
+    layout_of: Callable[[bytes], Layout],
+    value_count: int,
+) -> tuple[IntArray, FloatArray, Refused]:
+    """Return stamps and values of the messages that can be read, in their order, and the rest."""
+    parts = [(np.empty(0, np.intp), np.empty(0, np.int64), np.empty((value_count, 0)))]
+    refused = Refused(0, "")
+    left = np.arange(len(begin))
+    for attempt in itertools.count():
+        if len(left) == 0:
+            break
+        try:
+            layout = layout_of(data[begin[left[0]] : end[left[0]]])
+        except MessageError as error:
+            refused = Refused(refused.number + 1, refused.reason or str(error))
+            left = left[1:]
+            continue
+        # Where every message has a structure of its own, to compare them all would take for ever.
+        compared = left if attempt < _STRUCTURES else left[:1]
+        taken = end[compared] - begin[compared] == layout.size
+        messages = _rows(data, begin[compared[taken]], layout.size)
+        fits = layout.fits(messages)
+        taken[taken] = fits
+        parts.append((compared[taken], *layout.table(messages if fits.all() else messages[fits])))
+        left = compared[~taken] if attempt < _STRUCTURES else left[1:]
+    if len(parts) == 2:
+        return *parts[1][1:], refused
+    places, stamps, values = zip(*parts, strict=True)
+    order = np.argsort(np.concatenate(places))
+    return np.concatenate(stamps)[order], np.concatenate(values, axis=1)[:, order], refused
+
+
+def _rows(data: bytes, starts: IntArray, size: int) -> NDArray[np.void]:
+    """Return the stretches of `size` bytes that begin there as items of an array, copied."""
+    stretches = np.ndarray(
+        (max(0, len(data) - size + 1),), np.dtype((np.void, size)), data, strides=(1,)
+    )
+    return stretches[starts]

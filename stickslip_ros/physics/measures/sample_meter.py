@@ -1,0 +1,94 @@
+"""The measures of a motion from its samples."""
+
+import numpy as np
+
+from stickslip_ros.physics.measures.breakpoints import breakpoints_from_samples
+from stickslip_ros.physics.measures.cycles import UNBOUNDED_BELT_SPEEDS, Cycle, CycleMeter, Measures
+from stickslip_ros.physics.measures.sampling_grid import SamplingGrid
+from stickslip_ros.samples import SampleColumns
+
+
+class SampleMeter:
+    """Measures a motion from its samples, fed in blocks of columns of any length.
+
+    A gap of a whole number of sample periods is loss, up to ten million of them; any other, and a
+    stamp that goes back, is the start of a new segment and not lost. Stamps that are on no grid,
+    as those read from a clock, are measured too: then what is missing between two samples is loss
+    up to ten periods, and beyond that a new segment starts.
+    """
+
+    def __init__(self, window: int) -> None:
+        """Average over the last `window` cycles at most."""
+        self.samples = 0
+        """Samples seen."""
+        self.steps_back = 0
+        """Samples whose stamp was not later than the one before."""
+        self._grid = SamplingGrid()
+        self._meter = CycleMeter(window)
+        self._last: SampleColumns | None = None
+        self._elapsed = 0
+
+    def feed(self, samples: SampleColumns) -> list[Cycle]:
+        """Take the samples that follow; return the cycles completed by them.
+
+        Samples that are not to be believed, see `SampleColumns`, count as lost.
+        """
+        believed = samples.believed
+        if not believed.all():
+            samples = samples[believed]
+        self.samples += len(samples)
+        if self._last is not None:
+            samples = self._last.followed_by(samples)
+        if len(samples) == 0:
+            return []
+        self.steps_back += np.count_nonzero(samples.stamp[1:] <= samples.stamp[:-1])
+        cycles: list[Cycle] = []
+        segments = self._grid.segments(samples.stamp)
+        ends = [*(segment.start for segment in segments[1:]), len(samples)]
+        for (start, jittered), end in zip(segments, ends, strict=True):
+            segment = samples[start:end]
+            self._look_for_run_away(segment)
+            if len(segment) == 1 and end < len(samples):
+                continue  # a lone sample is no motion, and there may be very many of them
+            if start > 0:
+                self._meter.interrupt()
+                self._last = None
+            cycles += self._feed_segment(segment, jittered)
+        self._last = samples[-1:]
+        return cycles
+
+    @property
+    def lost_samples(self) -> int:
+        """Samples that the stamps say are missing."""
+        return self._grid.lost
+
+    @property
+    def duration(self) -> float:
+        """Simulated time covered, s."""
+        return self._elapsed * 1e-9
+
+    def measures(self) -> Measures:
+        """Return the means over the last whole cycles."""
+        return self._meter.measures()
+
+    def _feed_segment(self, samples: SampleColumns, jittered: bool) -> list[Cycle]:
+        stamp = samples.stamp
+        time = (stamp - stamp[0] + float(self._elapsed)) * 1e-9
+        self._elapsed += int(stamp[-1] - stamp[0])
+        with np.errstate(over="ignore", invalid="ignore"):
+            breakpoints = breakpoints_from_samples(
+                time,
+                samples.position,
+                samples.velocity,
+                samples.belt_velocity,
+                exact_times=not jittered,
+            )
+        if self._last is not None:
+            breakpoints = breakpoints[1:]  # the sample carried over was fed with its own block
+        return self._meter.feed(breakpoints, float(samples.belt_velocity[-1]))
+
+    def _look_for_run_away(self, samples: SampleColumns) -> None:
+        belt_speed = np.abs(samples.belt_velocity)
+        fast = np.abs(samples.velocity) > UNBOUNDED_BELT_SPEEDS * belt_speed
+        if fast.any() and belt_speed.all():
+            self._meter.report_run_away()

@@ -1,0 +1,25 @@
+import numpy as np
+
+from stickslip_ros.samples import ForceColumns
+
+
+def forces(*stamps: int) -> ForceColumns:
+    return ForceColumns(np.array(stamps, np.int64), np.array(stamps, float) / 2.0)
+
+
+def told(table: ForceColumns) -> list[tuple[int, float]]:
+    return list(zip(table.stamp.tolist(), table.force.tolist(), strict=True))
+
+
+def test_a_table_has_rows() -> None:
+    table = forces(3, 5, 7)
+    assert len(table) == 3
+    assert told(table[1:]) == [(5, 2.5), (7, 3.5)]
+    assert told(table[np.array([2, 0])]) == [(7, 3.5), (3, 1.5)]
+    assert told(table[table.force > 2.0]) == told(table[1:])
+    assert len(table[:0]) == 0
+
+
+def test_tables_follow_each_other() -> None:
+    assert told(forces(1).followed_by(forces(), forces(2, 3))) == told(forces(1, 2, 3))
+    assert told(forces(1).followed_by()) == [(1, 0.5)]
