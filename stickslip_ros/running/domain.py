@@ -11,11 +11,10 @@ from threading import Lock
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.domain_ports import FIRST_PROCESS, is_free, port
-from stickslip_ros.nodes.base.process import check_machine, this_machine_only
+from stickslip_ros.nodes.base.process import initialise, this_machine_only
 
 DOMAINS = range(1, 102)
 """Domains all ports of which are below those that the system gives away."""
@@ -66,10 +65,8 @@ def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
     _collect_before_forks()
     with _initialising:
         context = Context() if rclpy.ok() else rclpy.get_default_context()
-        with _environment(this_machine_only()):
-            check_machine(domain)
         with _environment({**_this_process_only_here(), **_NO_PEERS}):
-            _initialise(context, domain, arguments)
+            initialise([*arguments, *_NO_LOGS_ELSEWHERE], context=context, domain=domain)
     try:
         yield context
     finally:
@@ -98,21 +95,12 @@ def _this_process_only_here() -> Mapping[str, str]:
     variables = this_machine_only()
     context = Context()
     with own_domain() as domain, _environment({**variables, _DISCOVERY_RANGE: "OFF"}):
-        _initialise(context, domain, ["--ros-args"])
+        initialise(["--ros-args", *_NO_LOGS_ELSEWHERE], context=context, domain=domain)
         node = Node("which_addresses", context=context)
         elsewhere_free = is_free(port(domain, FIRST_PROCESS), "127.0.0.2")
         node.destroy_node()
         rclpy.shutdown(context=context)
     return variables if elsewhere_free else {_DISCOVERY_RANGE: "LOCALHOST"}
-
-
-def _initialise(context: Context, domain: int, arguments: Sequence[str]) -> None:
-    rclpy.init(
-        args=[*arguments, *_NO_LOGS_ELSEWHERE],
-        context=context,
-        domain_id=domain,
-        signal_handler_options=SignalHandlerOptions.NO,
-    )
 
 
 @contextmanager

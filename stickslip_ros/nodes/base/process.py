@@ -7,12 +7,14 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import rclpy
+from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
@@ -59,15 +61,26 @@ _ECHO_TIMEOUT = 1.0
 _SPIN_TIMEOUT = 0.2
 
 
-def initialise() -> None:
-    """Initialise ROS for a command, which handles the signals itself.
+def initialise(
+    arguments: Sequence[str] = ROS_ARGUMENTS,
+    *,
+    context: Context | None = None,
+    domain: int | None = None,
+) -> None:
+    """Initialise ROS for whoever handles the signals itself.
 
-    Raises InvalidInputError for what the environment says amiss.
+    In the default context and the domain that the environment says, unless others are given.
+    Raises InvalidInputError where nodes could not live, and for arguments that ROS refuses.
     """
-    check_machine(_domain_of_environment())
+    check_machine(_domain_of_environment() if domain is None else domain)
     try:
-        rclpy.init(args=ROS_ARGUMENTS, signal_handler_options=SignalHandlerOptions.NO)
-    except Exception as error:
+        rclpy.init(
+            args=list(arguments),
+            context=context,
+            domain_id=domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+    except Exception as error:  # its first line names what rcl could not parse
         raise InvalidInputError(first_line(error)) from None
 
 
@@ -91,9 +104,8 @@ def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) 
     prefer_prompt_middleware()
     try:
         parser.parse_args(remove_ros_args(sys.argv)[1:])
-        check_machine(_domain_of_environment())
-        rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-    except Exception as error:  # what rcl could not parse; its first line names it
+        initialise(sys.argv)
+    except Exception as error:
         print(f"{parser.prog}: {first_line(error)}", file=sys.stderr)
         return 2
     try:
@@ -291,11 +303,15 @@ def stop_on_signals(executor: Executor, *stopped: Future) -> dict[signal.Signals
     return {number: signal.signal(number, stop) for number in numbers}
 
 
-def spin(executor: Executor, until: Future) -> None:
-    """Run callbacks until the future is done; one that raises is logged, and the rest go on."""
-    while not until.done():
+def spin(executor: Executor, until: Future, timeout: float = inf) -> None:
+    """Run callbacks until the future is done or so much wall time (s) is over.
+
+    A callback that raises is logged, and the rest go on.
+    """
+    deadline = time.monotonic() + timeout
+    while not until.done() and (left := deadline - time.monotonic()) > 0.0:
         try:
-            executor.spin_until_future_complete(until, timeout_sec=_SPIN_TIMEOUT)
+            executor.spin_until_future_complete(until, timeout_sec=min(left, _SPIN_TIMEOUT))
         except Exception as error:  # an impossible request from outside ends up here, too
             get_logger("stickslip_ros").error(f"{type(error).__name__}: {error}")
 
