@@ -1,13 +1,14 @@
 """Bringing the nodes up and down: as processes or composed in one, activated in order."""
 
 import signal
+import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import rclpy
 from lifecycle_msgs.msg import Transition
@@ -17,29 +18,27 @@ from rclpy.parameter import Parameter
 from rclpy.task import Future
 
 from stickslip_ros.errors import RunError
-from stickslip_ros.nodes.base.child_process import how_it_ended
+from stickslip_ros.nodes.base.child_process import GUARD_TIMEOUT, how_it_ended, start_child
 from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, initialise, stop_on_signals
 from stickslip_ros.nodes.base.service_call import ServiceCall
+from stickslip_ros.running.composition import LOOP_NODES, node_parameters
 from stickslip_ros.running.controller_search import ControllerSearch
 from stickslip_ros.running.lifecycle_client import ACTIVE, NEXT_TRANSITION, LifecycleClient
-from stickslip_ros.running.loop_nodes import LOOP_NODES, node_parameters
 from stickslip_ros.running.namespace_lock import lock_namespace
-from stickslip_ros.running.processes import EXIT_TIMEOUT, Processes
 from stickslip_ros.running.run_monitor import Notify, OnSimulatedTime, RunMonitor
-from stickslip_ros.running.spinner import Spinner, first_of
+from stickslip_ros.running.spinner import Spinner
 from stickslip_ros.scenarios.files import Scenario, parameter_file, section_matches
 
 _READY_TIMEOUT = 30.0
 _ANSWER_TIMEOUT = 15.0
-_RETRY_PERIOD = 0.02
-_WATCH_PERIOD = 0.1
-_LOOK_PERIOD = 0.1
-_DISCOVERY_TIME = 3.0
-"""Time, s, for which something must stand before it is no longer a matter of discovery."""
-_SETTLING_TIME = 0.3
-"""Time, s, given to a controller to match our readers: on our side nothing tells that it has."""
 _LAST_FIGURES_TIMEOUT = 2.0
 _CATCH_UP_TIMEOUT = 10.0
+_EXIT_TIMEOUT = 2.0 * GUARD_TIMEOUT + 2.0
+_DISCOVERY_TIME = 3.0
+"""Time, s, for which something must stand before it is no longer a matter of discovery."""
+_RETRY_PERIOD = 0.02
+_WATCH_PERIOD = 0.1
+_FINISH_PERIOD = 0.03
 
 
 @dataclass
@@ -79,21 +78,10 @@ def run_nodes(
     try:
         with lock_namespace(namespace, rclpy.get_default_context().get_domain_id()):
             supervisor = _Supervisor(scenario, namespace, controller, on_simulated_time, notify)
-            try:
-                return supervisor.run(_parameters(scenario, bag), composed)
-            finally:
-                supervisor.close()
+            with closing(supervisor):
+                return supervisor.run(bag, composed)
     finally:
         rclpy.try_shutdown()
-
-
-def _parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
-    """Return the parameters by node, those of bringup included."""
-    values = node_parameters(scenario, bag)
-    # The analyzer only listens until it is active; it is matched by those that write to it.
-    for node in values.keys() - {"analyzer"}:
-        values[node]["wait_for"] = [other for other in values if other != node]
-    return values
 
 
 class _Supervisor:
@@ -116,11 +104,12 @@ class _Supervisor:
         self._node = Node("bringup", namespace=namespace)
         self._spinner = Spinner()
         self._spinner.add(self._node)
-        self._stop, self._hurry, self._failure = Future(), Future(), Future()
+        self._stop, self._hurry = Future(), Future()
+        self._failure: str | None = None
         self._signal_handlers = stop_on_signals(self._spinner.executor, self._stop, self._hurry)
-        self._spinner.cut_short = first_of(self._stop, self._failure)
+        self._spinner.is_cut_short = self._is_ended
         self._search = ControllerSearch(self._node, namespace, ("analyzer", "plant"))
-        self._processes = Processes()
+        self._processes: dict[str, subprocess.Popen[bytes]] = {}
         self._clients: dict[str, LifecycleClient] = {}
         self._active: list[str] = []
         self._monitor = RunMonitor(
@@ -128,8 +117,12 @@ class _Supervisor:
         )
         self._node.create_timer(_WATCH_PERIOD, self._watch_processes)
 
-    def run(self, parameters: Mapping[str, Mapping[str, Any]], composed: bool) -> RunOutcome:
+    def run(self, bag: Path, composed: bool) -> RunOutcome:
+        parameters = node_parameters(self._scenario, bag)
         nodes = list(parameters)
+        # The analyzer only listens until it is active; it is matched by those that write to it.
+        for node in nodes[1:]:
+            parameters[node]["wait_for"] = [other for other in nodes if other != node]
         if "washout_controller" in nodes:
             self._outcome.controller = f"{self._namespace.rstrip('/')}/washout_controller"
         if self._user_controller is not None:
@@ -150,11 +143,11 @@ class _Supervisor:
                 if self._user_controller:
                     self._start_user_controller(self._user_controller, file)
                 self._bring_up(nodes)
-            self._spinner.wait_for(self._monitor.finished)
+            self._spinner.spin_until(lambda: self._monitor.finished, period=_FINISH_PERIOD)
         finally:
             self._bring_down()
-        if self._failure.done():
-            raise RunError(self._failure.result())
+        if self._failure is not None:
+            raise RunError(self._failure)
         self._outcome.interrupted = self._stop.done()
         self._outcome.plant = self._monitor.plant
         return self._outcome
@@ -164,13 +157,15 @@ class _Supervisor:
         for number, handler in self._signal_handlers.items():
             signal.signal(number, handler)
 
+    def _is_ended(self) -> bool:
+        return self._stop.done() or self._failure is not None
+
     def _spawn(self, nodes: Iterable[str], file: Path) -> None:
         self._signal_handlers[signal.SIGTSTP] = signal.signal(signal.SIGTSTP, self._suspend)
         arguments = [*ROS_ARGUMENTS, "--params-file", str(file), "-r", f"__ns:={self._namespace}"]
         for name in nodes:
-            self._processes.start(
-                name, [sys.executable, "-m", LOOP_NODES[name].__module__, *arguments]
-            )
+            module = LOOP_NODES[name].__module__
+            self._processes[name] = start_child([sys.executable, "-m", module, *arguments])
 
     def _suspend(self, *_: object) -> None:
         """Stop, as by Ctrl-Z, which does not reach the nodes."""
@@ -186,9 +181,8 @@ class _Supervisor:
         # Its own parameters may stand in the scenario; overrides are in the other file. What was
         # given with the command comes last, and so has the last word.
         files = ["--params-file", str(self._scenario.path), "--params-file", str(file)]
-        self._processes.start(
-            executable, [executable, *in_namespace, *files, "--", *further], guarded=True
-        )
+        command = [executable, *in_namespace, *files, "--", *further]
+        self._processes[executable] = start_child(command, guarded=True)
 
     def _bring_up(self, nodes: Iterable[str]) -> None:
         for node in nodes:
@@ -198,7 +192,8 @@ class _Supervisor:
         for node in nodes:
             if node == "plant" and self._user_controller is not None:
                 self._await_controller(active=True)
-                self._spinner.spin_for(_SETTLING_TIME)
+                # For it to match our readers, too: on our side nothing tells that it has.
+                self._spinner.spin_for(0.3)
             self._take_through(node, Transition.TRANSITION_ACTIVATE)
 
     def _take_through(self, node: str, transition: int) -> None:
@@ -206,7 +201,7 @@ class _Supervisor:
         ready = self._spinner.spin_until(
             lambda: self._change_state(node, transition), _READY_TIMEOUT, _RETRY_PERIOD
         )
-        if not ready and not self._spinner.cut_short.done():
+        if not ready and not self._is_ended():
             self._fail(f"{node} did not become ready within {_READY_TIMEOUT:g} s")
 
     def _connect_user_controller(self, command: Sequence[str]) -> None:
@@ -220,7 +215,7 @@ class _Supervisor:
         if controller is None:
             return
         if command:
-            self._processes.rename(command[0], controller)
+            self._processes[controller] = self._processes.pop(command[0])
         name = controller.rpartition("/")[2]
         self._set_wait_for("analyzer", [name])
         self._set_wait_for("plant", ["analyzer", name])
@@ -237,7 +232,7 @@ class _Supervisor:
         """
         started = time.monotonic()
         amiss_since: dict[str, float] = {}
-        while not self._spinner.cut_short.done():
+        while not self._is_ended():
             self._outcome.controller, amiss = self._look_for_controller(active)
             if self._outcome.controller is not None:
                 return self._outcome.controller
@@ -252,7 +247,7 @@ class _Supervisor:
                 self._fail(
                     f"{self._user_controller[0]} was not ready within {_READY_TIMEOUT:g} s: {why}"
                 )
-            self._spinner.spin_for(_LOOK_PERIOD)
+            self._spinner.spin_for(_WATCH_PERIOD)
         return None
 
     def _look_for_controller(self, active: bool) -> tuple[str | None, list[str]]:
@@ -283,7 +278,6 @@ class _Supervisor:
         parameter = Parameter("wait_for", value=others).to_parameter_msg()
         call.start(SetParameters.Request(parameters=[parameter]))
         self._spinner.spin_until(call.pursue)
-        call.close()
 
     def _bring_down(self) -> None:
         """Deactivate what is active, the analyzer last, and end the processes.
@@ -291,30 +285,37 @@ class _Supervisor:
         Who is in a hurry, and says so by a second signal, does not wait for any answer.
         """
         self._monitor.ending = True
-        self._spinner.cut_short = self._hurry
+        self._spinner.is_cut_short = self._hurry.done
         for node in reversed(self._active):
             if node == "analyzer":
                 self._let_the_analyzer_catch_up()
-            finished = node == "plant" and self._monitor.finished.done()
+            finished = node == "plant" and self._monitor.finished
             if not finished and not self._is_dead(node):
                 self._deactivate(node)
             if node == "plant" and not self._is_dead(node):
                 self._spinner.spin_until(lambda: self._monitor.plant_stopped, _LAST_FIGURES_TIMEOUT)
-        for name in self._processes.end():
-            self._notify(f"the node {name} did not end within {EXIT_TIMEOUT:g} s: killed")
+        for process in self._processes.values():
+            process.terminate()
+        deadline = time.monotonic() + _EXIT_TIMEOUT
+        for name, process in self._processes.items():
+            try:
+                process.wait(max(deadline - time.monotonic(), 0.0))
+            except subprocess.TimeoutExpired:
+                self._notify(f"the node {name} did not end within {_EXIT_TIMEOUT:g} s: killed")
+                process.kill()
+                process.wait()
 
     def _let_the_analyzer_catch_up(self) -> None:
         """Wait until it holds the plant's last sample; fail if it stops short of that."""
-        seen, seen_at = self._monitor.newest_recorded, time.monotonic()
         while self._monitor.unrecorded > 0.0 and not self._is_dead("analyzer"):
-            if self._hurry.done():
-                return
-            self._spinner.spin_for(_RETRY_PERIOD)
-            if self._monitor.newest_recorded > seen:
-                seen, seen_at = self._monitor.newest_recorded, time.monotonic()
-            elif time.monotonic() - seen_at > _CATCH_UP_TIMEOUT:
-                missing = self._monitor.unrecorded
-                self._fail(f"the analyzer did not take in the last {missing:g} s of samples")
+            before = self._monitor.unrecorded
+            goes_on = self._spinner.spin_until(
+                lambda b=before: self._monitor.unrecorded < b or self._is_dead("analyzer"),
+                _CATCH_UP_TIMEOUT,
+            )
+            if not goes_on:
+                if not self._hurry.done():
+                    self._fail(f"the analyzer did not take in the last {before:g} s of samples")
                 return
 
     def _deactivate(self, node: str) -> None:
@@ -337,15 +338,16 @@ class _Supervisor:
         return self._clients[node]
 
     def _is_dead(self, node: str) -> bool:
-        return node in self._processes.ended()
+        return node in self._processes and self._processes[node].poll() is not None
 
     def _watch_processes(self) -> None:
-        for name, status in self._processes.ended().items():
+        for name, process in self._processes.items():
+            status = process.poll()
             if name == "plant" and status == 0 and self._monitor.plant_stopped:
-                self._monitor.finish()  # somebody has ended it in order
-            else:
+                self._monitor.finished = True  # somebody has ended it in order
+            elif status is not None:
                 self._fail(f"the node {name} died ({how_it_ended(status)})")
 
     def _fail(self, why: str) -> None:
-        if not self._failure.done():
-            self._failure.set_result(why)
+        if self._failure is None:
+            self._failure = why

@@ -1,8 +1,9 @@
-"""Our nodes of a closed loop in this process, managed by direct calls."""
+"""Our nodes of a closed loop: what they are, their parameters, and all of them in this process."""
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import redirect_stderr
+from pathlib import Path
 from typing import Any
 
 from rclpy.context import Context
@@ -14,8 +15,30 @@ from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.running.loop_nodes import LOOP_NODES
+from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.running.spinner import Spinner
+from stickslip_ros.scenarios.files import Scenario
+
+LOOP_NODES: dict[str, Callable[..., ManagedNode[Any]]] = {
+    "analyzer": AnalyzerNode,
+    "washout_controller": WashoutControllerNode,
+    "plant": PlantNode,
+}
+"""Every node by its name, in the order of activation."""
+
+
+def node_parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
+    """Return the parameters of the nodes that a scenario needs, in the order of activation.
+
+    Somebody else is to activate them, and they record to `bag`.
+    """
+    values = scenario.as_dict()
+    values["analyzer"]["bag"] = str(bag)
+    return {
+        node: {**values[node], "autostart": False}
+        for node in LOOP_NODES
+        if node != "washout_controller" or scenario.plant.expects_control
+    }
 
 
 class Composition:

@@ -42,7 +42,9 @@ def own_domain() -> Generator[int]:
     """
     for domain in DOMAINS:
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as held:
-            if not _bind(held, "127.0.0.1", port(domain, _FREE_PORT)):
+            try:
+                held.bind(("127.0.0.1", port(domain, _FREE_PORT)))
+            except OSError:
                 continue
             if all(is_free(port(domain, number)) for number in _DISCOVERY_PORTS):
                 yield domain
@@ -70,10 +72,8 @@ def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
     try:
         yield context
     finally:
-        if context is rclpy.get_default_context():
-            rclpy.try_shutdown()  # with no context named it can be initialised again
-        else:
-            rclpy.try_shutdown(context=context)
+        # With no context named, the default one can be initialised again.
+        rclpy.try_shutdown(context=None if context is rclpy.get_default_context() else context)
         # What rclpy's destroyed nodes still hold, threads, sockets and shared memory of the
         # middleware, goes with the last of them, and they refer to each other.
         gc.collect()
@@ -105,21 +105,11 @@ def _this_process_only_here() -> Mapping[str, str]:
 
 @contextmanager
 def _environment(variables: Mapping[str, str]) -> Generator[None]:
-    before = {name: os.environ.get(name) for name in variables}
+    before = {name: os.environ[name] for name in variables if name in os.environ}
     os.environ.update(variables)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
-def _bind(free: socket.socket, address: str, port: int) -> bool:
-    try:
-        free.bind((address, port))
-    except OSError:
-        return False
-    return True
+        for name in variables:
+            del os.environ[name]
+        os.environ.update(before)

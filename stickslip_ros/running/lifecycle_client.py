@@ -72,8 +72,3 @@ class LifecycleClient:
             ):
                 asked.append(state)
                 self.change_state(NEXT_TRANSITION[state])
-
-    def close(self) -> None:
-        """Ask no more."""
-        self._get_state.close()
-        self._change_state.close()

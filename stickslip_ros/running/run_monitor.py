@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from rclpy.task import Future
 from std_msgs.msg import Header
 
 from stickslip_ros.messages.topics import DIAGNOSTICS, RECORDED
@@ -34,8 +33,8 @@ class RunMonitor:
         """Listen by a node in the run's namespace; `fail` is called when the plant gives up."""
         self.plant: dict[str, str] = {}
         """The plant's last figures, as in its diagnostics."""
-        self.finished = Future()
-        """Done when the plant has come to its end, or was ended by somebody."""
+        self.finished = False
+        """Whether the plant has come to its end, or was ended by somebody."""
         self.plant_stopped = False
         """Whether the plant has told its last figures, being active no more."""
         self.newest_recorded = 0
@@ -56,11 +55,6 @@ class RunMonitor:
         """Time from the newest sample that the analyzer has taken in to the plant's last, s."""
         return (int(self.plant.get(NEWEST_STAMP, 0)) - self.newest_recorded) * 1e-9
 
-    def finish(self) -> None:
-        """Take the plant for finished."""
-        if not self.finished.done():
-            self.finished.set_result(None)
-
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.name == self._plant_name:
@@ -77,7 +71,7 @@ class RunMonitor:
         elif NEWEST_STAMP in self.plant:
             self.plant_stopped = True
             if self.plant.get(FINISHED) == str(True) or state == "finalized":
-                self.finish()
+                self.finished = True
             elif state in NEXT_TRANSITION and not (self._paused or self.ending):
                 self._paused = True
                 self._notify(

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from math import inf
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
@@ -14,17 +15,16 @@ from rclpy.task import Future
 from stickslip_ros.nodes.base.process import spin
 from stickslip_ros.nodes.base.service_call import ServiceCall
 
-_LOOK_PERIOD = 0.005
-
 
 class Spinner:
     """Runs its nodes until a condition holds, time is over, or waiting is cut short."""
 
     def __init__(self, context: Context | None = None) -> None:
         self.executor: Executor = EventsExecutor(context=context)
-        self.cut_short = Future()
-        """As long as this is done, nothing is waited for."""
+        self.is_cut_short: Callable[[], bool] = lambda: False
+        """Whether nothing is to be waited for at present."""
         self._nodes: list[Node] = []
+        self._clock = Clock(clock_type=ClockType.STEADY_TIME)
 
     def add(self, node: Node) -> None:
         """Run a node, too; `close` destroys it."""
@@ -32,28 +32,36 @@ class Spinner:
         self.executor.add_node(node)
 
     def spin_until(
-        self, condition: Callable[[], bool], timeout: float = inf, period: float = _LOOK_PERIOD
+        self, condition: Callable[[], bool], timeout: float = inf, period: float = 0.005
     ) -> bool:
         """Run the nodes until the condition holds, for so much wall time (s); return if it does.
 
         The condition is looked at every `period` (s).
         """
         deadline = time.monotonic() + timeout
-        while not self.cut_short.done():
-            if condition():
-                return True
-            if time.monotonic() >= deadline:
-                break
-            self.spin_for(period)
-        return False
+        due = Future()
+
+        def look() -> None:
+            if not due.done():
+                due.set_result(None)
+
+        # The executor's own timeouts do not count while there are callbacks to run.
+        timer = self._nodes[0].create_timer(period, look, clock=self._clock)
+        try:
+            while not self.is_cut_short():
+                if condition():
+                    return True
+                if time.monotonic() >= deadline:
+                    break
+                due = Future()
+                spin(self.executor, due)
+            return False
+        finally:
+            self._nodes[0].destroy_timer(timer)
 
     def spin_for(self, duration: float) -> None:
         """Run the nodes for so much wall time (s)."""
-        spin(self.executor, self.cut_short, duration)
-
-    def wait_for(self, future: Future) -> None:
-        """Run the nodes until a future is done."""
-        spin(self.executor, first_of(future, self.cut_short))
+        self.spin_until(lambda: False, duration)
 
     def ask(self, call: ServiceCall, request: Any, timeout: float) -> Any:
         """Call a service and return its answer.
@@ -71,16 +79,3 @@ class Spinner:
             self.executor.remove_node(node)
             node.destroy_node()
         self.executor.shutdown()
-
-
-def first_of(*futures: Future) -> Future:
-    """Return a future that is done as soon as one of these is."""
-    first = Future()
-
-    def finish(_: Future) -> None:
-        if not first.done():
-            first.set_result(None)
-
-    for future in futures:
-        future.add_done_callback(finish)
-    return first

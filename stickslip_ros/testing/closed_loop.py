@@ -11,7 +11,6 @@ from types import TracebackType
 from typing import Any, Literal, Self
 
 import rclpy
-from rcl_interfaces.srv import GetParameters
 from rclpy.exceptions import InvalidNamespaceException
 from rclpy.node import Node
 from rclpy.validate_namespace import validate_namespace
@@ -20,12 +19,11 @@ from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.analyzer import VERDICT_TIME
 from stickslip_ros.nodes.base.managed import ERROR
-from stickslip_ros.nodes.base.service_call import ServiceCall
-from stickslip_ros.running.composition import Composition
+from stickslip_ros.nodes.base.service_call import parameters_call
+from stickslip_ros.running.composition import Composition, node_parameters
 from stickslip_ros.running.controller_search import ControllerSearch
 from stickslip_ros.running.domain import domain_variables, own_domain, ros_context
 from stickslip_ros.running.lifecycle_client import LifecycleClient
-from stickslip_ros.running.loop_nodes import node_parameters
 from stickslip_ros.running.user_controller import ControllerProcess, ControllerThread
 from stickslip_ros.scenarios.files import (
     DEFAULT_NAMESPACE,
@@ -131,7 +129,11 @@ class ClosedLoop:
             )
             self.context = opened.enter_context(ros_context(self._domain, self.ros_arguments))
             opened.callback(self._forget)  # before ROS ends: then nothing of it is left
-            self._nodes = Composition(self.context, self._parameters())
+            bag = self._bag or Path(self._directory, "bag")
+            parameters = node_parameters(self.scenario, bag)
+            if self._to_control != "washout":
+                parameters.pop("washout_controller", None)
+            self._nodes = Composition(self.context, parameters)
             opened.callback(self._nodes.close)
             self._start_controller(opened)
             self._opened = opened.pop_all()
@@ -244,12 +246,6 @@ class ClosedLoop:
             raise RunError("the loop is not open: use it within `with ClosedLoop(...) as loop:`")
         return self._nodes
 
-    def _parameters(self) -> dict[str, dict[str, Any]]:
-        parameters = node_parameters(self.scenario, self._bag or Path(self._directory, "bag"))
-        if self._to_control != "washout":
-            parameters.pop("washout_controller", None)
-        return parameters
-
     def _start_controller(self, opened: ExitStack) -> None:
         if callable(self._to_control):
             self.controller = self._made_node(self._to_control)
@@ -309,15 +305,18 @@ class ClosedLoop:
         for name in managed():
             client = LifecycleClient(nodes.spinner, nodes.plant, name, _ANSWER_TIMEOUT)
             client.bring_up(timeout, self._check_running)
-            client.close()
             self._brought_up.add(name)
             self._wait(nodes, lambda: bool(search.controllers()), timeout)
         found = search.controllers()
         if not found:
             reasons = "; ".join([f"nobody {search.task}", *search.near_misses()])
             raise RunError(f"no controller was found within {timeout:g} s: {reasons}")
+        # The middleware tells a process of our topics in the order in which we have made them: once
+        # it has found what its answer is to go to, it has found plant and analyzer, too.
         for name in found if elsewhere else []:
-            _await_discovery(nodes, name)
+            call = parameters_call(nodes.plant, name, [], lambda _: None)
+            nodes.spinner.spin_until(call.pursue, 2.0 * _ANSWER_TIMEOUT)
+            call.close()
         return found
 
     def _wait(self, nodes: Composition, condition: Callable[[], bool], timeout: float) -> bool:
@@ -351,17 +350,6 @@ class ClosedLoop:
         nodes.analyzer.call_soon(nodes.analyzer.trigger_deactivate)
         nodes.spinner.spin_until(lambda: not nodes.analyzer.active, _DEACTIVATION_TIMEOUT)
         return diagnostics
-
-
-def _await_discovery(nodes: Composition, name: str) -> None:
-    """Wait, within bounds, for an answer of a node, with which it knows plant and analyzer.
-
-    The middleware tells a process of our topics in the order in which we have made them: whoever
-    has found what answers are to go to has found all that was here before.
-    """
-    call = ServiceCall(nodes.plant, GetParameters, f"{name}/get_parameters")
-    nodes.spinner.ask(call, GetParameters.Request(), _ANSWER_TIMEOUT)
-    call.close()
 
 
 def _target(override: str) -> str:

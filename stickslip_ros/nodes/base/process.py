@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
-from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +71,7 @@ def initialise(
     In the default context and the domain that the environment says, unless others are given.
     Raises InvalidInputError where nodes could not live, and for arguments that ROS refuses.
     """
-    check_machine(_domain_of_environment() if domain is None else domain)
+    _check_machine(_domain_of_environment() if domain is None else domain)
     try:
         rclpy.init(
             args=list(arguments),
@@ -171,13 +170,11 @@ def this_machine_only() -> dict[str, str]:
     }
 
 
-def check_machine(domain: int) -> None:
-    """Raise InvalidInputError where nodes could not live: for the domain, the clock, the network.
+def _check_machine(domain: int) -> None:
+    """Raise InvalidInputError where nodes could not live: for the clock, the network, the domain.
 
     What the middleware itself says of these is no sentence, or nothing.
     """
-    if domain > _LARGEST_DOMAIN:
-        raise _domain_refused(domain)
     now = time.time_ns()
     if not 0 < now < END_OF_TIME:
         year = datetime.fromtimestamp(now / NANOSECONDS, UTC).year
@@ -231,14 +228,11 @@ def _domain_of_environment() -> int:
     rcl would take -1 for 0, 1.5 for 1 and 010 for 8. Raises InvalidInputError.
     """
     text = os.environ.get(_DOMAIN, "").strip() or "0"
-    if not _DECIMAL.fullmatch(text):
-        raise _domain_refused(repr(text))
-    return int(text)
-
-
-def _domain_refused(domain: object) -> InvalidInputError:
-    return InvalidInputError(
-        f"{_DOMAIN} = {domain!s:.40} is refused: must be an integer from 0 to {_LARGEST_DOMAIN}, "
+    if _DECIMAL.fullmatch(text) and int(text) <= _LARGEST_DOMAIN:
+        return int(text)
+    shown = text if _DECIMAL.fullmatch(text) else repr(text)
+    raise InvalidInputError(
+        f"{_DOMAIN} = {shown:.40} is refused: must be an integer from 0 to {_LARGEST_DOMAIN}, "
         "the last domain that has ports"
     )
 
@@ -303,15 +297,11 @@ def stop_on_signals(executor: Executor, *stopped: Future) -> dict[signal.Signals
     return {number: signal.signal(number, stop) for number in numbers}
 
 
-def spin(executor: Executor, until: Future, timeout: float = inf) -> None:
-    """Run callbacks until the future is done or so much wall time (s) is over.
-
-    A callback that raises is logged, and the rest go on.
-    """
-    deadline = time.monotonic() + timeout
-    while not until.done() and (left := deadline - time.monotonic()) > 0.0:
+def spin(executor: Executor, until: Future) -> None:
+    """Run callbacks until the future is done; one that raises is logged, and the rest go on."""
+    while not until.done():
         try:
-            executor.spin_until_future_complete(until, timeout_sec=min(left, _SPIN_TIMEOUT))
+            executor.spin_until_future_complete(until, timeout_sec=_SPIN_TIMEOUT)
         except Exception as error:  # an impossible request from outside ends up here, too
             get_logger("stickslip_ros").error(f"{type(error).__name__}: {error}")
 

@@ -11,26 +11,20 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 
 ANSWER_TIME = 1.0
-"""Time, s, that an answer may take before another client asks; doubled with each."""
-
-_MATCH_TIME = 1.0
-"""Time, s, in which a client has to match a service that is there; doubled with each client."""
+"""Time, s, that a client has to match a service that is there, and then to get its answer."""
 
 
 class ServiceCall:
     """Calls a service as soon as it is there, until it has answered.
 
     A client may never match a service that is there, and an answer may be lost: then another client
-    asks. So the service may be asked more than once.
+    asks, and has twice the time. So the service may be asked more than once.
     """
 
     def __init__(
         self, node: Node, kind: Any, service: str, *, answer_time: float = ANSWER_TIME
     ) -> None:
-        """Prepare calls of a service by `node`; they begin with `start`.
-
-        `answer_time` is how long, s, an answer may take before the service is asked once more.
-        """
+        """Prepare to call a service for a node; it has `answer_time` (s) for its first answer."""
         self._node = node
         self._kind = kind
         self._service = service
@@ -39,7 +33,7 @@ class ServiceCall:
         self._pending: Future | None = None
 
     def start(self, request: Any, on_answer: Callable[[Any], None] = lambda _: None) -> None:
-        """Begin to ask, in place of what was asked before; the answer is passed on."""
+        """Ask this from now on, in place of what was asked before."""
         self._request = request
         self._on_answer = on_answer
         self.answer: Any = None
@@ -60,13 +54,12 @@ class ServiceCall:
         if not self._node.count_services(self._service):
             return False
         now = time.monotonic()
-        if self._attempt_ends is None:
-            self._attempt_ends = now + _MATCH_TIME * self._factor
-        elif now > self._attempt_ends:
-            self._factor *= 2.0
+        if self._attempt_ends is not None and now > self._attempt_ends:
             self._node.destroy_client(self._client)
             self._client, self._pending = self._new_client(), None
-            self._attempt_ends = now + _MATCH_TIME * self._factor
+            self._attempt_ends, self._factor = None, 2.0 * self._factor
+        if self._attempt_ends is None:
+            self._attempt_ends = now + ANSWER_TIME * self._factor
         if self._pending is None and self._client.service_is_ready():
             self._attempt_ends = now + self._answer_time * self._factor
             self._pending = self._client.call_async(self._request)
@@ -91,7 +84,7 @@ class ServiceCall:
 def parameters_call(
     node: Node, other: str, names: Sequence[str], on_answer: Callable[[dict[str, Any]], None]
 ) -> ServiceCall:
-    """Return a call, already started, that asks the node `other` for its parameters by name."""
+    """Return a call that asks the node `other` for its parameters of these names."""
 
     def take(response: Any) -> None:
         values = [parameter_value_to_python(value) for value in response.values]
