@@ -7,7 +7,7 @@ import tempfile
 import time
 from collections.abc import Iterable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import rclpy
@@ -36,20 +36,18 @@ _CATCH_UP_TIMEOUT = 10.0
 _EXIT_TIMEOUT = 2.0 * GUARD_TIMEOUT + 2.0
 _DISCOVERY_TIME = 3.0
 """Time, s, for which something must stand before it is no longer a matter of discovery."""
-_RETRY_PERIOD = 0.02
 _WATCH_PERIOD = 0.1
-_FINISH_PERIOD = 0.03
 
 
-@dataclass
+@dataclass(frozen=True)
 class RunOutcome:
     """What a run came to."""
 
-    interrupted: bool = False
+    interrupted: bool
     """Whether SIGINT, SIGTERM or SIGHUP ended it."""
-    plant: dict[str, str] = field(default_factory=dict)
+    plant: dict[str, str]
     """The plant's last figures, as in its diagnostics."""
-    controller: str | None = None
+    controller: str | None
     """Full name of the node that was the controller."""
 
 
@@ -100,7 +98,7 @@ class _Supervisor:
         self._user_controller = user_controller
         self._notify = notify
         self._notified: set[str] = set()
-        self._outcome = RunOutcome()
+        self._controller: str | None = None
         self._node = Node("bringup", namespace=namespace)
         self._spinner = Spinner()
         self._spinner.add(self._node)
@@ -124,7 +122,7 @@ class _Supervisor:
         for node in nodes[1:]:
             parameters[node]["wait_for"] = [other for other in nodes if other != node]
         if "washout_controller" in nodes:
-            self._outcome.controller = f"{self._namespace.rstrip('/')}/washout_controller"
+            self._controller = f"{self._namespace.rstrip('/')}/washout_controller"
         if self._user_controller is not None:
             nodes.remove("washout_controller")
         try:
@@ -143,14 +141,12 @@ class _Supervisor:
                 if self._user_controller:
                     self._start_user_controller(self._user_controller, file)
                 self._bring_up(nodes)
-            self._spinner.spin_until(lambda: self._monitor.finished, period=_FINISH_PERIOD)
+            self._spinner.spin_until(lambda: self._monitor.finished, period=0.03)
         finally:
             self._bring_down()
         if self._failure is not None:
             raise RunError(self._failure)
-        self._outcome.interrupted = self._stop.done()
-        self._outcome.plant = self._monitor.plant
-        return self._outcome
+        return RunOutcome(self._stop.done(), self._monitor.plant, self._controller)
 
     def close(self) -> None:
         self._spinner.close()
@@ -199,7 +195,7 @@ class _Supervisor:
     def _take_through(self, node: str, transition: int) -> None:
         """Take a node through a transition, again and again while it is not ready for it."""
         ready = self._spinner.spin_until(
-            lambda: self._change_state(node, transition), _READY_TIMEOUT, _RETRY_PERIOD
+            lambda: self._change_state(node, transition), _READY_TIMEOUT, period=0.02
         )
         if not ready and not self._is_ended():
             self._fail(f"{node} did not become ready within {_READY_TIMEOUT:g} s")
@@ -233,9 +229,9 @@ class _Supervisor:
         started = time.monotonic()
         amiss_since: dict[str, float] = {}
         while not self._is_ended():
-            self._outcome.controller, amiss = self._look_for_controller(active)
-            if self._outcome.controller is not None:
-                return self._outcome.controller
+            self._controller, amiss = self._look_for_controller(active)
+            if self._controller is not None:
+                return self._controller
             now = time.monotonic()
             amiss_since = {what: amiss_since.get(what, now) for what in amiss}
             for what, since in amiss_since.items():
@@ -259,7 +255,7 @@ class _Supervisor:
         # Before it is configured, it may have nothing to be found by but its namespace.
         namespace = self._namespace.rstrip("/")
         candidates = [node for node in managed if node.rpartition("/")[0] == namespace]
-        amiss = self._search.near_misses()
+        amiss = list(self._search.near_misses())
         for node in dict.fromkeys([*found, *candidates]):
             if node in found and not (active and node in managed):
                 return node, []

@@ -45,33 +45,43 @@ class ControllerSearch:
     def managed(self) -> list[str]:
         """Return the full names of all managed (lifecycle) nodes but ours."""
         nodes = self._observer.get_node_names_and_namespaces()
-        full_names = {
-            f"{namespace.rstrip('/')}/{name}": (name, namespace) for name, namespace in nodes
-        }
-        return [
-            full_name
-            for full_name, node in full_names.items()
-            if full_name not in self._ours and _is_managed(self._observer, *node)
-        ]
+        managed = [node for node in nodes if _is_managed(self._observer, *node)]
+        names = [f"{namespace.rstrip('/')}/{name}" for name, namespace in managed]
+        return [name for name in names if name not in self._ours]
 
-    def near_misses(self) -> list[str]:
-        """Return in a sentence each why nodes that look like controllers are none."""
-        sentences: list[str] = []
+    def near_misses(self) -> Iterator[str]:
+        """Say in a sentence each why nodes that look like controllers are none."""
         joint_states, control_force = self._joint_states, self._control_force
         readers = self._observer.get_subscriptions_info_by_topic(JOINT_STATES.name)
         writers = self._observer.get_publishers_info_by_topic(CONTROL_FORCE.name)
         reads, writes = _named(readers), _named(writers)
         for node in sorted(reads - writes - {*self._ours, f"{self._namespace}/{DASHBOARD}"}):
-            sentences.append(f"{node} reads {joint_states} but does not publish {control_force}")
+            yield f"{node} reads {joint_states} but does not publish {control_force}"
         for node in sorted(writes - reads - self._ours):
-            sentences.append(f"{node} publishes {control_force} but does not read {joint_states}")
+            yield f"{node} publishes {control_force} but does not read {joint_states}"
         for info in readers:
             if misfit := _misfit_as_reader(info):
-                sentences.append(f"{_full_name(info)} cannot read {joint_states}: {misfit}")
+                yield f"{_full_name(info)} cannot read {joint_states}: {misfit}"
         for info in writers:
             if misfit := _misfit_as_writer(info):
-                sentences.append(f"nobody can read {control_force} of {_full_name(info)}: {misfit}")
-        return sentences + list(_elsewhere(self._observer, joint_states, control_force))
+                yield f"nobody can read {control_force} of {_full_name(info)}: {misfit}"
+        yield from self._near_misses_elsewhere()
+
+    def _near_misses_elsewhere(self) -> Iterator[str]:
+        """Say who uses topics of these names in a namespace in which no plant is."""
+        here = self._joint_states.rpartition("/")[0]
+        for topic, _ in self._observer.get_topic_names_and_types():
+            namespace, _, name = topic.rpartition("/")
+            if namespace == here or self._observer.get_publishers_info_by_topic(
+                f"{namespace}/{JOINT_STATES.name}"
+            ):
+                continue
+            if name == JOINT_STATES.name:
+                for node in sorted(_named(self._observer.get_subscriptions_info_by_topic(topic))):
+                    yield f"{node} reads {topic}, the plant publishes {self._joint_states}"
+            elif name == CONTROL_FORCE.name:
+                for node in sorted(_named(self._observer.get_publishers_info_by_topic(topic))):
+                    yield f"{node} publishes {topic}, the plant reads {self._control_force}"
 
 
 def _is_managed(observer: Node, name: str, namespace: str) -> bool:
@@ -80,23 +90,6 @@ def _is_managed(observer: Node, name: str, namespace: str) -> bool:
     except NodeNameNonExistentError:  # it has gone meanwhile
         return False
     return any(_CHANGE_STATE in types for _, types in services)
-
-
-def _elsewhere(observer: Node, joint_states: str, control_force: str) -> Iterator[str]:
-    """Say who uses topics of these names in a namespace in which no plant is."""
-    here = joint_states.rpartition("/")[0]
-    for topic, _ in observer.get_topic_names_and_types():
-        namespace, _, name = topic.rpartition("/")
-        if namespace == here or observer.get_publishers_info_by_topic(
-            f"{namespace}/{JOINT_STATES.name}"
-        ):
-            continue
-        if name == JOINT_STATES.name:
-            for node in sorted(_named(observer.get_subscriptions_info_by_topic(topic))):
-                yield f"{node} reads {topic}, the plant publishes {joint_states}"
-        elif name == CONTROL_FORCE.name:
-            for node in sorted(_named(observer.get_publishers_info_by_topic(topic))):
-                yield f"{node} publishes {topic}, the plant reads {control_force}"
 
 
 def _named(

@@ -40,11 +40,6 @@ class ControllerThread:
             _bring_up(self.node)
         self._thread.start()
 
-    @property
-    def ended(self) -> bool:
-        """Whether the node runs no more."""
-        return self._failure is not None
-
     def check(self) -> None:
         """Raise RunError if the node runs no more."""
         if self._failure is not None:
@@ -57,7 +52,7 @@ class ControllerThread:
     def settle(self) -> None:
         """Wait, within bounds, until the callback under way is over."""
         self._idle.clear()
-        if not self.ended:
+        if self._failure is None:
             self._executor.create_task(self._idle.set)
             self._idle.wait(_CALLBACK_TIMEOUT)
 
@@ -100,11 +95,6 @@ class ControllerProcess:
             raise InvalidInputError(f"the controller {self._name}: no command {command[0]!r}")
         setting = [f"{name}={value}" for name, value in variables.items()]
         self._process = start_child(["env", *setting, *command], guarded=True)
-
-    @property
-    def ended(self) -> bool:
-        """Whether the process is no more."""
-        return self._process.poll() is not None
 
     def check(self) -> None:
         """Raise RunError if the process is no more."""

@@ -321,12 +321,12 @@ class ClosedLoop:
 
     def _wait(self, nodes: Composition, condition: Callable[[], bool], timeout: float) -> bool:
         """Run our nodes until the condition holds; RunError as soon as the controller ends."""
-        running = self._running
-        nodes.spinner.spin_until(
-            lambda: condition() or (running is not None and running.ended), timeout
-        )
-        self._check_running()
-        return condition()
+
+        def is_met() -> bool:
+            self._check_running()
+            return condition()
+
+        return nodes.spinner.spin_until(is_met, timeout)
 
     def _check_running(self) -> None:
         if self._running is not None:
