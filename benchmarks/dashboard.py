@@ -27,7 +27,7 @@ from urllib.error import URLError
 
 from benchmarks.parties import READY_TIMEOUT, ObservedPlant, Slice, closed_loop, party
 from benchmarks.slices import Row, by_turns, compare_rates, lacks, show
-from stickslip_ros.nodes.base.child_process import start
+from stickslip_ros.nodes.base.child_process import start_child
 
 LOCKSTEP_ROUNDS = 9
 LOCKSTEP_TIME = 3.0
@@ -85,7 +85,7 @@ def dashboard(*, with_page: bool) -> Generator[Callable[[], AbstractContextManag
     url = f"http://127.0.0.1:{port}"
     command = [sys.executable, "-m", "stickslip_ros.app.main", "dashboard", "--port", str(port)]
     with ExitStack() as resources:
-        process = start(command)
+        process = start_child(command)
         resources.callback(process.wait)
         resources.callback(process.terminate)
         resources.callback(process.send_signal, signal.SIGCONT)

@@ -27,7 +27,7 @@ from rclpy.task import Future
 
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.base.child_process import start
+from stickslip_ros.nodes.base.child_process import start_child
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.base.process import spin
 from stickslip_ros.nodes.plant import PlantNode
@@ -146,7 +146,7 @@ class OurLoop(Generic[PlantT]):
             file.write_text(parameter_file(values), encoding="utf-8")
             arguments = [*ROS_ARGUMENTS, "--params-file", str(file)]
             self.processes = [
-                start([sys.executable, "-m", node.__module__, *arguments])
+                start_child([sys.executable, "-m", node.__module__, *arguments])
                 for node in (AnalyzerNode, WashoutControllerNode)
             ]
         for node in [*self._composed, self.plant]:

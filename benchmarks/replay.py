@@ -26,7 +26,7 @@ from benchmarks.slices import Row, show
 from stickslip_ros.bags.recorder import QosProfile, Recorder
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 from stickslip_ros.messages.topics import CONTROL_FORCE, DEEP, JOINT_STATES
-from stickslip_ros.nodes.base.child_process import start
+from stickslip_ros.nodes.base.child_process import start_child
 from stickslip_ros.nodes.base.process import spin
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.replaying.player import Message
@@ -94,7 +94,7 @@ def replay(bag: Path) -> tuple[Sequence[float], Sequence[float]]:
     ours, theirs = context.Pipe()
     loop = context.Process(target=bare_loop, args=(theirs,))
     loop.start()
-    analyzer = start([sys.executable, "-m", "stickslip_ros.nodes.analyzer", *ROS_ARGUMENTS])
+    analyzer = start_child([sys.executable, "-m", "stickslip_ros.nodes.analyzer", *ROS_ARGUMENTS])
     try:
         with ros():
             node = TimedReplay(bag, ours)

@@ -161,8 +161,8 @@ def record(
                 bag=bag,
                 composed=composed,
                 controller=controller,
-                progress=progress,
-                tell=_tell,
+                on_simulated_time=progress,
+                notify=_tell,
             )
         except RunError as error:
             raise RunError(f"{error}; {_state_of(bag)}") from None
@@ -186,7 +186,7 @@ def _dashboard(namespace: str) -> Generator[None]:
         "--namespace",
         namespace,
     ]
-    process = ros_nodes("nodes.base.child_process").start(command)
+    process = ros_nodes("nodes.base.child_process").start_child(command)
     try:
         yield
     finally:

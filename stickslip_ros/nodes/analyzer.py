@@ -40,7 +40,7 @@ from stickslip_ros.nodes.base.duplicate_publishers import rivals
 from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Level, ManagedNode
 from stickslip_ros.nodes.base.polling import take_waiting
 from stickslip_ros.nodes.base.process import run_node
-from stickslip_ros.nodes.base.service_call import ask_parameters
+from stickslip_ros.nodes.base.service_call import parameters_call
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.prefixes import quantity
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters, known_parameters
@@ -95,8 +95,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._open_bag()
         # It exists while there is a recorder to wait for, and the plant sees by it that there is.
         self._recorded = self.advertise(RECORDED)
-        self._inquiries = [
-            ask_parameters(self, node, list(known_parameters(model)), partial(self._keep, node))
+        self._parameter_calls = [
+            parameters_call(self, node, list(known_parameters(model)), partial(self._keep, node))
             for node, model in NODE_PARAMETERS.items()
             if node != "analyzer"
         ]
@@ -119,8 +119,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         report = self._meter.report()
         for end in (self._recorded, *self._listening.values()):
             self.disconnect(end)
-        for inquiry in self._inquiries:
-            inquiry.close()
+        for call in self._parameter_calls:
+            call.close()
         self._keep("report", report)
         self._close_bag()
         if self._bag_failure:  # then it is nowhere else
@@ -216,8 +216,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         forces = self._columns(CONTROL_FORCE, wrench_columns)
         dropped = self._columns(DROPPED_FORCE, wrench_columns)
         self._meter.feed_forces(forces, dropped)
-        for inquiry in self._inquiries:
-            inquiry.pursue()
+        for call in self._parameter_calls:
+            call.pursue()
 
     def _log_measures(self) -> None:
         """Log what the last window of cycles was, unless it reads as the one before."""

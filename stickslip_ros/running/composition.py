@@ -1,48 +1,68 @@
-"""Our nodes of a closed loop in this process, run only while somebody waits for something."""
+"""Our nodes of a closed loop: what they are, their parameters, and all of them in this process."""
 
 import sys
-import time
 from collections.abc import Callable, Mapping
 from contextlib import redirect_stderr
+from pathlib import Path
 from typing import Any
 
 from rclpy.context import Context
-from rclpy.executors import Executor
-from rclpy.experimental import EventsExecutor
 from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter
-from rclpy.task import Future
 
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import ManagedNode
-from stickslip_ros.nodes.base.process import spin
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.running.spinner import Spinner
+from stickslip_ros.scenarios.files import Scenario
 
-_LOOK_PERIOD = 0.005
+LOOP_NODES: dict[str, Callable[..., ManagedNode[Any]]] = {
+    "analyzer": AnalyzerNode,
+    "washout_controller": WashoutControllerNode,
+    "plant": PlantNode,
+}
+"""Every node by its name, in the order of activation."""
+
+
+def node_parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
+    """Return the parameters of the nodes that a scenario needs, in the order of activation.
+
+    Somebody else is to activate them, and they record to `bag`.
+    """
+    values = scenario.as_dict()
+    values["analyzer"]["bag"] = str(bag)
+    return {
+        node: {**values[node], "autostart": False}
+        for node in LOOP_NODES
+        if node != "washout_controller" or scenario.plant.expects_control
+    }
 
 
 class Composition:
     """Plant, analyzer and perhaps our controller, configured, on one executor."""
 
-    def __init__(
-        self, context: Context, parameters: Mapping[str, Mapping[str, Any]], *, washout: bool
-    ) -> None:
-        """Make the nodes with these parameters, by node and flat name; RunError if one refuses."""
+    def __init__(self, context: Context, parameters: Mapping[str, Mapping[str, Any]]) -> None:
+        """Make the nodes of these parameters, by node and flat name; RunError if one refuses."""
         with redirect_stderr(sys.__stderr__):  # it asks for a file, which pytest may not have there
-            self._executor: Executor = EventsExecutor(context=context)
-        self.nodes: dict[str, ManagedNode[Any]] = {}
+            self.spinner = Spinner(context)
+        self.nodes: dict[str, Any] = {}
         """By name, in the order of activation."""
         try:
-            self.analyzer = self._add(AnalyzerNode, context, parameters["analyzer"])
-            if washout:
-                self._add(WashoutControllerNode, context, parameters["washout_controller"])
-            self.plant = self._add(PlantNode, context, parameters["plant"])
+            for name, values in parameters.items():
+                node = LOOP_NODES[name](context=context, overrides=values)
+                node.get_logger().set_level(LoggingSeverity.WARN)
+                self.nodes[name] = node
+                self.spinner.add(node)
+                if node.trigger_configure() is not TransitionCallbackReturn.SUCCESS:
+                    raise RunError(f"{name} could not be configured; its log says why")
         except BaseException:
             self.close()
             raise
+        self.analyzer: AnalyzerNode = self.nodes["analyzer"]
+        self.plant: PlantNode = self.nodes["plant"]
 
     def activate(self, node: ManagedNode[Any], timeout: float = 0.0) -> None:
         """Activate a node, within so much wall time (s) in which those it waits for may come."""
@@ -50,7 +70,7 @@ class Composition:
         def activated() -> bool:
             return node.trigger_activate() is TransitionCallbackReturn.SUCCESS
 
-        if not self.spin_until(activated, timeout):
+        if not self.spinner.spin_until(activated, timeout):
             reason = node.unmatched() or "its log says why"
             raise RunError(f"{node.get_name()} could not be activated: {reason}")
 
@@ -61,49 +81,9 @@ class Composition:
         if not result.successful:
             raise InvalidInputError(result.reason)
 
-    def spin_until(self, condition: Callable[[], bool], timeout: float) -> bool:
-        """Run the nodes until the condition holds, for so much wall time (s); return if it does."""
-        deadline = time.monotonic() + timeout
-        while not condition():
-            if time.monotonic() >= deadline:
-                return False
-            self._spin_for(_LOOK_PERIOD)
-        return True
-
-    def ask(self, kind: Any, service: str, request: Any, timeout: float) -> Any:
-        """Call a service and return its answer, None if none comes within so much wall time (s)."""
-        client = self.plant.create_client(kind, service)
-        try:
-            if not self.spin_until(client.service_is_ready, timeout):
-                return None
-            answer = client.call_async(request)
-            self.spin_until(answer.done, timeout)
-            return answer.result()
-        finally:
-            self.plant.destroy_client(client)
-
     def close(self) -> None:
         """Deactivate and destroy the nodes."""
         for node in reversed(self.nodes.values()):
             if node.active:
                 node.trigger_deactivate()
-            self._executor.remove_node(node)
-            node.destroy_node()
-        self._executor.shutdown()
-
-    def _add(
-        self, make: Callable[..., Any], context: Context, parameters: Mapping[str, Any]
-    ) -> Any:
-        node = make(context=context, overrides={**parameters, "autostart": False})
-        node.get_logger().set_level(LoggingSeverity.WARN)
-        self.nodes[node.get_name()] = node
-        self._executor.add_node(node)
-        if node.trigger_configure() is not TransitionCallbackReturn.SUCCESS:
-            raise RunError(f"{node.get_name()} could not be configured; its log says why")
-        return node
-
-    def _spin_for(self, duration: float) -> None:
-        over = Future()
-        timer = self.plant.every(duration, lambda: over.done() or over.set_result(None))
-        spin(self._executor, over)
-        self.plant.destroy_timer(timer)
+        self.spinner.close()

@@ -14,49 +14,74 @@ DASHBOARD = "dashboard"
 _CHANGE_STATE = "lifecycle_msgs/srv/ChangeState"
 
 
-def find_controllers(observer: Node) -> list[str]:
-    """Return the full names of the nodes that read joint_states and publish control_force.
+class ControllerSearch:
+    """Looks for the controller of a loop, which is a node of somebody else's."""
 
-    The topics are those of the observer's namespace; type and quality of service are such that the
-    plant's writer and reader match.
-    """
-    readers = _named(observer.get_subscriptions_info_by_topic(JOINT_STATES.name), _misfit_as_reader)
-    writers = _named(observer.get_publishers_info_by_topic(CONTROL_FORCE.name), _misfit_as_writer)
-    return sorted(readers & writers)
+    def __init__(self, observer: Node, namespace: str, ours: Iterable[str]) -> None:
+        """Look, with an `observer` in the loop's namespace, for nodes that are not `ours`.
 
+        Those are given by their names relative to the namespace.
+        """
+        self._observer = observer
+        self._namespace = namespace.rstrip("/")
+        self._ours = {f"{self._namespace}/{node}" for node in ours}
+        self._joint_states = observer.resolve_topic_name(JOINT_STATES.name)
+        self._control_force = observer.resolve_topic_name(CONTROL_FORCE.name)
 
-def find_managed(observer: Node) -> list[str]:
-    """Return the full names of all managed (lifecycle) nodes."""
-    return [
-        f"{namespace.rstrip('/')}/{name}"
-        for name, namespace in observer.get_node_names_and_namespaces()
-        if _is_managed(observer, name, namespace)
-    ]
+    @property
+    def task(self) -> str:
+        """What a controller does, in words."""
+        return f"reads {self._joint_states} and publishes {self._control_force}"
 
+    def controllers(self) -> list[str]:
+        """Return the full names of the nodes that read joint_states and publish control_force.
 
-def near_misses(observer: Node, expected: Iterable[str]) -> list[str]:
-    """Return in a sentence each why nodes that look like controllers are none.
+        Type and quality of service are such that the plant's writer and reader match.
+        """
+        readers = self._observer.get_subscriptions_info_by_topic(JOINT_STATES.name)
+        writers = self._observer.get_publishers_info_by_topic(CONTROL_FORCE.name)
+        return sorted(_named(readers, _misfit_as_reader) & _named(writers, _misfit_as_writer))
 
-    The nodes of those full names are `expected` to do what they do.
-    """
-    sentences: list[str] = []
-    readers = observer.get_subscriptions_info_by_topic(JOINT_STATES.name)
-    writers = observer.get_publishers_info_by_topic(CONTROL_FORCE.name)
-    reads, writes = _named(readers), _named(writers)
-    joint_states = observer.resolve_topic_name(JOINT_STATES.name)
-    control_force = observer.resolve_topic_name(CONTROL_FORCE.name)
-    here = joint_states.rpartition("/")[0]
-    for node in sorted(reads - writes - {*expected, f"{here}/{DASHBOARD}"}):
-        sentences.append(f"{node} reads {joint_states} but does not publish {control_force}")
-    for node in sorted(writes - reads - set(expected)):
-        sentences.append(f"{node} publishes {control_force} but does not read {joint_states}")
-    for info in readers:
-        if misfit := _misfit_as_reader(info):
-            sentences.append(f"{_full_name(info)} cannot read {joint_states}: {misfit}")
-    for info in writers:
-        if misfit := _misfit_as_writer(info):
-            sentences.append(f"nobody can read {control_force} of {_full_name(info)}: {misfit}")
-    return sentences + list(_elsewhere(observer, joint_states, control_force))
+    def managed(self) -> list[str]:
+        """Return the full names of all managed (lifecycle) nodes but ours."""
+        nodes = self._observer.get_node_names_and_namespaces()
+        managed = [node for node in nodes if _is_managed(self._observer, *node)]
+        names = [f"{namespace.rstrip('/')}/{name}" for name, namespace in managed]
+        return [name for name in names if name not in self._ours]
+
+    def near_misses(self) -> Iterator[str]:
+        """Say in a sentence each why nodes that look like controllers are none."""
+        joint_states, control_force = self._joint_states, self._control_force
+        readers = self._observer.get_subscriptions_info_by_topic(JOINT_STATES.name)
+        writers = self._observer.get_publishers_info_by_topic(CONTROL_FORCE.name)
+        reads, writes = _named(readers), _named(writers)
+        for node in sorted(reads - writes - {*self._ours, f"{self._namespace}/{DASHBOARD}"}):
+            yield f"{node} reads {joint_states} but does not publish {control_force}"
+        for node in sorted(writes - reads - self._ours):
+            yield f"{node} publishes {control_force} but does not read {joint_states}"
+        for info in readers:
+            if misfit := _misfit_as_reader(info):
+                yield f"{_full_name(info)} cannot read {joint_states}: {misfit}"
+        for info in writers:
+            if misfit := _misfit_as_writer(info):
+                yield f"nobody can read {control_force} of {_full_name(info)}: {misfit}"
+        yield from self._near_misses_elsewhere()
+
+    def _near_misses_elsewhere(self) -> Iterator[str]:
+        """Say who uses topics of these names in a namespace in which no plant is."""
+        here = self._joint_states.rpartition("/")[0]
+        for topic, _ in self._observer.get_topic_names_and_types():
+            namespace, _, name = topic.rpartition("/")
+            if namespace == here or self._observer.get_publishers_info_by_topic(
+                f"{namespace}/{JOINT_STATES.name}"
+            ):
+                continue
+            if name == JOINT_STATES.name:
+                for node in sorted(_named(self._observer.get_subscriptions_info_by_topic(topic))):
+                    yield f"{node} reads {topic}, the plant publishes {self._joint_states}"
+            elif name == CONTROL_FORCE.name:
+                for node in sorted(_named(self._observer.get_publishers_info_by_topic(topic))):
+                    yield f"{node} publishes {topic}, the plant reads {self._control_force}"
 
 
 def _is_managed(observer: Node, name: str, namespace: str) -> bool:
@@ -65,23 +90,6 @@ def _is_managed(observer: Node, name: str, namespace: str) -> bool:
     except NodeNameNonExistentError:  # it has gone meanwhile
         return False
     return any(_CHANGE_STATE in types for _, types in services)
-
-
-def _elsewhere(observer: Node, joint_states: str, control_force: str) -> Iterator[str]:
-    """Say who uses topics of these names in a namespace in which no plant is."""
-    here = joint_states.rpartition("/")[0]
-    for topic, _ in observer.get_topic_names_and_types():
-        namespace, _, name = topic.rpartition("/")
-        if namespace == here or observer.get_publishers_info_by_topic(
-            f"{namespace}/{JOINT_STATES.name}"
-        ):
-            continue
-        if name == JOINT_STATES.name:
-            for node in sorted(_named(observer.get_subscriptions_info_by_topic(topic))):
-                yield f"{node} reads {topic}, the plant publishes {joint_states}"
-        elif name == CONTROL_FORCE.name:
-            for node in sorted(_named(observer.get_publishers_info_by_topic(topic))):
-                yield f"{node} publishes {topic}, the plant reads {control_force}"
 
 
 def _named(

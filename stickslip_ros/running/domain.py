@@ -11,11 +11,10 @@ from threading import Lock
 import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.domain_ports import FIRST_PROCESS, is_free, port
-from stickslip_ros.nodes.base.process import check_machine, this_machine_only
+from stickslip_ros.nodes.base.process import initialise, this_machine_only
 
 DOMAINS = range(1, 102)
 """Domains all ports of which are below those that the system gives away."""
@@ -43,7 +42,9 @@ def own_domain() -> Generator[int]:
     """
     for domain in DOMAINS:
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as held:
-            if not _bind(held, "127.0.0.1", port(domain, _FREE_PORT)):
+            try:
+                held.bind(("127.0.0.1", port(domain, _FREE_PORT)))
+            except OSError:
                 continue
             if all(is_free(port(domain, number)) for number in _DISCOVERY_PORTS):
                 yield domain
@@ -66,17 +67,13 @@ def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
     _collect_before_forks()
     with _initialising:
         context = Context() if rclpy.ok() else rclpy.get_default_context()
-        with _environment(this_machine_only()):
-            check_machine(domain)
         with _environment({**_this_process_only_here(), **_NO_PEERS}):
-            _initialise(context, domain, arguments)
+            initialise([*arguments, *_NO_LOGS_ELSEWHERE], context=context, domain=domain)
     try:
         yield context
     finally:
-        if context is rclpy.get_default_context():
-            rclpy.try_shutdown()  # with no context named it can be initialised again
-        else:
-            rclpy.try_shutdown(context=context)
+        # With no context named, the default one can be initialised again.
+        rclpy.try_shutdown(context=None if context is rclpy.get_default_context() else context)
         # What rclpy's destroyed nodes still hold, threads, sockets and shared memory of the
         # middleware, goes with the last of them, and they refer to each other.
         gc.collect()
@@ -98,7 +95,7 @@ def _this_process_only_here() -> Mapping[str, str]:
     variables = this_machine_only()
     context = Context()
     with own_domain() as domain, _environment({**variables, _DISCOVERY_RANGE: "OFF"}):
-        _initialise(context, domain, ["--ros-args"])
+        initialise(["--ros-args", *_NO_LOGS_ELSEWHERE], context=context, domain=domain)
         node = Node("which_addresses", context=context)
         elsewhere_free = is_free(port(domain, FIRST_PROCESS), "127.0.0.2")
         node.destroy_node()
@@ -106,32 +103,13 @@ def _this_process_only_here() -> Mapping[str, str]:
     return variables if elsewhere_free else {_DISCOVERY_RANGE: "LOCALHOST"}
 
 
-def _initialise(context: Context, domain: int, arguments: Sequence[str]) -> None:
-    rclpy.init(
-        args=[*arguments, *_NO_LOGS_ELSEWHERE],
-        context=context,
-        domain_id=domain,
-        signal_handler_options=SignalHandlerOptions.NO,
-    )
-
-
 @contextmanager
 def _environment(variables: Mapping[str, str]) -> Generator[None]:
-    before = {name: os.environ.get(name) for name in variables}
+    before = {name: os.environ[name] for name in variables if name in os.environ}
     os.environ.update(variables)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
-def _bind(free: socket.socket, address: str, port: int) -> bool:
-    try:
-        free.bind((address, port))
-    except OSError:
-        return False
-    return True
+        for name in variables:
+            del os.environ[name]
+        os.environ.update(before)

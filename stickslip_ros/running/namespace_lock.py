@@ -1,4 +1,4 @@
-"""A namespace is claimed by one run at a time: two plants on one topic would spoil both."""
+"""One run in a namespace at a time: two plants on one topic would spoil both."""
 
 import socket
 import struct
@@ -11,11 +11,11 @@ from hashlib import sha256
 from stickslip_ros.errors import InvalidInputError
 
 _CREDENTIALS = struct.Struct("3i")
-_PATIENCE = 1.0
+_TIMEOUT = 1.0
 
 
 @contextmanager
-def claim(namespace: str, domain: int) -> Generator[None]:
+def lock_namespace(namespace: str, domain: int) -> Generator[None]:
     """Hold a namespace of a ROS domain on this machine; it is free when this process ends.
 
     Raises InvalidInputError if another process of any user holds it. Linux only; elsewhere, and
@@ -42,7 +42,7 @@ def claim(namespace: str, domain: int) -> Generator[None]:
 def _holder(address: str) -> str:
     """Return which process holds an address, in words, as far as that can be found out."""
     with socket.socket(socket.AF_UNIX) as asking, suppress(OSError):
-        asking.settimeout(_PATIENCE)
+        asking.settimeout(_TIMEOUT)
         asking.connect(address)
         credentials = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
         process, _, _ = _CREDENTIALS.unpack(credentials)

@@ -17,14 +17,14 @@ from rclpy.validate_namespace import validate_namespace
 
 from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.analyzer import VERDICT_TIME
 from stickslip_ros.nodes.base.managed import ERROR
-from stickslip_ros.running.composition import Composition
-from stickslip_ros.running.controller_search import find_controllers, find_managed, near_misses
+from stickslip_ros.nodes.base.service_call import parameters_call
+from stickslip_ros.running.composition import Composition, node_parameters
+from stickslip_ros.running.controller_search import ControllerSearch
 from stickslip_ros.running.domain import domain_variables, own_domain, ros_context
-from stickslip_ros.running.foreign_controller import ControllerNode, ControllerProcess
-from stickslip_ros.running.remote import bring_up, greet
+from stickslip_ros.running.lifecycle_client import LifecycleClient
+from stickslip_ros.running.user_controller import ControllerProcess, ControllerThread
 from stickslip_ros.scenarios.files import (
     DEFAULT_NAMESPACE,
     LONGEST_NAMESPACE,
@@ -46,6 +46,7 @@ _EXPECTS_CONTROL, _BAG = "plant.expects_control", "analyzer.bag"
 _NODE_TIMEOUT, _PROCESS_TIMEOUT = 5.0, 30.0
 """Wall time, s, in which a controller has to be found, in this process or in one of its own."""
 _DEACTIVATION_TIMEOUT = 30.0
+_ANSWER_TIMEOUT = 2.0
 
 
 class ClosedLoop:
@@ -100,7 +101,7 @@ class ClosedLoop:
         if self._bag is not None:
             check_new_bag(self._bag)
         self._opened = ExitStack()
-        self._running: ControllerNode | ControllerProcess | None = None
+        self._running: ControllerThread | ControllerProcess | None = None
         self._nodes: Composition | None = None
 
     @property
@@ -128,9 +129,11 @@ class ClosedLoop:
             )
             self.context = opened.enter_context(ros_context(self._domain, self.ros_arguments))
             opened.callback(self._forget)  # before ROS ends: then nothing of it is left
-            self._nodes = Composition(
-                self.context, self._parameters(), washout=self._to_control == "washout"
-            )
+            bag = self._bag or Path(self._directory, "bag")
+            parameters = node_parameters(self.scenario, bag)
+            if self._to_control != "washout":
+                parameters.pop("washout_controller", None)
+            self._nodes = Composition(self.context, parameters)
             opened.callback(self._nodes.close)
             self._start_controller(opened)
             self._opened = opened.pop_all()
@@ -144,7 +147,7 @@ class ClosedLoop:
     ) -> None:
         running = self._running
         with self._opened:
-            if isinstance(running, ControllerNode) and running.unreported and error is None:
+            if isinstance(running, ControllerThread) and running.unreported and error is None:
                 running.check()
 
     def run(self, duration: float, *, timeout: float = 300.0) -> RunResult:
@@ -243,15 +246,10 @@ class ClosedLoop:
             raise RunError("the loop is not open: use it within `with ClosedLoop(...) as loop:`")
         return self._nodes
 
-    def _parameters(self) -> dict[str, dict[str, Any]]:
-        parameters = self.scenario.as_dict()
-        parameters["analyzer"]["bag"] = str(self._bag or Path(self._directory, "bag"))
-        return parameters
-
     def _start_controller(self, opened: ExitStack) -> None:
         if callable(self._to_control):
             self.controller = self._made_node(self._to_control)
-            self._running = ControllerNode(self.controller)
+            self._running = ControllerThread(self.controller)
             opened.callback(self._running.close)
             self._running.start()
         elif self._to_control not in ("washout", "external", None):
@@ -294,37 +292,41 @@ class ClosedLoop:
 
     def _find_controller(self, nodes: Composition) -> list[str]:
         """Wait for a controller, get it ready, and return its full name; RunError if none comes."""
-        plant = nodes.plant
-        ours = {node.get_fully_qualified_name() for node in nodes.nodes.values()}
-        here = f"{self.namespace.rstrip('/')}/"
+        search = ControllerSearch(nodes.plant, self.namespace, nodes.nodes)
         elsewhere = self.controller is None
         timeout = _PROCESS_TIMEOUT if elsewhere else _NODE_TIMEOUT
 
         def managed() -> set[str]:
-            found = {name for name in find_managed(plant) if name.startswith(here)}
-            return found - ours - self._brought_up if elsewhere else set()
+            here = f"{self.namespace.rstrip('/')}/"
+            found = {name for name in search.managed() if name.startswith(here)}
+            return found - self._brought_up if elsewhere else set()
 
-        self._wait(nodes, lambda: bool(find_controllers(plant) or managed()), timeout)
+        self._wait(nodes, lambda: bool(search.controllers() or managed()), timeout)
         for name in managed():
-            bring_up(nodes, name, timeout, self._check_running)
+            client = LifecycleClient(nodes.spinner, nodes.plant, name, _ANSWER_TIMEOUT)
+            client.bring_up(timeout, self._check_running)
             self._brought_up.add(name)
-            self._wait(nodes, lambda: bool(find_controllers(plant)), timeout)
-        found = find_controllers(plant)
+            self._wait(nodes, lambda: bool(search.controllers()), timeout)
+        found = search.controllers()
         if not found:
-            topics = map(plant.resolve_topic_name, (JOINT_STATES.name, CONTROL_FORCE.name))
-            nobody = "nobody reads {} and publishes {}".format(*topics)
-            reasons = "; ".join([nobody, *near_misses(plant, ours)])
+            reasons = "; ".join([f"nobody {search.task}", *search.near_misses()])
             raise RunError(f"no controller was found within {timeout:g} s: {reasons}")
+        # The middleware tells a process of our topics in the order in which we have made them: once
+        # it has found what its answer is to go to, it has found plant and analyzer, too.
         for name in found if elsewhere else []:
-            greet(nodes, name)
+            call = parameters_call(nodes.plant, name, [], lambda _: None)
+            nodes.spinner.spin_until(call.pursue, 2.0 * _ANSWER_TIMEOUT)
+            call.close()
         return found
 
     def _wait(self, nodes: Composition, condition: Callable[[], bool], timeout: float) -> bool:
         """Run our nodes until the condition holds; RunError as soon as the controller ends."""
-        running = self._running
-        nodes.spin_until(lambda: condition() or (running is not None and running.ended), timeout)
-        self._check_running()
-        return condition()
+
+        def is_met() -> bool:
+            self._check_running()
+            return condition()
+
+        return nodes.spinner.spin_until(is_met, timeout)
 
     def _check_running(self) -> None:
         if self._running is not None:
@@ -332,7 +334,7 @@ class ClosedLoop:
 
     def _end_run(self, nodes: Composition) -> dict[str, Diagnostics]:
         """Let the analyzer take in what is under way and close its bag; return all diagnostics."""
-        if isinstance(self._running, ControllerNode):
+        if isinstance(self._running, ControllerThread):
             self._running.settle()
             self._running.check()
         level, complaint, _ = nodes.analyzer.diagnose()
@@ -344,9 +346,9 @@ class ClosedLoop:
             if node is not nodes.analyzer
         }
         if diagnostics["plant"].figures["dropped_messages"]:
-            nodes.spin_until(lambda: False, VERDICT_TIME)
+            nodes.spinner.spin_for(VERDICT_TIME)
         nodes.analyzer.call_soon(nodes.analyzer.trigger_deactivate)
-        nodes.spin_until(lambda: not nodes.analyzer.active, _DEACTIVATION_TIMEOUT)
+        nodes.spinner.spin_until(lambda: not nodes.analyzer.active, _DEACTIVATION_TIMEOUT)
         return diagnostics
 
 

@@ -38,7 +38,7 @@ from stickslip_ros.messages.topics import (
 )
 from stickslip_ros.nodes.base.managed import STATE
 from stickslip_ros.nodes.base.polling import Collecting, take_waiting
-from stickslip_ros.nodes.base.service_call import PATIENCE, Inquiry, ask_parameters
+from stickslip_ros.nodes.base.service_call import ANSWER_TIME, ServiceCall, parameters_call
 from stickslip_ros.running.controller_search import DASHBOARD
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, known_parameters
@@ -59,8 +59,8 @@ _TAKE_PERIOD = 0.02
 _TAP_PERIOD = 0.002
 _WATCH_PERIOD = 0.1
 _ANSWER_TIMEOUT = 10.0
-_TRANSITION_PATIENCE = 80
-"""Times, ten a second, that a transition is pursued before it is asked for again."""
+_TRANSITION_TIME = 8.0
+"""Time, s, that a transition may take before it is asked for again."""
 _CYCLES_KEPT = 200
 _EVENTS_KEPT = 200
 _MOST_NODES = 50
@@ -117,8 +117,8 @@ class ObserverNode(Collecting):
         self.events: deque[tuple[float, str]] = deque(maxlen=_EVENTS_KEPT)
         """When, in s since the epoch, and what happened to the nodes, the newest last."""
         self._steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
-        self._inquiries: list[tuple[Inquiry, float, Callable[[], None]]] = []
-        self._asked_parameters: dict[str, Inquiry] = {}
+        self._calls: list[tuple[ServiceCall, float, Callable[[], None]]] = []
+        self._asked_parameters: dict[str, ServiceCall] = {}
         self._parameter_writers = 0
         self._newest = 0
         self._tap_end = 0
@@ -163,7 +163,7 @@ class ObserverNode(Collecting):
             "change_state",
             ChangeState.Request(transition=Transition(id=_TRANSITIONS[active])),
             lambda response: "" if response.success else f"{node} could not be {done}",
-            _TRANSITION_PATIENCE,
+            _TRANSITION_TIME,
         )
 
     def reset(self) -> Answer:
@@ -205,10 +205,10 @@ class ObserverNode(Collecting):
         if self._tap_timer is not None:
             self._end_tap()
             self._disturbance.wait_for_all_acked(Duration(seconds=1.0))
-        for inquiry, _, give_up in self._inquiries:
-            inquiry.close()
+        for call, _, give_up in self._calls:
+            call.close()
             give_up()
-        self._inquiries.clear()
+        self._calls.clear()
 
     def _listen_loosely(self, topic: Topic) -> Any:
         """Let messages wait, without acknowledging any: the writer has no work with that."""
@@ -239,23 +239,17 @@ class ObserverNode(Collecting):
         service: str,
         request: Any,
         outcome: Callable[[Any], str],
-        patience: int = PATIENCE,
+        answer_time: float = ANSWER_TIME,
     ) -> Answer:
         """Call a service of a node; `outcome` says of its response what came of it."""
         answer = Answer()
 
         def ask() -> None:
-            inquiry = Inquiry(
-                self,
-                kind,
-                f"{node}/{service}",
-                request,
-                lambda response: _settle(answer, outcome(response)),
-                patience,
-            )
-            inquiry.pursue()
+            call = ServiceCall(self, kind, f"{node}/{service}", answer_time=answer_time)
+            call.start(request, lambda response: _settle(answer, outcome(response)))
+            call.pursue()
             give_up = partial(_settle, answer, f"{node} does not answer")
-            self._inquiries.append((inquiry, time.monotonic() + _ANSWER_TIMEOUT, give_up))
+            self._calls.append((call, time.monotonic() + _ANSWER_TIMEOUT, give_up))
 
         self._call_soon(ask)
         return answer
@@ -282,15 +276,14 @@ class ObserverNode(Collecting):
     def _watch(self) -> None:
         """Pursue what was asked; notice who has fallen silent."""
         now = time.monotonic()
-        for entry in list(self._inquiries):
-            inquiry, deadline, give_up = entry
-            inquiry.pursue()
-            if inquiry.answered or now > deadline:
+        for entry in list(self._calls):
+            call, deadline, give_up = entry
+            if call.pursue() or now > deadline:
                 give_up()
-                inquiry.close()
-                self._inquiries.remove(entry)
-        for inquiry in self._asked_parameters.values():
-            inquiry.pursue()
+                call.close()
+                self._calls.remove(entry)
+        for call in self._asked_parameters.values():
+            call.pursue()
         matched = self._parameter_events.get_publisher_count()
         if matched != self._parameter_writers:
             self._parameter_writers = matched
@@ -334,7 +327,7 @@ class ObserverNode(Collecting):
         names = list(known_parameters(NODE_PARAMETERS[node]))
         if node in self._asked_parameters:
             self._asked_parameters[node].close()
-        self._asked_parameters[node] = ask_parameters(self, node, names, partial(self._know, node))
+        self._asked_parameters[node] = parameters_call(self, node, names, partial(self._know, node))
 
     def _know(self, node: str, values: Mapping[str, Any]) -> None:
         self.parameters = {**self.parameters, node: {**self.parameters[node], **values}}
@@ -348,7 +341,7 @@ class ObserverNode(Collecting):
             values = {p.name: parameter_value_to_python(p.value) for p in changed}
             self._know(node, {name: value for name, value in values.items() if name in known})
             asked = self._asked_parameters.get(node)
-            if asked is not None and not asked.answered:  # its answer may be from before
+            if asked is not None and asked.answer is None:  # its answer may be from before
                 self._ask_parameters(node)
 
     def _on_cycle(self, topic: Topic, message: Float64) -> None:

@@ -13,14 +13,14 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
-GUARD_PATIENCE = 3.0
+GUARD_TIMEOUT = 3.0
 """Time, s, that a guarded command has to end after SIGINT, and again after SIGTERM."""
 
 _PARENT_VARIABLE = "STICKSLIP_ROS_PARENT"
 _PR_SET_PDEATHSIG = 1
 
 
-def start(command: Sequence[str], *, guarded: bool = False) -> subprocess.Popen[bytes]:
+def start_child(command: Sequence[str], *, guarded: bool = False) -> subprocess.Popen[bytes]:
     """Start a command that ends with this process; its output goes to standard error.
 
     Either the command calls `die_with_parent`, or it is guarded: then SIGTERM to the process
@@ -36,8 +36,13 @@ def start(command: Sequence[str], *, guarded: bool = False) -> subprocess.Popen[
     )
 
 
+def how_it_ended(status: int) -> str:
+    """Return in words how a process ended, from its return code."""
+    return f"killed by signal {-status}" if status < 0 else f"exit status {status}"
+
+
 def die_with_parent() -> None:
-    """Be sent SIGTERM when the process that has started this one by `start` is no more.
+    """Let SIGTERM be sent to this process when the one that started it by `start_child` ends.
 
     Linux only; elsewhere it does nothing.
     """
@@ -80,7 +85,7 @@ def _end(child: subprocess.Popen[bytes]) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         os.killpg(child.pid, number)
         with suppress(subprocess.TimeoutExpired):
-            child.wait(GUARD_PATIENCE)
+            child.wait(GUARD_TIMEOUT)
             return
     print(f"{sys.argv[1]} ends neither on SIGINT nor on SIGTERM: killed", file=sys.stderr)
     os.killpg(child.pid, signal.SIGKILL)

@@ -7,12 +7,13 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import rclpy
+from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
@@ -59,15 +60,26 @@ _ECHO_TIMEOUT = 1.0
 _SPIN_TIMEOUT = 0.2
 
 
-def initialise() -> None:
-    """Initialise ROS for a command, which handles the signals itself.
+def initialise(
+    arguments: Sequence[str] = ROS_ARGUMENTS,
+    *,
+    context: Context | None = None,
+    domain: int | None = None,
+) -> None:
+    """Initialise ROS for whoever handles the signals itself.
 
-    Raises InvalidInputError for what the environment says amiss.
+    In the default context and the domain that the environment says, unless others are given.
+    Raises InvalidInputError where nodes could not live, and for arguments that ROS refuses.
     """
-    check_machine(_domain_of_environment())
+    _check_machine(_domain_of_environment() if domain is None else domain)
     try:
-        rclpy.init(args=ROS_ARGUMENTS, signal_handler_options=SignalHandlerOptions.NO)
-    except Exception as error:
+        rclpy.init(
+            args=list(arguments),
+            context=context,
+            domain_id=domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+    except Exception as error:  # its first line names what rcl could not parse
         raise InvalidInputError(first_line(error)) from None
 
 
@@ -91,9 +103,8 @@ def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) 
     prefer_prompt_middleware()
     try:
         parser.parse_args(remove_ros_args(sys.argv)[1:])
-        check_machine(_domain_of_environment())
-        rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-    except Exception as error:  # what rcl could not parse; its first line names it
+        initialise(sys.argv)
+    except Exception as error:
         print(f"{parser.prog}: {first_line(error)}", file=sys.stderr)
         return 2
     try:
@@ -159,13 +170,11 @@ def this_machine_only() -> dict[str, str]:
     }
 
 
-def check_machine(domain: int) -> None:
-    """Raise InvalidInputError where nodes could not live: for the domain, the clock, the network.
+def _check_machine(domain: int) -> None:
+    """Raise InvalidInputError where nodes could not live: for the clock, the network, the domain.
 
     What the middleware itself says of these is no sentence, or nothing.
     """
-    if domain > _LARGEST_DOMAIN:
-        raise _domain_refused(domain)
     now = time.time_ns()
     if not 0 < now < END_OF_TIME:
         year = datetime.fromtimestamp(now / NANOSECONDS, UTC).year
@@ -219,14 +228,11 @@ def _domain_of_environment() -> int:
     rcl would take -1 for 0, 1.5 for 1 and 010 for 8. Raises InvalidInputError.
     """
     text = os.environ.get(_DOMAIN, "").strip() or "0"
-    if not _DECIMAL.fullmatch(text):
-        raise _domain_refused(repr(text))
-    return int(text)
-
-
-def _domain_refused(domain: object) -> InvalidInputError:
-    return InvalidInputError(
-        f"{_DOMAIN} = {domain!s:.40} is refused: must be an integer from 0 to {_LARGEST_DOMAIN}, "
+    if _DECIMAL.fullmatch(text) and int(text) <= _LARGEST_DOMAIN:
+        return int(text)
+    shown = text if _DECIMAL.fullmatch(text) else repr(text)
+    raise InvalidInputError(
+        f"{_DOMAIN} = {shown:.40} is refused: must be an integer from 0 to {_LARGEST_DOMAIN}, "
         "the last domain that has ports"
     )
 

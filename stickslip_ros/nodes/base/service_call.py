@@ -1,5 +1,6 @@
-"""Asking another node, where the middleware may not do its part at once."""
+"""Calling a service of another node, where the middleware may not do its part at once."""
 
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -9,80 +10,86 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 
-PATIENCE = 10
-"""Times that an inquiry is pursued before another client asks; doubled with each."""
+ANSWER_TIME = 1.0
+"""Time, s, that a client has to match a service that is there, and then to get its answer."""
 
 
-class Inquiry:
+class ServiceCall:
     """Calls a service as soon as it is there, until it has answered.
 
-    A client may never match a service that is there, and an answer may be lost: then another asks.
-    So it may be asked more than once.
+    A client may never match a service that is there, and an answer may be lost: then another client
+    asks, and has twice the time. So the service may be asked more than once.
     """
 
     def __init__(
-        self,
-        inquirer: Node,
-        kind: Any,
-        service: str,
-        request: Any,
-        on_answer: Callable[[Any], None],
-        patience: int = PATIENCE,
+        self, node: Node, kind: Any, service: str, *, answer_time: float = ANSWER_TIME
     ) -> None:
-        """Call, for `inquirer`, a service of some kind, and pass on its answer.
-
-        `patience` is how often the inquiry is pursued before it is asked a second time.
-        """
-        self._inquirer = inquirer
+        """Prepare to call a service for a node; it has `answer_time` (s) for its first answer."""
+        self._node = node
         self._kind = kind
         self._service = service
+        self._answer_time = answer_time
+        self._client = self._new_client()
+        self._pending: Future | None = None
+
+    def start(self, request: Any, on_answer: Callable[[Any], None] = lambda _: None) -> None:
+        """Ask this from now on, in place of what was asked before."""
         self._request = request
         self._on_answer = on_answer
-        self.answered = False
-        """Whether the answer has come."""
-        self._closed = False
-        self._pursued = 0
-        self._patience = patience
-        self._client = self._new_client()
-        self._answer: Future | None = None
+        self.answer: Any = None
+        """The answer, once it has come."""
+        self._pending = None
+        self._attempt_ends: float | None = None
+        self._factor = 1.0
 
-    def pursue(self) -> None:
-        """Do what is due; to be called about ten times a second."""
-        if self.answered or not self._inquirer.count_services(self._service):
-            return
-        self._pursued += 1
-        if self._pursued > self._patience:
-            self._pursued, self._patience = 0, 2 * self._patience
-            self._inquirer.destroy_client(self._client)
-            self._client, self._answer = self._new_client(), None
-        if self._answer is None and self._client.service_is_ready():
-            self._answer = self._client.call_async(self._request)
-            self._answer.add_done_callback(self._take)
+    @property
+    def sent(self) -> bool:
+        """Whether the service was asked."""
+        return self._pending is not None
+
+    def pursue(self) -> bool:
+        """Do what is due, to be called again and again; return whether the answer has come."""
+        if self.answer is not None:
+            return True
+        if not self._node.count_services(self._service):
+            return False
+        now = time.monotonic()
+        if self._attempt_ends is not None and now > self._attempt_ends:
+            self._node.destroy_client(self._client)
+            self._client, self._pending = self._new_client(), None
+            self._attempt_ends, self._factor = None, 2.0 * self._factor
+        if self._attempt_ends is None:
+            self._attempt_ends = now + ANSWER_TIME * self._factor
+        if self._pending is None and self._client.service_is_ready():
+            self._attempt_ends = now + self._answer_time * self._factor
+            self._pending = self._client.call_async(self._request)
+            self._pending.add_done_callback(self._take)
+        return False
 
     def close(self) -> None:
-        """Ask no more; an answer that comes still is nobody's."""
-        self._closed = True
-        self._inquirer.destroy_client(self._client)
+        """Ask no more; an answer that still comes is ignored."""
+        self._pending = None
+        self._node.destroy_client(self._client)
 
     def _new_client(self) -> Client:
-        return self._inquirer.create_client(self._kind, self._service)
+        return self._node.create_client(self._kind, self._service)
 
-    def _take(self, answer: Future) -> None:
-        response = answer.result()
-        if response is None or self.answered or self._closed:
-            return
-        self.answered = True
-        self._on_answer(response)
+    def _take(self, pending: Future) -> None:
+        response = pending.result()
+        if response is not None and pending is self._pending:
+            self.answer = response
+            self._on_answer(response)
 
 
-def ask_parameters(
-    inquirer: Node, asked: str, names: Sequence[str], on_answer: Callable[[dict[str, Any]], None]
-) -> Inquiry:
-    """Return an inquiry to the node `asked` for its parameters of these names."""
+def parameters_call(
+    node: Node, other: str, names: Sequence[str], on_answer: Callable[[dict[str, Any]], None]
+) -> ServiceCall:
+    """Return a call that asks the node `other` for its parameters of these names."""
 
     def take(response: Any) -> None:
         values = [parameter_value_to_python(value) for value in response.values]
         on_answer(dict(zip(names, values, strict=False)))
 
-    request = GetParameters.Request(names=names)
-    return Inquiry(inquirer, GetParameters, f"{asked}/get_parameters", request, take)
+    call = ServiceCall(node, GetParameters, f"{other}/get_parameters")
+    call.start(GetParameters.Request(names=names), take)
+    return call

@@ -6,7 +6,7 @@ import pytest
 from rclpy.client import Client
 from rclpy.node import Node
 
-from stickslip_ros.nodes.base.service_call import ask_parameters
+from stickslip_ros.nodes.base.service_call import parameters_call
 from stickslip_ros.nodes.plant import PlantNode
 from tests.nodes.graph import Graph
 
@@ -40,16 +40,16 @@ def test_another_client_asks_where_one_does_not_match(
 ) -> None:
     graph.add(PlantNode, autostart=False, mass=3.0, rate=10.0)
     answers: list[dict[str, Any]] = []
-    inquiry = ask_parameters(unlucky, "plant", names, answers.append)
-    graph.wait_until(lambda: inquiry.pursue() or answers, "the plant answers")
+    call = parameters_call(unlucky, "plant", names, answers.append)
+    graph.wait_until(lambda: call.pursue() or answers, "the plant answers")
     assert answers == [known]
     assert unlucky.clients_made > 1
-    inquiry.close()
+    call.close()
 
 
 def test_for_a_node_that_is_not_there_one_client_is_enough(graph: Graph, unlucky: _Unlucky) -> None:
-    inquiry = ask_parameters(unlucky, "plant", ["mass"], lambda _: None)
+    call = parameters_call(unlucky, "plant", ["mass"], lambda _: None)
     rounds = iter(range(30))
-    graph.wait_until(lambda: inquiry.pursue() or next(rounds, None) is None, "many rounds")
+    graph.wait_until(lambda: call.pursue() or next(rounds, None) is None, "many rounds")
     assert unlucky.clients_made == 1
-    inquiry.close()
+    call.close()

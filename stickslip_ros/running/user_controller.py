@@ -1,4 +1,4 @@
-"""Controllers of others, kept running: a node in a thread, or a process."""
+"""Controllers of a user's, kept running: a node in a thread, or a command in a process."""
 
 import shlex
 import shutil
@@ -10,14 +10,14 @@ from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.node import Node
 
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.nodes.base import child_process
+from stickslip_ros.nodes.base.child_process import how_it_ended, start_child
 
 _END_TIMEOUT = 5.0
 _CALLBACK_TIMEOUT = 1.0
 
 
-class ControllerNode:
-    """A node that runs on an executor of its own in a thread of its own.
+class ControllerThread:
+    """A node on an executor of its own in a thread of its own.
 
     On an executor of the usual kind, that is, which runs every kind of callback. A managed
     (lifecycle) node that is not active is configured and activated.
@@ -40,11 +40,6 @@ class ControllerNode:
             _bring_up(self.node)
         self._thread.start()
 
-    @property
-    def ended(self) -> bool:
-        """Whether the node runs no more."""
-        return self._failure is not None
-
     def check(self) -> None:
         """Raise RunError if the node runs no more."""
         if self._failure is not None:
@@ -57,7 +52,7 @@ class ControllerNode:
     def settle(self) -> None:
         """Wait, within bounds, until the callback under way is over."""
         self._idle.clear()
-        if not self.ended:
+        if self._failure is None:
             self._executor.create_task(self._idle.set)
             self._idle.wait(_CALLBACK_TIMEOUT)
 
@@ -99,19 +94,13 @@ class ControllerProcess:
         if shutil.which(command[0]) is None:
             raise InvalidInputError(f"the controller {self._name}: no command {command[0]!r}")
         setting = [f"{name}={value}" for name, value in variables.items()]
-        self._process = child_process.start(["env", *setting, *command], guarded=True)
-
-    @property
-    def ended(self) -> bool:
-        """Whether the process is no more."""
-        return self._process.poll() is not None
+        self._process = start_child(["env", *setting, *command], guarded=True)
 
     def check(self) -> None:
         """Raise RunError if the process is no more."""
         status = self._process.poll()
         if status is not None:
-            how = f"killed by signal {-status}" if status < 0 else f"exit status {status}"
-            raise RunError(f"the controller {self._name} has ended ({how})")
+            raise RunError(f"the controller {self._name} has ended ({how_it_ended(status)})")
 
     def close(self) -> None:
         """End the process, and what it has started."""

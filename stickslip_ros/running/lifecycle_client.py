@@ -1,0 +1,74 @@
+"""Managed (lifecycle) nodes, in whatever process they run: their states and transitions."""
+
+from collections.abc import Callable
+from math import inf
+from time import monotonic
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.node import Node
+
+from stickslip_ros.errors import RunError
+from stickslip_ros.nodes.base.service_call import ServiceCall
+from stickslip_ros.running.spinner import Spinner
+
+ACTIVE = "active"
+
+NEXT_TRANSITION = {
+    "unconfigured": Transition.TRANSITION_CONFIGURE,
+    "inactive": Transition.TRANSITION_ACTIVATE,
+}
+"""The way from a state to the active one."""
+
+_PARTICIPLE = {"unconfigured": "configured", "inactive": "activated"}
+
+_AUTOSTART_TIMEOUT = 1.0
+"""Wall time, s, in which a managed node may go on to its next state by itself."""
+
+
+class LifecycleClient:
+    """Asks a managed node for its state, and for transitions."""
+
+    def __init__(self, spinner: Spinner, node: Node, name: str, answer_timeout: float) -> None:
+        """Prepare to ask the managed node of that name, by `node`, which the spinner runs.
+
+        `answer_timeout` is how much wall time (s) it has for each answer.
+        """
+        self.name = name
+        self._spinner = spinner
+        self._timeout = answer_timeout
+        # No second request: a transition that is under way would make it an impossible one.
+        self._get_state = ServiceCall(node, GetState, f"{name}/get_state", answer_time=inf)
+        self._change_state = ServiceCall(node, ChangeState, f"{name}/change_state", answer_time=inf)
+
+    def state(self) -> str:
+        """Return the name of the node's state, nothing if it does not answer."""
+        answer = self._spinner.ask(self._get_state, GetState.Request(), self._timeout)
+        return answer.current_state.label if answer is not None else ""
+
+    def change_state(self, transition: int) -> bool:
+        """Ask for a transition; return whether the node has made it."""
+        request = ChangeState.Request(transition=Transition(id=transition))
+        answer = self._spinner.ask(self._change_state, request, self._timeout)
+        return answer is not None and answer.success
+
+    def bring_up(self, timeout: float, check: Callable[[], None]) -> None:
+        """Configure and activate the node unless it does so by itself.
+
+        Raises RunError if it refuses or is not active within so much wall time (s), and what
+        `check` raises, which is called again and again meanwhile.
+        """
+        deadline = monotonic() + timeout
+        asked: list[str] = []
+        while (state := self.state()) != ACTIVE:
+            check()
+            if state in asked or state == "finalized":
+                done = _PARTICIPLE[asked[-1]] if asked else "brought up"
+                raise RunError(f"the controller {self.name} could not be {done}; its log says why")
+            if monotonic() >= deadline:
+                raise RunError(f"the controller {self.name} was not active within {timeout:g} s")
+            if state in NEXT_TRANSITION and not self._spinner.spin_until(
+                lambda before=state: self.state() != before, _AUTOSTART_TIMEOUT
+            ):
+                asked.append(state)
+                self.change_state(NEXT_TRANSITION[state])

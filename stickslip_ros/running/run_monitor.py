@@ -1,0 +1,85 @@
+"""What the nodes of a run tell of it while it goes on."""
+
+from collections.abc import Callable
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+from std_msgs.msg import Header
+
+from stickslip_ros.messages.topics import DIAGNOSTICS, RECORDED
+from stickslip_ros.nodes.base.managed import STATE
+from stickslip_ros.nodes.plant import FAILURE, FINISHED, NEWEST_STAMP
+from stickslip_ros.running.lifecycle_client import ACTIVE, NEXT_TRANSITION
+from stickslip_ros.stamps import NANOSECONDS
+
+OnSimulatedTime = Callable[[float], None]
+"""Called now and then with the time that has been simulated so far, s."""
+
+Notify = Callable[[str], None]
+"""Called with what a person should know meanwhile, in a sentence."""
+
+
+class RunMonitor:
+    """Listens to the plant's diagnostics, and to how far the recording has come."""
+
+    def __init__(
+        self,
+        node: Node,
+        *,
+        fail: Callable[[str], None],
+        notify: Notify,
+        on_simulated_time: OnSimulatedTime,
+    ) -> None:
+        """Listen by a node in the run's namespace; `fail` is called when the plant gives up."""
+        self.plant: dict[str, str] = {}
+        """The plant's last figures, as in its diagnostics."""
+        self.finished = False
+        """Whether the plant has come to its end, or was ended by somebody."""
+        self.plant_stopped = False
+        """Whether the plant has told its last figures, being active no more."""
+        self.newest_recorded = 0
+        """Stamp of the newest sample that the analyzer has taken in, ns."""
+        self.ending = False
+        """Whether the run is being ended: then a plant that stops was not paused."""
+        self._fail, self._notify, self._on_simulated_time = fail, notify, on_simulated_time
+        self._plant_name = f"{node.get_namespace().rstrip('/')}/plant"
+        self._paused = False
+        self._first_recorded: int | None = None
+        node.create_subscription(
+            DIAGNOSTICS.type, DIAGNOSTICS.name, self._on_diagnostics, DIAGNOSTICS.qos()
+        )
+        node.create_subscription(RECORDED.type, RECORDED.name, self._on_recorded, RECORDED.qos())
+
+    @property
+    def unrecorded(self) -> float:
+        """Time from the newest sample that the analyzer has taken in to the plant's last, s."""
+        return (int(self.plant.get(NEWEST_STAMP, 0)) - self.newest_recorded) * 1e-9
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == self._plant_name:
+                self.plant = {entry.key: entry.value for entry in status.values}
+                self._follow_plant(self.plant.get(STATE))
+
+    def _follow_plant(self, state: str | None) -> None:
+        if FAILURE in self.plant:
+            self._fail(f"the plant could not go on: {self.plant[FAILURE]}")
+        if state == ACTIVE:
+            if self._paused:
+                self._notify("the plant goes on")
+            self._paused = self.plant_stopped = False
+        elif NEWEST_STAMP in self.plant:
+            self.plant_stopped = True
+            if self.plant.get(FINISHED) == str(True) or state == "finalized":
+                self.finished = True
+            elif state in NEXT_TRANSITION and not (self._paused or self.ending):
+                self._paused = True
+                self._notify(
+                    "the plant is paused: activate it to go on, or end the run with Ctrl-C"
+                )
+
+    def _on_recorded(self, message: Header) -> None:
+        self.newest_recorded = message.stamp.sec * NANOSECONDS + message.stamp.nanosec
+        if self._first_recorded is None:
+            self._first_recorded = self.newest_recorded
+        self._on_simulated_time((self.newest_recorded - self._first_recorded) * 1e-9)
