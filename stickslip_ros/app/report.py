@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
             start=arguments.start,
             end=arguments.end,
             namespace=arguments.namespace,
-            spectator=history,
+            observer=history,
         )
         for bag in arguments.bags
     }

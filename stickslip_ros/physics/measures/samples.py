@@ -1,7 +1,8 @@
 """Measures from samples: stamps give time and losses, samples breakpoints, and these cycles."""
 
+from dataclasses import replace
 from itertools import islice
-from math import isfinite
+from math import inf, isfinite
 from statistics import median
 from typing import Any, NamedTuple, Self
 
@@ -10,9 +11,10 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.physics.measures.breakpoints import breakpoints_from_samples
 from stickslip_ros.physics.measures.cycles import UNBOUNDED_BELT_SPEEDS, Cycle, CycleMeter, Measures
+from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver
 from stickslip_ros.stamps import NANOSECONDS
 
-_LONGEST_GAP = 10
+LONGEST_GAP = 10
 """Periods over which a motion may still be interpolated."""
 
 _FEW_STEPS = 10
@@ -92,7 +94,7 @@ class _JitteredSteps:
     def follow(self, steps: IntArray) -> int:
         """Follow some of the steps (ns) up to the next gap; return how many, none at a gap."""
         steps = steps[: self._next_estimate - self._count]
-        steps = steps[: _first((steps <= 0) | (steps > _LONGEST_GAP * self._period))]
+        steps = steps[: _first((steps <= 0) | (steps > LONGEST_GAP * self._period))]
         periods = np.rint(steps / self._period)
         single = steps[periods == 1.0]
         self._count += len(steps)
@@ -174,7 +176,7 @@ class _Grid:
             return np.ones(len(steps), dtype=bool)
         periods = np.rint(steps / self._step)
         off_grid = np.abs(steps - periods * self._step) > periods + 1.0
-        return off_grid | (periods < 1.0) | (periods > _LONGEST_GAP)
+        return off_grid | (periods < 1.0) | (periods > LONGEST_GAP)
 
     def _reconsider(self, step: int) -> bool:
         """Take the first few steps for several periods each if a shorter one fits into them."""
@@ -232,10 +234,13 @@ class SampleMeter:
     up to ten periods, and beyond that a new segment starts.
     """
 
-    def __init__(self, window: int) -> None:
-        """Average over the last `window` cycles at most."""
+    def __init__(self, window: int, observer: MotionObserver | None = None) -> None:
+        """Average over the last `window` cycles at most; an `observer` sees what is measured."""
+        self.origin = 0
+        """Stamp, ns, from which the observer's times count."""
         self.samples = 0
         """Samples seen."""
+        self._observer = observer
         self.steps_back = 0
         """Samples whose stamp was not later than the one before."""
         self._grid = _Grid()
@@ -304,7 +309,20 @@ class SampleMeter:
             )
         if self._last is not None:
             breakpoints = breakpoints[1:]  # the sample carried over was fed with its own block
-        return self._meter.feed(breakpoints, float(belt_velocity[-1]))
+        cycles = self._meter.feed(breakpoints, float(belt_velocity[-1]))
+        if self._observer is not None:
+            observed = (stamp - self.origin) / NANOSECONDS
+            known = LONGEST_GAP * float(np.median(np.diff(observed))) if len(observed) > 1 else inf
+            self._observer.take_motion(
+                MeasuredMotion(
+                    replace(breakpoints, time=np.interp(breakpoints.time, time, observed)),
+                    belt_velocity[np.searchsorted(time, breakpoints.time)],
+                    cycles,
+                    np.interp(self._meter.ends, time, observed).tolist(),
+                    known,
+                )
+            )
+        return cycles
 
     def _look_for_run_away(self, rows: _Rows) -> None:
         belt_speed = np.abs(rows.belt_velocity)
@@ -444,13 +462,15 @@ class ForceSettler:
 class RunMeter:
     """Measures a run from what is recorded of it: the samples and the control force."""
 
-    def __init__(self, window: int, *, dropped_known: bool = False) -> None:
-        """Average over the last `window` cycles at most.
+    def __init__(
+        self, window: int, *, dropped_known: bool = False, observer: MotionObserver | None = None
+    ) -> None:
+        """Average over the last `window` cycles at most; an `observer` sees the motion.
 
         `dropped_known` says whether it is told which forces were dropped; only then it is known
         which acted.
         """
-        self.motion = SampleMeter(window)
+        self.motion = SampleMeter(window, observer)
         self.force = ForceMeter()
         """The force as it was sent."""
         self.applied = ForceMeter()
