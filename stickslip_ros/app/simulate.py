@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     if plot is not None:
         check_picture(plot)
     history = None if plot is None else RunHistory()
-    units = Units.of(scenario.plant.as_drive())
+    units = Units.for_drive(scenario.plant.as_drive())
     shown = f"{duration:g} {units.of_unit('s')}".rstrip()
     with progress_bar(f"simulating {shown}", 1.0) as progress:
         measures = simulate(

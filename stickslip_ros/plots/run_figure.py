@@ -65,7 +65,7 @@ class _Pane(NamedTuple):
     end: float
 
     @classmethod
-    def of(cls, title: str, rows: DrawnMotion, *other: FloatArray) -> Self:
+    def covering(cls, title: str, rows: DrawnMotion, *other: FloatArray) -> Self:
         """Return one as long as the rows and other times last."""
         times = [time for time in (rows.time, *other) if len(time)]
         if not times:
@@ -132,10 +132,10 @@ class _Picture:
     """What the panels have in common, and each of them."""
 
     def __init__(self, history: RunHistory, drive: Drive | None, last: DrawnMotion) -> None:
-        self.units = units = Units.of(drive)
+        self.units = units = Units.for_drive(drive)
         self._history, self._drive, self._last = history, drive, last
         motion = history.motion
-        self._run = _Pane.of("the whole run", motion, *self._force_times)
+        self._run = _Pane.covering("the whole run", motion, *self._force_times)
         self._length = units.axis("displacement", "m", motion.position)
         self._speed = units.axis("velocity", "m/s", motion.velocity, motion.belt_velocity)
         self.holds = False
@@ -151,7 +151,7 @@ class _Picture:
         """Draw displacement, velocity and force, the whole run to the left and its end enlarged."""
         history = self._history
         others = [] if len(self._last.time) else self._force_times
-        end = _Pane.of("its end, enlarged", self._last, *others)
+        end = _Pane.covering("its end, enlarged", self._last, *others)
         traces = history.friction, history.control, history.dropped
         whole = [trace.columns() for trace in traces]
         ending = [trace.since(end.start) for trace in traces]
