@@ -7,7 +7,7 @@ from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.physics.measures.observer import RunObserver
-from stickslip_ros.physics.measures.samples import RunMeter, SettledForces
+from stickslip_ros.physics.measures.samples import RunMeter
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -113,8 +113,7 @@ class _RunReader:
     def finish(self) -> None:
         """Measure what was kept back: the last forces, or all where there is no joint state."""
         self._begin_without_states()
-        if self.first is not None:
-            self._show(self.meter.finish(), self.first)
+        self.meter.finish()
 
     def _begin_without_states(self) -> None:
         stamps = [forces.stamp[0] for forces, _ in self._early if len(forces.stamp) > 0]
@@ -131,13 +130,7 @@ class _RunReader:
     def _feed_forces(self, forces: ForceColumns, dropped: ForceColumns, first: int) -> None:
         forces, dropped = (each[self._part(each.stamp, first)] for each in (forces, dropped))
         self.measured += len(forces)
-        settled = self.meter.feed_forces(forces.stamp, forces.force, dropped.stamp, dropped.force)
-        self._show(settled, first)
-
-    def _show(self, forces: SettledForces, first: int) -> None:
-        if self._observer is not None:
-            time = (forces.stamp - first) / NANOSECONDS
-            self._observer.take_control(time, forces.force, forces.acted)
+        self.meter.feed_forces(forces.stamp, forces.force, dropped.stamp, dropped.force)
 
     def _part(self, stamp: IntArray, first: int) -> BoolArray:
         since = stamp - first

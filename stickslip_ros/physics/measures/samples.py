@@ -11,7 +11,7 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.physics.measures.breakpoints import breakpoints_from_samples
 from stickslip_ros.physics.measures.cycles import UNBOUNDED_BELT_SPEEDS, Cycle, CycleMeter, Measures
-from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver
+from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver, RunObserver
 from stickslip_ros.stamps import NANOSECONDS
 
 LONGEST_GAP = 10
@@ -463,9 +463,9 @@ class RunMeter:
     """Measures a run from what is recorded of it: the samples and the control force."""
 
     def __init__(
-        self, window: int, *, dropped_known: bool = False, observer: MotionObserver | None = None
+        self, window: int, *, dropped_known: bool = False, observer: RunObserver | None = None
     ) -> None:
-        """Average over the last `window` cycles at most; an `observer` sees the motion.
+        """Average over the last `window` cycles at most; an `observer` sees motion and forces.
 
         `dropped_known` says whether it is told which forces were dropped; only then it is known
         which acted.
@@ -479,6 +479,7 @@ class RunMeter:
         self.dropped = 0
         """Forces that were told to be dropped."""
         self._settler = ForceSettler()
+        self._observer = observer
 
     def feed_forces(
         self,
@@ -501,6 +502,9 @@ class RunMeter:
 
     def _apply(self, settled: SettledForces) -> SettledForces:
         self.applied.feed(settled.stamp, np.where(settled.acted, settled.force, 0.0))
+        if self._observer is not None:
+            time = (settled.stamp - self.motion.origin) / NANOSECONDS
+            self._observer.take_control(time, settled.force, settled.acted)
         return settled
 
     def report(self) -> dict[str, Any]:
