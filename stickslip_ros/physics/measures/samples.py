@@ -312,11 +312,13 @@ class SampleMeter:
         cycles = self._meter.feed(breakpoints, float(belt_velocity[-1]))
         if self._observer is not None:
             observed = (stamp - self.origin) / NANOSECONDS
+            # A breakpoint's time may be rounded beyond that of the last sample.
+            ends = np.minimum(np.searchsorted(time, breakpoints.time), len(time) - 1)
             known = LONGEST_GAP * float(np.median(np.diff(observed))) if len(observed) > 1 else inf
             self._observer.take_motion(
                 MeasuredMotion(
                     replace(breakpoints, time=np.interp(breakpoints.time, time, observed)),
-                    belt_velocity[np.searchsorted(time, breakpoints.time)],
+                    belt_velocity[ends],
                     cycles,
                     np.interp(self._meter.ends, time, observed).tolist(),
                     known,
