@@ -34,10 +34,9 @@ def simulate(
         record=True,
     )
     meter = CycleMeter(scenario.analyzer.window)
-    tracer = None if observer is None else MotionTracer(motion, observer)
-    advance = None if tracer is None else tracer.advance
     if continuous:
-        return simulate_continuous(motion, washout, duration, meter, progress, tracer, advance)
-    loop = sampled_loop(plant, motion, advance)
+        return simulate_continuous(motion, washout, duration, meter, progress, observer)
+    tracer = None if observer is None else MotionTracer(motion, observer)
+    loop = sampled_loop(plant, motion, None if tracer is None else tracer.advance)
     law = None if washout is None else Washout(washout)
     return simulate_sampled(loop, motion, law, duration, meter, progress, tracer)

@@ -5,9 +5,10 @@ from collections.abc import Callable
 import numpy as np
 
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+from stickslip_ros.physics.loop.tracer import MotionTracer
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycles import CycleMeter, Measures
-from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver
+from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver, RunObserver
 from stickslip_ros.physics.motion.motion import Motion
 
 BLOCK_SAMPLES = 1000
@@ -62,16 +63,15 @@ def simulate_continuous(
     duration: float,
     meter: CycleMeter,
     progress: Progress = lambda _: None,
-    observer: MotionObserver | None = None,
-    advance: Callable[[float], None] | None = None,
+    observer: RunObserver | None = None,
 ) -> Measures:
     """Run `motion` under the washout law acting without sampling (eq. 19) and measure it.
 
     `motion` must record its breakpoints and have been made for continuous control. The filter runs
-    from the start, the gains act after `start_after` (s). An `observer` sees the motion in blocks;
-    `advance` stands in for the motion's own (see `MotionTracer`).
+    from the start, the gains act after `start_after` (s). An `observer` sees motion and forces in blocks.
     """
-    advance = advance or motion.advance
+    tracer = None if observer is None else MotionTracer(motion, observer)
+    advance = motion.advance if tracer is None else tracer.advance
     parts = [(duration, False)]
     if washout is not None:
         free = min(washout.start_after, duration)
@@ -89,7 +89,7 @@ def simulate_continuous(
             step = min(block, end - done)
             advance(step)
             done += step
-            measure_block(motion, meter, observer)
+            measure_block(motion, meter, tracer)
             progress(done / duration)
     if motion.unbounded:
         meter.report_run_away()
