@@ -68,7 +68,8 @@ def simulate_continuous(
     """Run `motion` under the washout law acting without sampling (eq. 19) and measure it.
 
     `motion` must record its breakpoints and have been made for continuous control. The filter runs
-    from the start, the gains act after `start_after` (s). An `observer` sees motion and forces in blocks.
+    from the start, the gains act after `start_after` (s). An `observer` sees motion and forces, in
+    blocks.
     """
     tracer = None if observer is None else MotionTracer(motion, observer)
     advance = motion.advance if tracer is None else tracer.advance
