@@ -14,7 +14,6 @@ from xml.etree import ElementTree
 
 from api import PUBLIC, reference
 
-from stickslip_ros.app.stability import stability
 from stickslip_ros.messages.topics import TOPICS
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.scenarios.files import load_scenario
@@ -25,6 +24,7 @@ from stickslip_ros.scenarios.parameters import (
     ReplayParameters,
     parameters_of,
 )
+from stickslip_ros.studies.stability import stability
 
 HERE = Path(__file__).parent
 PAGES = ("parameters.md", "topics.md", "theory.md", "reference.md")

@@ -10,7 +10,7 @@ from pathlib import Path
 from velocity_feedback import VelocityFeedback
 
 from stickslip_ros.physics.measures.cycles import Regime
-from stickslip_ros.plots.controller_comparison import Course, draw_courses
+from stickslip_ros.plots.controller_comparison import ControlledRun, draw_comparison
 from stickslip_ros.testing import ClosedLoop, RunResult
 
 HERE = Path(__file__).parent
@@ -73,12 +73,9 @@ def main() -> None:
     }
     rows = [figures(*case, result) for case, result in results.items()]
     (HERE / "comparison.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    draw_courses(
+    draw_comparison(
         HERE / "comparison.png",
-        [
-            Course(*case, r.time, r.states.position, r.force_time, r.forces.force)
-            for case, r in results.items()
-        ],
+        [ControlledRun(*case, r.states, r.forces) for case, r in results.items()],
     )
     page = PAGE.read_text(encoding="utf-8")
     new = BEGIN + table(rows) + END

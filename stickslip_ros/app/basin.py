@@ -94,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
             write_json(sys.stdout, journal, further, finite({**made_of(scenario), **made}))
         else:
             title = f"{scenario.name}, {study.plan.size} starts"
-            _print(title, basins, Units.of(scenario.plant.as_drive()))
+            _print(title, basins, Units.for_drive(scenario.plant.as_drive()))
     return 0
 
 
@@ -147,7 +147,7 @@ def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> No
 
     plan, scenario = journal.study.plan, journal.study.scenario
     drive = scenario.plant.as_drive()
-    units = Units.of(drive)
+    units = Units.for_drive(drive)
     columns = Columns.of(journal)
     with writing("--plot", arguments.plot):
         draw_basin(

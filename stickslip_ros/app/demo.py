@@ -1,7 +1,6 @@
 """`make demo`: the washout filter kills the vibration of a feed drive, through real ROS topics."""
 
 import sys
-from pathlib import Path
 
 from stickslip_ros.app.optional import ros_nodes
 from stickslip_ros.app.output import print_figures
@@ -9,7 +8,7 @@ from stickslip_ros.app.run import default_bag, record
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.plots.run_picture import RunColumns, draw_control_coming_on
+from stickslip_ros.plots.control_coming_on import draw_control_coming_on
 from stickslip_ros.scenarios.files import load_scenario
 
 _SCENARIO = "feed_drive"
@@ -59,22 +58,10 @@ def _demonstrate() -> None:
         {title: {name: part[name] for name in _FIGURES} for title, part in parts.items()},
     )
     picture = bag.with_suffix(".png")
-    draw_control_coming_on(picture, _columns(bag), switched_on, _SHOWN_AROUND)
-    print(f"bag:     {bag}\npicture: {picture}")
-
-
-def _columns(bag: Path) -> RunColumns:
     with Recording(bag) as recording:
         states, forces = recording.joint_states, recording.control_forces
-    first = states.stamp[0]
-    return RunColumns(
-        time=(states.stamp - first) * 1e-9,
-        position=states.position,
-        velocity=states.velocity,
-        belt_velocity=states.belt_velocity,
-        force_time=(forces.stamp - first) * 1e-9,
-        force=forces.force,
-    )
+    draw_control_coming_on(picture, states, forces, switched_on, _SHOWN_AROUND)
+    print(f"bag:     {bag}\npicture: {picture}")
 
 
 if __name__ == "__main__":

@@ -172,7 +172,7 @@ def _largest(values: Iterable[float | None]) -> float | None:
 
 
 def _print(name: str, found: Design, *, written: bool) -> None:
-    units = Units.of(found.task.drive)
+    units = Units.for_drive(found.task.drive)
     speeds = units.texts(sorted({*found.task.belt_speeds}), "m/s")
     task = f"{name}, belt speed {' to '.join(speeds)}"
     if found.controller is not None:

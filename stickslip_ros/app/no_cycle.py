@@ -13,7 +13,7 @@ def why_no_cycle(regime: str | None, duration: float, drive: Drive | None) -> st
     """Return why a motion over `duration` (s) has no regime; None if it has one."""
     if regime is not None:
         return None
-    units = Units.of(drive)
+    units = Units.for_drive(drive)
     said = f"no whole cycle was completed in {duration:g} {units.of_unit('s')}".rstrip()
     if drive is None:
         return said

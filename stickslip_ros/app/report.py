@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
             start=arguments.start,
             end=arguments.end,
             namespace=arguments.namespace,
-            spectator=history,
+            observer=history,
         )
         for bag in arguments.bags
     }
@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
     print_figures(
         "" if several else str(arguments.bags[0]),
         {bag if several else "": report for bag, report in reports.items()},
-        {bag if several else "": Units.of(drive) for bag, drive in drives.items()},
+        {bag if several else "": Units.for_drive(drive) for bag, drive in drives.items()},
     )
     for bag, report in reports.items():
         sentences = [*report["missing"], *report["notes"]]

@@ -175,7 +175,7 @@ def _ranges(journal: Journal, plan: Grid) -> Iterator[list[str]]:
 
 
 def _units(journal: Journal, plan: Grid) -> Units:
-    return Units.of(journal.study.scenario.plant.as_drive(), plan.parameters)
+    return Units.for_drive(journal.study.scenario.plant.as_drive(), plan.parameters)
 
 
 class _Extremes:

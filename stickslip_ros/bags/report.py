@@ -1,16 +1,12 @@
 """A recorded run from its bag: a report of its measures and counts."""
 
-from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-import numpy as np
-
-from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
+from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.physics.measures.control_forces import SettledForces
-from stickslip_ros.physics.measures.cycles import Cycle
+from stickslip_ros.physics.measures.observer import RunObserver
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
@@ -24,29 +20,6 @@ _MOST_EARLY = 1_000_000
 """Forces that are kept until there is a joint state."""
 _MEASURED_AT_ONCE = 20_000
 """Messages; to measure each chunk by itself would take twice as long."""
-_WATCHED_SHARE = 500
-"""Part of the samples so far within which it is told where a cycle ended, for who watches."""
-_LEAST_WATCHED = 16
-
-
-class Spectator(Protocol):
-    """Sees what is measured go by; times in s from the first joint state, all else in SI units."""
-
-    def take_samples(
-        self,
-        time: FloatArray,
-        position: FloatArray,
-        velocity: FloatArray,
-        belt_velocity: FloatArray,
-        friction: FloatArray,
-        cycles: Sequence[Cycle],
-    ) -> None:
-        """Take the joint states that follow, and the cycles completed by them."""
-        ...
-
-    def take_control(self, time: FloatArray, force: FloatArray, acted: BoolArray) -> None:
-        """Take the control forces that follow, and whether each acted, as far as it is known."""
-        ...
 
 
 def report_of_bag(
@@ -56,7 +29,7 @@ def report_of_bag(
     end: float = float("inf"),
     window: int | None = None,
     namespace: str | None = None,
-    spectator: Spectator | None = None,
+    observer: RunObserver | None = None,
 ) -> dict[str, Any]:
     """Return measures, counts and completeness of the recording at `path`, ready for JSON.
 
@@ -65,7 +38,7 @@ def report_of_bag(
     whole cycles of it (None: as many as the analyzer did). The drive is that in the ROS
     `namespace`, None where there is only one. `complete` says whether `missing`, sentences on what
     the bag lacks, is empty; `notes` are sentences on what makes the measures doubtful. A
-    `spectator` sees all of the part.
+    `observer` sees all of the part; its times are those of `start` and `end`.
 
     Raises BagError for what is no bag or holds neither joint states nor control forces, and
     InvalidInputError for an empty part.
@@ -74,9 +47,11 @@ def report_of_bag(
         raise InvalidInputError(f"the part from {start} s to {end} s is empty")
     with Recording(path, namespace) as recording:
         meter = RunMeter(
-            window or _window_at_recording(recording), dropped_known=recording.dropped_known
+            window or _window_at_recording(recording),
+            dropped_known=recording.dropped_known,
+            observer=observer,
         )
-        run = _RunReader(meter, start, end, spectator)
+        run = _RunReader(meter, start, end, observer)
         for block in recording.blocks(least=_MEASURED_AT_ONCE):
             run.feed(*block)
         run.finish()
@@ -103,10 +78,10 @@ class _RunReader:
     """Feeds a meter with the part of a run that lies between two instants."""
 
     def __init__(
-        self, meter: RunMeter, start: float, end: float, spectator: Spectator | None
+        self, meter: RunMeter, start: float, end: float, observer: RunObserver | None
     ) -> None:
         self.meter = meter
-        self._spectator = spectator
+        self._observer = observer
         self.first: int | None = None
         """Stamp from which the instants count, ns, once there is one."""
         self.has_states = False
@@ -122,10 +97,12 @@ class _RunReader:
         if len(states.stamp) > 0:
             self.has_states = True
             first = self._begin(int(states.stamp[0])) if self.first is None else self.first
-            rows = self._part(states.stamp, first)
-            self.measured += int(rows.sum())
-            for piece in self._pieces(np.flatnonzero(rows)):
-                self._feed_states(states, piece, first)
+            part = states[self._part(states.stamp, first)]
+            self.measured += len(part)
+            self.meter.motion.feed(part)
+            if self._observer is not None:
+                time = (part.stamp - first) / NANOSECONDS
+                self._observer.take_friction(time, part.friction_force)
         if self.first is None:
             self._early.append((forces, dropped))
             if sum(len(forces.stamp) for forces, _ in self._early) > _MOST_EARLY:
@@ -136,8 +113,7 @@ class _RunReader:
     def finish(self) -> None:
         """Measure what was kept back: the last forces, or all where there is no joint state."""
         self._begin_without_states()
-        if self.first is not None:
-            self._show(self.meter.finish(), self.first)
+        self.meter.finish()
 
     def _begin_without_states(self) -> None:
         stamps = [forces.stamp[0] for forces, _ in self._early if len(forces.stamp) > 0]
@@ -145,43 +121,16 @@ class _RunReader:
             self._begin(int(stamps[0]))
 
     def _begin(self, first: int) -> int:
-        self.first = first
+        self.first = self.meter.motion.origin = first
         for forces, dropped in self._early:
             self._feed_forces(forces, dropped, first)
         self._early.clear()
         return first
 
-    def _pieces(self, rows: IntArray) -> Iterator[IntArray]:
-        """Yield the rows to be measured at once: so few that it is seen where a cycle ended."""
-        while self._spectator is not None and len(rows) > 0:
-            most = max(_LEAST_WATCHED, self.meter.motion.samples // _WATCHED_SHARE)
-            yield rows[:most]
-            rows = rows[most:]
-        if self._spectator is None:
-            yield rows
-
-    def _feed_states(self, states: SampleColumns, rows: IntArray, first: int) -> None:
-        states = states[rows]
-        cycles = self.meter.motion.feed(states)
-        if self._spectator is not None:
-            self._spectator.take_samples(
-                (states.stamp - first) / NANOSECONDS,
-                states.position,
-                states.velocity,
-                states.belt_velocity,
-                states.friction_force,
-                cycles,
-            )
-
     def _feed_forces(self, forces: ForceColumns, dropped: ForceColumns, first: int) -> None:
-        rows, dropped_rows = self._part(forces.stamp, first), self._part(dropped.stamp, first)
-        self.measured += int(rows.sum())
-        self._show(self.meter.feed_forces(forces[rows], dropped[dropped_rows]), first)
-
-    def _show(self, settled: SettledForces, first: int) -> None:
-        if self._spectator is not None:
-            time = (settled.sent.stamp - first) / NANOSECONDS
-            self._spectator.take_control(time, settled.sent.force, settled.acted)
+        forces, dropped = (each[self._part(each.stamp, first)] for each in (forces, dropped))
+        self.measured += len(forces)
+        self.meter.feed_forces(forces, dropped)
 
     def _part(self, stamp: IntArray, first: int) -> BoolArray:
         since = stamp - first

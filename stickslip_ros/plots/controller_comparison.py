@@ -7,9 +7,10 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from stickslip_ros.arrays import FloatArray
 from stickslip_ros.plots.style import BLUE, GREY, ORANGE, drawing, styled
 from stickslip_ros.plots.units import SI
+from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.stamps import NANOSECONDS
 
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": GREY, "ls": "-", "lw": 0.8},
@@ -20,39 +21,39 @@ _LOOKS: tuple[dict[str, Any], ...] = (
 
 
 @dataclass(frozen=True)
-class Course:
-    """One run over time, in s from its start; SI units."""
+class ControlledRun:
+    """A run at a belt speed (m/s) with a controller."""
 
     belt_speed: float
     controller: str
-    time: FloatArray
-    position: FloatArray
-    force_time: FloatArray
-    force: FloatArray
+    states: SampleColumns
+    forces: ForceColumns
 
 
 @styled
-def courses_figure(courses: Sequence[Course], shown: float = 0.6) -> Figure:
+def comparison_figure(runs: Sequence[ControlledRun], shown: float = 0.6) -> Figure:
     """Return displacement and force of the first `shown` s, a column per belt speed.
 
     Three controllers can be told apart.
     """
     units = SI
-    length, length_label = units.axis("displacement", "m", *(one.position for one in courses))
-    newton, force_label = units.axis("control force", "N", *(one.force for one in courses))
-    speeds = sorted({course.belt_speed for course in courses})
-    controllers = list(dict.fromkeys(course.controller for course in courses))
+    length, length_label = units.axis("displacement", "m", *(run.states.position for run in runs))
+    newton, force_label = units.axis("control force", "N", *(run.forces.force for run in runs))
+    speeds = sorted({run.belt_speed for run in runs})
+    controllers = list(dict.fromkeys(run.controller for run in runs))
     looks = dict(zip(controllers, cycle(_LOOKS), strict=False))
     figure = Figure(figsize=(11.0, 5.6))
     axes = figure.subplots(2, len(speeds), sharex=True, sharey="row", squeeze=False)
-    for course in courses:
-        column = axes[:, speeds.index(course.belt_speed)]
-        look = {**looks[course.controller], "label": course.controller}
-        rows, forces = course.time <= shown, course.force_time <= shown
-        column[0].plot(course.time[rows], course.position[rows] / length, **look)
-        force = course.force[forces] / newton
-        column[1].step(course.force_time[forces], force, where="post", **look)
-        column[0].set_title(f"belt speed {units.text(course.belt_speed, 'm/s')}")
+    for run in runs:
+        column = axes[:, speeds.index(run.belt_speed)]
+        look = {**looks[run.controller], "label": run.controller}
+        start = run.states.stamp[0]
+        end = start + round(shown * NANOSECONDS)
+        states, forces = run.states[run.states.stamp <= end], run.forces[run.forces.stamp <= end]
+        time, force_time = ((each.stamp - start) / NANOSECONDS for each in (states, forces))
+        column[0].plot(time, states.position / length, **look)
+        column[1].step(force_time, forces.force / newton, where="post", **look)
+        column[0].set_title(f"belt speed {units.text(run.belt_speed, 'm/s')}")
         column[1].set_xlabel("time (s)")
     axes[0, 0].set_ylabel(length_label)
     axes[1, 0].set_ylabel(force_label)
@@ -60,5 +61,5 @@ def courses_figure(courses: Sequence[Course], shown: float = 0.6) -> Figure:
     return figure
 
 
-draw_courses = drawing(courses_figure)
+draw_comparison = drawing(comparison_figure)
 """Write the picture to a path."""

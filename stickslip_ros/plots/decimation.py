@@ -1,11 +1,11 @@
 """Fewer points to draw, with every peak kept."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from stickslip_ros.arrays import FloatArray, IntArray
-
-LONGEST_GAP = 10.0
-"""Usual steps beyond which nothing is known of what was between two samples."""
 
 
 def peaks(bucket: IntArray, *columns: FloatArray) -> IntArray:
@@ -36,63 +36,71 @@ class Trace:
     """Columns over time that come in blocks, however many, kept in as many rows as can be drawn.
 
     Of rows that are too many, those of short intervals are thinned to their peaks; the intervals
-    are a small part of what a column of pixels will show. The last rows are kept as they are, too.
+    are a small part of what a column of pixels will show. The last rows are kept as they are.
+    Times are in s, or stamps in ns.
     """
 
-    _MOST_ROWS = 200_000
+    _MOST_THINNED = 150_000
     _LEAST_INTERVALS = 10_000
     _LAST_ROWS = 50_000
 
-    def __init__(self, columns: int) -> None:
-        """Take blocks of a time and so many columns."""
-        self._blocks: list[list[FloatArray]] = [[np.empty(0)] * (1 + columns)]
-        self._rows = 0
-        self._interval = 0.0
-        self._last = self._blocks.copy()
-        self._last_rows = 0
+    def __init__(self, columns: int, time: type[np.float64 | np.int64] = np.float64) -> None:
+        """Take blocks of a time, of that type, and so many columns."""
+        self._kept: list[NDArray[Any]] = [np.empty(0, time), *[np.empty(0)] * columns]
+        self._size = self._thinned = 0
+        """Rows that are filled, and how many of them may be thinned."""
+        self.interval = 0.0
+        """Longest time from row to row that is due to rows having been thinned out."""
 
-    def add(self, time: FloatArray, *columns: FloatArray) -> None:
-        """Take the rows that follow, in ascending order of time (s)."""
-        block = [time, *columns]
-        self._blocks.append(block)
-        self._rows += len(time)
-        if self._rows > self._MOST_ROWS:
-            self._thin()
-        self._last.append(block)
-        self._last_rows += len(time)
-        if self._last_rows > 2 * self._LAST_ROWS:
-            self._last = [[column[-self._LAST_ROWS :] for column in _joined(self._last)]]
-            self._last_rows = self._LAST_ROWS
+    def add(self, time: NDArray[Any], *columns: FloatArray) -> None:
+        """Take the rows that follow, in ascending order of time."""
+        size = self._size + len(time)
+        if size > len(self._kept[0]):
+            self._keep(slice(0, self._size), 2 * size)
+        for kept, column in zip(self._kept, (time, *columns), strict=True):
+            kept[self._size : size] = column
+        self._size = size
+        if size - self._thinned > 2 * self._LAST_ROWS:
+            self._thinned = size - self._LAST_ROWS
+            if self._thinned > self._MOST_THINNED:
+                self._thin()
 
-    def columns(self) -> list[FloatArray]:
-        """Return time and columns of what is left."""
-        self._blocks = [_joined(self._blocks)]
-        return self._blocks[0]
+    def forget(self, end: float) -> None:
+        """Let go of the rows before a time, once they are half of all."""
+        first = int(np.searchsorted(self._kept[0][: self._size], end))
+        if 2 * first > self._size:
+            self._thinned = max(self._thinned - first, 0)
+            self._keep(slice(first, self._size), 2 * (self._size - first))
 
-    def since(self, start: float) -> list[FloatArray]:
-        """Return time and columns from `start` (s) on, not thinned; some 50,000 rows at most."""
-        self._last = [_joined(self._last)]
-        time = self._last[0][0]
-        return [column[time >= start] for column in self._last[0]]
+    def columns(self) -> list[NDArray[Any]]:
+        """Return time and columns of all that is left, as long as nothing is added."""
+        return [kept[: self._size] for kept in self._kept]
+
+    def since(self, start: float) -> list[NDArray[Any]]:
+        """Return the same from `start` on, not thinned; some 50,000 rows of it."""
+        first = int(np.searchsorted(self._kept[0][: self._size], start))
+        return [kept[max(first, self._thinned) : self._size] for kept in self._kept]
 
     def _thin(self) -> None:
-        time, *columns = self.columns()
-        interval = self._interval or (time[-1] - time[0]) / self._LEAST_INTERVALS or 1.0
-        while self._rows > self._MOST_ROWS // 2:
+        time, *columns = (kept[: self._thinned] for kept in self._kept)
+        interval = self.interval or float(time[-1] - time[0]) / self._LEAST_INTERVALS or 1.0
+        rows = np.arange(self._thinned)
+        while len(rows) > self._MOST_THINNED // 2:
             # Doubled, an interval holds whole ones of those before, and of their peaks the higher.
-            rows = peaks(intervals(time, interval), *columns)
-            time, *columns = (column[rows] for column in (time, *columns))
-            self._rows, self._interval = len(rows), interval
+            kept = peaks(intervals(time[rows], interval), *(column[rows] for column in columns))
+            rows, self.interval = rows[kept], interval
             interval *= 2.0
-        self._blocks = [[time, *columns]]
+        rows = np.append(rows, np.arange(self._thinned, self._size))
+        self._thinned = len(rows) - self._LAST_ROWS
+        self._keep(rows, 2 * len(rows))
+
+    def _keep(self, rows: slice | IntArray, room: int) -> None:
+        """Keep only these rows, with room for so many."""
+        kept = [column[rows] for column in self._kept]
+        self._size = len(kept[0])
+        self._kept = [np.resize(column, room) for column in kept]
 
 
-def _joined(blocks: list[list[FloatArray]]) -> list[FloatArray]:
-    if len(blocks) == 1:
-        return blocks[0]
-    return [np.concatenate(parts) for parts in zip(*blocks, strict=True)]
-
-
-def intervals(time: FloatArray, length: float) -> IntArray:
-    """Return the number of the interval of that length (s) in which each time lies."""
+def intervals(time: NDArray[Any], length: float) -> IntArray:
+    """Return the number of the interval of that length in which each time lies."""
     return np.floor(time / length).astype(np.int64)

@@ -17,7 +17,7 @@ from stickslip_ros.physics.measures.cycles import Measures, with_trend
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.decimation import intervals, peaks
 from stickslip_ros.plots.regimes import REGIMES
-from stickslip_ros.plots.run_history import Rows, RunHistory
+from stickslip_ros.plots.run_history import DrawnMotion, RunHistory
 from stickslip_ros.plots.style import (
     BLUE,
     GREEN,
@@ -60,12 +60,12 @@ class _Pane(NamedTuple):
     """A part of the run over time."""
 
     title: str
-    rows: Rows
+    rows: DrawnMotion
     start: float
     end: float
 
     @classmethod
-    def of(cls, title: str, rows: Rows, *other: FloatArray) -> Self:
+    def covering(cls, title: str, rows: DrawnMotion, *other: FloatArray) -> Self:
         """Return one as long as the rows and other times last."""
         times = [time for time in (rows.time, *other) if len(time)]
         if not times:
@@ -131,11 +131,11 @@ def run_figure(
 class _Picture:
     """What the panels have in common, and each of them."""
 
-    def __init__(self, history: RunHistory, drive: Drive | None, last: Rows) -> None:
-        self.units = units = Units.of(drive)
+    def __init__(self, history: RunHistory, drive: Drive | None, last: DrawnMotion) -> None:
+        self.units = units = Units.for_drive(drive)
         self._history, self._drive, self._last = history, drive, last
         motion = history.motion
-        self._run = _Pane.of("the whole run", motion, *self._force_times)
+        self._run = _Pane.covering("the whole run", motion, *self._force_times)
         self._length = units.axis("displacement", "m", motion.position)
         self._speed = units.axis("velocity", "m/s", motion.velocity, motion.belt_velocity)
         self.holds = False
@@ -151,7 +151,7 @@ class _Picture:
         """Draw displacement, velocity and force, the whole run to the left and its end enlarged."""
         history = self._history
         others = [] if len(self._last.time) else self._force_times
-        end = _Pane.of("its end, enlarged", self._last, *others)
+        end = _Pane.covering("its end, enlarged", self._last, *others)
         traces = history.friction, history.control, history.dropped
         whole = [trace.columns() for trace in traces]
         ending = [trace.since(end.start) for trace in traces]
@@ -305,7 +305,7 @@ def _found(measures: Measures, units: Units) -> str:
     return ", ".join(found)
 
 
-def _shown(motion: Rows, measures: Measures, drive: Drive | None) -> float:
+def _shown(motion: DrawnMotion, measures: Measures, drive: Drive | None) -> float:
     """Return how much of the end is enlarged, s."""
     span = float(motion.time[-1] - motion.time[0]) if len(motion.time) else 0.0
     period = measures.period or (drive.natural_period if drive is not None else 0.0)

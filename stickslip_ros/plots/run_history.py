@@ -1,22 +1,21 @@
 """A run as it goes by, kept in as little as it takes to draw it."""
 
-from collections.abc import Sequence
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
-from stickslip_ros.physics.measures.breakpoints import Breakpoints, breakpoints_from_samples
-from stickslip_ros.physics.measures.cycles import Cycle
-from stickslip_ros.plots.decimation import LONGEST_GAP, Trace
+from stickslip_ros.physics.measures.observer import MeasuredMotion
+from stickslip_ros.physics.measures.sampling_grid import LONGEST_GAP
+from stickslip_ros.plots.decimation import Trace
 from stickslip_ros.samples import LARGEST
 
 _FIRST_ROWS = 20_000
 """Rows of the beginning that are kept as they are, for a phase portrait."""
 
 
-class Rows(NamedTuple):
-    """A motion as columns over time, SI units."""
+class DrawnMotion(NamedTuple):
+    """Breakpoints, all or some, as columns; SI units."""
 
     time: FloatArray
     position: FloatArray
@@ -25,23 +24,9 @@ class Rows(NamedTuple):
     stick_time: FloatArray
     """Time that the slide has stuck to the belt up to then, s."""
 
-    @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
-        """Return the rows of all parts, one after the other."""
-        if not parts:
-            return cls(*[np.empty(0)] * 5)
-        return cls(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
-
-
-class _Samples(NamedTuple):
-    time: FloatArray
-    position: FloatArray
-    velocity: FloatArray
-    belt_velocity: FloatArray
-
 
 class RunHistory:
-    """What was seen of a run: taken in blocks of any length, kept in constant memory.
+    """What was seen of a run, as an observer of it: kept in constant memory.
 
     Times in s, all else in SI units. What is not later than all before is left out.
     """
@@ -62,26 +47,27 @@ class RunHistory:
         self.dropped = Trace(1)
         """Force (N) that was asked for and did not act, as far as that is known."""
         self._motion, self._cycles = Trace(4), Trace(2)
-        self._first: list[Rows] = []
+        self._first: list[DrawnMotion] = []
         self._first_rows = 0
-        self._end = 0.0
         self._stick_time = 0.0
-        self._before: _Samples | None = None
-        self._control_time = -float("inf")
+        self._motion_end = self._cycles_end = -float("inf")
+        self._friction_end = self._control_end = -float("inf")
 
     @property
-    def motion(self) -> Rows:
+    def motion(self) -> DrawnMotion:
         """The whole motion, thinned to its peaks where it is long."""
-        return Rows(*self._motion.columns())
+        return DrawnMotion(*self._motion.columns())
 
     @property
-    def beginning(self) -> Rows:
+    def beginning(self) -> DrawnMotion:
         """The beginning of the motion, not thinned; some 20,000 rows of it."""
-        return Rows.joined(self._first)
+        if not self._first:
+            return DrawnMotion(*[np.empty(0)] * 5)
+        return DrawnMotion(*map(np.concatenate, zip(*self._first, strict=True)))
 
-    def end(self, duration: float) -> Rows:
+    def end(self, duration: float) -> DrawnMotion:
         """Return the last `duration` (s) of the motion, not thinned; some 50,000 rows of it."""
-        return Rows(*self._motion.since(self._end - duration))
+        return DrawnMotion(*self._motion.since(self._motion_end - duration))
 
     @property
     def cycles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -89,129 +75,62 @@ class RunHistory:
         time, amplitude, stick_fraction = self._cycles.columns()
         return time, amplitude, stick_fraction
 
-    def take_samples(
-        self,
-        time: FloatArray,
-        position: FloatArray,
-        velocity: FloatArray,
-        belt_velocity: FloatArray,
-        friction: FloatArray,
-        cycles: Sequence[Cycle],
-    ) -> None:
-        """Take the samples that follow, and the cycles completed by them; equal lengths.
-
-        What is not to be believed (see `SampleMeter`) is left out; of friction, what is not known.
-        """
-        believed = np.ones(len(time), dtype=bool)
-        for column in (position, velocity, belt_velocity):
-            believed &= np.abs(column) <= LARGEST
-        columns = (time, position, velocity, belt_velocity, friction)
-        time, position, velocity, belt_velocity, friction = (c[believed] for c in columns)
-        if self._before is not None:
-            time = np.append(self._before.time, time)
-            position = np.append(self._before.position, position)
-            velocity = np.append(self._before.velocity, velocity)
-            belt_velocity = np.append(self._before.belt_velocity, belt_velocity)
-            friction = np.append(np.nan, friction)
+    def take_motion(self, motion: MeasuredMotion) -> None:
+        """Take the motion that follows."""
+        self._take_cycles(motion)
+        time = motion.breakpoints.time
         if len(time) == 0:
             return
-        follows = np.append(True, time[1:] > np.maximum.accumulate(time)[:-1])
-        self.left_out += int((~follows).sum())
-        samples = _Samples(
-            time[follows], position[follows], velocity[follows], belt_velocity[follows]
-        )
-        if self.gap == float("inf") and len(samples.time) > 1:
-            self.gap = _gap(samples.time)
-        self._add_between(samples)
-        known = np.isfinite(friction) & follows
-        self.friction.add(time[known], friction[known])
-        self._take_cycles(float(samples.time[-1]), cycles)
-        self._before = _Samples(*(column[-1:] for column in samples))
-
-    def take_breakpoints(
-        self, breakpoints: Breakpoints, belt_speed: float, cycles: Sequence[Cycle]
-    ) -> None:
-        """Take the breakpoints that follow, of a motion known between them, and its cycles."""
+        if self.gap == float("inf"):
+            self.gap = motion.longest_step
+        # Breakpoints may be of one instant; what goes back in time goes back by more.
+        rows = (time > self._motion_end) | (time[0] >= self._motion_end)
+        breakpoints, belt_velocity = motion.breakpoints[rows], motion.belt_velocity[rows]
         if len(breakpoints) == 0:
             return
         time = breakpoints.time
-        steps = np.diff(time, prepend=self._end if self._first else time[0])
-        self._add(
-            time, breakpoints.position, breakpoints.velocity, np.full(len(time), belt_speed),
-            np.where(breakpoints.sticking, steps, 0.0),
-        )  # fmt: skip
-        self._take_cycles(float(time[-1]), cycles)
-
-    def take_friction(self, time: FloatArray, force: FloatArray) -> None:
-        """Take friction forces on the slide (N) that follow."""
-        self.friction.add(time, force)
-
-    def take_control(
-        self, time: FloatArray, force: FloatArray, acted: BoolArray | None = None
-    ) -> None:
-        """Take control forces (N) that follow, by the time from which each acts or is asked for.
-
-        All of them have `acted` unless it is given.
-        """
-        before = np.maximum.accumulate(np.append(self._control_time, time))[:-1]
-        rows = (time > before) & np.isfinite(force)
-        if self.control_gap == float("inf") and rows.sum() > 1:
-            self.control_gap = _gap(time[rows])
-        if acted is not None:
-            dropped = rows & ~acted
-            self.dropped.add(time[dropped], force[dropped])
-            rows &= acted
-        self.control.add(time[rows], force[rows])
-        self._control_time = float(max(self._control_time, time.max(initial=self._control_time)))
-
-    def _take_cycles(self, time: float, cycles: Sequence[Cycle]) -> None:
-        self._cycles.add(
-            np.full(len(cycles), time),
-            np.array([cycle.amplitude for cycle in cycles]),
-            np.array([cycle.stick_fraction for cycle in cycles]),
+        steps = np.diff(time, prepend=self._motion_end if self._first else time[0])
+        stick_time = self._stick_time + np.cumsum(np.where(breakpoints.sticking, steps, 0.0))
+        self._motion_end, self._stick_time = float(time[-1]), float(stick_time[-1])
+        drawn = DrawnMotion(
+            time, breakpoints.position, breakpoints.velocity, belt_velocity, stick_time
         )
-
-    def _add_between(self, samples: _Samples) -> None:
-        """Add samples, of which the first may have been added before, and what is between them."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            breakpoints = breakpoints_from_samples(*samples, exact_times=False)
-        # Number of the sample that ends the interval in which a breakpoint lies.
-        number = np.searchsorted(samples.time, breakpoints.time)
-        unknown = np.append(False, np.diff(samples.time) > self.gap)[number]
-        kept = ~unknown | (breakpoints.time == samples.time[number])
-        steps = np.diff(breakpoints.time, prepend=breakpoints.time[0])
-        sticking = np.where(breakpoints.sticking & ~unknown, steps, 0.0)
-        kept[0] &= self._before is None
-        self._add(
-            breakpoints.time[kept], breakpoints.position[kept], breakpoints.velocity[kept],
-            samples.belt_velocity[number][kept], sticking[kept],
-        )  # fmt: skip
-
-    def _add(
-        self,
-        time: FloatArray,
-        position: FloatArray,
-        velocity: FloatArray,
-        belt_velocity: FloatArray,
-        sticking: FloatArray,
-    ) -> None:
-        """Add rows to all that is kept; `sticking` is the time stuck since the row before, s."""
-        if len(time) == 0:
-            return
-        stick_time = self._stick_time + np.cumsum(sticking)
-        rows = Rows(time, position, velocity, belt_velocity, stick_time)
-        self._end, self._stick_time = float(time[-1]), float(stick_time[-1])
-        self._motion.add(*rows)
+        self._motion.add(*drawn)
         if self._first_rows < _FIRST_ROWS:
-            self._first.append(rows)
+            self._first.append(drawn)
             self._first_rows += len(time)
-        relative = velocity - belt_velocity
+        relative = breakpoints.velocity - belt_velocity
         least, largest = self.relative_speeds or (np.inf, -np.inf)
         self.relative_speeds = (
             min(least, float(relative.min())),
             max(largest, float(relative.max())),
         )
 
+    def _take_cycles(self, motion: MeasuredMotion) -> None:
+        time = np.array(motion.cycle_ends)
+        columns = np.array([(c.amplitude, c.stick_fraction) for c in motion.cycles])
+        later = _later(time, self._cycles_end)
+        self._cycles_end = float(time.max(initial=self._cycles_end))
+        self._cycles.add(time[later], *columns.reshape(-1, 2)[later].T)
 
-def _gap(time: FloatArray) -> float:
-    return LONGEST_GAP * float(np.median(np.diff(time)))
+    def take_friction(self, time: FloatArray, force: FloatArray) -> None:
+        """Take the friction force at the samples that follow; what is not known is left out."""
+        later = _later(time, self._friction_end)
+        self.left_out += int((~later).sum())
+        self._friction_end = float(time.max(initial=self._friction_end))
+        rows = later & (np.abs(force) <= LARGEST)
+        self.friction.add(time[rows], force[rows])
+
+    def take_control(self, time: FloatArray, force: FloatArray, acted: BoolArray) -> None:
+        """Take control forces that follow, by the time from which each acts or is asked for."""
+        rows = _later(time, self._control_end) & np.isfinite(force)
+        self._control_end = float(time.max(initial=self._control_end))
+        if self.control_gap == float("inf") and rows.sum() > 1:
+            self.control_gap = LONGEST_GAP * float(np.median(np.diff(time[rows])))
+        for trace, drawn in ((self.control, rows & acted), (self.dropped, rows & ~acted)):
+            trace.add(time[drawn], force[drawn])
+
+
+def _later(time: FloatArray, end: float) -> BoolArray:
+    """Return which times are later than all before, and than `end`."""
+    return time > np.maximum.accumulate(np.append(end, time))[:-1]

@@ -42,7 +42,7 @@ draw_stability_map = drawing(stability_figure)
 
 def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> None:
     corners, gains, rates = found.corner_frequencies, found.linear_gains, found.decay_rates.T
-    units = Units.of(found.loop.drive)
+    units = Units.for_drive(found.loop.drive)
     axes.grid(visible=False)
     fastest = float(rates.max())
     if fastest > 0.0:
@@ -78,7 +78,7 @@ def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> None:
 
 
 def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, found: StabilityMap) -> None:
-    units = Units.of(found.loop.drive)
+    units = Units.for_drive(found.loop.drive)
     late, label = units.axis("delay of the force", "s", critical.force_delays)
     axes.set_xlabel(label)
     for index, (rate, gains) in enumerate(zip(critical.rates, critical.linear_gains, strict=True)):

@@ -169,7 +169,7 @@ draw_diagram, draw_map = drawing(diagram_figure), drawing(map_figure)
 
 
 def _units(study: Study) -> Units:
-    return Units.of(study.scenario.plant.as_drive(), _grid(study).parameters)
+    return Units.for_drive(study.scenario.plant.as_drive(), _grid(study).parameters)
 
 
 def _grid(study: Study) -> Grid:

@@ -23,7 +23,7 @@ class Units:
     dimensionless: bool = False
 
     @classmethod
-    def of(cls, drive: Drive | None, varied: Iterable[str] = ()) -> Self:
+    def for_drive(cls, drive: Drive | None, varied: Iterable[str] = ()) -> Self:
         """Return those of a drive; SI where one of its scales is among the parameters `varied`."""
         unit = drive is not None and drive.is_dimensionless
         return cls(dimensionless=unit and _SCALES.isdisjoint(varied))

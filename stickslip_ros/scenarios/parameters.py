@@ -322,6 +322,7 @@ class PlantParameters(NodeParameters):
         *,
         hold_late: bool = False,
         overtaken: Callable[[int, float], None] = lambda stamp, force: None,
+        advance: Callable[[float], None] | None = None,
     ) -> SampledLoop:
         """Return the sampled loop over `motion`; see there for `start` (ns) and the others."""
         return SampledLoop(
@@ -336,6 +337,7 @@ class PlantParameters(NodeParameters):
             expects_control=self.expects_control,
             disturbance=self.as_disturbance(),
             overtaken=overtaken,
+            advance=advance,
         )
 
 

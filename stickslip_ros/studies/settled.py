@@ -7,10 +7,10 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.loop.simulation import simulate_sampled
+from stickslip_ros.physics.loop.simulation import measure_block, simulate_sampled
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
-from stickslip_ros.physics.measures.breakpoints import Breakpoints
-from stickslip_ros.physics.measures.cycles import LEAST_CYCLES, Cycle, CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycles import LEAST_CYCLES, CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.observer import MeasuredMotion
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.returns import loading_time, release_position
@@ -170,20 +170,20 @@ class Settler:
                 law = Washout(washout, start.low_passed)
                 simulate_sampled(loop, motion, law, washout.start_after, CycleMeter(1))
 
-            def advance(duration: float, meter: CycleMeter) -> None:
-                simulate_sampled(loop, motion, law, duration, meter)
+            def advance(duration: float, section: _Section) -> None:
+                simulate_sampled(loop, motion, law, duration, section.meter, observer=section)
         else:
             if washout is not None:
                 _begin_control(motion, washout, start)
 
-            def advance(duration: float, meter: CycleMeter) -> None:
+            def advance(duration: float, section: _Section) -> None:
                 motion.advance(duration)
-                meter.feed(motion.take_breakpoints(), drive.belt_speed)
+                measure_block(motion, section.meter, section)
 
-        def observe() -> _SectionMeter:
+        def observe() -> _Section:
             motion.recording = False
-            meter = _SectionMeter(course.cycles)
-            advance(transient, meter)
+            section = _Section(course.cycles)
+            advance(transient, section)
             if motion.sticking and not controlled and drive.belt_speed != 0.0:
                 left = (release_position(drive) - motion.position) / drive.belt_speed
                 if left > drive.natural_period:  # the transient is but begun
@@ -192,24 +192,24 @@ class Settler:
             motion.recording = True
             longest = cycles * (drive.natural_period + loading)
             done, step = 0.0, block
-            while not motion.unbounded and done < longest and not (done and meter.done):
-                advance(step, meter)
+            while not motion.unbounded and done < longest and not (done and section.done):
+                advance(step, section)
                 done, step = done + step, done + step  # a slow belt's cycles are that long
             if motion.unbounded:
-                meter.report_run_away()
-            return meter
+                section.meter.report_run_away()
+            return section
 
-        meter = observe()
+        section = observe()
         for _ in range(course.patience - 1):
-            before, meter = meter, observe()
-            measures = meter.measures()
-            if _is_settled(measures) and _alike(before.measures(), measures):
+            before, section = section.meter.measures(), observe()
+            measures = section.meter.measures()
+            if _is_settled(measures) and _alike(before, measures):
                 break
         low_passed = motion.low_passed if continuous else None
         if law is not None and loop is not None:
             law.answer(loop.sample.stamp, loop.sample.velocity)
             low_passed = law.low_passed
-        return meter.settled(State(motion.position, motion.velocity, low_passed))
+        return section.settled(State(motion.position, motion.velocity, low_passed))
 
     def _motion(self, drive: Drive, continuous: bool) -> Motion:
         if continuous not in self._motions:
@@ -247,29 +247,28 @@ def _alike(before: Measures, after: Measures) -> bool:
     return abs(after.amplitude - before.amplitude) <= _TWICE_THE_SAME * after.amplitude
 
 
-class _SectionMeter(CycleMeter):
-    """Keeps the Poincare section, and counts the cycles that are measured."""
+class _Section:
+    """Measures a motion, keeps its Poincare section, and counts the cycles that are measured."""
 
     def __init__(self, cycles: int) -> None:
-        super().__init__(cycles)
+        self.meter = CycleMeter(cycles)
         self._missing = max(cycles, LEAST_CYCLES)
         self._sections = [np.empty(0)]
 
-    def feed(self, breakpoints: Breakpoints, belt_speed: float) -> list[Cycle]:
-        """Take the breakpoints that follow, as any meter does."""
+    def take_motion(self, motion: MeasuredMotion) -> None:
+        """Keep where the slide turned, as an observer."""
+        breakpoints = motion.breakpoints
         self._sections.append(breakpoints.position[breakpoints.velocity == 0.0])
-        cycles = super().feed(breakpoints, belt_speed)
-        self._missing -= len(cycles)
-        return cycles
+        self._missing -= len(motion.cycles)
 
     @property
     def done(self) -> bool:
         """Whether there are cycles enough, or no more will come."""
-        return self._missing <= 0 or self.measures().regime in _RESTS
+        return self._missing <= 0 or self.meter.measures().regime in _RESTS
 
     def settled(self, end: State) -> Settled:
         """Return what was found, the motion having come to `end`."""
-        measures = self.measures()
+        measures = self.meter.measures()
         section = np.concatenate(self._sections)
         if measures.regime is Regime.UNBOUNDED:
             section = np.empty(0)

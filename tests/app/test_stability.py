@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from stickslip_ros.app.stability import stability as theory_of
 from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.studies.stability import stability as theory_of
 from tests.app.conftest import Run
 
 

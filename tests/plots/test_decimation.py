@@ -99,6 +99,19 @@ def test_the_end_of_a_trace_is_not_thinned() -> None:
     assert 50_000 <= len(trace.since(0.0)[0]) <= 100_000
 
 
+def test_what_is_old_is_forgotten_and_nothing_else() -> None:
+    time, *columns = noise(30_000)
+    trace = Trace(2)
+    for start in range(0, len(time), 1000):
+        trace.add(*(column[start : start + 1000] for column in (time, *columns)))
+        trace.forget(time[start] - 5.0)
+        found = trace.columns()
+        assert len(found[0]) <= 2 * 6000 + 1
+        kept = slice(max(start - 5000, 0), start + 1000)
+        for whole, of_it in zip((time, *columns), found, strict=True):
+            assert np.array_equal(of_it[-len(whole[kept]) :], whole[kept])
+
+
 def test_a_short_trace_is_left_as_it_is() -> None:
     columns = noise(1000)
     trace = Trace(2)

@@ -8,7 +8,7 @@ import pytest
 from stickslip_ros.plots.units import Units
 from tests.physics.drives import FEED_DRIVE, PAPER
 
-SI = Units.of(FEED_DRIVE)
+SI = Units.for_drive(FEED_DRIVE)
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_si_has_the_prefix_that_suits(
 
 
 def test_the_unit_drive_is_dimensionless() -> None:
-    units = Units.of(PAPER)
+    units = Units.for_drive(PAPER)
     for name, unit, largest in (("displacement", "m", 1e-5), ("time", "s", 1e-3)):
         assert units.axis(name, unit, [largest]) == (1.0, f"{name} (dimensionless)")
     assert units.axis("stick fraction", "", [0.1])[1] == "stick fraction"
@@ -41,11 +41,11 @@ def test_the_unit_drive_is_dimensionless() -> None:
 
 
 def test_a_study_that_varies_one_of_its_scales_is_in_si() -> None:
-    assert Units.of(PAPER, ["plant.belt_speed"]).dimensionless
-    assert not Units.of(PAPER, ["plant.belt_speed", "plant.mass"]).dimensionless
+    assert Units.for_drive(PAPER, ["plant.belt_speed"]).dimensionless
+    assert not Units.for_drive(PAPER, ["plant.belt_speed", "plant.mass"]).dimensionless
 
 
 @pytest.mark.parametrize("other", ["mass", "stiffness", "normal_force"])
 def test_a_drive_that_differs_in_one_scale_is_not(other: str) -> None:
-    assert not Units.of(replace(PAPER, **{other: 2.0})).dimensionless
-    assert not Units.of(None).dimensionless
+    assert not Units.for_drive(replace(PAPER, **{other: 2.0})).dimensionless
+    assert not Units.for_drive(None).dimensionless

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stickslip_ros.app.simulate import simulate
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.measures.cycles import Regime
@@ -23,6 +22,7 @@ from stickslip_ros.studies.settled import (
     State,
     check_continuous,
 )
+from stickslip_ros.studies.simulate import simulate
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, LimitCycle
 from tests.studies.studies import EXPONENTIAL, paper
 

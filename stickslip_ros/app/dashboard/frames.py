@@ -86,7 +86,7 @@ class Frames:
                 "end": frame.end,
                 "window": periods * period,
                 "labels": [label for _, label in axes],
-                "time_label": Units.of(drive).label("time before now", "s"),
+                "time_label": Units.for_drive(drive).label("time before now", "s"),
                 "counts": {name: len(line[0]) for name, line in lines.items()},
                 "equilibrium": drive.equilibrium_position / length if drive and at_rest else None,
                 "belt_speed": float(frame.belt_velocity.y[-1]) / speed,
@@ -119,7 +119,7 @@ def _axes(drive: Drive | None) -> list[tuple[float, str]]:
         friction = abs(float(drive.friction.static)) * drive.normal_force
         speed = abs(drive.belt_speed) or drive.speed_scale
         largest = (friction / drive.stiffness, speed, friction)
-    units = Units.of(drive)
+    units = Units.for_drive(drive)
     return [
         units.axis(*quantity, magnitude)
         for quantity, magnitude in zip(_QUANTITIES, largest, strict=True)

@@ -163,7 +163,7 @@ class _Page:
 
     def _refresh(self) -> None:
         observer, drive = self._observer, self._frames.drive
-        units = Units.of(drive)
+        units = Units.for_drive(drive)
         for topic, label in self._measures.items():
             values = observer.cycles[topic]
             unit = {AMPLITUDE: "m", FREQUENCY: "Hz"}.get(topic, "")

@@ -66,8 +66,12 @@ class SampledLoop:
         expects_control: bool = True,
         disturbance: Disturbance | None = None,
         overtaken: Callable[[int, float], None] = lambda stamp, force: None,
+        advance: Callable[[float], None] | None = None,
     ) -> None:
-        """Take sample 0 of `motion` at the stamp `start` (ns); rate in Hz, times in s."""
+        """Take sample 0 of `motion` at the stamp `start` (ns); rate in Hz, times in s.
+
+        `advance` stands in for the motion's own (see `MotionTracer`).
+        """
         self.period = 1.0 / rate
         """T, s."""
         self.late_forces = 0
@@ -77,6 +81,7 @@ class SampledLoop:
         self.controller_present = expects_control
         """Whether an answer to the present sample may be hoped for: one came since the last gap."""
         self._motion = motion
+        self._advance = advance or motion.advance
         self._start = start
         # So many samples take so many ns, exactly.
         self._nanoseconds, self._samples = (NANOSECONDS / Fraction(rate)).as_integer_ratio()
@@ -167,7 +172,7 @@ class SampledLoop:
             self._send(number, force)
             now = self._deliver()
         motion.force = self._acting + self.disturbance
-        motion.advance((1.0 - now) * period)
+        self._advance((1.0 - now) * period)
         belt_position = self.sample.belt_position + motion.drive.belt_speed * period
         self.sample_number += 1
         sample = self.sample = self._take_sample(belt_position)
@@ -185,7 +190,7 @@ class SampledLoop:
             self._acting_number = max(self._acting_number, answered)
             if instant > now:
                 motion.force = self._acting + self.disturbance
-                motion.advance((instant - now) * self.period)
+                self._advance((instant - now) * self.period)
                 now = instant
             self._acting = force
         return now

@@ -2,13 +2,26 @@
 
 from collections.abc import Callable
 
+import numpy as np
+
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+from stickslip_ros.physics.loop.tracer import MotionTracer
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycles import CycleMeter, Measures
+from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver, RunObserver
 from stickslip_ros.physics.motion.motion import Motion
 
 Progress = Callable[[float], None]
 """Told now and then what share (0 to 1) of the work is done."""
+
+
+def measure_block(motion: Motion, meter: CycleMeter, observer: MotionObserver | None) -> None:
+    """Feed a meter, and show an observer, what `motion` has recorded since the last time."""
+    breakpoints, belt_speed = motion.take_breakpoints(), motion.drive.belt_speed
+    cycles = meter.feed(breakpoints, belt_speed)
+    if observer is not None:
+        belt_velocity = np.full(len(breakpoints), belt_speed)
+        observer.take_motion(MeasuredMotion(breakpoints, belt_velocity, cycles, meter.ends))
 
 
 def simulate_sampled(
@@ -18,10 +31,12 @@ def simulate_sampled(
     duration: float,
     meter: CycleMeter,
     progress: Progress = lambda _: None,
+    observer: MotionObserver | None = None,
 ) -> Measures:
     """Run `loop` over `motion` for `duration` (s), rounded to whole samples, and measure it.
 
-    `motion` must record its breakpoints; `washout` None leaves the loop without control.
+    `motion` must record its breakpoints; `washout` None leaves the loop without control. An
+    `observer` sees the motion in blocks.
     """
     samples = round(duration / loop.period)
     sample = loop.sample
@@ -32,7 +47,7 @@ def simulate_sampled(
                 loop.offer(sample.stamp, force)
         sample = loop.advance()
         if number % 1000 == 0 or number == samples or motion.unbounded:
-            meter.feed(motion.take_breakpoints(), motion.drive.belt_speed)
+            measure_block(motion, meter, observer)
             progress(number / samples)
             if motion.unbounded:
                 meter.report_run_away()
@@ -46,12 +61,16 @@ def simulate_continuous(
     duration: float,
     meter: CycleMeter,
     progress: Progress = lambda _: None,
+    observer: RunObserver | None = None,
 ) -> Measures:
     """Run `motion` under the washout law acting without sampling (eq. 19) and measure it.
 
     `motion` must record its breakpoints and have been made for continuous control. The filter runs
-    from the start, the gains act after `start_after` (s).
+    from the start, the gains act after `start_after` (s). An `observer` sees motion and forces, in
+    blocks.
     """
+    tracer = None if observer is None else MotionTracer(motion, observer)
+    advance = motion.advance if tracer is None else tracer.advance
     parts = [(duration, False)]
     if washout is not None:
         free = min(washout.start_after, duration)
@@ -67,9 +86,9 @@ def simulate_continuous(
         end = done + length
         while done < end and not motion.unbounded:
             step = min(block, end - done)
-            motion.advance(step)
+            advance(step)
             done += step
-            meter.feed(motion.take_breakpoints(), motion.drive.belt_speed)
+            measure_block(motion, meter, tracer)
             progress(done / duration)
     if motion.unbounded:
         meter.report_run_away()

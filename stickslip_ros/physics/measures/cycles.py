@@ -187,6 +187,8 @@ class CycleMeter:
         self._belt_speed = 0.0
         self._fastest = 0.0
         self._unbounded = False
+        self.ends: list[float] = []
+        """Time, s, at which each cycle was complete that `feed` returned last."""
         self.interrupt()
 
     def interrupt(self) -> None:
@@ -207,6 +209,7 @@ class CycleMeter:
 
         Return the cycles that were completed by them.
         """
+        self.ends = []
         if len(breakpoints) == 0:
             return []
         self._belt_speed = belt_speed
@@ -220,6 +223,7 @@ class CycleMeter:
             self._open.extend(breakpoints, first, edge)
             if self._whole and self._open.duration > 0.0:
                 completed.append(self._open.as_cycle())
+                self.ends.append(self._open.end)
             self._open = _Stretch.from_breakpoint(breakpoints, edge)
             self._whole = True
             self._recent = []

@@ -5,20 +5,24 @@ from typing import Any
 import numpy as np
 
 from stickslip_ros.physics.measures.control_forces import ForceMeter, ForceSettler, SettledForces
+from stickslip_ros.physics.measures.observer import RunObserver
 from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.samples import ForceColumns
+from stickslip_ros.stamps import NANOSECONDS
 
 
 class RunMeter:
     """Measures a run from what is recorded of it: the samples and the control force."""
 
-    def __init__(self, window: int, *, dropped_known: bool = False) -> None:
-        """Average over the last `window` cycles at most.
+    def __init__(
+        self, window: int, *, dropped_known: bool = False, observer: RunObserver | None = None
+    ) -> None:
+        """Average over the last `window` cycles at most; an `observer` sees motion and forces.
 
         `dropped_known` says whether it is told which forces were dropped; only then it is known
         which acted.
         """
-        self.motion = SampleMeter(window)
+        self.motion = SampleMeter(window, observer)
         self.force = ForceMeter()
         """The force as it was sent."""
         self.applied = ForceMeter()
@@ -27,6 +31,7 @@ class RunMeter:
         self.dropped = 0
         """Forces that were told to be dropped."""
         self._settler = ForceSettler()
+        self._observer = observer
 
     def feed_forces(self, forces: ForceColumns, dropped: ForceColumns) -> SettledForces:
         """Take the forces that follow, sent and dropped; return those of which it is settled."""
@@ -41,6 +46,9 @@ class RunMeter:
     def _apply(self, settled: SettledForces) -> SettledForces:
         sent, acted = settled
         self.applied.feed(ForceColumns(sent.stamp, np.where(acted, sent.force, 0.0)))
+        if self._observer is not None:
+            time = (sent.stamp - self.motion.origin) / NANOSECONDS
+            self._observer.take_control(time, sent.force, acted)
         return settled
 
     def report(self) -> dict[str, Any]:

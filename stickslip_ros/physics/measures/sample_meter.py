@@ -1,11 +1,16 @@
 """The measures of a motion from its samples."""
 
+from dataclasses import replace
+from math import inf
+
 import numpy as np
 
 from stickslip_ros.physics.measures.breakpoints import breakpoints_from_samples
 from stickslip_ros.physics.measures.cycles import UNBOUNDED_BELT_SPEEDS, Cycle, CycleMeter, Measures
-from stickslip_ros.physics.measures.sampling_grid import SamplingGrid
+from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver
+from stickslip_ros.physics.measures.sampling_grid import LONGEST_GAP, SamplingGrid
 from stickslip_ros.samples import SampleColumns
+from stickslip_ros.stamps import NANOSECONDS
 
 
 class SampleMeter:
@@ -17,12 +22,15 @@ class SampleMeter:
     up to ten periods, and beyond that a new segment starts.
     """
 
-    def __init__(self, window: int) -> None:
-        """Average over the last `window` cycles at most."""
+    def __init__(self, window: int, observer: MotionObserver | None = None) -> None:
+        """Average over the last `window` cycles at most; an `observer` sees what is measured."""
+        self.origin = 0
+        """Stamp, ns, from which the observer's times count."""
         self.samples = 0
         """Samples seen."""
         self.steps_back = 0
         """Samples whose stamp was not later than the one before."""
+        self._observer = observer
         self._grid = SamplingGrid()
         self._meter = CycleMeter(window)
         self._last: SampleColumns | None = None
@@ -85,7 +93,22 @@ class SampleMeter:
             )
         if self._last is not None:
             breakpoints = breakpoints[1:]  # the sample carried over was fed with its own block
-        return self._meter.feed(breakpoints, float(samples.belt_velocity[-1]))
+        cycles = self._meter.feed(breakpoints, float(samples.belt_velocity[-1]))
+        if self._observer is not None:
+            observed = (stamp - self.origin) / NANOSECONDS
+            # A breakpoint's time may be rounded beyond that of the last sample.
+            ends = np.minimum(np.searchsorted(time, breakpoints.time), len(time) - 1)
+            known = LONGEST_GAP * float(np.median(np.diff(observed))) if len(observed) > 1 else inf
+            self._observer.take_motion(
+                MeasuredMotion(
+                    replace(breakpoints, time=np.interp(breakpoints.time, time, observed)),
+                    samples.belt_velocity[ends],
+                    cycles,
+                    np.interp(self._meter.ends, time, observed).tolist(),
+                    known,
+                )
+            )
+        return cycles
 
     def _look_for_run_away(self, samples: SampleColumns) -> None:
         belt_speed = np.abs(samples.belt_velocity)

@@ -8,7 +8,7 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.stamps import NANOSECONDS
 
-_LONGEST_GAP = 10
+LONGEST_GAP = 10
 """Periods over which a motion may still be interpolated."""
 
 _FEW_STEPS = 10
@@ -47,7 +47,7 @@ class _JitteredSteps:
     def follow(self, steps: IntArray) -> int:
         """Follow some of the steps (ns) up to the next gap; return how many, none at a gap."""
         steps = steps[: self._next_estimate - self._count]
-        steps = steps[: _first((steps <= 0) | (steps > _LONGEST_GAP * self._period))]
+        steps = steps[: _first((steps <= 0) | (steps > LONGEST_GAP * self._period))]
         periods = np.rint(steps / self._period)
         single = steps[periods == 1.0]
         self._count += len(steps)
@@ -129,7 +129,7 @@ class SamplingGrid:
             return np.ones(len(steps), dtype=bool)
         periods = np.rint(steps / self._step)
         off_grid = np.abs(steps - periods * self._step) > periods + 1.0
-        return off_grid | (periods < 1.0) | (periods > _LONGEST_GAP)
+        return off_grid | (periods < 1.0) | (periods > LONGEST_GAP)
 
     def _reconsider(self, step: int) -> bool:
         """Take the first few steps for several periods each if a shorter one fits into them."""

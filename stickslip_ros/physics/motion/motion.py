@@ -173,6 +173,13 @@ class Motion:
             scaled = max(-_LARGEST_FORCE, min(_LARGEST_FORCE, scaled))
         self._force = scaled
 
+    @property
+    def applied_force(self) -> float:
+        """Force on the slide at present, N: the one held, or that of the continuous controller."""
+        if self._continuous_control:
+            return self._controller.force(self.velocity - self.low_passed)
+        return self.force
+
     def set_gains(self, corner_frequency: float, linear: float, cubic: float) -> None:
         """Set the continuous controller: d (rad/s), k1 (N s/m), k2 (N s^3/m^3), eq. 17 and 18.
 

@@ -1,0 +1,41 @@
+"""What an observer sees of a motion that is simulated, besides what is measured of it."""
+
+from math import ceil
+
+import numpy as np
+
+from stickslip_ros.physics.measures.observer import MeasuredMotion, RunObserver
+from stickslip_ros.physics.motion.motion import Motion
+
+_STEPS_PER_PERIOD = 64
+"""Steps in a natural period, at least: a line through their ends is as good as the motion."""
+
+
+class MotionTracer:
+    """Advances a motion in short steps, and shows an observer its forces along with the motion."""
+
+    def __init__(self, motion: Motion, observer: RunObserver) -> None:
+        self._motion, self._observer = motion, observer
+        self._now = 0.0
+        self._forces: list[tuple[float, float, float, float]] = []
+        """Time (s) and force (N) from then on; time, and friction force (N) up to then."""
+
+    def advance(self, duration: float) -> None:
+        """Advance the motion by `duration` (s), or until it runs away."""
+        motion = self._motion
+        steps = max(1, ceil(duration / motion.drive.natural_period * _STEPS_PER_PERIOD))
+        for _ in range(steps):
+            if motion.unbounded:
+                break
+            start, force = self._now, motion.applied_force
+            motion.advance(duration / steps)
+            self._now += duration / steps
+            self._forces.append((start, force, self._now, motion.friction_force))
+
+    def take_motion(self, motion: MeasuredMotion) -> None:
+        """Pass the motion on to the observer, and the forces up to its end."""
+        start, force, end, friction = np.array(self._forces).reshape(-1, 4).T
+        self._forces.clear()
+        self._observer.take_motion(motion)
+        self._observer.take_control(start, force, np.ones(len(force), dtype=bool))
+        self._observer.take_friction(end, friction)
