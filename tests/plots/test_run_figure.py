@@ -21,6 +21,7 @@ from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.plots.run_figure import LAST_CYCLES, run_figure
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.style import save
+from stickslip_ros.samples import SampleColumns
 from tests.physics.drives import FEED_DRIVE, PAPER
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -60,7 +61,10 @@ def see(
 ) -> None:
     """Show samples that follow each other from 0 s on, as a recording of them is shown."""
     stamp = np.rint(time * 1e9).astype(np.int64)
-    SampleMeter(20, history).feed(stamp, position, velocity, belt_velocity)
+    belt_position = np.full(len(stamp), np.nan)
+    SampleMeter(20, history).feed(
+        SampleColumns(stamp, position, velocity, friction, belt_position, belt_velocity)
+    )
     history.take_friction(time, friction)
 
 
@@ -366,7 +370,9 @@ def hour_of(blocks: Sequence[int]) -> RunHistory:
         position = np.sin(100.0 * time) + 5.0 * (number == 1_234_567)
         velocity = np.minimum(100.0 * np.cos(100.0 * time), 80.0)
         belt = np.full(length, 80.0)
-        meter.feed(number * 1_000_000, position, velocity, belt)
+        meter.feed(
+            SampleColumns(number * 1_000_000, position, velocity, velocity, number * 0.08, belt)
+        )
         history.take_friction(time, velocity)
         history.take_control(time, position, all_acted(position))
     return history
