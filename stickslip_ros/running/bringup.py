@@ -29,6 +29,7 @@ from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.child_process import GUARD_PATIENCE, start
 from stickslip_ros.nodes.base.managed import STATE, ManagedNode
 from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, initialise, spin, stop_on_signals
+from stickslip_ros.nodes.base.qos import qos_profile
 from stickslip_ros.nodes.plant import FAILURE, FINISHED, NEWEST_STAMP, PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.running.controller_search import find_controllers, find_managed, near_misses
@@ -166,10 +167,10 @@ class _Bringup:
         self._first_recorded: int | None = None
         self._recorded = 0
         self._node.create_subscription(
-            DIAGNOSTICS.type, DIAGNOSTICS.name, self._on_diagnostics, DIAGNOSTICS.qos()
+            DiagnosticArray, DIAGNOSTICS.name, self._on_diagnostics, qos_profile(DIAGNOSTICS)
         )
         self._node.create_subscription(
-            RECORDED.type, RECORDED.name, self._on_recorded, RECORDED.qos()
+            Header, RECORDED.name, self._on_recorded, qos_profile(RECORDED)
         )
         self._node.create_timer(_WATCH_PERIOD, self._watch_processes)
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 
-from stickslip_ros.nodes.base.process import this_machine_only
+from stickslip_ros.nodes.base.network import this_machine_only
 from tests.nodes.graph import PATIENCE, wait_for
 
 HOST, STRANGER = "192.0.2.1", "192.0.2.2"

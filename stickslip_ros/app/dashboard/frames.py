@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from stickslip_ros.app.dashboard.listener import ObserverNode
+from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
@@ -29,7 +29,7 @@ _UNKNOWN_PERIOD = 1.0
 class Frames:
     """Makes frames of what an observer has heard."""
 
-    def __init__(self, observer: ObserverNode) -> None:
+    def __init__(self, observer: ListenerNode) -> None:
         self._observer = observer
         self._trace = LiveTrace(PERIODS[-1] * _UNKNOWN_PERIOD)
         self._drive_of: tuple[Mapping[str, Any], Drive | None] = ({}, None)
