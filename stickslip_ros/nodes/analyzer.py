@@ -5,7 +5,8 @@ import json
 import shutil
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from itertools import islice
 from operator import attrgetter
@@ -77,8 +78,6 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
         self._channels: dict[str, int] = {}
         self._tick = min(_TAKE_PERIOD, self.parameters.flush_period / 2.0)
-        self.keep(self.every(self._tick, self._on_tick))
-        self.keep(self.every(_MEASURE_PERIOD, self._on_time_to_measure))
 
     def start(self) -> None:
         """Open a bag, start to measure, and then listen: who is heard is not lost."""
@@ -102,18 +101,21 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             DROPPED_FORCE: [],
         }
         self._listening = {topic: self.subscribe_polled(topic) for topic in RECORDED_TOPICS}
+        self._periodic = [
+            self.keep(self.every(self._tick, self._take_in)),
+            self.keep(self.every(_MEASURE_PERIOD, self._measure)),
+        ]
 
     def stop(self) -> None:
         """Measure what is left, close the bag with its report, and log the report."""
         self._take_in()
         if self._meter.dropped:
             time.sleep(VERDICT_TIME)
-            for message in self._take(DROPPED_FORCE):
-                self._write(message)
+            self._write(self._take(DROPPED_FORCE))
         self._measure()
         self._meter.finish()
         report = self._meter.report()
-        for end in (self._recorded, *self._listening.values()):
+        for end in (self._recorded, *self._listening.values(), *self._periodic):
             self.release(end)
         for inquiry in self._inquiries:
             inquiry.close()
@@ -147,14 +149,6 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             complaints.append("samples were lost")
         return diagnosis(complaints, figures)
 
-    def _on_tick(self) -> None:
-        if self.active:
-            self._take_in()
-
-    def _on_time_to_measure(self) -> None:
-        if self.active:
-            self._measure()
-
     def _take_in(self) -> None:
         """Record what has come since the last time, and keep it to be measured."""
         taken = [self._take(topic) for topic in RECORDED_TOPICS]
@@ -164,8 +158,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if states and states[-1].stamp != self._newest_recorded:
             self._newest_recorded = states[-1].stamp
             self._recorded.publish(pack_header(self._newest_recorded))
-        for message in heapq.merge(*taken, key=attrgetter("stamp")):
-            self._write(message)
+        self._write(heapq.merge(*taken, key=attrgetter("stamp")))
         self._flush_if_due()
 
     def _take(self, topic: Topic[Any]) -> list[_Message]:
@@ -192,10 +185,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             taken or self._listening[DROPPED_FORCE].get_publisher_count() > 0
         )
         if self._meter.dropped_known and self._recorder is not None:
-            try:
+            with self._recording():
                 self._add_topic(self._recorder, DROPPED_FORCE)
-            except BagError as error:
-                self._give_up_recording(error)
 
     def _measure(self) -> None:
         """Decode and measure what was taken in since the last time."""
@@ -275,18 +266,15 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if self._recorder is None:
             return
         texts = {key: json.dumps(value) for key, value in values.items()}
-        try:
+        with self._recording():
             self._recorder.add_metadata(f"stickslip_ros/{name}", texts)
-        except BagError as error:
-            self._give_up_recording(error)
 
-    def _write(self, message: _Message) -> None:
+    def _write(self, messages: Iterable[_Message]) -> None:
         if self._recorder is None:
             return
-        try:
-            self._recorder.write(self._channels[message.topic.name], message.data, message.stamp)
-        except BagError as error:
-            self._give_up_recording(error)
+        with self._recording():
+            for topic, stamp, data in messages:
+                self._recorder.write(self._channels[topic.name], data, stamp)
 
     def _flush_if_due(self) -> None:
         """Flush if that would be too late at the next tick."""
@@ -296,24 +284,24 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if now + self._tick < self._flushed_at + self.parameters.flush_period:
             return
         self._flushed_at = now
-        try:
+        with self._recording():
             self._recorder.flush()
-        except BagError as error:
-            self._give_up_recording(error)
-
-    def _give_up_recording(self, error: BagError) -> None:
-        """Go on measuring without a bag."""
-        self._recorder = None
-        self._bag_failure = str(error)
-        self.get_logger().error(self._bag_failure)
 
     def _close_bag(self) -> None:
         if self._recorder is not None:
-            try:
+            with self._recording():
                 self._recorder.close()
-            except BagError as error:
-                self._give_up_recording(error)
             self._recorder = None
+
+    @contextmanager
+    def _recording(self) -> Generator[None]:
+        """Go on measuring without a bag where that cannot be written."""
+        try:
+            yield
+        except BagError as error:
+            self._recorder = None
+            self._bag_failure = str(error)
+            self.get_logger().error(self._bag_failure)
 
 
 def main() -> None:

@@ -86,7 +86,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             hold_late=realtime,
             expects_control=parameters.expects_control,
             disturbance=parameters.as_disturbance(),
-            overtaken=self._on_overtaken,
+            overtaken=lambda stamp, force: self._dropped_force.publish(pack_wrench(stamp, force)),
         )
         latest = END_OF_TIME - NANOSECONDS
         stampable = self._loop.number(latest) - 1
@@ -218,9 +218,6 @@ class PlantNode(ManagedNode[PlantParameters]):
             self.dropped.add(f"control force {force} N stamped {stamp} ns: {verdict}")
             self._dropped_force.publish(message)
         self._pacer.force_came()
-
-    def _on_overtaken(self, stamp: int, force: float) -> None:
-        self._dropped_force.publish(pack_wrench(stamp, force))
 
     def _on_disturbance(self, stamped_force: tuple[int, float]) -> None:
         _, force = stamped_force

@@ -31,10 +31,6 @@ class WashoutControllerNode(ManagedNode[WashoutControllerParameters]):
         self._washout = Washout(self.parameters.as_washout())
         self._answered = 0
 
-    def stop(self) -> None:
-        """Fall silent, once the forces sent have arrived."""
-        self.wait_for_delivery(self._force)
-
     def apply_parameters(self) -> None:
         """Use new gains from the next joint state on."""
         if self.active:

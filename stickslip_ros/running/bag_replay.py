@@ -6,7 +6,7 @@ from typing import Any
 import rclpy
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
-from stickslip_ros.errors import RunError, StickslipError
+from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.process import initialise, run_until_stopped
 from stickslip_ros.nodes.replay import ReplayNode
 
@@ -59,17 +59,13 @@ class _OneReplay(ReplayNode):
         self._offering(list(self._writers))
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self._finish(RunError("the replay failed for the reason above"))
+        self.end_process(RunError("the replay failed for the reason above"))
         return super().on_error(state)
 
     def _end(self) -> None:
         super()._end()
         self._ended = True
-        self._finish(None)
-
-    def _finish(self, failure: StickslipError | None) -> None:
-        if not self.stopped.done():
-            self.stopped.set_result(failure)
+        self.end_process(None)
 
     def _tell_progress(self) -> None:
         if self._position > 0.0:

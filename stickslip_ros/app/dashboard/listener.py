@@ -68,11 +68,6 @@ _EVENTS_KEPT = 200
 _MOST_NODES = 50
 """That health is kept of: anybody may publish diagnostics of any name."""
 
-_TRANSITIONS = {
-    True: Transition.TRANSITION_ACTIVATE,
-    False: Transition.TRANSITION_DEACTIVATE,
-}
-
 Answer = Future[str]
 """What a request comes to: nothing where it was done, else why not, in a sentence."""
 
@@ -166,11 +161,12 @@ class ListenerNode(PollingNode):
     def set_active(self, node: str, active: bool) -> Answer:
         """Activate or deactivate a managed (lifecycle) node."""
         done = "activated" if active else "deactivated"
+        transition = Transition.TRANSITION_ACTIVATE if active else Transition.TRANSITION_DEACTIVATE
         return self._request(
             node,
             ChangeState,
             "change_state",
-            ChangeState.Request(transition=Transition(id=_TRANSITIONS[active])),
+            ChangeState.Request(transition=Transition(id=transition)),
             lambda response: "" if response.success else f"{node} could not be {done}",
             _TRANSITION_PATIENCE,
         )

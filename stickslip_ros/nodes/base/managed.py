@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -9,12 +10,13 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
+from rclpy.serialization import deserialize_message
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.timer import Timer
 
-from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.errors import BagError, InvalidInputError, StickslipError
 from stickslip_ros.messages.topics import DIAGNOSTICS, Topic
 from stickslip_ros.nodes.base.dropped_messages import DroppedMessages
 from stickslip_ros.nodes.base.matching import matching_readers, matching_writers
@@ -50,15 +52,15 @@ def diagnosis(complaints: Iterable[str], figures: dict[str, Any]) -> Diagnosis:
 class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
     """A managed (lifecycle) node whose parameters come from one validated model.
 
-    A subclass says in `connect`, `start` and `stop` what it does when it is configured, activated
-    and deactivated; what they raise is logged and makes the transition fail.
+    A subclass says in `connect`, and maybe in `start` and `stop`, what it does when it is
+    configured, activated and deactivated; what they raise is logged and fails the transition.
     """
 
     def __init__(self, name: str, model: type[ParametersT], **options: Any) -> None:
         """Make the node with the options of a ParameterNode."""
         super().__init__(name, model, **options)
         self.stopped = Future()
-        """Done when the node's process may end; carries the refusal, if that was the reason."""
+        """Done when the node's process may end; carries the error that was the reason, if any."""
         self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         """Wall time, whatever simulated time does."""
         self.dropped = DroppedMessages(self.get_logger())
@@ -66,7 +68,9 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         self._kept: list[Any] = []
         self._last_refusal = ""
         self._waiting = False
-        self._diagnostics = self._create_publisher(DIAGNOSTICS)
+        self._diagnostics = self.create_publisher(
+            DiagnosticArray, DIAGNOSTICS.name, qos_profile(DIAGNOSTICS)
+        )
         self.every(_DIAGNOSTICS_PERIOD, self.publish_diagnostics)
         self._autostart_timer: Timer | None = None
         if self.parameters.autostart:
@@ -76,13 +80,14 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
     def connect(self) -> None:
         """Make publishers and subscriptions and prepare what takes time (configure)."""
 
-    @abstractmethod
     def start(self) -> None:
         """Begin to work (activate)."""
 
-    @abstractmethod
     def stop(self) -> None:
-        """Stop working (deactivate)."""
+        """Stop working (deactivate), once the messages sent have arrived."""
+        for publisher in self._kept:
+            if isinstance(publisher, Publisher):
+                self.wait_for_delivery(publisher)
 
     def diagnose(self) -> Diagnosis:
         """Return the node's health; by default what it tells of dropped messages."""
@@ -126,7 +131,8 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
 
     def advertise(self, topic: Topic[Any]) -> Publisher:
         """Publish a topic until the node is cleaned up."""
-        return self.keep(self._create_publisher(topic))
+        kind = message_class(topic.type_name)
+        return self.keep(self.create_publisher(kind, topic.name, qos_profile(topic)))
 
     def subscribe(
         self,
@@ -141,23 +147,26 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         One that cannot be decoded, or answered, by a BagError, counts as dropped. `while_active`
         leaves out what comes while the node is not active.
         """
-        decode = topic.decode
+        decode = topic.decode or partial(
+            deserialize_message, message_type=message_class(topic.type_name)
+        )
 
-        def take(message: Any) -> None:
+        def take(message: bytes) -> None:
             if while_active and not self.active:
                 return
             try:
-                callback(message if decode is None else decode(message))
+                callback(decode(message))
             except BagError as error:
                 self.dropped.add(f"{topic.name.replace('_', ' ')}: {error}")
 
-        return self._subscribe(topic, take, depth, raw=decode is not None)
+        return self.subscribe_serialized(topic, take, depth)
 
     def subscribe_serialized(
         self, topic: Topic[Any], callback: Callable[[bytes], None], depth: int | None = None
     ) -> Subscription:
         """Pass the messages of a topic, as they are, to `callback` until the node is cleaned up."""
-        return self._subscribe(topic, callback, depth, raw=True)
+        kind, qos = message_class(topic.type_name), qos_profile(topic, depth)
+        return self.keep(self.create_subscription(kind, topic.name, callback, qos, raw=True))
 
     def subscribe_polled(self, topic: Topic[Any]) -> Subscription:
         """Let the messages of a topic wait to be taken, until the node is cleaned up."""
@@ -183,10 +192,10 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         array.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(array)
 
-    def refuse(self, error: InvalidInputError) -> None:
-        """End the process because of what came in."""
+    def end_process(self, reason: StickslipError | None) -> None:
+        """End the process that the node runs in, for that reason if there is one."""
         if not self.stopped.done():
-            self.stopped.set_result(error)
+            self.stopped.set_result(reason)
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Connect."""
@@ -240,7 +249,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
             action()
         except InvalidInputError as error:
             if self._autostart_timer is not None:
-                self.refuse(error)
+                self.end_process(error)
             elif str(error) != self._last_refusal:  # whoever brings us up may try again and again
                 self._last_refusal = str(error)
                 self.get_logger().error(self._last_refusal)
@@ -298,13 +307,3 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
                 return f"{end.topic_name} is not yet matched"
         absent = waiting_for - found
         return f"not there: {', '.join(sorted(absent))}" if absent else ""
-
-    def _subscribe(
-        self, topic: Topic[Any], callback: Callable[[Any], None], depth: int | None, *, raw: bool
-    ) -> Subscription:
-        kind, qos = message_class(topic.type_name), qos_profile(topic, depth)
-        return self.keep(self.create_subscription(kind, topic.name, callback, qos, raw=raw))
-
-    def _create_publisher(self, topic: Topic[Any]) -> Publisher:
-        kind = message_class(topic.type_name)
-        return self.create_publisher(kind, topic.name, qos_profile(topic))
