@@ -5,7 +5,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.parameter import Parameter
 
-from stickslip_ros.app.dashboard import listener as observer_module
+from stickslip_ros.app.dashboard import listener as listener_module
 from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, ListenerNode
 from stickslip_ros.messages.topics import (
     AMPLITUDE,
@@ -204,14 +204,14 @@ def test_a_push_ends_with_the_observer(graph: Graph, observer: ListenerNode) -> 
 def test_a_node_that_is_not_there_does_not_answer(
     graph: Graph, observer: ListenerNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(observer_module, "_ANSWER_TIMEOUT", 0.3)
+    monkeypatch.setattr(listener_module, "_ANSWER_TIMEOUT", 0.3)
     assert outcome(graph, observer.reset()) == "plant does not answer"
 
 
 def test_a_node_that_falls_silent_and_comes_back_is_shown_as_that(
     graph: Graph, observer: ListenerNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(observer_module, "SILENCE", 1.0)
+    monkeypatch.setattr(listener_module, "SILENCE", 1.0)
     plant = graph.add(PlantNode, pace="realtime", expects_control=False)
     graph.wait_until(lambda: observer.health["plant"].state == "active", "the plant")
     graph.executor.remove_node(plant)
