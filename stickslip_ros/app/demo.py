@@ -40,7 +40,7 @@ def _demonstrate() -> None:
     scenario = load_scenario(_SCENARIO, ["plant.pace=lockstep", f"plant.duration={_DURATION}"])
     switched_on = scenario.washout_controller.start_after
     bag = default_bag(_SCENARIO)
-    reach = ros_nodes("nodes.base.process").keep_on_this_machine(network=False)
+    reach = ros_nodes("nodes.base.network").keep_on_this_machine(network=False)
     print(
         f"{_DURATION:g} s of {_SCENARIO} in lockstep: plant, washout controller and analyzer as "
         f"ROS 2 nodes, {reach}; the controller acts from {switched_on:g} s on"

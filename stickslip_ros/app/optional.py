@@ -17,7 +17,7 @@ def ros_nodes(module: str) -> ModuleType:
     """
     try:
         with interrupts_kept():
-            import_module("stickslip_ros.nodes").check_shared_memory()
+            import_module("stickslip_ros.nodes.base.shared_memory").check_shared_memory()
             return import_module(f"stickslip_ros.{module}")
     except ModuleNotFoundError as error:
         raise RunError(

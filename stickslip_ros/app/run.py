@@ -113,7 +113,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_new_bag(bag)
     if arguments.dashboard:
         check_dashboard()
-    reach = ros_nodes("nodes.base.process").keep_on_this_machine(arguments.network)
+    reach = ros_nodes("nodes.base.network").keep_on_this_machine(arguments.network)
     _tell(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}")
     with _dashboard(namespace) if arguments.dashboard else nullcontext():
         figures, interrupted = record(

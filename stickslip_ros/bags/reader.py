@@ -22,6 +22,14 @@ from stickslip_ros.bags.metadata import METADATA_FILE
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.cdr import Refused
 from stickslip_ros.messages.codec import joint_states_in, wrenches_in
+from stickslip_ros.messages.topics import (
+    APPLIED_DISTURBANCE,
+    CONTROL_FORCE,
+    DROPPED_FORCE,
+    JOINT_STATES,
+    RECORDED_TOPICS,
+    Topic,
+)
 from stickslip_ros.printable import printable
 from stickslip_ros.samples import ForceColumns, SampleColumns
 
@@ -33,18 +41,6 @@ _LARGEST_METADATA = 4_000_000
 
 _LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 """That of libyaml is ten times as fast."""
-
-_JOINT_STATES = "joint_states"
-_CONTROL_FORCE = "control_force"
-_APPLIED_DISTURBANCE = "applied_disturbance"
-_DROPPED_FORCE = "dropped_force"
-_TOPICS = {
-    _JOINT_STATES: "sensor_msgs/msg/JointState",
-    _CONTROL_FORCE: "geometry_msgs/msg/WrenchStamped",
-    _APPLIED_DISTURBANCE: "geometry_msgs/msg/WrenchStamped",
-    _DROPPED_FORCE: "geometry_msgs/msg/WrenchStamped",
-}
-"""Types of the topics of a drive, by the last part of their names."""
 
 ColumnsT = TypeVar("ColumnsT", SampleColumns, ForceColumns)
 _Decode = Callable[[bytes, IntArray, IntArray], tuple[ColumnsT, Refused]]
@@ -126,22 +122,22 @@ class Recording:
     @cached_property
     def joint_states(self) -> SampleColumns:
         """All joint states; BagError as for `blocks`."""
-        return self._whole(_JOINT_STATES, joint_states_in)
+        return self._whole(JOINT_STATES, joint_states_in)
 
     @cached_property
     def control_forces(self) -> ForceColumns:
         """All control forces; BagError as for `blocks`."""
-        return self._whole(_CONTROL_FORCE, wrenches_in)
+        return self._whole(CONTROL_FORCE, wrenches_in)
 
     @cached_property
     def applied_disturbances(self) -> ForceColumns:
         """All disturbance forces at the samples from which they act; BagError as for `blocks`."""
-        return self._whole(_APPLIED_DISTURBANCE, wrenches_in)
+        return self._whole(APPLIED_DISTURBANCE, wrenches_in)
 
     @cached_property
     def dropped_forces(self) -> ForceColumns:
         """All control forces that did not act, as they were sent; BagError as for `blocks`."""
-        return self._whole(_DROPPED_FORCE, wrenches_in)
+        return self._whole(DROPPED_FORCE, wrenches_in)
 
     @property
     def dropped_known(self) -> bool:
@@ -149,7 +145,7 @@ class Recording:
 
         Bags of older versions do not, nor those of other plants.
         """
-        return self._topic(_DROPPED_FORCE) != ""
+        return self._topic(DROPPED_FORCE) != ""
 
     def blocks(self, least: int = 1) -> Iterator[RunBlock]:
         """Yield joint states, control forces sent and dropped, a chunk at a time, in file order.
@@ -159,7 +155,7 @@ class Recording:
         BagError where the bag holds several drives and no namespace was given, and where the
         operating system fails to read it.
         """
-        states, forces, dropped = map(self._topic, (_JOINT_STATES, _CONTROL_FORCE, _DROPPED_FORCE))
+        states, forces, dropped = map(self._topic, (JOINT_STATES, CONTROL_FORCE, DROPPED_FORCE))
         gathered: list[RunBlock] = []
         count = 0
         for messages, channels in self._blocks(states, forces, dropped):
@@ -243,11 +239,11 @@ class Recording:
         """What the names of the drive's topics begin with; BagError if there are several drives."""
         if self._namespace is not None:
             return f"/{self._namespace.strip('/')}/".replace("//", "/")
-        for name, type_name in _TOPICS.items():
+        for topic in RECORDED_TOPICS:
             prefixes = [
-                topic.removesuffix(name)
-                for topic, topic_type in self.topics.items()
-                if topic_type == type_name and f"/{topic}".endswith(f"/{name}")
+                name.removesuffix(topic.name)
+                for name, type_name in self.topics.items()
+                if type_name == topic.type_name and f"/{name}".endswith(f"/{topic.name}")
             ]
             if len(prefixes) > 1:
                 namespaces = ", ".join(sorted(prefix.rstrip("/") or "/" for prefix in prefixes))
@@ -259,10 +255,10 @@ class Recording:
                 return prefixes[0]
         return "/"
 
-    def _topic(self, name: str) -> str:
-        """Return the drive's topic of that name, "" if it has none."""
-        topic = self._prefix + name
-        return topic if self.topics.get(topic) == _TOPICS[name] else ""
+    def _topic(self, topic: Topic[Any]) -> str:
+        """Return the name of a topic of the drive, "" if the bag has none."""
+        name = self._prefix + topic.name
+        return name if self.topics.get(name) == topic.type_name else ""
 
     def _blocks(self, *topics: str) -> Iterator[tuple[MessageBlock, dict[str, list[int]]]]:
         """Yield the messages of these topics chunk by chunk, and the channels of each topic."""
@@ -288,10 +284,10 @@ class Recording:
             self._reasons.setdefault(topic, refused.reason)
         return columns
 
-    def _whole(self, name: str, decode: _Decode[ColumnsT]) -> ColumnsT:
+    def _whole(self, topic: Topic[Any], decode: _Decode[ColumnsT]) -> ColumnsT:
         """Return all columns of a topic as one."""
-        topic = self._topic(name)
-        blocks = [self._decoded(topic, block, ids, decode) for block, ids in self._blocks(topic)]
+        name = self._topic(topic)
+        blocks = [self._decoded(name, block, ids, decode) for block, ids in self._blocks(name)]
         if not blocks:
             nothing = np.empty(0, np.int64)
             blocks = [decode(b"", nothing, nothing)[0]]

@@ -6,6 +6,7 @@ from typing import Any
 from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.physics.measures.observer import RunObserver
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.samples import ForceColumns, SampleColumns
@@ -61,7 +62,7 @@ def report_of_bag(
                 f"{name} ({kind})" for name, kind in sorted(recording.topics.items())
             )
             raise BagError(
-                f"the bag {path} holds no joint_states and no control_force"
+                f"the bag {path} holds no {JOINT_STATES.name} and no {CONTROL_FORCE.name}"
                 + (f" in {namespace}" if namespace else "")
                 + f" that can be read; its topics are: {topics or 'none'}"
                 + "".join(f"; {sentence}" for sentence in missing)

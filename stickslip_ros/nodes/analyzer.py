@@ -5,7 +5,8 @@ import json
 import shutil
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from itertools import islice
 from operator import attrgetter
@@ -35,10 +36,9 @@ from stickslip_ros.messages.topics import (
     STICK_FRACTION,
     Topic,
 )
-from stickslip_ros.nodes.base.dropped_messages import Dropped
-from stickslip_ros.nodes.base.duplicate_publishers import rivals
-from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Level, ManagedNode
-from stickslip_ros.nodes.base.polling import take_waiting
+from stickslip_ros.nodes.base.duplicate_publishers import duplicate_publishers
+from stickslip_ros.nodes.base.managed import ERROR, OK, Diagnosis, ManagedNode, diagnosis
+from stickslip_ros.nodes.base.polling import waiting_messages
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.base.service_call import parameters_call
 from stickslip_ros.physics.measures.run_meter import RunMeter
@@ -56,10 +56,10 @@ VERDICT_TIME = 0.05
 """Time, s, in which a plant that has dropped forces says so of the last ones, too."""
 
 
-class _Heard(NamedTuple):
+class _Message(NamedTuple):
     """A message that was taken."""
 
-    topic: Topic
+    topic: Topic[Any]
     stamp: int
     data: bytes
 
@@ -76,20 +76,15 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if self.parameters.bag:
             check_new_bag(self._next_bag())
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
-        self._dropped = Dropped(self)
-        self._connections.append(self._dropped)
         self._channels: dict[str, int] = {}
         self._tick = min(_TAKE_PERIOD, self.parameters.flush_period / 2.0)
-        self._connections.append(self.every(self._tick, self._on_tick))
-        self._connections.append(self.every(_MEASURE_PERIOD, self._on_time_to_measure))
 
     def start(self) -> None:
         """Open a bag, start to measure, and then listen: who is heard is not lost."""
         self._meter = RunMeter(self.parameters.window)
-        self._cycles = self._told = 0
+        self._cycles = self._newest_recorded = 0
         self._logged = ""
         self._bag_failure = ""
-        self._dropped.clear()
         self._recorder: Recorder | None = None
         if self.parameters.bag:
             self._open_bag()
@@ -100,25 +95,28 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             for node, model in NODE_PARAMETERS.items()
             if node != "analyzer"
         ]
-        self._to_measure: dict[Topic, list[bytes]] = {
+        self._to_measure: dict[Topic[Any], list[bytes]] = {
             JOINT_STATES: [],
             CONTROL_FORCE: [],
             DROPPED_FORCE: [],
         }
-        self._listening = {topic: self.collect(topic) for topic in RECORDED_TOPICS}
+        self._listening = {topic: self.subscribe_polled(topic) for topic in RECORDED_TOPICS}
+        self._periodic = [
+            self.keep(self.every(self._tick, self._take_in)),
+            self.keep(self.every(_MEASURE_PERIOD, self._measure)),
+        ]
 
     def stop(self) -> None:
         """Measure what is left, close the bag with its report, and log the report."""
         self._take_in()
         if self._meter.dropped:
             time.sleep(VERDICT_TIME)
-            for message in self._take(DROPPED_FORCE):
-                self._write(message)
+            self._write(self._take(DROPPED_FORCE))
         self._measure()
         self._meter.finish()
         report = self._meter.report()
-        for end in (self._recorded, *self._listening.values()):
-            self.disconnect(end)
+        for end in (self._recorded, *self._listening.values(), *self._periodic):
+            self.release(end)
         for call in self._parameter_calls:
             call.close()
         self._keep("report", report)
@@ -128,7 +126,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         else:
             self.get_logger().info(f"report: {json.dumps(report)}")
 
-    def heard(self) -> set[str]:
+    def publishing_nodes(self) -> set[str]:
         """Return who writes what will be recorded."""
         return {
             writer.node_name
@@ -136,71 +134,59 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             for writer in self.get_publishers_info_by_topic(topic.name)
         }
 
-    def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
+    def diagnose(self) -> Diagnosis:
         """Return regime and steadiness, counts of samples, and what is wrong with them."""
         if not self.active:
             return OK, "", {}
         report = self._meter.report()
         counts = {name: report[name] for name in ("regime", "steady", "samples", "lost_samples")}
         counts["trend"] = report["trend"] or ""
-        figures = {**counts, **self._dropped.figures, "notes": "; ".join(report["notes"])}
+        figures = {**counts, **self.dropped.figures, "notes": "; ".join(report["notes"])}
         if self._bag_failure:
             return ERROR, self._bag_failure, figures
-        complaints = [self._dropped.complaint, *rivals(self, *RECORDED_TOPICS)]
+        complaints = [self.dropped.complaint, *duplicate_publishers(self, *RECORDED_TOPICS)]
         if report["lost_samples"]:
             complaints.append("samples were lost")
-        complaint = "; ".join(filter(None, complaints))
-        return WARN if complaint else OK, complaint, figures
-
-    def _on_tick(self) -> None:
-        if self.active:
-            self._take_in()
-
-    def _on_time_to_measure(self) -> None:
-        if self.active:
-            self._measure()
+        return diagnosis(complaints, figures)
 
     def _take_in(self) -> None:
         """Record what has come since the last time, and keep it to be measured."""
-        heard = [self._take(topic) for topic in RECORDED_TOPICS]
+        taken = [self._take(topic) for topic in RECORDED_TOPICS]
         if not self._meter.dropped_known:
-            self._look_for_dropped_forces(bool(heard[RECORDED_TOPICS.index(DROPPED_FORCE)]))
-        states = heard[RECORDED_TOPICS.index(JOINT_STATES)]
-        if states and states[-1].stamp != self._told:
-            self._told = states[-1].stamp
-            self._recorded.publish(pack_header(self._told))
-        for message in heapq.merge(*heard, key=attrgetter("stamp")):
-            self._write(message)
+            self._look_for_dropped_forces(bool(taken[RECORDED_TOPICS.index(DROPPED_FORCE)]))
+        states = taken[RECORDED_TOPICS.index(JOINT_STATES)]
+        if states and states[-1].stamp != self._newest_recorded:
+            self._newest_recorded = states[-1].stamp
+            self._recorded.publish(pack_header(self._newest_recorded))
+        self._write(heapq.merge(*taken, key=attrgetter("stamp")))
         self._flush_if_due()
 
-    def _take(self, topic: Topic) -> list[_Heard]:
+    def _take(self, topic: Topic[Any]) -> list[_Message]:
         """Take the messages of a topic that wait; one without a proper stamp is dropped."""
-        heard: list[_Heard] = []
+        taken: list[_Message] = []
         # Whoever sends faster than this can take must not keep it from all else.
-        for data in islice(take_waiting(self._listening[topic]), DEEP):
+        for data in islice(waiting_messages(self._listening[topic]), DEEP):
             try:
                 stamp = unpack_header(data)
             except MessageError as error:
-                self._dropped.add(f"{topic.name}: {error}")
+                self.dropped.add(f"{topic.name}: {error}")
                 continue
             if not 0 < stamp < END_OF_TIME:
-                self._dropped.add(f"{topic.name}: a message with the stamp {stamp} ns")
+                self.dropped.add(f"{topic.name}: a message with the stamp {stamp} ns")
                 continue
-            heard.append(_Heard(topic, stamp, data))
+            taken.append(_Message(topic, stamp, data))
         if topic in self._to_measure:
-            self._to_measure[topic] += [message.data for message in heard]
-        return heard
+            self._to_measure[topic] += [message.data for message in taken]
+        return taken
 
-    def _look_for_dropped_forces(self, heard: bool) -> None:
+    def _look_for_dropped_forces(self, taken: bool) -> None:
         """Let the bag have their topic where a plant tells of them: without it, it is not known."""
         self._meter.dropped_known = (
-            heard or self._listening[DROPPED_FORCE].get_publisher_count() > 0
+            taken or self._listening[DROPPED_FORCE].get_publisher_count() > 0
         )
         if self._meter.dropped_known and self._recorder is not None:
-            try:
+            with self._recording():
                 self._add_topic(self._recorder, DROPPED_FORCE)
-            except BagError as error:
-                self._give_up_recording(error)
 
     def _measure(self) -> None:
         """Decode and measure what was taken in since the last time."""
@@ -235,13 +221,13 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self.get_logger().info(text)
 
     def _columns(
-        self, topic: Topic, decode: Callable[[Sequence[bytes]], tuple[ColumnsT, Refused]]
+        self, topic: Topic[Any], decode: Callable[[Sequence[bytes]], tuple[ColumnsT, Refused]]
     ) -> ColumnsT:
         """Return what is to be measured of a topic; a message that is unreadable is dropped."""
         messages, self._to_measure[topic] = self._to_measure[topic], []
         columns, refused = decode(messages)
         if refused.number > 0:
-            self._dropped.add(f"{topic.name}: {refused.reason}", refused.number)
+            self.dropped.add(f"{topic.name}: {refused.reason}", refused.number)
         return columns
 
     def _next_bag(self) -> Path:
@@ -268,7 +254,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._keep("versions", versions())
         self._keep("analyzer", self.parameters.flat())
 
-    def _add_topic(self, recorder: Recorder, topic: Topic) -> None:
+    def _add_topic(self, recorder: Recorder, topic: Topic[Any]) -> None:
         name = self.resolve_topic_name(topic.name)
         qos = QosProfile(depth=topic.depth)
         self._channels[topic.name] = recorder.add_topic(name, topic.type_name, qos)
@@ -278,18 +264,15 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if self._recorder is None:
             return
         texts = {key: json.dumps(value) for key, value in values.items()}
-        try:
+        with self._recording():
             self._recorder.add_metadata(f"stickslip_ros/{name}", texts)
-        except BagError as error:
-            self._give_up_recording(error)
 
-    def _write(self, message: _Heard) -> None:
+    def _write(self, messages: Iterable[_Message]) -> None:
         if self._recorder is None:
             return
-        try:
-            self._recorder.write(self._channels[message.topic.name], message.data, message.stamp)
-        except BagError as error:
-            self._give_up_recording(error)
+        with self._recording():
+            for topic, stamp, data in messages:
+                self._recorder.write(self._channels[topic.name], data, stamp)
 
     def _flush_if_due(self) -> None:
         """Flush if that would be too late at the next tick."""
@@ -299,24 +282,24 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if now + self._tick < self._flushed_at + self.parameters.flush_period:
             return
         self._flushed_at = now
-        try:
+        with self._recording():
             self._recorder.flush()
-        except BagError as error:
-            self._give_up_recording(error)
-
-    def _give_up_recording(self, error: BagError) -> None:
-        """Go on measuring without a bag."""
-        self._recorder = None
-        self._bag_failure = str(error)
-        self.get_logger().error(self._bag_failure)
 
     def _close_bag(self) -> None:
         if self._recorder is not None:
-            try:
+            with self._recording():
                 self._recorder.close()
-            except BagError as error:
-                self._give_up_recording(error)
             self._recorder = None
+
+    @contextmanager
+    def _recording(self) -> Generator[None]:
+        """Go on measuring without a bag where that cannot be written."""
+        try:
+            yield
+        except BagError as error:
+            self._recorder = None
+            self._bag_failure = str(error)
+            self.get_logger().error(self._bag_failure)
 
 
 def main() -> None:

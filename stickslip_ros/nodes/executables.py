@@ -1,17 +1,35 @@
-"""What the installed executables of the nodes start."""
-
-from functools import partial
-from importlib import import_module
+"""What the installed executables of the nodes start; each loads ROS when it is called."""
 
 from stickslip_ros.nodes import prepare_process
 
 
-def _run(node: str) -> None:
+def plant() -> None:
+    """Run the plant node."""
     prepare_process()
-    import_module(f"stickslip_ros.nodes.{node}").main()
+    from stickslip_ros.nodes.plant import main
+
+    main()
 
 
-plant = partial(_run, "plant")
-washout_controller = partial(_run, "washout_controller")
-analyzer = partial(_run, "analyzer")
-replay = partial(_run, "replay")
+def washout_controller() -> None:
+    """Run the washout controller node."""
+    prepare_process()
+    from stickslip_ros.nodes.washout_controller import main
+
+    main()
+
+
+def analyzer() -> None:
+    """Run the analyzer node."""
+    prepare_process()
+    from stickslip_ros.nodes.analyzer import main
+
+    main()
+
+
+def replay() -> None:
+    """Run the replay node."""
+    prepare_process()
+    from stickslip_ros.nodes.replay import main
+
+    main()

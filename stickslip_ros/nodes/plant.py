@@ -10,7 +10,7 @@ from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
 from stickslip_ros.errors import InvalidInputError, MessageError
-from stickslip_ros.messages.codec import pack_joint_state, pack_wrench, unpack_header, unpack_wrench
+from stickslip_ros.messages.codec import pack_joint_state, pack_wrench, unpack_wrench
 from stickslip_ros.messages.topics import (
     APPLIED_DISTURBANCE,
     CLOCK,
@@ -20,9 +20,8 @@ from stickslip_ros.messages.topics import (
     JOINT_STATES,
     RECORDED,
 )
-from stickslip_ros.nodes.base.dropped_messages import Dropped
-from stickslip_ros.nodes.base.duplicate_publishers import rivals
-from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Level, ManagedNode
+from stickslip_ros.nodes.base.duplicate_publishers import duplicate_publishers
+from stickslip_ros.nodes.base.managed import ERROR, OK, Diagnosis, ManagedNode, diagnosis
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer
 from stickslip_ros.nodes.punctuality import Punctuality
@@ -46,6 +45,7 @@ class PlantNode(ManagedNode[PlantParameters]):
     def __init__(self, **options: Any) -> None:
         super().__init__("plant", PlantParameters, **options)
         self._next_start = LOCKSTEP_START
+        self._has_started = False
         self.elapsed = 0.0
         """Simulated time, s, before the last pause that counts as part of the duration."""
 
@@ -57,23 +57,20 @@ class PlantNode(ManagedNode[PlantParameters]):
         self.elapsed = 0.0
         self._disturbance = 0.0
         self._lock = threading.Lock()
-        self._dropped = Dropped(self)
         self._punctuality = Punctuality()
-        self._connections.append(self._dropped)
         self._state = self.advertise(JOINT_STATES)
         self._applied = self.advertise(APPLIED_DISTURBANCE)
         self._dropped_force = self.advertise(DROPPED_FORCE)
         self._answerable = 0
         """Stamp of the sample that may still be answered while the plant pauses, ns."""
         self._clock_time = self.advertise(CLOCK) if self.parameters.publish_clock else None
-        self.subscribe(CONTROL_FORCE, self._on_force)
-        self.subscribe(DISTURBANCE_FORCE, self._on_disturbance)
-        self.subscribe(RECORDED, self._on_recorded)
-        self._connections.append(self.create_service(Trigger, "~/reset", self._on_reset))
+        self.subscribe_serialized(CONTROL_FORCE, self._on_force)
+        self.subscribe(DISTURBANCE_FORCE, self._on_disturbance, while_active=False)
+        self.subscribe(RECORDED, lambda stamp: self._pacer.recorder_came_to(stamp))
+        self.keep(self.create_service(Trigger, "~/reset", self._on_reset))
 
     def start(self) -> None:
         """Begin a segment: sample 0 now, further ones as the pacer lets them come."""
-        self._dropped.clear()
         self._punctuality.clear()
         if self._disturbance:  # whoever records the new segment has not heard of it
             self._disturbance = nan
@@ -83,7 +80,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             self._motion,
             time.time_ns() if realtime else self._next_start,
             hold_late=realtime,
-            overtaken=self._on_overtaken,
+            overtaken=lambda stamp, force: self._dropped_force.publish(pack_wrench(stamp, force)),
         )
         latest = END_OF_TIME - NANOSECONDS
         stampable = self._loop.number(latest) - 1
@@ -105,6 +102,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         last = parameters.last_sample
         if last is not None:
             last = max(last - round(self.elapsed * parameters.rate), 0)
+        self._has_started = True
         self._pacer.start(stampable if last is None else min(last, stampable))
 
     def stop(self) -> None:
@@ -124,15 +122,15 @@ class PlantNode(ManagedNode[PlantParameters]):
             with self._lock:
                 self._loop.change_drive(self.parameters.as_drive())
                 self._loop.scenario_disturbance = self.parameters.as_disturbance()
-        elif self._connections:
+        elif self.configured:
             self._motion.drive = self.parameters.as_drive()
             if not self._moved:
                 initial = self.parameters.initial
                 self._motion.restart(initial.position, initial.velocity)
 
-    def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
+    def diagnose(self) -> Diagnosis:
         """Return counts of samples, late and dropped forces and missed deadlines."""
-        if not hasattr(self, "_loop"):
+        if not self._has_started:
             return OK, "", {}
         loop, pacer = self._loop, self._pacer
         figures = {
@@ -143,7 +141,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             "missed_deadlines": pacer.missed_deadlines,
             "largest_lateness": round(pacer.largest_lateness, 6),
             "steps_per_second": round(pacer.steps_per_second, 1),
-            **self._dropped.figures,
+            **self.dropped.figures,
             **{f"dropped: {reason}": count for reason, count in loop.dropped.items()},
         }
         if loop.unbounded:
@@ -162,9 +160,9 @@ class PlantNode(ManagedNode[PlantParameters]):
                 controlled=controlled,
             )
         )
-        complaints += [self._dropped.complaint, *rivals(self, CONTROL_FORCE, DISTURBANCE_FORCE)]
-        complaint = "; ".join(filter(None, complaints))
-        return WARN if complaint else OK, complaint, figures
+        complaints.append(self.dropped.complaint)
+        complaints += duplicate_publishers(self, CONTROL_FORCE, DISTURBANCE_FORCE)
+        return diagnosis(complaints, figures)
 
     def _publish(self, sample: Sample) -> None:
         friction = sample.friction_force
@@ -202,7 +200,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             stamp, force = unpack_wrench(message)
         except MessageError as error:
             if self.active:
-                self._dropped.add(f"control force: {error}")
+                self.dropped.add(f"control force: {error}")
             return
         if not self.active:
             if stamp != self._answerable:
@@ -211,42 +209,25 @@ class PlantNode(ManagedNode[PlantParameters]):
         with self._lock:
             verdict = self._loop.offer(stamp, force)
         if verdict is not Verdict.ACCEPTED:
-            self._dropped.add(f"control force {force} N stamped {stamp} ns: {verdict}")
+            self.dropped.add(f"control force {force} N stamped {stamp} ns: {verdict}")
             self._dropped_force.publish(message)
         self._pacer.force_came()
 
-    def _on_overtaken(self, stamp: int, force: float) -> None:
-        self._dropped_force.publish(pack_wrench(stamp, force))
-
-    def _on_disturbance(self, message: bytes) -> None:
-        try:
-            _, force = unpack_wrench(message)
-        except MessageError as error:
-            self._dropped.add(f"disturbance force: {error}")
-            return
+    def _on_disturbance(self, stamped_force: tuple[int, float]) -> None:
+        _, force = stamped_force
         if not self.active or not isfinite(force):
             why = "not finite" if self.active else "the plant is not active"
-            self._dropped.add(f"disturbance force {force} N: {why}")
+            self.dropped.add(f"disturbance force {force} N: {why}")
             return
         with self._lock:
             self._loop.disturb(force)
-
-    def _on_recorded(self, message: bytes) -> None:
-        if not self.active:
-            return
-        try:
-            stamp = unpack_header(message)
-        except MessageError as error:
-            self._dropped.add(f"{RECORDED.name}: {error}")
-            return
-        self._pacer.recorder_came_to(stamp)
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         initial = self.parameters.initial
         if self.active:
             with self._lock:
                 self._loop.reset(initial.position, initial.velocity)
-        elif self._connections:
+        else:
             self._motion.restart(initial.position, initial.velocity)
         response.success = True
         return response

@@ -6,26 +6,23 @@ wait_for it begins when the nodes named there read what it publishes.
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import rclpy
 from rclpy.duration import Duration
-from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from stickslip_ros.errors import RunError, StickslipError
-from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.messages.topics import CLOCK, JOINT_STATES, RECORDED
-from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Level, ManagedNode
-from stickslip_ros.nodes.base.process import initialise, run_node, run_until_stopped
+from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Diagnosis, ManagedNode
+from stickslip_ros.nodes.base.process import run_node
+from stickslip_ros.nodes.base.qos import message_class
 from stickslip_ros.nodes.pacing import FlowWindow
 from stickslip_ros.nodes.replaying.player import Message, Player
-from stickslip_ros.nodes.replaying.selection import Excerpt
+from stickslip_ros.nodes.replaying.selection import Selection
 from stickslip_ros.scenarios.parameters import PlantParameters, ReplayParameters
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -36,7 +33,6 @@ _SETTLED = 0.5
 """Time, s, without a new reader after which those that are there count as all."""
 _SILENCE = 3.0
 """Time, s, after which it is said what is waited for."""
-_PROGRESS_PERIOD = 0.1
 
 
 class ReplayNode(ManagedNode[ReplayParameters]):
@@ -49,26 +45,25 @@ class ReplayNode(ManagedNode[ReplayParameters]):
 
     def connect(self) -> None:
         """Refuse what cannot be replayed; offer the topics."""
-        excerpt = self._excerpt = Excerpt(self.parameters, self.get_fully_qualified_name())
-        for sentence in excerpt.left_out:
+        self._selection = Selection(self.parameters, self.get_fully_qualified_name())
+        for sentence in self._selection.left_out:
             self.get_logger().warning(sentence)
         self._writers = {
-            topic: self.create_publisher(offer.message_type, topic, offer.profile)
-            for topic, offer in excerpt.offers.items()
+            name: self.keep(self.create_publisher(topic.message_class, name, topic.qos))
+            for name, topic in self._selection.topics.items()
         }
-        self._connections.extend(self._writers.values())
         self._clock_writer = self.advertise(CLOCK) if self.parameters.clock else None
+        joint_state = message_class(JOINT_STATES.type_name)
         self._recorders = {
-            topic: self._hear_recorder(topic, writer)
+            topic: self._listen_to_recorder(topic, writer)
             for topic, writer in self._writers.items()
-            if writer.msg_type is JOINT_STATES.type and topic.endswith(f"/{JOINT_STATES.name}")
+            if writer.msg_type is joint_state and topic.endswith(f"/{JOINT_STATES.name}")
         }
         for name, act in (("pause", Player.pause), ("resume", Player.resume)):
-            service = self.create_service(Trigger, f"~/{name}", partial(self._steer, act))
-            self._connections.append(service)
+            self.keep(self.create_service(Trigger, f"~/{name}", partial(self._steer, act)))
         self._readers: list[int] = []
         self._connected_at = self._readers_changed_at = time.monotonic()
-        self._connections.append(self.every(_LOOK_PERIOD, self._look_for_readers))
+        self.keep(self.every(_LOOK_PERIOD, self._look_for_readers))
 
     def start(self) -> None:
         """Publish the first message now, further ones when they are due."""
@@ -94,7 +89,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         for writer in self._writers.values():
             self.wait_for_delivery(writer)
 
-    def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
+    def diagnose(self) -> Diagnosis:
         """Return how far the replay has come and how late it was, or what it waits for."""
         player = self._player
         if player is None:
@@ -114,12 +109,12 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         """Recorded time from the bag's first message to the last one that was sent, s."""
         if self._player is None or self._player.sent == 0:
             return 0.0
-        return (self._player.recorded_time - self._excerpt.first) * 1e-9
+        return (self._player.recorded_time - self._selection.first) * 1e-9
 
     def _messages(self) -> Iterator[Message]:
-        yield from self._excerpt.messages()
-        if self._excerpt.lacking:
-            lacking = "; ".join(self._excerpt.lacking)
+        yield from self._selection.messages()
+        if self._selection.lacking:
+            lacking = "; ".join(self._selection.lacking)
             self.get_logger().warning(f"the bag is not complete: {lacking}", once=True)
 
     def _publish(self, message: Message, recorded_time: int) -> None:
@@ -144,9 +139,9 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         if self.active:
             self.trigger_deactivate()
 
-    def unmatched(self) -> str:
+    def missing_peers(self) -> str:
         """Return what is missing of the readers: those named or, if none are, any."""
-        missing = super().unmatched()
+        missing = super().missing_peers()
         if not missing and not any(self._readers):
             missing = f"nobody reads {', '.join(self._writers)}"
         now = time.monotonic()
@@ -163,7 +158,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         if readers != self._readers:
             self._readers, self._readers_changed_at = readers, time.monotonic()
 
-    def _hear_recorder(self, topic: str, writer: Publisher) -> str:
+    def _listen_to_recorder(self, topic: str, writer: Publisher) -> str:
         """Listen to the recorder that may be among a topic's readers; return what it speaks on."""
         name = f"{writer.topic_name.rpartition('/')[0]}/{RECORDED.name}"
         self.subscribe(replace(RECORDED, name=name), partial(self._on_recorded, topic))
@@ -172,9 +167,9 @@ class ReplayNode(ManagedNode[ReplayParameters]):
     def _has_publisher(self, topic: str) -> bool:
         return self.count_publishers(topic) > 0
 
-    def _on_recorded(self, topic: str, message: bytes) -> None:
+    def _on_recorded(self, topic: str, stamp: int) -> None:
         if self._player is not None:
-            self._player.recorder_came_to(topic, unpack_header(message))
+            self._player.recorder_came_to(topic, stamp)
 
     def _steer(
         self, act: Callable[[Player], None], _: Trigger.Request, response: Trigger.Response
@@ -187,70 +182,6 @@ class ReplayNode(ManagedNode[ReplayParameters]):
             state = "paused" if player.paused else "playing"
             response.message = f"{state} at {self._position:.3f} s of the bag"
         return response
-
-
-def replay_bag(
-    parameters: Mapping[str, Any],
-    offering: Callable[[Sequence[str]], None],
-    progress: Callable[[float], None],
-) -> bool:
-    """Replay a bag in this process; return whether a signal ended it before the bag did.
-
-    `parameters` are those of the node by name. `offering` is told the topics when they are offered,
-    `progress` now and then which share of the recorded time is done. Raises InvalidInputError for
-    what is refused, BagError where the bag cannot be read on, and RunError where all else fails.
-    """
-    initialise()
-    try:
-        node = _OneReplay(offering, progress, overrides=parameters)
-        return node.run()
-    finally:
-        rclpy.try_shutdown()
-
-
-class _OneReplay(ReplayNode):
-    """Runs until the bag or a signal ends it, and says how far it has come."""
-
-    def __init__(
-        self,
-        offering: Callable[[Sequence[str]], None],
-        progress: Callable[[float], None],
-        **options: Any,
-    ) -> None:
-        super().__init__(**options)
-        self._offering = offering
-        self._progress = progress
-        self._ended = False
-        self.every(_PROGRESS_PERIOD, self._tell_progress)
-
-    def run(self) -> bool:
-        """Return whether a signal ended it."""
-        run_until_stopped(self)
-        if self._player is not None and self._player.failure is not None:
-            raise self._player.failure
-        return not self._ended
-
-    def connect(self) -> None:
-        super().connect()
-        self._offering(list(self._writers))
-
-    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        self._finish(RunError("the replay failed for the reason above"))
-        return super().on_error(state)
-
-    def _end(self) -> None:
-        super()._end()
-        self._ended = True
-        self._finish(None)
-
-    def _finish(self, failure: StickslipError | None) -> None:
-        if not self.stopped.done():
-            self.stopped.set_result(failure)
-
-    def _tell_progress(self) -> None:
-        if self._position > 0.0:
-            done = self._position - self.parameters.start
-            self._progress(done / max(self._excerpt.length, 1e-9))
 
 
 def main() -> None:

@@ -4,12 +4,10 @@ import sys
 from math import isfinite
 from typing import Any
 
-from stickslip_ros.errors import MessageError
-from stickslip_ros.messages.codec import pack_wrench, unpack_joint_state
+from stickslip_ros.messages.codec import pack_wrench
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
-from stickslip_ros.nodes.base.dropped_messages import Dropped
-from stickslip_ros.nodes.base.duplicate_publishers import rivals
-from stickslip_ros.nodes.base.managed import OK, WARN, Level, ManagedNode
+from stickslip_ros.nodes.base.duplicate_publishers import duplicate_publishers
+from stickslip_ros.nodes.base.managed import OK, Diagnosis, ManagedNode, diagnosis
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.physics.loop.washout import Washout
 from stickslip_ros.samples import LARGEST, Sample
@@ -24,8 +22,6 @@ class WashoutControllerNode(ManagedNode[WashoutControllerParameters]):
 
     def connect(self) -> None:
         """Publish forces; take the newest joint state only."""
-        self._dropped = Dropped(self)
-        self._connections.append(self._dropped)
         self._force = self.advertise(CONTROL_FORCE)
         self.subscribe(JOINT_STATES, self._on_joint_state, depth=1)
 
@@ -33,43 +29,31 @@ class WashoutControllerNode(ManagedNode[WashoutControllerParameters]):
         """Start the filter on the next joint state."""
         self._washout = Washout(self.parameters.as_washout())
         self._answered = 0
-        self._dropped.clear()
-
-    def stop(self) -> None:
-        """Fall silent, once the forces sent have arrived."""
-        self.wait_for_delivery(self._force)
 
     def apply_parameters(self) -> None:
         """Use new gains from the next joint state on."""
         if self.active:
             self._washout.parameters = self.parameters.as_washout()
 
-    def diagnose(self) -> tuple[Level, str, dict[str, Any]]:
+    def diagnose(self) -> Diagnosis:
         """Return how many joint states were answered, and what is wrong with others."""
         if not self.active:
             return OK, "", {}
-        complaint = "; ".join(filter(None, [self._dropped.complaint, *rivals(self, JOINT_STATES)]))
-        figures = {"answered": self._answered, **self._dropped.figures}
-        return WARN if complaint else OK, complaint, figures
+        return diagnosis(
+            [self.dropped.complaint, *duplicate_publishers(self, JOINT_STATES)],
+            {"answered": self._answered, **self.dropped.figures},
+        )
 
-    def _on_joint_state(self, message: bytes) -> None:
-        if not self.active:
-            return
-        try:
-            self._answer(unpack_joint_state(message))
-        except MessageError as error:
-            self._dropped.add(str(error))
-
-    def _answer(self, sample: Sample) -> None:
+    def _on_joint_state(self, sample: Sample) -> None:
         stamp, velocity = sample.stamp, sample.velocity
         if not abs(velocity) <= LARGEST:
-            self._dropped.add(f"a joint state stamped {stamp} ns with the velocity {velocity} m/s")
+            self.dropped.add(f"a joint state stamped {stamp} ns with the velocity {velocity} m/s")
             return
         force = self._washout.answer(stamp, velocity)
         if force is None:
-            self._dropped.add(f"a joint state stamped {stamp} ns, not later than the last one")
+            self.dropped.add(f"a joint state stamped {stamp} ns, not later than the last one")
         elif not isfinite(force):
-            self._dropped.add(f"to the velocity {velocity} m/s the force would be {force} N")
+            self.dropped.add(f"to the velocity {velocity} m/s the force would be {force} N")
         else:
             self._force.publish(pack_wrench(stamp, force))
             self._answered += 1

@@ -71,7 +71,7 @@ class Composition:
             return node.trigger_activate() is TransitionCallbackReturn.SUCCESS
 
         if not self.spinner.spin_until(activated, timeout):
-            reason = node.unmatched() or "its log says why"
+            reason = node.missing_peers() or "its log says why"
             raise RunError(f"{node.get_name()} could not be activated: {reason}")
 
     def set_parameters(self, node: ManagedNode[Any], values: Mapping[str, Any]) -> None:

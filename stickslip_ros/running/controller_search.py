@@ -1,12 +1,15 @@
 """Controllers in the ROS graph: which nodes close the loop, and which ones nearly do."""
 
 from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
 from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, Topic, mismatch
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, Topic
+from stickslip_ros.nodes.base.matching import mismatch
+from stickslip_ros.nodes.base.qos import qos_profile
 
 DASHBOARD = "dashboard"
 """Name of a node that reads joint_states and yet is meant to be no controller."""
@@ -109,14 +112,16 @@ def _full_name(info: TopicEndpointInfo) -> str:
 
 
 def _misfit_as_reader(info: TopicEndpointInfo) -> str:
-    return _misfit(info, JOINT_STATES, JOINT_STATES.qos(), info.qos_profile)
+    return _misfit(info, JOINT_STATES, qos_profile(JOINT_STATES), info.qos_profile)
 
 
 def _misfit_as_writer(info: TopicEndpointInfo) -> str:
-    return _misfit(info, CONTROL_FORCE, info.qos_profile, CONTROL_FORCE.qos())
+    return _misfit(info, CONTROL_FORCE, info.qos_profile, qos_profile(CONTROL_FORCE))
 
 
-def _misfit(info: TopicEndpointInfo, topic: Topic, writer: QoSProfile, reader: QoSProfile) -> str:
+def _misfit(
+    info: TopicEndpointInfo, topic: Topic[Any], writer: QoSProfile, reader: QoSProfile
+) -> str:
     """Return why an endpoint and the plant's do not match, or nothing."""
     if info.topic_type != topic.type_name:
         return f"its type is {info.topic_type}, not {topic.type_name}"

@@ -14,7 +14,8 @@ from rclpy.node import Node
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.domain_ports import FIRST_PROCESS, is_free, port
-from stickslip_ros.nodes.base.process import initialise, this_machine_only
+from stickslip_ros.nodes.base.network import this_machine_only
+from stickslip_ros.nodes.base.process import initialise
 
 DOMAINS = range(1, 102)
 """Domains all ports of which are below those that the system gives away."""

@@ -8,6 +8,7 @@ from std_msgs.msg import Header
 
 from stickslip_ros.messages.topics import DIAGNOSTICS, RECORDED
 from stickslip_ros.nodes.base.managed import STATE
+from stickslip_ros.nodes.base.qos import qos_profile
 from stickslip_ros.nodes.plant import FAILURE, FINISHED, NEWEST_STAMP
 from stickslip_ros.running.lifecycle_client import ACTIVE, NEXT_TRANSITION
 from stickslip_ros.stamps import NANOSECONDS
@@ -46,9 +47,9 @@ class RunMonitor:
         self._paused = False
         self._first_recorded: int | None = None
         node.create_subscription(
-            DIAGNOSTICS.type, DIAGNOSTICS.name, self._on_diagnostics, DIAGNOSTICS.qos()
+            DiagnosticArray, DIAGNOSTICS.name, self._on_diagnostics, qos_profile(DIAGNOSTICS)
         )
-        node.create_subscription(RECORDED.type, RECORDED.name, self._on_recorded, RECORDED.qos())
+        node.create_subscription(Header, RECORDED.name, self._on_recorded, qos_profile(RECORDED))
 
     @property
     def unrecorded(self) -> float:

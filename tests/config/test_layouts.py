@@ -22,7 +22,7 @@ from stickslip_ros.messages.topics import (
     STICK_FRACTION,
 )
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.base.process import this_machine_only
+from stickslip_ros.nodes.base.network import this_machine_only
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.physics.measures.cycles import Regime

@@ -21,7 +21,7 @@ from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 
 from stickslip_ros.app import INTERRUPTED
-from stickslip_ros.nodes.base.process import this_machine_only
+from stickslip_ros.nodes.base.network import this_machine_only
 from tests.docs.page import CHECKOUT
 from tests.nodes.graph import PATIENCE, Graph, wait_for
 

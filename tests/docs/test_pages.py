@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
-from stickslip_ros.nodes.base.process import this_machine_only
+from stickslip_ros.nodes.base.network import this_machine_only
 from stickslip_ros.running.domain import own_domain
 from stickslip_ros.scenarios.files import load_scenario
 from tests.docs.page import CHECKOUT, Block, blocks, pages

@@ -3,7 +3,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from stickslip_ros.nodes.base.process import this_machine_only
+from stickslip_ros.nodes.base.network import this_machine_only
 from stickslip_ros.testing import own_domain
 from tests.nodes.graph import Graph
 from tests.nodes.processes import Processes

@@ -17,6 +17,7 @@ from rclpy.task import Future
 
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.base.process import spin
+from stickslip_ros.nodes.base.qos import message_class, qos_profile
 
 PATIENCE = 60.0
 """How long a test waits, s, for what should happen at once on an idle machine."""
@@ -114,7 +115,7 @@ class Graph:
         heard: list[Any] = []
         name = topic.name if topic.name.startswith("/") else f"/test/{topic.name}"
         self.observer.create_subscription(
-            topic.type, name, heard.append, topic.qos(10_000), raw=raw
+            message_class(topic.type_name), name, heard.append, qos_profile(topic, 10_000), raw=raw
         )
         return heard
 

@@ -8,7 +8,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from geometry_msgs.msg import WrenchStamped
 from rclpy.duration import Duration
+from sensor_msgs.msg import JointState
 
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_bag
@@ -23,6 +25,7 @@ from stickslip_ros.messages.topics import (
 )
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import ERROR
+from stickslip_ros.nodes.base.qos import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import PATIENCE, Graph
@@ -145,7 +148,7 @@ def test_a_message_without_a_proper_stamp_does_not_end_the_recording(
 ) -> None:
     analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
     force = graph.observer.create_publisher(
-        CONTROL_FORCE.type, f"/test/{CONTROL_FORCE.name}", CONTROL_FORCE.qos()
+        WrenchStamped, f"/test/{CONTROL_FORCE.name}", qos_profile(CONTROL_FORCE)
     )
     graph.wait_until(
         lambda: analyzer.active and force.get_subscription_count() == 1, "analyzer listens"
@@ -167,7 +170,7 @@ def test_the_closed_loop_is_answered_without_loss(graph: Graph, tmp_path: Path) 
         PlantNode, wait_for=["analyzer", "washout_controller"], belt_speed=0.45, duration=20.0
     )
     tap = graph.observer.create_publisher(
-        DISTURBANCE_FORCE.type, f"/test/{DISTURBANCE_FORCE.name}", DISTURBANCE_FORCE.qos()
+        WrenchStamped, f"/test/{DISTURBANCE_FORCE.name}", qos_profile(DISTURBANCE_FORCE)
     )
     graph.wait_until(lambda: plant.active and tap.get_subscription_count() == 1, "plant active")
     tap.publish(pack_wrench(0, 0.01))
@@ -187,7 +190,7 @@ def test_what_has_arrived_when_it_stops_is_recorded_although_nothing_has_run(
 ) -> None:
     analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
     states = graph.observer.create_publisher(
-        JOINT_STATES.type, f"/test/{JOINT_STATES.name}", JOINT_STATES.qos()
+        JointState, f"/test/{JOINT_STATES.name}", qos_profile(JOINT_STATES)
     )
     graph.wait_until(
         lambda: analyzer.active and states.get_subscription_count() == 1, "analyzer listens"

@@ -8,12 +8,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from sensor_msgs.msg import JointState
 
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import pack_joint_state
 from stickslip_ros.messages.topics import JOINT_STATES
+from stickslip_ros.nodes.base.qos import qos_profile
 from tests.nodes.graph import PATIENCE, Graph
 
 PERIOD = 1_000_000
@@ -30,7 +32,7 @@ class Recorded:
         self._graph = graph
         self._bag = bag
         self._publisher = graph.observer.create_publisher(
-            JOINT_STATES.type, f"/test/{JOINT_STATES.name}", JOINT_STATES.qos(depth)
+            JointState, f"/test/{JOINT_STATES.name}", qos_profile(JOINT_STATES, depth)
         )
         graph.wait_until(lambda: self._publisher.get_subscription_count() == 1, "it listens")
 

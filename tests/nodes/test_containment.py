@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 
-from stickslip_ros.nodes.base.process import this_machine_only
+from stickslip_ros.nodes.base.network import this_machine_only
 from tests.nodes.graph import PATIENCE, wait_for
 
 HOST, STRANGER = "192.0.2.1", "192.0.2.2"
@@ -90,7 +90,7 @@ with ClosedLoop("paper", "plant.pace=realtime") as loop:
 
 ADDRESSES = """
 import os, rclpy
-from stickslip_ros.nodes.base import process
+from stickslip_ros.nodes.base import network
 
 print({call})
 rclpy.init()
@@ -341,12 +341,12 @@ def test_a_loopback_interface_that_is_down_is_told(
     ("call", "environment"),
     [
         (
-            "process.keep_on_this_machine(network=False)",
+            "network.keep_on_this_machine(network=False)",
             {"FASTRTPS_DEFAULT_PROFILES_FILE": "", "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"},
         ),
-        ("process.keep_on_this_machine(network=False)", {"ROS_LOCALHOST_ONLY": "1"}),
+        ("network.keep_on_this_machine(network=False)", {"ROS_LOCALHOST_ONLY": "1"}),
         (
-            "process.prefer_prompt_middleware() or 'kept on this machine'",
+            "network.prefer_prompt_middleware() or 'kept on this machine'",
             {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
         ),
     ],

@@ -18,6 +18,7 @@ from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, RECORDED, Topic
+from stickslip_ros.nodes.base.qos import message_class, qos_profile
 from tests.nodes.graph import PATIENCE, Graph, wait_for
 from tests.nodes.processes import Processes
 
@@ -101,7 +102,11 @@ class Trio:
             stamps.add(unpack_header(message))
 
         reader = self._graph.observer.create_subscription(
-            topic.type, f"/test/{topic.name}", hear, topic.qos(), raw=True
+            message_class(topic.type_name),
+            f"/test/{topic.name}",
+            hear,
+            qos_profile(topic),
+            raw=True,
         )
         yield stamps
         self._graph.observer.destroy_subscription(reader)

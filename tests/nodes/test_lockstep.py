@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sensor_msgs.msg import JointState
 
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.messages.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
 from stickslip_ros.nodes.base.managed import STATE, WARN
+from stickslip_ros.nodes.base.qos import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
@@ -36,7 +38,7 @@ class Watch:
         self._standard_error = standard_error
         self._logged = ""
         graph.observer.create_subscription(
-            JOINT_STATES.type, JOINT_STATES.name, self._take, JOINT_STATES.qos(10_000), raw=True
+            JointState, JOINT_STATES.name, self._take, qos_profile(JOINT_STATES, 10_000), raw=True
         )
 
     def _take(self, message: bytes) -> None:

@@ -262,7 +262,7 @@ def test_what_is_set_while_inactive_acts_when_it_is_activated(graph: Graph) -> N
     changes = {"rate": 10.0, "duration": 1.0, "initial.position": 0.25, "friction.law": "coulomb"}
     assert set_all(graph, "plant", **changes) == ""
     assert "while the node is configured" in set_all(graph, "plant", publish_clock=True)
-    graph.wait_until(lambda: not plant.unmatched(), "the observer is there")
+    graph.wait_until(lambda: not plant.missing_peers(), "the observer is there")
     plant.trigger_activate()
     graph.wait_until(lambda: len(heard) == 11 and not plant.active, "eleven samples")
     columns, _ = joint_state_columns(heard)

@@ -4,8 +4,10 @@ from math import nan
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from stickslip_ros.messages.codec import (
@@ -24,6 +26,7 @@ from stickslip_ros.messages.topics import (
     JOINT_STATES,
     RECORDED,
 )
+from stickslip_ros.nodes.base.qos import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
@@ -38,7 +41,7 @@ SECOND = 1_000_000_000
 def answers(graph: Graph):
     """Return a publisher of control forces, matched with the plant."""
     publisher = graph.observer.create_publisher(
-        CONTROL_FORCE.type, f"/test/{CONTROL_FORCE.name}", CONTROL_FORCE.qos()
+        WrenchStamped, f"/test/{CONTROL_FORCE.name}", qos_profile(CONTROL_FORCE)
     )
     graph.wait_until(lambda: publisher.get_subscription_count() == 1, "plant listens to forces")
     return publisher
@@ -121,7 +124,7 @@ def test_a_missing_controller_is_given_up_and_taken_back(graph: Graph) -> None:
 def test_it_runs_no_further_ahead_of_the_recorder_than_the_window(graph: Graph) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
     recorded = graph.observer.create_publisher(
-        RECORDED.type, f"/test/{RECORDED.name}", RECORDED.qos()
+        Header, f"/test/{RECORDED.name}", qos_profile(RECORDED)
     )
     plant = graph.add(
         PlantNode, expects_control=False, wait_for=["observer"], flow_window=200, duration=10.0
@@ -152,7 +155,7 @@ def test_a_pause_is_no_end_and_does_not_count_as_duration(
 ) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
     recorded = graph.observer.create_publisher(
-        RECORDED.type, f"/test/{RECORDED.name}", RECORDED.qos()
+        Header, f"/test/{RECORDED.name}", qos_profile(RECORDED)
     )
     parameters = {"expects_control": False, "wait_for": ["observer"], "flow_window": 200}
     plant = graph.add(PlantNode, pace=pace, duration=3.0, real_time_factor=2.0, **parameters)
@@ -200,7 +203,7 @@ def test_a_disturbance_acts_from_the_next_sample_and_is_told(graph: Graph) -> No
     plant = graph.add(PlantNode, wait_for=["observer"])
     force = answers(graph)
     tap = graph.observer.create_publisher(
-        DISTURBANCE_FORCE.type, f"/test/{DISTURBANCE_FORCE.name}", DISTURBANCE_FORCE.qos()
+        WrenchStamped, f"/test/{DISTURBANCE_FORCE.name}", qos_profile(DISTURBANCE_FORCE)
     )
     graph.wait_until(lambda: tap.get_subscription_count() == 1, "plant listens to disturbances")
     graph.wait_until(lambda: len(heard) == 1, "sample 0")

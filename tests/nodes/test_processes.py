@@ -16,7 +16,7 @@ from tests.nodes.graph import PATIENCE, Graph
 
 Start = Callable[..., subprocess.Popen[str]]
 
-FORCE_OF_OTHERS = Topic("/other/force", CONTROL_FORCE.type, CONTROL_FORCE.type_name)
+FORCE_OF_OTHERS = Topic("/other/force", CONTROL_FORCE.type_name)
 
 
 @pytest.fixture

@@ -4,9 +4,12 @@ from itertools import count
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import WrenchStamped
+from sensor_msgs.msg import JointState
 
 from stickslip_ros.messages.codec import pack_wrench, unpack_header
 from stickslip_ros.messages.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
+from stickslip_ros.nodes.base.qos import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.punctuality import Punctuality
 from tests.nodes.graph import Graph
@@ -49,7 +52,7 @@ def test_a_plant_whose_controller_answers_every_third_sample_warns(
 ) -> None:
     health: list[DiagnosticArray] = graph.listen(DIAGNOSTICS)
     force = graph.observer.create_publisher(
-        CONTROL_FORCE.type, f"/test/{CONTROL_FORCE.name}", CONTROL_FORCE.qos()
+        WrenchStamped, f"/test/{CONTROL_FORCE.name}", qos_profile(CONTROL_FORCE)
     )
     counted = count()
 
@@ -58,7 +61,7 @@ def test_a_plant_whose_controller_answers_every_third_sample_warns(
             force.publish(pack_wrench(unpack_header(message), 0.0))
 
     graph.observer.create_subscription(
-        JOINT_STATES.type, f"/test/{JOINT_STATES.name}", answer, JOINT_STATES.qos(), raw=True
+        JointState, f"/test/{JOINT_STATES.name}", answer, qos_profile(JOINT_STATES), raw=True
     )
     graph.add(PlantNode, pace="realtime", rate=500.0, wait_for=["observer"])
 

@@ -2,12 +2,15 @@
 
 from pathlib import Path
 
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.messages.codec import pack_header, unpack_header
 from stickslip_ros.messages.topics import JOINT_STATES, RECORDED
 from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.base.qos import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
@@ -37,9 +40,9 @@ def test_the_recorder_is_waited_for_under_another_name(domain: int) -> None:
     graph = Graph(domain, *REMAPPED)
     heard: list[bytes] = []
     graph.observer.create_subscription(
-        JOINT_STATES.type, "/x/y", heard.append, JOINT_STATES.qos(), raw=True
+        JointState, "/x/y", heard.append, qos_profile(JOINT_STATES), raw=True
     )
-    recorder = graph.observer.create_publisher(RECORDED.type, "/held", RECORDED.qos())
+    recorder = graph.observer.create_publisher(Header, "/held", qos_profile(RECORDED))
     parameters = {"expects_control": False, "reply_timeout": 1e3, "wait_for": ["observer"]}
     graph.add(PlantNode, flow_window=200, **parameters)
     graph.wait_until(lambda: len(heard) >= 200, "the plant fills the window")

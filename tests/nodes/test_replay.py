@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from geometry_msgs.msg import WrenchStamped
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
@@ -13,6 +14,7 @@ from stickslip_ros.messages.codec import pack_header, pack_wrench, unpack_header
 from stickslip_ros.messages.topics import CLOCK, CONTROL_FORCE, JOINT_STATES, RECORDED
 from stickslip_ros.nodes import replay
 from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.base.qos import qos_profile
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
@@ -123,7 +125,7 @@ def test_the_clock_shows_recorded_time_before_each_message(graph: Graph, tmp_pat
     def on_clock(message: Clock) -> None:
         heard.append(message.clock.sec * SECOND + message.clock.nanosec)
 
-    graph.observer.create_subscription(Clock, CLOCK.name, on_clock, CLOCK.qos(1000))
+    graph.observer.create_subscription(Clock, CLOCK.name, on_clock, qos_profile(CLOCK, 1000))
     states = graph.listen(JOINT_STATES, raw=True)
     graph.add(ReplayNode, bag=record_states(tmp_path / "bag", 50), clock=True, rate=2.0)
     graph.wait_until(lambda: len(heard) == 50 and len(states) == 50, "all is heard")
@@ -154,13 +156,15 @@ def test_a_controller_answers_a_recorded_state_with_the_recorded_forces(
     monkeypatch.setattr(replay, "_FLOW_WINDOW", 1)
     record_run(tmp_path / "run", belt_speed=0.45, duration=3.0)
     forces = graph.listen(CONTROL_FORCE, raw=True)
-    recorder = graph.observer.create_publisher(Header, f"/test/{RECORDED.name}", RECORDED.qos())
+    recorder = graph.observer.create_publisher(
+        Header, f"/test/{RECORDED.name}", qos_profile(RECORDED)
+    )
 
     def on_force(force: bytes) -> None:
         recorder.publish(pack_header(unpack_header(force)))
 
     graph.observer.create_subscription(
-        CONTROL_FORCE.type, FORCES, on_force, CONTROL_FORCE.qos(), raw=True
+        WrenchStamped, FORCES, on_force, qos_profile(CONTROL_FORCE), raw=True
     )
     graph.add(WashoutControllerNode, wait_for=["observer"])
     parameters = {"topics": [STATES], "wait_for": ["washout_controller"], "rate": FAST}

@@ -4,9 +4,11 @@ from math import nan
 
 import pytest
 from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
 
 from stickslip_ros.messages.codec import pack_joint_state, unpack_wrench
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
+from stickslip_ros.nodes.base.qos import qos_profile
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.scenarios.parameters import WashoutControllerParameters
@@ -23,7 +25,7 @@ class Loop:
         self.forces = graph.listen(CONTROL_FORCE, raw=True)
         self.controller = graph.add(WashoutControllerNode, wait_for=["observer"], **parameters)
         self.states = graph.observer.create_publisher(
-            JOINT_STATES.type, f"/test/{JOINT_STATES.name}", JOINT_STATES.qos()
+            JointState, f"/test/{JOINT_STATES.name}", qos_profile(JOINT_STATES)
         )
         graph.wait_until(
             lambda: self.controller.active and self.states.get_subscription_count() == 1,

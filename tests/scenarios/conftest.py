@@ -14,7 +14,7 @@ def read_by_ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[ReadByRos]:
     """What ROS itself gives to a node `plant` from a parameter file."""
     context_module = pytest.importorskip("rclpy.context")
     node_module = pytest.importorskip("rclpy.node")
-    from stickslip_ros.nodes.base.process import this_machine_only
+    from stickslip_ros.nodes.base.network import this_machine_only
     from stickslip_ros.testing import own_domain
 
     for name, value in this_machine_only().items():

@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     namespace = namespace_of(arguments.namespace)
     check_dashboard()
-    reach = ros_nodes("nodes.base.process").keep_on_this_machine(arguments.network)
+    reach = ros_nodes("nodes.base.network").keep_on_this_machine(arguments.network)
     ros_nodes("nodes.base.child_process").die_with_parent()
     with suppress(OSError):
         os.nice(_NICENESS)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from stickslip_ros.app.dashboard.listener import ObserverNode
+from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
@@ -27,17 +27,17 @@ _UNKNOWN_PERIOD = 1.0
 
 
 class Frames:
-    """Makes frames of what an observer has heard."""
+    """Makes frames of what a listener has heard."""
 
-    def __init__(self, observer: ObserverNode) -> None:
-        self._observer = observer
+    def __init__(self, listener: ListenerNode) -> None:
+        self._listener = listener
         self._trace = LiveTrace(PERIODS[-1] * _UNKNOWN_PERIOD)
         self._drive_of: tuple[Mapping[str, Any], Drive | None] = ({}, None)
 
     @property
     def drive(self) -> Drive | None:
         """The drive as it is at present; None while the plant has not told of it."""
-        values = self._observer.parameters["plant"]
+        values = self._listener.parameters["plant"]
         if values is not self._drive_of[0]:
             try:
                 drive = PlantParameters.validated(values, "plant").as_drive() if values else None
@@ -51,7 +51,7 @@ class Frames:
         """Natural period, s, or that of the last cycle where the drive is not known."""
         if self.drive is not None:
             return self.drive.natural_period
-        frequencies = list(self._observer.cycles[FREQUENCY])[-1:]
+        frequencies = list(self._listener.cycles[FREQUENCY])[-1:]
         return next((1.0 / f for f in frequencies if 1e-9 < f < 1e9), _UNKNOWN_PERIOD)
 
     def feed(self, states: SampleColumns, forces: ForceColumns, dropped: ForceColumns) -> None:
@@ -99,12 +99,12 @@ class Frames:
         return b"".join([struct.pack("<I", len(text)), text, *floats])
 
     def _cycles(self, drive: Drive | None) -> dict[str, Any]:
-        amplitudes = list(self._observer.cycles[AMPLITUDE])
+        amplitudes = list(self._listener.cycles[AMPLITUDE])
         scale, label = _axes(drive)[0]
         return {
-            "count": self._observer.cycle_count,
+            "count": self._listener.cycle_count,
             "amplitude": [amplitude / scale for amplitude in amplitudes],
-            "stick_fraction": list(self._observer.cycles[STICK_FRACTION]),
+            "stick_fraction": list(self._listener.cycles[STICK_FRACTION]),
             "label": label.replace("displacement", "amplitude"),
         }
 

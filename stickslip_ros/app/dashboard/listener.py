@@ -11,6 +11,7 @@ from math import isfinite
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import WrenchStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import ParameterEvent
@@ -19,7 +20,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_parameter_events
+from rclpy.qos import ReliabilityPolicy, qos_profile_parameter_events
 from rclpy.timer import Timer
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
@@ -37,7 +38,8 @@ from stickslip_ros.messages.topics import (
     Topic,
 )
 from stickslip_ros.nodes.base.managed import STATE
-from stickslip_ros.nodes.base.polling import Collecting, take_waiting
+from stickslip_ros.nodes.base.polling import PollingNode, waiting_messages
+from stickslip_ros.nodes.base.qos import qos_profile
 from stickslip_ros.nodes.base.service_call import ANSWER_TIME, ServiceCall, parameters_call
 from stickslip_ros.running.controller_search import DASHBOARD
 from stickslip_ros.samples import ForceColumns, SampleColumns
@@ -66,11 +68,6 @@ _EVENTS_KEPT = 200
 _MOST_NODES = 50
 """That health is kept of: anybody may publish diagnostics of any name."""
 
-_TRANSITIONS = {
-    True: Transition.TRANSITION_ACTIVATE,
-    False: Transition.TRANSITION_DEACTIVATE,
-}
-
 Answer = Future[str]
 """What a request comes to: nothing where it was done, else why not, in a sentence."""
 
@@ -85,11 +82,11 @@ class Health:
     """0 well, 1 warning, 2 error, as in DiagnosticStatus."""
     message: str = ""
     figures: Mapping[str, str] = field(default_factory=dict)
-    heard: float = 0.0
+    heard_at: float = 0.0
     """When, on the monotonic clock, s."""
 
 
-class ObserverNode(Collecting):
+class ListenerNode(PollingNode):
     """Listens to states, forces sent and dropped, cycles and /diagnostics of a namespace.
 
     What it has heard may be read from any thread: mappings are replaced as a whole, deques to be
@@ -110,7 +107,7 @@ class ObserverNode(Collecting):
         """Health by the node's name relative to the namespace."""
         self.parameters: Mapping[str, Mapping[str, Any]] = {node: {} for node in NODE_PARAMETERS}
         """Parameters in force by node and flat name, as far as they are known."""
-        self.cycles: dict[Topic, deque[float]] = {}
+        self.cycles: dict[Topic[Any], deque[float]] = {}
         """The measures of the last cycles, each by its topic."""
         self.cycle_count = 0
         """How many cycles were heard of in all."""
@@ -127,12 +124,19 @@ class ObserverNode(Collecting):
         self._forces = self._listen_loosely(CONTROL_FORCE)
         self._dropped_forces = self._listen_loosely(DROPPED_FORCE)
         self._disturbance = self.create_publisher(
-            DISTURBANCE_FORCE.type, DISTURBANCE_FORCE.name, DISTURBANCE_FORCE.qos()
+            WrenchStamped, DISTURBANCE_FORCE.name, qos_profile(DISTURBANCE_FORCE)
         )
         for topic in (AMPLITUDE, STICK_FRACTION, FREQUENCY):
             self.cycles[topic] = deque(maxlen=_CYCLES_KEPT)
-            self._subscribe(topic, partial(self._on_cycle, topic), topic.qos(_CYCLES_KEPT))
-        self._subscribe(DIAGNOSTICS, self._on_diagnostics, DIAGNOSTICS.qos())
+            self.create_subscription(
+                Float64,
+                topic.name,
+                partial(self._on_cycle, topic),
+                qos_profile(topic, _CYCLES_KEPT),
+            )
+        self.create_subscription(
+            DiagnosticArray, DIAGNOSTICS.name, self._on_diagnostics, qos_profile(DIAGNOSTICS)
+        )
         self._parameter_events = self.create_subscription(
             ParameterEvent,
             "/parameter_events",
@@ -157,11 +161,12 @@ class ObserverNode(Collecting):
     def set_active(self, node: str, active: bool) -> Answer:
         """Activate or deactivate a managed (lifecycle) node."""
         done = "activated" if active else "deactivated"
+        transition = Transition.TRANSITION_ACTIVATE if active else Transition.TRANSITION_DEACTIVATE
         return self._request(
             node,
             ChangeState,
             "change_state",
-            ChangeState.Request(transition=Transition(id=_TRANSITIONS[active])),
+            ChangeState.Request(transition=Transition(id=transition)),
             lambda response: "" if response.success else f"{node} could not be {done}",
             _TRANSITION_TIME,
         )
@@ -210,14 +215,11 @@ class ObserverNode(Collecting):
             give_up()
         self._calls.clear()
 
-    def _listen_loosely(self, topic: Topic) -> Any:
+    def _listen_loosely(self, topic: Topic[Any]) -> Any:
         """Let messages wait, without acknowledging any: the writer has no work with that."""
-        qos = topic.qos()
+        qos = qos_profile(topic)
         qos.reliability = ReliabilityPolicy.BEST_EFFORT
-        return self.collect_from(topic, qos)
-
-    def _subscribe(self, topic: Topic, callback: Callable[[Any], None], qos: QoSProfile) -> None:
-        self.create_subscription(topic.type, topic.name, callback, qos)
+        return self.create_polled_subscription(topic, qos)
 
     def _every(self, period: float, callback: Callable[[], None]) -> Timer:
         return self.create_timer(period, callback, clock=self._steady_clock)
@@ -256,9 +258,9 @@ class ObserverNode(Collecting):
 
     def _take(self) -> None:
         """Pass on what has come."""
-        states, _ = joint_state_columns(list(take_waiting(self._states)))
-        forces, _ = wrench_columns(list(take_waiting(self._forces)))
-        dropped, _ = wrench_columns(list(take_waiting(self._dropped_forces)))
+        states, _ = joint_state_columns(list(waiting_messages(self._states)))
+        forces, _ = wrench_columns(list(waiting_messages(self._forces)))
+        dropped, _ = wrench_columns(list(waiting_messages(self._dropped_forces)))
         if len(states.stamp):
             self._newest = int(states.stamp[-1])
         if len(states.stamp) or len(forces.stamp) or len(dropped.stamp):
@@ -290,8 +292,8 @@ class ObserverNode(Collecting):
             for node in self._asked_parameters:  # what changed before was not told
                 self._ask_parameters(node)
         for node, health in self.health.items():
-            if health.heard and health.state != SILENT and now - health.heard > SILENCE:
-                self._update(node, Health(SILENT, 2, "", health.figures, health.heard))
+            if health.heard_at and health.state != SILENT and now - health.heard_at > SILENCE:
+                self._update(node, Health(SILENT, 2, "", health.figures, health.heard_at))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         here = f"{self.get_namespace().rstrip('/')}/"
@@ -307,11 +309,11 @@ class ObserverNode(Collecting):
         if before is None and len(self.health) >= _MOST_NODES:
             return
         before = before or Health()
-        anew = state == before.state and _began_anew(before.figures, figures)
-        if anew:
+        restarted = state == before.state and _has_restarted(before.figures, figures)
+        if restarted:
             self.events.append((time.time(), f"{node} was started again"))
         self._update(node, Health(state, status.level[0], message, figures, time.monotonic()))
-        if node in NODE_PARAMETERS and (anew or state != before.state):
+        if node in NODE_PARAMETERS and (restarted or state != before.state):
             self._ask_parameters(node)  # it may be another one of the same name
 
     def _update(self, node: str, health: Health) -> None:
@@ -344,7 +346,7 @@ class ObserverNode(Collecting):
             if asked is not None and asked.answer is None:  # its answer may be from before
                 self._ask_parameters(node)
 
-    def _on_cycle(self, topic: Topic, message: Float64) -> None:
+    def _on_cycle(self, topic: Topic[Any], message: Float64) -> None:
         self.cycles[topic].append(message.data)
         if topic is AMPLITUDE:
             self.cycle_count += 1
@@ -361,8 +363,8 @@ def _wording(message: str) -> str:
     return re.sub(r"[\d.]+", "", message)
 
 
-def _began_anew(before: Mapping[str, str], figures: Mapping[str, str]) -> bool:
-    """Return whether a node that counts has begun to count again."""
+def _has_restarted(before: Mapping[str, str], figures: Mapping[str, str]) -> bool:
+    """Return whether a node that counts counts from 0 again."""
     return any(
         figures.get(count, "").isdecimal()
         and before.get(count, "").isdecimal()

@@ -14,7 +14,7 @@ from nicegui.events import GenericEventArguments
 
 from stickslip_ros.app.dashboard.charts import CYCLES, PORTRAIT, TRACE
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
-from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, Health, ObserverNode
+from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, Health, ListenerNode
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.regimes import REGIMES
@@ -37,7 +37,7 @@ _LEVELS = ("well", "warning", "error", "stale")
 _STATE_TIMEOUT = 3.0
 
 
-def add_page(app: FastAPI, observer: ObserverNode, frames: Frames) -> None:
+def add_page(app: FastAPI, listener: ListenerNode, frames: Frames) -> None:
     """Add the page, and the frames of its charts."""
     script = Path(__file__).with_name("page.js").read_text(encoding="utf-8")
 
@@ -55,20 +55,20 @@ def add_page(app: FastAPI, observer: ObserverNode, frames: Frames) -> None:
 
     @ui.page("/")
     def page() -> None:
-        _Page(observer, frames, script)
+        _Page(listener, frames, script)
 
 
 class _Page:
     """One page that is open; it keeps nothing, so that closing it changes nothing."""
 
-    def __init__(self, observer: ObserverNode, frames: Frames, script: str) -> None:
-        self._observer = observer
+    def __init__(self, listener: ListenerNode, frames: Frames, script: str) -> None:
+        self._listener = listener
         self._frames = frames
         self._busy = False
-        self._told = 0.0
+        self._newest_event = 0.0
         self._tap_scales: tuple[float, float] | None = None
         with ui.row().classes("w-full items-center"):
-            ui.label(observer.get_namespace()).classes("text-2xl font-bold")
+            ui.label(listener.get_namespace()).classes("text-2xl font-bold")
             self._regime = ui.badge("").classes("text-base")
             self._trouble = ui.label("").classes("text-red-700")
             ui.space()
@@ -144,13 +144,13 @@ class _Page:
         ]
         with _card("Parameters"):
             self._fields = [
-                _ParameterField(self._observer, name, lambda n=name: n) for name in _FIRST
+                _ParameterField(self._listener, name, lambda n=name: n) for name in _FIRST
             ]
             chosen = ui.select(
                 [name for name in others if name not in _FIRST], label="another parameter"
             )
             chosen.classes("w-full").props("dense")
-            self._fields.append(_ParameterField(self._observer, "value", lambda: chosen.value))
+            self._fields.append(_ParameterField(self._listener, "value", lambda: chosen.value))
 
     def _add_health(self) -> None:
         columns = [
@@ -162,14 +162,14 @@ class _Page:
             self._health.classes("w-full").props("wrap-cells flat dense")
 
     def _refresh(self) -> None:
-        observer, drive = self._observer, self._frames.drive
+        listener, drive = self._listener, self._frames.drive
         units = Units.for_drive(drive)
         for topic, label in self._measures.items():
-            values = observer.cycles[topic]
+            values = listener.cycles[topic]
             unit = {AMPLITUDE: "m", FREQUENCY: "Hz"}.get(topic, "")
             largest = max(values, default=0.0)
             label.set_text(units.text(values[-1] if values else None, unit, largest=largest))
-        self._show_regime(observer.health["analyzer"])
+        self._show_regime(listener.health["analyzer"])
         self._trouble.set_text(", ".join(self._missing()))
         scales = (drive.normal_force, drive.natural_period) if drive is not None else None
         if scales is not None and scales != self._tap_scales:
@@ -182,20 +182,20 @@ class _Page:
                 field.props["label"] = label
         for field in self._fields:
             field.refresh(units)
-        self._show_control(observer.health[_CONTROLLER])
-        rows = [_row(node, health) for node, health in sorted(observer.health.items())]
+        self._show_control(listener.health[_CONTROLLER])
+        rows = [_row(node, health) for node, health in sorted(listener.health.items())]
         if rows != self._health.rows:
             self._health.rows = rows
-        events = [event for event in list(observer.events) if event[0] > self._told]
+        events = [event for event in list(listener.events) if event[0] > self._newest_event]
         for when, what in events:
             self._events.push(f"{time.strftime('%H:%M:%S', time.localtime(when))} {what}")
-            self._told = when
+            self._newest_event = when
 
     def _missing(self) -> list[str]:
         """Say which nodes of the loop are not heard."""
         return [
             f"{node} {health.state}"
-            for node, health in self._observer.health.items()
+            for node, health in self._listener.health.items()
             if health.state == SILENT or (health.state == ABSENT and node != _CONTROLLER)
         ]
 
@@ -220,19 +220,19 @@ class _Page:
     def _switch_control(self, event: GenericEventArguments) -> Awaitable[None] | None:
         """Take what the person asked for from the event: a refresh may set the switch back."""
         active = bool(event.args)
-        if self._busy or active == (self._observer.health[_CONTROLLER].state == "active"):
+        if self._busy or active == (self._listener.health[_CONTROLLER].state == "active"):
             return None
         self._busy = True
         self._switch.set_value(active)
         return self._pursue_control(active)
 
     async def _pursue_control(self, active: bool) -> None:
-        observer = self._observer
+        listener = self._listener
         try:
-            await _report(observer.set_active(_CONTROLLER, active), self._switch_refusal)
+            await _report(listener.set_active(_CONTROLLER, active), self._switch_refusal)
             deadline = time.monotonic() + _STATE_TIMEOUT
             while time.monotonic() < deadline:
-                if active == (observer.health[_CONTROLLER].state == "active"):
+                if active == (listener.health[_CONTROLLER].state == "active"):
                     break
                 await asyncio.sleep(_REFRESH)
         finally:
@@ -243,10 +243,10 @@ class _Page:
         if force is None or duration is None:
             self._act_refusal.set_text("a tap needs a force and a time")
             return
-        await _report(self._observer.tap(force, duration), self._act_refusal)
+        await _report(self._listener.tap(force, duration), self._act_refusal)
 
     async def _reset(self) -> None:
-        await _report(self._observer.reset(), self._act_refusal)
+        await _report(self._listener.reset(), self._act_refusal)
 
     def _show_window(self, event: Any) -> None:
         ui.run_javascript(f"stickslip.periods = {int(event.value)}; stickslip.fit()")
@@ -256,10 +256,10 @@ class _ParameterField:
     """A field for the value of a parameter, with the one in force, and why another was refused."""
 
     def __init__(
-        self, observer: ObserverNode, label: str, name_of: Callable[[], str | None]
+        self, listener: ListenerNode, label: str, name_of: Callable[[], str | None]
     ) -> None:
         """Add the field; `name_of` returns which parameter it is for, as NODE.PARAMETER."""
-        self._observer = observer
+        self._listener = listener
         self._name_of = name_of
         self._hint = ""
         self._field = ui.input(label).classes("w-full").props("dense")
@@ -287,14 +287,14 @@ class _ParameterField:
             self._refusal.set_text(f"{text!r} is not a number")
             return
         node, _, name = full_name.partition(".")
-        await _report(self._observer.set_parameter(node, name, value), self._refusal)
+        await _report(self._listener.set_parameter(node, name, value), self._refusal)
 
     def _in_force(self, units: Units) -> str:
         full_name = self._name_of()
         if full_name is None:
             return ""
         node, _, name = full_name.partition(".")
-        value = self._observer.parameters[node].get(name)
+        value = self._listener.parameters[node].get(name)
         unit = units.of_unit(known_parameters(NODE_PARAMETERS[node])[name].unit or "")
         number = f"{value:g}" if isinstance(value, float) else value
         return "not known" if value is None else f"now {number} {unit}".rstrip()
@@ -319,7 +319,7 @@ def _refusal() -> ui.label:
 
 
 def _row(node: str, health: Health) -> dict[str, str]:
-    level = _LEVELS[min(health.level, 3)] if health.heard else ""
+    level = _LEVELS[min(health.level, 3)] if health.heard_at else ""
     return {
         "node": node,
         "state": health.state,

@@ -17,7 +17,7 @@ from rclpy.task import Future
 
 from stickslip_ros.app.dashboard import DEFAULT_PORT
 from stickslip_ros.app.dashboard.frames import Frames
-from stickslip_ros.app.dashboard.listener import ObserverNode
+from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.app.dashboard.page import add_page
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.base.domain_ports import LARGEST_PORT
@@ -37,14 +37,14 @@ def serve(namespace: str, port: int | None, reach: str) -> None:
         signal.signal(signal.SIGHUP, _exit)
     initialise()
     try:
-        observer = ObserverNode(
+        listener = ListenerNode(
             namespace, lambda states, forces, dropped: frames.feed(states, forces, dropped)
         )
-        frames = Frames(observer)
-        with _running(observer):
+        frames = Frames(listener)
+        with _running(listener):
             app = FastAPI(openapi_url=None)
             _keep_others_out(app)
-            add_page(app, observer, frames)
+            add_page(app, listener, frames)
             ui.run_with(app, title=f"stickslip {namespace}", show_welcome_message=False)
             host, port = listening.getsockname()
             print(f"dashboard of {namespace}, {reach}: http://{host}:{port}", file=sys.stderr)
@@ -91,7 +91,7 @@ def _listen(port: int | None) -> socket.socket:
 
 
 @contextmanager
-def _running(node: ObserverNode) -> Generator[None]:
+def _running(node: ListenerNode) -> Generator[None]:
     """Run a node in a thread of its own."""
     executor = EventsExecutor()
     executor.add_node(node)

@@ -1,13 +1,14 @@
 """Publishers of a topic that is meant to have one."""
 
 from collections import Counter
+from typing import Any
 
 from rclpy.node import Node
 
 from stickslip_ros.messages.topics import Topic
 
 
-def rivals(node: Node, *topics: Topic) -> list[str]:
+def duplicate_publishers(node: Node, *topics: Topic[Any]) -> list[str]:
     """Return a sentence for each topic that several publishers share, with all their nodes.
 
     One that was killed counts until the middleware gives it up.

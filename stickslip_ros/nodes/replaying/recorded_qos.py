@@ -1,7 +1,6 @@
-"""How a recorded topic is offered again: its message type and its quality of service."""
+"""How a recorded topic is published again: its message class and its quality of service."""
 
 from collections.abc import Mapping
-from importlib import import_module
 from typing import Any, TypeVar
 
 from rclpy.duration import Duration
@@ -18,6 +17,7 @@ from stickslip_ros.bags.definitions import message_definition
 from stickslip_ros.bags.metadata import offered_profiles
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.topics import DEEP
+from stickslip_ros.nodes.base.qos import message_class
 from stickslip_ros.stamps import NANOSECONDS
 
 PolicyT = TypeVar("PolicyT", bound=QoSPolicyEnum)
@@ -27,22 +27,21 @@ _LONGEST = 2**63 - 1
 _DEEPEST = 100_000
 
 
-def message_type(type_name: str) -> Any:
+def installed_message_class(type_name: str) -> Any:
     """Return the class of a message type such as `sensor_msgs/msg/JointState`.
 
     Raises BagError for a type that is not installed.
     """
     message_definition(type_name)  # what has none is no message, and must not be imported
-    package, _, name = type_name.partition("/msg/")
     try:
-        return getattr(import_module(f"{package}.msg"), name)
+        return message_class(type_name)
     except (ImportError, AttributeError) as error:
         raise BagError(
             f"the message type '{type_name}' is not installed for Python: {error}"
         ) from error
 
 
-def offered_profile(recorded: str) -> QoSProfile:
+def recorded_profile(recorded: str) -> QoSProfile:
     """Return the quality of service with which a topic was offered, from YAML as rosbag2 keeps it.
 
     History is no matter between writer and reader: it is deep, but for a topic that latches, of

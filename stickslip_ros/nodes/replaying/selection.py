@@ -1,4 +1,4 @@
-"""What of a bag is to be replayed: which topics, how they are offered, and which messages."""
+"""What of a bag is to be replayed: which topics, how they are published, and which messages."""
 
 from collections.abc import Iterator
 from math import inf
@@ -12,21 +12,22 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.topics import CLOCK, JOINT_STATES, RECORDED
-from stickslip_ros.nodes.replaying.player import JITTER, Message, Timeline
-from stickslip_ros.nodes.replaying.recorded_qos import message_type, offered_profile
+from stickslip_ros.nodes.replaying.player import Message
+from stickslip_ros.nodes.replaying.recorded_qos import installed_message_class, recorded_profile
+from stickslip_ros.nodes.replaying.timeline import JITTER, Timeline
 from stickslip_ros.printable import printable
 from stickslip_ros.scenarios.parameters import ReplayParameters
 from stickslip_ros.stamps import NANOSECONDS
 
 
-class Offer(NamedTuple):
-    """How a topic is offered."""
+class ReplayedTopic(NamedTuple):
+    """How a topic is published."""
 
-    message_type: Any
-    profile: QoSProfile
+    message_class: Any
+    qos: QoSProfile
 
 
-class Excerpt:
+class Selection:
     """The part of a bag that is to be replayed.
 
     Its start and duration count recorded time as it passes in the replay, from the bag's first
@@ -41,8 +42,8 @@ class Excerpt:
         Raises BagError for what is no bag or holds nothing that can be replayed, and
         InvalidInputError that names `source` and the parameter that asks for what the bag has not.
         """
-        self.offers: dict[str, Offer] = {}
-        """By topic."""
+        self.topics: dict[str, ReplayedTopic] = {}
+        """By name."""
         self.left_out: list[str] = []
         """Topics that cannot be replayed, and why, in sentences."""
         self.lacking: list[str] = []
@@ -57,7 +58,7 @@ class Excerpt:
                 raise BagError(f"the bag {recording.path} holds no messages")
             self.first: int = first[1]
             """Log time of the bag's first message, ns."""
-            self._find_offers(recording)
+            self._find_topics(recording)
             self._check_part(recording)
             self.length = self._known_length(recording)
             """Recorded time from start to end, s; infinite where no account of the bag tells it."""
@@ -71,7 +72,7 @@ class Excerpt:
     def _part(self, recording: Recording) -> Iterator[Message]:
         begin = round(self._parameters.start * NANOSECONDS)
         end = begin + self._parameters.duration * NANOSECONDS
-        for (topic, log_time, data), elapsed, newest in self._timed(recording, *self.offers):
+        for (topic, log_time, data), elapsed, newest in self._timed(recording, *self.topics):
             if newest >= end + JITTER:
                 return
             # An empty message cannot be delivered, and Fast DDS would hold back what follows it.
@@ -87,7 +88,7 @@ class Excerpt:
             elapsed = max(timeline.elapsed_at(message[1]), 0)
             yield message, elapsed, timeline.elapsed_at(timeline.now)
 
-    def _find_offers(self, recording: Recording) -> None:
+    def _find_topics(self, recording: Recording) -> None:
         asked = self._parameters.topics
         if any(topic not in recording.topics for topic in asked):
             known = ", ".join(sorted(recording.topics))
@@ -97,13 +98,14 @@ class Excerpt:
         for topic in asked or self._worth_replaying(recording):
             try:
                 validate_full_topic_name(topic)
-                kind = message_type(recording.topics[topic])
+                kind = installed_message_class(recording.topics[topic])
             except (BagError, InvalidTopicNameException) as error:
                 reason = str(error).splitlines()[0]
                 self.left_out.append(printable(f"{topic} is left out: {reason}"))
             else:
-                self.offers[topic] = Offer(kind, offered_profile(recording.offered_qos(topic)))
-        if not self.offers:
+                qos = recorded_profile(recording.offered_qos(topic))
+                self.topics[topic] = ReplayedTopic(kind, qos)
+        if not self.topics:
             reasons = "; ".join(self.left_out)
             raise BagError(f"no topic of the bag {recording.path} can be replayed: {reasons}")
 
@@ -121,7 +123,7 @@ class Excerpt:
         length = max(elapsed for _, elapsed, _ in self._timed(recording, *recording.topics))
         raise self._refused(
             f"start = {self._parameters.start} s, duration = {self._parameters.duration} s",
-            f"nothing was recorded then on {', '.join(self.offers)}; "
+            f"nothing was recorded then on {', '.join(self.topics)}; "
             f"the bag {recording.path} is {length * 1e-9:g} s long",
         )
 

@@ -5,8 +5,8 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.parameter import Parameter
 
-from stickslip_ros.app.dashboard import listener as observer_module
-from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, ObserverNode
+from stickslip_ros.app.dashboard import listener as listener_module
+from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, ListenerNode
 from stickslip_ros.messages.topics import (
     AMPLITUDE,
     APPLIED_DISTURBANCE,
@@ -51,8 +51,8 @@ def shown() -> Shown:
 
 
 @pytest.fixture
-def observer(graph: Graph, shown: Shown) -> ObserverNode:
-    node = ObserverNode("/test", shown.take, context=graph.context)
+def observer(graph: Graph, shown: Shown) -> ListenerNode:
+    node = ListenerNode("/test", shown.take, context=graph.context)
     graph.adopt(node)
     return node
 
@@ -62,7 +62,7 @@ def outcome(graph: Graph, answer: Answer) -> str:
     return answer.result()
 
 
-def run_loop(graph: Graph, observer: ObserverNode, **plant: object) -> None:
+def run_loop(graph: Graph, observer: ListenerNode, **plant: object) -> None:
     """Let all three run, until the observer has heard of them all and knows their parameters."""
     graph.add(AnalyzerNode)
     graph.add(WashoutControllerNode)
@@ -77,7 +77,7 @@ def run_loop(graph: Graph, observer: ObserverNode, **plant: object) -> None:
 
 
 def test_it_hears_states_forces_and_cycles(
-    graph: Graph, observer: ObserverNode, shown: Shown
+    graph: Graph, observer: ListenerNode, shown: Shown
 ) -> None:
     assert {health.state for health in observer.health.values()} == {ABSENT}
     run_loop(graph, observer, pace="lockstep", rate=50.0, expects_control=False)
@@ -93,7 +93,7 @@ def test_it_hears_states_forces_and_cycles(
 
 
 def test_a_value_is_taken_or_refused_with_the_reason_of_the_node(
-    graph: Graph, observer: ObserverNode
+    graph: Graph, observer: ListenerNode
 ) -> None:
     run_loop(graph, observer)
     assert observer.parameters["plant"]["belt_speed"] == 0.2
@@ -105,14 +105,14 @@ def test_a_value_is_taken_or_refused_with_the_reason_of_the_node(
     assert "rate cannot be changed" in outcome(graph, observer.set_parameter("plant", "rate", 1.0))
 
 
-def test_what_others_set_is_noticed(graph: Graph, observer: ObserverNode) -> None:
+def test_what_others_set_is_noticed(graph: Graph, observer: ListenerNode) -> None:
     plant = graph.add(PlantNode, pace="realtime", expects_control=False)
     graph.wait_until(lambda: observer.parameters["plant"], "the plant's parameters")
     plant.set_parameters([Parameter("damping", value=0.5)])
     graph.wait_until(lambda: observer.parameters["plant"]["damping"] == 0.5, "the new value")
 
 
-def test_the_controller_is_switched_off_and_on(graph: Graph, observer: ObserverNode) -> None:
+def test_the_controller_is_switched_off_and_on(graph: Graph, observer: ListenerNode) -> None:
     run_loop(graph, observer)
     for active, state in ((False, "inactive"), (True, "active")):
         assert not outcome(graph, observer.set_active("washout_controller", active))
@@ -124,7 +124,7 @@ def test_the_controller_is_switched_off_and_on(graph: Graph, observer: ObserverN
     ]
 
 
-def test_reset_puts_the_motion_back(graph: Graph, observer: ObserverNode, shown: Shown) -> None:
+def test_reset_puts_the_motion_back(graph: Graph, observer: ListenerNode, shown: Shown) -> None:
     run_loop(graph, observer, expects_control=False, **{"initial.position": 0.5})
     graph.wait_until(lambda: abs(shown.position[-1] - 0.5) > 0.05, "the slide has moved")
     before = len(shown.position)
@@ -134,7 +134,7 @@ def test_reset_puts_the_motion_back(graph: Graph, observer: ObserverNode, shown:
 
 @pytest.mark.parametrize("pace", ["realtime", "lockstep"])
 def test_a_tap_lasts_for_its_simulated_time_and_ends(
-    graph: Graph, observer: ObserverNode, pace: str
+    graph: Graph, observer: ListenerNode, pace: str
 ) -> None:
     applied = graph.listen(APPLIED_DISTURBANCE)
     run_loop(graph, observer, pace=pace, rate=1000.0)
@@ -146,7 +146,7 @@ def test_a_tap_lasts_for_its_simulated_time_and_ends(
     assert end - begin > 0.15  # at most what was under way when it began
 
 
-def test_a_tap_that_nobody_feels_is_said(graph: Graph, observer: ObserverNode) -> None:
+def test_a_tap_that_nobody_feels_is_said(graph: Graph, observer: ListenerNode) -> None:
     assert outcome(graph, observer.tap(1.0, 0.1)) == "nobody listens to /test/disturbance_force"
 
 
@@ -154,14 +154,14 @@ def test_a_tap_that_nobody_feels_is_said(graph: Graph, observer: ObserverNode) -
     ("force", "duration"), [(float("nan"), 1.0), (float("inf"), 1.0), (1.0, 0.0), (1.0, 1e300)]
 )
 def test_an_impossible_tap_is_refused(
-    graph: Graph, observer: ObserverNode, force: float, duration: float
+    graph: Graph, observer: ListenerNode, force: float, duration: float
 ) -> None:
     refusal = outcome(graph, observer.tap(force, duration))
     assert refusal.startswith("a tap needs a finite force and a time above 0, at most")
 
 
 def test_a_node_that_was_started_again_at_once_is_asked_again(
-    graph: Graph, observer: ObserverNode
+    graph: Graph, observer: ListenerNode
 ) -> None:
     first = graph.add(PlantNode, pace="realtime", expects_control=False, damping=0.1)
     graph.wait_until(
@@ -177,9 +177,9 @@ def test_a_node_that_was_started_again_at_once_is_asked_again(
 
 
 def test_health_is_kept_of_few_whatever_somebody_publishes(
-    graph: Graph, observer: ObserverNode
+    graph: Graph, observer: ListenerNode
 ) -> None:
-    publisher = graph.observer.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, 100)
+    publisher = graph.observer.create_publisher(DiagnosticArray, DIAGNOSTICS.name, 100)
     statuses = [DiagnosticStatus(name=f"/test/<b>{number}</b>") for number in range(200)]
     message = DiagnosticArray(status=[*statuses, DiagnosticStatus(name="/test/plant")])
     message.status[-1].message = "the last of them"
@@ -192,7 +192,7 @@ def test_health_is_kept_of_few_whatever_somebody_publishes(
     assert len(observer.health) == 50
 
 
-def test_a_push_ends_with_the_observer(graph: Graph, observer: ObserverNode) -> None:
+def test_a_push_ends_with_the_observer(graph: Graph, observer: ListenerNode) -> None:
     applied = graph.listen(APPLIED_DISTURBANCE)
     run_loop(graph, observer)
     assert not outcome(graph, observer.tap(0.05, 1e6))
@@ -202,16 +202,16 @@ def test_a_push_ends_with_the_observer(graph: Graph, observer: ObserverNode) -> 
 
 
 def test_a_node_that_is_not_there_does_not_answer(
-    graph: Graph, observer: ObserverNode, monkeypatch: pytest.MonkeyPatch
+    graph: Graph, observer: ListenerNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(observer_module, "_ANSWER_TIMEOUT", 0.3)
+    monkeypatch.setattr(listener_module, "_ANSWER_TIMEOUT", 0.3)
     assert outcome(graph, observer.reset()) == "plant does not answer"
 
 
 def test_a_node_that_falls_silent_and_comes_back_is_shown_as_that(
-    graph: Graph, observer: ObserverNode, monkeypatch: pytest.MonkeyPatch
+    graph: Graph, observer: ListenerNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(observer_module, "SILENCE", 1.0)
+    monkeypatch.setattr(listener_module, "SILENCE", 1.0)
     plant = graph.add(PlantNode, pace="realtime", expects_control=False)
     graph.wait_until(lambda: observer.health["plant"].state == "active", "the plant")
     graph.executor.remove_node(plant)

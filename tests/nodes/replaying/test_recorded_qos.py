@@ -13,7 +13,8 @@ from sensor_msgs.msg import JointState
 from stickslip_ros.bags.recorder import QosProfile
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.topics import DEEP, JOINT_STATES
-from stickslip_ros.nodes.replaying.recorded_qos import message_type, offered_profile
+from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.nodes.replaying.recorded_qos import installed_message_class, recorded_profile
 
 # As rosbag2 keeps them: names since Iron, numbers before; `unknown` is what Fast DDS tells.
 NUMBERS = """
@@ -48,8 +49,8 @@ LATCHED = "- {durability: transient_local, depth: 1, history: keep_last, reliabi
 
 
 def test_names_and_numbers_say_the_same() -> None:
-    profile = offered_profile(NAMES)
-    assert offered_profile(NUMBERS) == profile
+    profile = recorded_profile(NAMES)
+    assert recorded_profile(NUMBERS) == profile
     assert profile.reliability is ReliabilityPolicy.BEST_EFFORT
     assert profile.durability is DurabilityPolicy.VOLATILE
     assert profile.liveliness is LivelinessPolicy.AUTOMATIC
@@ -58,18 +59,18 @@ def test_names_and_numbers_say_the_same() -> None:
 
 
 def test_our_own_profile_comes_back() -> None:
-    ours = JOINT_STATES.qos()
-    profile = offered_profile(QosProfile(depth=JOINT_STATES.depth).to_yaml())
+    ours = qos_profile(JOINT_STATES)
+    profile = recorded_profile(QosProfile(depth=JOINT_STATES.depth).to_yaml())
     for policy in ("history", "depth", "reliability", "durability"):
         assert getattr(profile, policy) == getattr(ours, policy)
 
 
 def test_no_depth_is_too_deep_for_the_middleware() -> None:
-    assert offered_profile(f"- {{history: keep_last, depth: {2**40}}}").depth == 100_000
+    assert recorded_profile(f"- {{history: keep_last, depth: {2**40}}}").depth == 100_000
 
 
 def test_a_latched_topic_keeps_what_it_kept() -> None:
-    profile = offered_profile(LATCHED)
+    profile = recorded_profile(LATCHED)
     assert profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
     assert profile.depth == 1
 
@@ -92,7 +93,7 @@ def test_a_latched_topic_keeps_what_it_kept() -> None:
     ],
 )
 def test_where_nothing_can_be_taken_over_the_topic_is_reliable(recorded: str) -> None:
-    assert offered_profile(recorded) == QoSProfile(
+    assert recorded_profile(recorded) == QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=DEEP,
         reliability=ReliabilityPolicy.RELIABLE,
@@ -102,7 +103,7 @@ def test_where_nothing_can_be_taken_over_the_topic_is_reliable(recorded: str) ->
 
 
 def test_a_type_is_found_by_its_name() -> None:
-    assert message_type("sensor_msgs/msg/JointState") is JointState
+    assert installed_message_class("sensor_msgs/msg/JointState") is JointState
 
 
 @pytest.mark.parametrize(
@@ -110,4 +111,4 @@ def test_a_type_is_found_by_its_name() -> None:
 )
 def test_a_type_that_is_not_installed_is_refused(name: str) -> None:
     with pytest.raises(BagError, match="message type"):
-        message_type(name)
+        installed_message_class(name)

@@ -9,8 +9,8 @@ from mcap.writer import Writer
 from stickslip_ros.bags.recorder import QosProfile, Recorder
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.codec import pack_header
-from stickslip_ros.nodes.replaying.player import JITTER
-from stickslip_ros.nodes.replaying.selection import Excerpt
+from stickslip_ros.nodes.replaying.selection import Selection
+from stickslip_ros.nodes.replaying.timeline import JITTER
 from stickslip_ros.scenarios.parameters import ReplayParameters
 
 SECOND = 1_000_000_000
@@ -39,13 +39,13 @@ def record(bag: Path, *messages: tuple[str, float]) -> str:
     return str(bag)
 
 
-def excerpt(bag: str, **parameters: object) -> Excerpt:
-    return Excerpt(ReplayParameters.validated({"bag": bag, **parameters}, "/replay"), "/replay")
+def selection(bag: str, **parameters: object) -> Selection:
+    return Selection(ReplayParameters.validated({"bag": bag, **parameters}, "/replay"), "/replay")
 
 
 def heard(bag: str, **parameters: object) -> list[tuple[str, float]]:
     """Return topic and log time (s) of what is to be replayed."""
-    messages = excerpt(bag, **parameters).messages()
+    messages = selection(bag, **parameters).messages()
     return [(topic, log_time / SECOND) for topic, log_time, _ in messages]
 
 
@@ -56,9 +56,9 @@ def test_a_part_begins_and_ends_at_recorded_times(tmp_path: Path) -> None:
     assert heard(bag, start=2.0, duration=3.0) == run[4:10]
     assert heard(bag, start=2.5, duration=1.0, topics=[FORCES]) == [(FORCES, 8.0)]
     assert heard(bag, start=2.0, duration=1e300) == run[4:]
-    assert excerpt(bag).length == 9.0
-    assert excerpt(bag, start=2.0).length == 7.0
-    assert excerpt(bag, start=2.0, duration=3.0).length == 3.0
+    assert selection(bag).length == 9.0
+    assert selection(bag, start=2.0).length == 7.0
+    assert selection(bag, start=2.0, duration=3.0).length == 3.0
 
 
 def test_what_comes_late_still_belongs_to_the_part(tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_the_first_message_need_not_be_the_earliest(tmp_path: Path) -> None:
     assert heard(bag) == run
     assert heard(bag, duration=1.0) == [*run[:2], run[3]]
     assert heard(bag, start=0.5) == run[2:]
-    assert excerpt(bag).length == 2.0
+    assert selection(bag).length == 2.0
 
 
 def test_a_segment_of_earlier_log_times_follows_the_one_before(tmp_path: Path) -> None:
@@ -84,16 +84,16 @@ def test_a_segment_of_earlier_log_times_follows_the_one_before(tmp_path: Path) -
     assert heard(bag) == run
     assert heard(bag, start=1.0, duration=3.0) == run[1:4]
     assert heard(bag, start=4.0) == run[4:]
-    assert excerpt(bag).length == inf
+    assert selection(bag).length == inf
     with pytest.raises(InvalidInputError, match="is 5 s long"):
-        excerpt(bag, start=6.0)
+        selection(bag, start=6.0)
 
 
 def test_what_only_the_living_say_is_left_out_unless_asked_for(tmp_path: Path) -> None:
     bag = record(tmp_path / "bag", (STATES, 1.0), (RECORDED, 1.0))
-    assert set(excerpt(bag).offers) == set(TYPES) - {RECORDED}
-    assert set(excerpt(bag, clock=True).offers) == set(TYPES) - {RECORDED, "/clock"}
-    assert set(excerpt(bag, topics=[RECORDED]).offers) == {RECORDED}
+    assert set(selection(bag).topics) == set(TYPES) - {RECORDED}
+    assert set(selection(bag, clock=True).topics) == set(TYPES) - {RECORDED, "/clock"}
+    assert set(selection(bag, topics=[RECORDED]).topics) == {RECORDED}
 
 
 def foreign_bag(file: Path, types: dict[str, str]) -> str:
@@ -110,21 +110,21 @@ def foreign_bag(file: Path, types: dict[str, str]) -> str:
 
 def test_what_cannot_be_published_is_left_out_with_the_reason(tmp_path: Path) -> None:
     types = {STATES: TYPES[STATES], "/thing": "nosuch_msgs/msg/Thing", "/a b": TYPES[FORCES]}
-    part = excerpt(foreign_bag(tmp_path / "bag.mcap", types))
-    assert part.offers.keys() == {STATES}
+    part = selection(foreign_bag(tmp_path / "bag.mcap", types))
+    assert part.topics.keys() == {STATES}
     assert [topic for topic, _, _ in part.messages()] == [STATES]
     thing, name = sorted(part.left_out, reverse=True)
     assert "/thing is left out: the message type 'nosuch_msgs/msg/Thing' is not installed" in thing
     assert "/a b is left out" in name
     del types[STATES]
     with pytest.raises(BagError, match=r"no topic of the bag .* can be replayed: .*nosuch_msgs"):
-        excerpt(foreign_bag(tmp_path / "other.mcap", types))
+        selection(foreign_bag(tmp_path / "other.mcap", types))
 
 
 def test_what_the_bag_lacks_is_known_when_it_was_read(tmp_path: Path) -> None:
     bag = record(tmp_path / "bag", (STATES, 1.0), (STATES, 2.0))
     (tmp_path / "bag" / "metadata.yaml").unlink()
-    part = excerpt(bag)
+    part = selection(bag)
     assert len(list(part.messages())) == 2
     assert "metadata.yaml" in " ".join(part.lacking)
 
@@ -147,11 +147,11 @@ def test_what_cannot_be_is_refused(
 ) -> None:
     bag = record(tmp_path / "bag", (STATES, 1.0), (STATES, 2.0), (STATES, 5.0))
     with pytest.raises(InvalidInputError) as refusal:
-        excerpt(**{"bag": bag, **parameters})
+        selection(**{"bag": bag, **parameters})
     for text in named:
         assert text in str(refusal.value)
 
 
 def test_an_empty_bag_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="no messages"):
-        excerpt(record(tmp_path / "bag"))
+        selection(record(tmp_path / "bag"))

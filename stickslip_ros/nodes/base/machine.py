@@ -1,0 +1,109 @@
+"""What ROS needs of this machine: a domain with free ports, the clock, the loopback, memory."""
+
+import os
+import re
+import socket
+import time
+from datetime import UTC, datetime
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.nodes.base.domain_ports import (
+    DISCOVERY,
+    FIRST_PROCESS,
+    LARGEST_PORT,
+    MOST_PROCESSES,
+    is_free,
+    port,
+)
+from stickslip_ros.nodes.base.network import TRANSPORTS, is_fast_dds, is_kept_on_loopback
+from stickslip_ros.nodes.base.shared_memory import SHARED_MEMORY, free_shared_memory
+from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
+
+_DOMAIN = "ROS_DOMAIN_ID"
+_LARGEST_DOMAIN = 232
+_DECIMAL = re.compile(r"0|[1-9][0-9]{0,20}")
+_DISCOVERY_ADDRESSES = ("127.0.0.1", "239.255.0.1")
+"""On which Fast DDS listens where it is kept on this machine."""
+_WITHOUT_SHARED_MEMORY = ("", "NONE", "UDPv4", "UDPv6")
+_LEAST_SHARED_MEMORY = 1 << 20
+"""Bytes that a process of Fast DDS takes at most, rounded up."""
+_ECHO_TIMEOUT = 1.0
+
+
+def check_machine(domain: int) -> None:
+    """Raise InvalidInputError where nodes could not live: for the clock, the network, the domain.
+
+    What the middleware itself says of these is no sentence, or nothing.
+    """
+    now = time.time_ns()
+    if not 0 < now < END_OF_TIME:
+        year = datetime.fromtimestamp(now / NANOSECONDS, UTC).year
+        raise InvalidInputError(
+            f"the clock of this machine says {year}: the stamps of ROS messages reach from 1970 "
+            "to January 2038"
+        )
+    if is_kept_on_loopback() and not _reaches_itself():
+        raise InvalidInputError(
+            "the loopback interface of this machine is down, and nodes that are kept on it need "
+            "that: ip link set lo up"
+        )
+    if is_fast_dds():
+        _check_ports(domain)
+        _check_shared_memory()
+
+
+def _check_ports(domain: int) -> None:
+    shared = port(domain, DISCOVERY)
+    for address in _DISCOVERY_ADDRESSES if is_kept_on_loopback() else ("",):
+        if not is_free(shared, address, shared=True):
+            raise InvalidInputError(
+                f"UDP port {shared}, by which the nodes of {_DOMAIN} = {domain} find each other, "
+                "is taken by another program: end that, or choose another domain"
+            )
+    own = range(port(domain, FIRST_PROCESS), LARGEST_PORT, 2)[:MOST_PROCESSES]
+    if not any(is_free(first) and is_free(first + 1) for first in own):
+        raise InvalidInputError(
+            f"{_DOMAIN} = {domain} is refused: of its UDP ports, {own[0]} to {own[-1] + 1}, a node "
+            "needs two that are free, and there are none: choose another domain"
+        )
+
+
+def _check_shared_memory() -> None:
+    transports = os.environ.get(TRANSPORTS, "")
+    if transports in _WITHOUT_SHARED_MEMORY or not SHARED_MEMORY.is_dir():
+        return
+    free = free_shared_memory()
+    if free < _LEAST_SHARED_MEMORY:
+        raise InvalidInputError(
+            f"{TRANSPORTS} = {transports} lets Fast DDS use shared memory, and {SHARED_MEMORY} "
+            f"has {free} bytes free, less than {_LEAST_SHARED_MEMORY}: unset it, or remove what is "
+            "left there"
+        )
+
+
+def domain_of_environment() -> int:
+    """Return the domain that the environment says, without which it is 0.
+
+    rcl would take -1 for 0, 1.5 for 1 and 010 for 8. Raises InvalidInputError.
+    """
+    text = os.environ.get(_DOMAIN, "").strip() or "0"
+    if _DECIMAL.fullmatch(text) and int(text) <= _LARGEST_DOMAIN:
+        return int(text)
+    shown = text if _DECIMAL.fullmatch(text) else repr(text)
+    raise InvalidInputError(
+        f"{_DOMAIN} = {shown:.40} is refused: must be an integer from 0 to {_LARGEST_DOMAIN}, "
+        "the last domain that has ports"
+    )
+
+
+def _reaches_itself() -> bool:
+    kind = socket.AF_INET, socket.SOCK_DGRAM
+    with socket.socket(*kind) as reader, socket.socket(*kind) as writer:
+        reader.bind(("127.0.0.1", 0))
+        reader.settimeout(_ECHO_TIMEOUT)
+        try:
+            writer.sendto(b"", reader.getsockname())
+            reader.recv(1)
+        except OSError:
+            return False
+    return True

@@ -1,0 +1,178 @@
+"""ROS parameters of a node, from one model that validates them."""
+
+from collections.abc import Mapping
+from typing import Any, Generic, TypeVar, cast
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.context import Context
+from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.lifecycle import LifecycleNode
+from rclpy.parameter import Parameter
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.nodes.base.ros_errors import RCLError, first_line
+from stickslip_ros.scenarios import parameters
+from stickslip_ros.scenarios.files import LONGEST_NAMESPACE, number_in
+from stickslip_ros.scenarios.parameters import Fixed, NodeParameters, shown
+
+ParametersT = TypeVar("ParametersT", bound=NodeParameters)
+
+_LARGEST_ON_SLIDER = 2**31 - 1
+_OWNED_BY_ROS = ("start_type_description_service",)
+_ROS_TYPES = {
+    bool: Parameter.Type.BOOL,
+    int: Parameter.Type.INTEGER,
+    float: Parameter.Type.DOUBLE,
+    str: Parameter.Type.STRING,
+    list: Parameter.Type.STRING_ARRAY,
+}
+
+
+class ParameterNode(LifecycleNode, Generic[ParametersT]):
+    """A lifecycle node whose parameters are those of a model, and fixed where that says so."""
+
+    def __init__(
+        self,
+        name: str,
+        model: type[ParametersT],
+        *,
+        context: Context | None = None,
+        namespace: str | None = None,
+        overrides: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Declare the parameters: those of the command line, then `overrides` by flat name.
+
+        Raises InvalidInputError for a parameter that is refused.
+        """
+        given = [Parameter(name, value=value) for name, value in (overrides or {}).items()]
+        try:
+            super().__init__(
+                name,
+                context=context,
+                namespace=namespace,
+                parameter_overrides=given,
+                automatically_declare_parameters_from_overrides=True,
+            )
+        except (ParameterException, ValueError) as error:  # an empty list, for one
+            raise InvalidInputError(
+                f"{name}: ROS refuses a parameter (an empty list is to be left out): {error}"
+            ) from None
+        except (NameValidationException, RCLError) as error:
+            raise InvalidInputError(
+                f"{name}: ROS refuses to make the node, maybe because its namespace has more than "
+                f"{LONGEST_NAMESPACE} characters: {first_line(error)}"
+            ) from None
+        self.active = False
+        """Whether the node is in the state active."""
+        self._model = model
+        self._known = parameters.known_parameters(model)
+        self.parameters = self._declare()
+        """The parameters in force."""
+
+    @property
+    def lifecycle_state(self) -> str:
+        """`unconfigured`, `inactive`, `active` or `finalized`, or that of a transition."""
+        return self._state_machine.current_state[1]
+
+    @property
+    def configured(self) -> bool:
+        """Whether the node is in any state but unconfigured."""
+        return self.lifecycle_state != "unconfigured"
+
+    def apply_parameters(self) -> None:
+        """Act on `self.parameters` having changed while the node lives."""
+
+    def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
+        """Set each parameter by itself."""
+        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set all parameters or none; what is refused is named, with what is allowed.
+
+        Whole numbers are taken where numbers are declared, as parameter files and -p do, and text
+        that is a number: `ros2 param load` sends inf and 1e-05 in no other way. It also sends back
+        what ROS keeps to itself, which may be as it is.
+        """
+        given = {parameter.name: parameter for parameter in parameter_list}
+        owned = [
+            parameter
+            for name, parameter in given.items()
+            if name in _OWNED_BY_ROS and parameter.value != self.get_parameter(name).value
+        ]
+        values = {n: self._as_meant(n, p.value) for n, p in given.items() if n not in _OWNED_BY_ROS}
+        source = self.get_fully_qualified_name()
+        try:
+            changed = self._model.validated(self.parameters.flat() | values, source)
+            self._check_fixed(values, source)
+        except InvalidInputError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        flat = changed.flat()
+        taken = self._as_ros({name: flat[name] for name in values})
+        result = super().set_parameters_atomically([*owned, *taken])
+        if result.successful:
+            self.parameters = changed
+            self.apply_parameters()
+        return result
+
+    def _declare(self) -> ParametersT:
+        given = {
+            name: cast(Parameter, parameter).value
+            for name, parameter in self.get_parameters_by_prefix("").items()
+            if name not in _OWNED_BY_ROS
+        }
+        validated = self._model.validated(given, self.get_fully_qualified_name())
+        for name, parameter in self._known.items():
+            if name == "use_sim_time":
+                continue  # declared by rclpy
+            if self.has_parameter(name):
+                self.undeclare_parameter(name)
+            self.declare_parameter(
+                name, _ROS_TYPES[parameter.kind], _descriptor(parameter), ignore_override=True
+            )
+        super().set_parameters(self._as_ros(validated.flat()))
+        return validated
+
+    def _check_fixed(self, values: Mapping[str, Any], source: str) -> None:
+        """Refuse to change what must stay in the present state."""
+        present = self.parameters.flat()
+        states = {Fixed.NEVER: False, Fixed.ACTIVE: self.active, Fixed.CONFIGURED: self.configured}
+        for name, value in values.items():
+            fixed = self._known[name].fixed
+            if states[fixed] and value != present[name]:
+                raise InvalidInputError(
+                    f"{source}: {name} = {shown(value)} is refused: {name} cannot be changed while "
+                    f"the node is {fixed}, and is {shown(present[name])}"
+                )
+
+    def _as_meant(self, name: str, value: Any) -> Any:
+        if isinstance(value, str) and name in self._known and self._known[name].kind is float:
+            number = number_in(value)
+            return value if number is None else number
+        return value
+
+    def _as_ros(self, values: Mapping[str, Any]) -> list[Parameter]:
+        return [
+            Parameter(name, _ROS_TYPES[self._known[name].kind], v) for name, v in values.items()
+        ]
+
+
+def _descriptor(parameter: parameters.Parameter) -> ParameterDescriptor:
+    unit = f" [{parameter.unit}]" if parameter.unit else ""
+    descriptor = ParameterDescriptor(
+        name=parameter.name,
+        description=parameter.meaning + unit,
+        additional_constraints=parameter.bounds,
+    )
+    # rqt_reconfigure makes a slider of a range, which fails with an infinite end or a long integer.
+    if parameter.range is not None and parameter.kind is float:
+        least, largest = parameter.range
+        descriptor.floating_point_range = [FloatingPointRange(from_value=least, to_value=largest)]
+    elif parameter.range is not None and parameter.range[1] <= _LARGEST_ON_SLIDER:
+        least, largest = (int(end) for end in parameter.range)
+        descriptor.integer_range = [IntegerRange(from_value=least, to_value=largest)]
+    return descriptor

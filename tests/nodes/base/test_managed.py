@@ -1,0 +1,91 @@
+"""What a node of a user's gets from its base: topics decoded, dropped messages, clean-up."""
+
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.publisher import Publisher
+from std_msgs.msg import Float64, Header
+
+from stickslip_ros.messages.codec import pack_header
+from stickslip_ros.messages.topics import AMPLITUDE, DIAGNOSTICS, RECORDED
+from stickslip_ros.nodes.base.managed import OK, WARN, ManagedNode
+from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.scenarios.parameters import NodeParameters
+from tests.nodes.graph import Graph
+
+
+class Thing:
+    destroyed = False
+
+    def destroy(self) -> None:
+        self.destroyed = True
+
+
+class Listener(ManagedNode[NodeParameters]):
+    def __init__(self, **options: Any) -> None:
+        super().__init__("listener", NodeParameters, **options)
+        self.stamps: list[int] = []
+        self.always: list[int] = []
+        self.amplitudes: list[float] = []
+
+    def connect(self) -> None:
+        self.thing = self.keep(Thing())
+        self.subscribe(RECORDED, self.stamps.append)
+        self.subscribe(RECORDED, self.always.append, while_active=False)
+        self.subscribe(AMPLITUDE, lambda message: self.amplitudes.append(message.data))
+
+
+def writer(graph: Graph, readers: int = 2) -> Publisher:
+    made = graph.observer.create_publisher(Header, RECORDED.name, qos_profile(RECORDED))
+    graph.wait_until(lambda: made.get_subscription_count() == readers, "matched")
+    return made
+
+
+def test_messages_come_decoded_and_unless_asked_for_only_while_active(graph: Graph) -> None:
+    node = graph.add(Listener, autostart=False)
+    node.trigger_configure()
+    publisher = writer(graph)
+    publisher.publish(pack_header(1))
+    graph.wait_until(lambda: node.always == [1], "one comes while inactive")
+    node.trigger_activate()
+    publisher.publish(pack_header(2))
+    graph.wait_until(lambda: node.always == [1, 2], "another while active")
+    assert node.stamps == [2]
+
+
+def test_a_topic_without_a_decoder_gives_the_objects_of_ros(graph: Graph) -> None:
+    node = graph.add(Listener)
+    publisher = graph.observer.create_publisher(Float64, AMPLITUDE.name, 10)
+    graph.wait_until(lambda: publisher.get_subscription_count() and node.active, "matched")
+    publisher.publish(Float64(data=0.25))
+    graph.wait_until(lambda: node.amplitudes == [0.25], "decoded")
+
+
+def test_what_cannot_be_decoded_is_told_until_the_next_activation(graph: Graph) -> None:
+    told: list[DiagnosticArray] = graph.listen(DIAGNOSTICS)
+    node = graph.add(Listener)
+    publisher = writer(graph)
+    graph.wait_until(lambda: node.active, "active")
+    publisher.publish(b"\0\1\0\0")
+    graph.wait_until(lambda: node.diagnose()[0] == WARN, "dropped")
+    node.publish_diagnostics()
+
+    def dropped() -> list[str]:
+        values = [{v.key: v.value for v in array.status[0].values} for array in told]
+        return [figures.get("dropped_messages", "") for figures in values]
+
+    graph.wait_until(lambda: "2" in dropped(), "told, once for each subscription")
+    assert "recorded: a header message" in node.diagnose()[1]
+    node.trigger_deactivate()
+    assert node.diagnose() == (OK, "", {})
+    node.trigger_activate()
+    assert node.diagnose()[2] == {"dropped_messages": 0, "last_dropped": "none"}
+
+
+def test_what_is_kept_goes_at_clean_up(graph: Graph) -> None:
+    node = graph.add(Listener, autostart=False)
+    node.trigger_configure()
+    assert not node.thing.destroyed
+    node.trigger_cleanup()
+    assert node.thing.destroyed
+    assert not [s for s in node.subscriptions if s.topic_name.endswith(RECORDED.name)]
