@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.suggestions import did_you_mean
+from stickslip_ros.text import did_you_mean
 
 _MARKERS = "share/ament_index/resource_index/packages"
 

@@ -10,14 +10,14 @@ from tempfile import TemporaryFile
 from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.printable import printable
 from stickslip_ros.scenarios.files import (
     DEFAULT_NAMESPACE,
     LONGEST_NAMESPACE,
     Scenario,
     load_scenario,
 )
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, known_parameters, shown
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, known_parameters
+from stickslip_ros.text import printable, shown
 from stickslip_ros.versions import versions
 
 _PICTURES = (".png", ".svg", ".pdf")

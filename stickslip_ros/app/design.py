@@ -23,8 +23,8 @@ from stickslip_ros.app.output import print_json, print_table, progress_bar
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.theory.stability_map import StabilityMap
 from stickslip_ros.plots.units import Units
-from stickslip_ros.printable import printable
 from stickslip_ros.studies.design import OWN_SPEED_RANGE, Design, Task, design
+from stickslip_ros.text import printable
 
 HELP = "propose corner frequency and gains that damp the vibration within a force limit"
 

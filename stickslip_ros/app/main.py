@@ -13,7 +13,7 @@ from stickslip_ros.app.optional import interrupts_kept
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.interrupts import raise_interrupts
 from stickslip_ros.streams import nowhere, open_closed_streams
-from stickslip_ros.suggestions import did_you_mean
+from stickslip_ros.text import did_you_mean
 from stickslip_ros.versions import versions
 
 _COMMANDS = (

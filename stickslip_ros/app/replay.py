@@ -9,7 +9,7 @@ from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.arguments import seconds
 from stickslip_ros.app.optional import ros_nodes
 from stickslip_ros.app.output import progress_bar
-from stickslip_ros.printable import printable
+from stickslip_ros.text import printable
 
 HELP = "publish the messages of a bag again, as they were spaced"
 DESCRIPTION = (

@@ -30,9 +30,9 @@ from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed import find_executable
 from stickslip_ros.plots.units import Units
-from stickslip_ros.printable import printable
 from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, Scenario
 from stickslip_ros.scenarios.parameters import Pace, WashoutControllerParameters
+from stickslip_ros.text import printable
 
 _PAGE_TIMEOUT = 5.0
 """Time, s, that a dashboard has to end."""

@@ -22,8 +22,8 @@ from stickslip_ros.bags.mcap_file import McapFile, MessageBlock
 from stickslip_ros.bags.metadata import METADATA_FILE
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import Refused, joint_states_in, wrenches_in
-from stickslip_ros.printable import printable
 from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.text import printable
 
 _PACKED = ".mcap.zstd"
 """Ending of the files that rosbag2 packs as a whole."""

@@ -20,9 +20,8 @@ from stickslip_ros.scenarios.parameters import (
     PlantParameters,
     WashoutControllerParameters,
     parameters_of,
-    shown,
 )
-from stickslip_ros.suggestions import did_you_mean
+from stickslip_ros.text import did_you_mean, shown
 
 DEFAULT_NAMESPACE = "/feed_drive"
 LONGEST_NAMESPACE = 200

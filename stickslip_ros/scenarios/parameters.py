@@ -20,7 +20,7 @@ from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
-from stickslip_ros.suggestions import did_you_mean
+from stickslip_ros.text import did_you_mean, shown
 
 
 class Pace(StrEnum):
@@ -47,7 +47,6 @@ class Fixed(StrEnum):
 
 _SMALLEST, _LARGEST = 1e-30, 1e30
 """Magnitudes, in SI units, between which no product or power in the physics overflows."""
-_LONGEST_SHOWN = 80
 _SHORTEST = 1e-3
 """Shortest time, s, that a node looks at the clock for."""
 
@@ -444,12 +443,6 @@ def parameters_of(model: type[BaseModel], prefix: str = "") -> Iterator[Paramete
             yield from parameters_of(kind, f"{prefix}{name}.")
         else:
             yield _parameter(prefix + name, field)
-
-
-def shown(value: Any) -> str:
-    """Return a value as messages show it, a long one cut."""
-    text = repr(value)
-    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
 
 
 def _parameter(name: str, field: FieldInfo) -> Parameter:

@@ -29,7 +29,8 @@ from stickslip_ros.messages.topics import DIAGNOSTICS, Topic, mismatch, type_nam
 from stickslip_ros.nodes.base.polling import Collecting
 from stickslip_ros.scenarios import parameters
 from stickslip_ros.scenarios.files import LONGEST_NAMESPACE, number_in
-from stickslip_ros.scenarios.parameters import Fixed, NodeParameters, shown
+from stickslip_ros.scenarios.parameters import Fixed, NodeParameters
+from stickslip_ros.text import shown
 
 ParametersT = TypeVar("ParametersT", bound=NodeParameters)
 

@@ -14,9 +14,9 @@ from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.topics import CLOCK, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.replaying.player import JITTER, Message, Timeline
 from stickslip_ros.nodes.replaying.recorded_qos import message_type, offered_profile
-from stickslip_ros.printable import printable
 from stickslip_ros.scenarios.parameters import ReplayParameters
 from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.text import printable
 
 
 class Offer(NamedTuple):
