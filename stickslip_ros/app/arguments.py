@@ -95,6 +95,15 @@ def check_writable(option: str, path: Path) -> None:
 
 
 @contextmanager
+def naming(option: str) -> Generator[None]:
+    """Name in a refusal the option that it is about."""
+    try:
+        yield
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{option} {error}") from None
+
+
+@contextmanager
 def writing(option: str, path: Path) -> Generator[None]:
     """Refuse `path`, given with `option`, if the system does not let it be written."""
     try:

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from stickslip_ros.app.optional import ros_nodes
+from stickslip_ros.app.optional import loading_ros
 from stickslip_ros.app.output import print_figures
 from stickslip_ros.app.run import default_bag, record
 from stickslip_ros.bags import Recording
@@ -41,7 +41,9 @@ def _demonstrate() -> None:
     scenario = load_scenario(_SCENARIO, ["plant.pace=lockstep", f"plant.duration={_DURATION}"])
     switched_on = scenario.washout_controller.start_after
     bag = default_bag(_SCENARIO)
-    reach = ros_nodes("nodes.base.process").keep_on_this_machine(network=False)
+    with loading_ros():
+        from stickslip_ros.nodes.base.process import keep_on_this_machine
+    reach = keep_on_this_machine(network=False)
     print(
         f"{_DURATION:g} s of {_SCENARIO} in lockstep: plant, washout controller and analyzer as "
         f"ROS 2 nodes, {reach}; the controller acts from {switched_on:g} s on"

@@ -6,7 +6,7 @@ import os
 import re
 import sys
 from collections.abc import Sequence
-from importlib import import_module
+from typing import Protocol
 
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.optional import interrupts_kept
@@ -29,13 +29,51 @@ _COMMANDS = (
     "replay",
     "paper",
 )
-"""Each is a module here, imported when it is asked for: some import what takes seconds."""
 
 _NEGATIVE = re.compile(r"-(\.?\d|inf)")
 _LONG_OPTION = re.compile(r"--[\w-]+")
 
 _PASSING_ON = ("run",)
 """Those that pass on to others what follows `--`, in the attribute `further`."""
+
+
+class _Command(Protocol):
+    """A module of a command."""
+
+    @property
+    def HELP(self) -> str: ...  # noqa: N802
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None: ...
+    def run(self, arguments: argparse.Namespace) -> int: ...
+
+
+def _load(name: str) -> _Command:
+    """Import a command, which some do for seconds, when it is asked for."""
+    match name:
+        case "run":
+            from stickslip_ros.app import run as command
+        case "dashboard":
+            from stickslip_ros.app import dashboard as command
+        case "simulate":
+            from stickslip_ros.app import simulate as command
+        case "stability":
+            from stickslip_ros.app import stability as command
+        case "design":
+            from stickslip_ros.app import design as command
+        case "sweep":
+            from stickslip_ros.app import sweep as command
+        case "basin":
+            from stickslip_ros.app import basin as command
+        case "report":
+            from stickslip_ros.app import report as command
+        case "repair":
+            from stickslip_ros.app import repair as command
+        case "replay":
+            from stickslip_ros.app import replay as command
+        case "paper":
+            from stickslip_ros.app import paper as command
+        case _:
+            raise AssertionError(name)
+    return command
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -123,7 +161,7 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in [name for name in _COMMANDS if name in given[:1]] or _COMMANDS:
         with interrupts_kept():
-            command = import_module(f"stickslip_ros.app.{name}")
+            command = _load(name)
         subparser = commands.add_parser(name, help=command.HELP, description=command.HELP)
         command.add_arguments(subparser)
         subparser.set_defaults(run=command.run, parser=subparser)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.arguments import seconds
-from stickslip_ros.app.optional import ros_nodes
+from stickslip_ros.app.optional import loading_ros
 from stickslip_ros.app.output import progress_bar
 from stickslip_ros.text import printable
 
@@ -78,7 +78,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    reach = ros_nodes("nodes.base.process").keep_on_this_machine(arguments.network)
+    with loading_ros():
+        from stickslip_ros.nodes.base.process import keep_on_this_machine
+        from stickslip_ros.nodes.replay import replay_bag
+    reach = keep_on_this_machine(arguments.network)
 
     def offering(topics: Sequence[str]) -> None:
         wait = f"until {', '.join(arguments.wait_for) or 'somebody'} reads them"
@@ -88,5 +91,5 @@ def run(arguments: argparse.Namespace) -> int:
     names = ("rate", "loop", "start", "duration", "topics", "clock", "wait_for")
     parameters = {name: getattr(arguments, name) for name in names} | {"bag": str(arguments.bag)}
     with progress_bar(f"replaying {arguments.bag}", None if arguments.loop else 1.0) as progress:
-        interrupted = ros_nodes("nodes.replay").replay_bag(parameters, offering, progress)
+        interrupted = replay_bag(parameters, offering, progress)
     return INTERRUPTED if interrupted else 0

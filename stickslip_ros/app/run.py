@@ -4,7 +4,7 @@ import argparse
 import shlex
 import subprocess
 import sys
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from datetime import UTC, datetime
 from itertools import count
@@ -22,7 +22,7 @@ from stickslip_ros.app.arguments import (
     seconds,
 )
 from stickslip_ros.app.no_cycle import why_no_cycle
-from stickslip_ros.app.optional import check_dashboard, ros_nodes
+from stickslip_ros.app.optional import check_dashboard, loading_ros
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import check_new_bag
@@ -113,7 +113,9 @@ def run(arguments: argparse.Namespace) -> int:
     check_new_bag(bag)
     if arguments.dashboard:
         check_dashboard()
-    reach = ros_nodes("nodes.base.process").keep_on_this_machine(arguments.network)
+    with loading_ros():
+        from stickslip_ros.nodes.base.process import keep_on_this_machine
+    reach = keep_on_this_machine(arguments.network)
     _tell(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}")
     with _dashboard(namespace) if arguments.dashboard else nullcontext():
         figures, interrupted = record(
@@ -153,9 +155,11 @@ def record(
     """
     duration = scenario.plant.duration
     total = duration if duration < float("inf") else None
+    with loading_ros():
+        from stickslip_ros.running.bringup import run_nodes
     with progress_bar(f"running {scenario.name}", total) as progress:
         try:
-            outcome = ros_nodes("running.bringup").run_nodes(
+            outcome = run_nodes(
                 scenario,
                 namespace=namespace,
                 bag=bag,
@@ -167,7 +171,7 @@ def record(
         except RunError as error:
             raise RunError(f"{error}; {_state_of(bag)}") from None
     try:
-        return _figures(bag, outcome), outcome.interrupted
+        return _figures(bag, outcome.controller, outcome.plant), outcome.interrupted
     except BagError as error:
         if outcome.interrupted:  # before the first sample
             left = f"; {bag} holds nothing" if bag.exists() else ""
@@ -178,6 +182,8 @@ def record(
 @contextmanager
 def _dashboard(namespace: str) -> Generator[None]:
     """Serve the page in a process of its own, which has no part in whether the run succeeds."""
+    from stickslip_ros.nodes.base.child_process import start
+
     command = [
         sys.executable,
         "-m",
@@ -186,7 +192,7 @@ def _dashboard(namespace: str) -> Generator[None]:
         "--namespace",
         namespace,
     ]
-    process = ros_nodes("nodes.base.child_process").start(command)
+    process = start(command)
     try:
         yield
     finally:
@@ -233,11 +239,11 @@ def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
     return [] if arguments.external_controller else None
 
 
-def _figures(bag: Path, outcome: Any) -> dict[str, Any]:
-    report, plant = report_of_bag(bag), outcome.plant
+def _figures(bag: Path, controller: str | None, plant: Mapping[str, str]) -> dict[str, Any]:
+    report = report_of_bag(bag)
     return {
         "bag": str(bag),
-        "controller": outcome.controller,
+        "controller": controller,
         "report": report,
         "samples": report["samples"],
         "lost_samples": report["lost_samples"],

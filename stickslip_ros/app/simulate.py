@@ -13,6 +13,7 @@ from stickslip_ros.app.arguments import (
     add_scenario,
     check_picture,
     made_of,
+    naming,
     scenario_of,
     seconds,
     writing,
@@ -107,7 +108,8 @@ def simulate(
     Raises InvalidInputError for what continuous control does not have.
     """
     if continuous:
-        check_continuous(scenario)
+        with naming("--continuous-control:"):
+            check_continuous(scenario)
     plant, washout = scenario.plant, scenario.washout_controller.as_washout()
     controlled = washout if plant.expects_control else None
     given: Any = {"continuous_control": continuous, "record": True}

@@ -9,11 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from stickslip_ros.app.arguments import made_of, writing
+from stickslip_ros.app.arguments import made_of, naming, writing
 from stickslip_ros.app.output import finite, progress_bar
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.studies.columns import Further, write_csv, write_json
-from stickslip_ros.studies.dask_cluster import dask_executor
+from stickslip_ros.studies.dask_cluster import DaskError, dask_executor
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.runner import run, run_here
 from stickslip_ros.studies.settled import Course
@@ -89,7 +89,10 @@ def done(arguments: argparse.Namespace, study: Study, label: str) -> Generator[J
                 if arguments.dask is None:
                     run_here(journal, arguments.workers, progress)
                 else:
-                    with dask_executor(arguments.dask) as (executor, in_flight):
+                    with (
+                        naming("--dask"),
+                        dask_executor(arguments.dask) as (executor, in_flight),
+                    ):
                         run(journal, executor, in_flight=in_flight, progress=progress)
         except KeyboardInterrupt:
             print(
@@ -100,6 +103,8 @@ def done(arguments: argparse.Namespace, study: Study, label: str) -> Generator[J
             raise
         except OSError as error:
             raise RunError(f"{part or 'temporary file'}: {error.strerror}{kept}") from None
+        except DaskError as error:
+            raise RunError(f"--dask {error}{kept}") from None
         except RunError as error:
             raise RunError(f"{error}{kept}") from None
         yield journal

@@ -13,6 +13,7 @@ from stickslip_ros.app.arguments import (
     add_scenario,
     check_picture,
     made_of,
+    naming,
     scenario_of,
     writing,
 )
@@ -72,7 +73,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    axes = [_axis(text) for text in arguments.over]
+    with naming("--over"):
+        axes = [Axis.parse(text) for text in arguments.over]
     if len(axes) == 1 and arguments.colour != "regime":
         raise InvalidInputError(f"--colour {arguments.colour}: is for maps, of two parameters")
     study = sweep_study(
@@ -105,13 +107,6 @@ def run(arguments: argparse.Namespace) -> int:
             for name, values in theory.items():
                 print(f"{name}: {', '.join(units.texts(values, plan.axes[0].unit))}")
     return 0
-
-
-def _axis(text: str) -> Axis:
-    try:
-        return Axis.parse(text)
-    except InvalidInputError as error:
-        raise InvalidInputError(f"--over {error}") from None
 
 
 def _draw(arguments: argparse.Namespace, journal: Journal) -> None:
