@@ -18,13 +18,8 @@ from stickslip_ros.app.stability import stability
 from stickslip_ros.messages.topics import TOPICS
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.parameters import (
-    NODE_PARAMETERS,
-    NodeParameters,
-    Parameter,
-    ReplayParameters,
-    parameters_of,
-)
+from stickslip_ros.scenarios.parameter import Parameter, parameters_of
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters, ReplayParameters
 
 HERE = Path(__file__).parent
 PAGES = ("parameters.md", "topics.md", "theory.md", "reference.md")

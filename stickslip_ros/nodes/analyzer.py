@@ -42,7 +42,8 @@ from stickslip_ros.nodes.base.polling import take_waiting
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.base.service_call import ask_parameters
 from stickslip_ros.physics.measures.samples import RunMeter
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters, known_parameters
+from stickslip_ros.scenarios.parameter import known_parameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters
 from stickslip_ros.stamps import END_OF_TIME
 from stickslip_ros.text import quantity
 from stickslip_ros.versions import versions

@@ -33,7 +33,8 @@ from stickslip_ros.nodes.plant import FAILURE, FINISHED, NEWEST_STAMP, PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.running.controller_search import find_controllers, find_managed, near_misses
 from stickslip_ros.running.namespace_lock import claim
-from stickslip_ros.scenarios.files import Scenario, parameter_file, section_matches
+from stickslip_ros.scenarios.files import Scenario, parameter_file
+from stickslip_ros.scenarios.sections import section_matches
 from stickslip_ros.stamps import NANOSECONDS
 
 _READY_TIMEOUT = 30.0

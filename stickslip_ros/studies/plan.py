@@ -11,7 +11,8 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, Parameter, known_parameters
+from stickslip_ros.scenarios.parameter import Parameter, known_parameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.text import did_you_mean
 
 MOST_POINTS = 1_000_000_000

@@ -27,9 +27,11 @@ from rclpy.timer import Timer
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.messages.topics import DIAGNOSTICS, Topic, mismatch, type_name
 from stickslip_ros.nodes.base.polling import Collecting
-from stickslip_ros.scenarios import parameters
-from stickslip_ros.scenarios.files import LONGEST_NAMESPACE, number_in
-from stickslip_ros.scenarios.parameters import Fixed, NodeParameters
+from stickslip_ros.scenarios.files import LONGEST_NAMESPACE
+from stickslip_ros.scenarios.parameter import Fixed, known_parameters
+from stickslip_ros.scenarios.parameter import Parameter as OwnParameter
+from stickslip_ros.scenarios.parameters import NodeParameters
+from stickslip_ros.scenarios.ros_yaml import number_in
 from stickslip_ros.text import shown
 
 ParametersT = TypeVar("ParametersT", bound=NodeParameters)
@@ -332,7 +334,7 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
             if name not in _OWNED_BY_ROS
         }
         validated = model.validated(given, self.get_fully_qualified_name())
-        for parameter in parameters.known_parameters(model).values():
+        for parameter in known_parameters(model).values():
             if parameter.name == "use_sim_time":
                 continue  # declared by rclpy
             if self.has_parameter(parameter.name):
@@ -381,7 +383,7 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
     def _check_fixed(self, values: Mapping[str, Any], source: str) -> None:
         """Refuse to change what must stay in the present state."""
         present = self.parameters.flat()
-        known = parameters.known_parameters(self._model)
+        known = known_parameters(self._model)
         configured = self._state_machine.current_state[1] != "unconfigured"
         states = {Fixed.NEVER: False, Fixed.ACTIVE: self.active, Fixed.CONFIGURED: configured}
         for name, value in values.items():
@@ -393,14 +395,14 @@ class ManagedNode(Collecting, LifecycleNode, ABC, Generic[ParametersT]):
                 )
 
     def _as_meant(self, name: str, value: Any) -> Any:
-        known = parameters.known_parameters(self._model)
+        known = known_parameters(self._model)
         if isinstance(value, str) and name in known and known[name].kind is float:
             number = number_in(value)
             return value if number is None else number
         return value
 
     def _as_ros(self, values: Mapping[str, Any]) -> list[Parameter]:
-        known = parameters.known_parameters(self._model)
+        known = known_parameters(self._model)
         return [Parameter(name, _ROS_TYPES[known[name].kind], v) for name, v in values.items()]
 
 
@@ -418,7 +420,7 @@ _ROS_TYPES = {
 }
 
 
-def _descriptor(parameter: parameters.Parameter) -> ParameterDescriptor:
+def _descriptor(parameter: OwnParameter) -> ParameterDescriptor:
     unit = f" [{parameter.unit}]" if parameter.unit else ""
     descriptor = ParameterDescriptor(
         name=parameter.name,

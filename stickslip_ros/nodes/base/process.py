@@ -32,7 +32,8 @@ from stickslip_ros.nodes.base.domain_ports import (
     port,
 )
 from stickslip_ros.nodes.base.managed import ManagedNode, first_line
-from stickslip_ros.scenarios.parameters import NodeParameters, parameters_of
+from stickslip_ros.scenarios.parameter import parameters_of
+from stickslip_ros.scenarios.parameters import NodeParameters
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 from stickslip_ros.streams import open_closed_streams
 
