@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from io import BufferedWriter, FileIO
 from math import inf
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal, NoReturn, Self
 
 import yaml
@@ -289,12 +288,7 @@ class Recorder:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        exception_type: type[BaseException] | None,
-        exception: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         self.close()
 
     def _open_file(self) -> None:
