@@ -77,11 +77,20 @@ def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
     )
 
 
-def check_picture(path: Path) -> None:
+def check_picture(path: Path | None) -> None:
     """Refuse what no picture can be written to, before anything is computed."""
+    if path is None:
+        return
     if path.suffix.lower() not in _PICTURES:
         raise InvalidInputError(f"--plot {path}: must end in one of {', '.join(_PICTURES)}")
     check_writable("--plot", path)
+
+
+def check_new(option: str, path: Path) -> None:
+    """Refuse `path`, given with `option`, where there is a file, or none can be written."""
+    if path.exists():
+        raise InvalidInputError(f"{option} {path}: exists already, and is left as it is")
+    check_writable(option, path)
 
 
 def check_writable(option: str, path: Path) -> None:

@@ -6,7 +6,7 @@ import os
 import re
 import sys
 from collections.abc import Sequence
-from typing import Protocol
+from types import ModuleType
 
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.optional import interrupts_kept
@@ -37,16 +37,7 @@ _PASSING_ON = ("run",)
 """Those that pass on to others what follows `--`, in the attribute `further`."""
 
 
-class _Command(Protocol):
-    """A module of a command."""
-
-    @property
-    def HELP(self) -> str: ...  # noqa: N802
-    def add_arguments(self, parser: argparse.ArgumentParser) -> None: ...
-    def run(self, arguments: argparse.Namespace) -> int: ...
-
-
-def _load(name: str) -> _Command:
+def _load(name: str) -> ModuleType:
     """Import a command, which some do for seconds, when it is asked for."""
     match name:
         case "run":
@@ -146,18 +137,14 @@ def _reason(error: OSError) -> str:
     return str(error)
 
 
-def _version() -> str:
-    """Return the versions of the package and of what its results depend on."""
-    return ", ".join(f"{name} {version}" for name, version in versions().items())
-
-
 def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     """Return the parser of the command that was given, or of all if none was."""
     parser = argparse.ArgumentParser(
         prog="stickslip",
         description="Stick-slip vibration of a feed drive: run, simulate and measure it.",
     )
-    parser.add_argument("--version", action="version", version=_version())
+    version = ", ".join(f"{name} {version}" for name, version in versions().items())
+    parser.add_argument("--version", action="version", version=version)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in [name for name in _COMMANDS if name in given[:1]] or _COMMANDS:
         with interrupts_kept():

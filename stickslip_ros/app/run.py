@@ -18,6 +18,7 @@ from stickslip_ros.app.arguments import (
     add_scenario,
     made_of,
     namespace_of,
+    naming,
     scenario_of,
     seconds,
 )
@@ -184,15 +185,8 @@ def _dashboard(namespace: str) -> Generator[None]:
     """Serve the page in a process of its own, which has no part in whether the run succeeds."""
     from stickslip_ros.nodes.base.child_process import start
 
-    command = [
-        sys.executable,
-        "-m",
-        "stickslip_ros.app.main",
-        "dashboard",
-        "--namespace",
-        namespace,
-    ]
-    process = start(command)
+    command = "-m", "stickslip_ros.app.main", "dashboard", "--namespace", namespace
+    process = start([sys.executable, *command])
     try:
         yield
     finally:
@@ -230,7 +224,8 @@ def _bag_of(scenario: Scenario) -> Path | None:
 def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
     """Return the command of the controller in place of ours, empty if somebody else starts it."""
     if arguments.controller is not None:
-        return [str(find_executable(arguments.controller, "--controller")), *arguments.further]
+        with naming("--controller"):
+            return [str(find_executable(arguments.controller)), *arguments.further]
     if arguments.further:
         raise InvalidInputError(
             f"-- {shlex.join(arguments.further)}: what follows -- is for --controller, "

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from stickslip_ros.app.arguments import made_of, naming, writing
+from stickslip_ros.app.arguments import check_new, made_of, naming, writing
 from stickslip_ros.app.output import finite, progress_bar
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.studies.columns import Further, write_csv, write_json
@@ -110,20 +110,28 @@ def done(arguments: argparse.Namespace, study: Study, label: str) -> Generator[J
         yield journal
 
 
-def write_table(
-    path: Path, journal: Journal, further: Further, made: Mapping[str, Any] | None = None
+def give_out(
+    arguments: argparse.Namespace, journal: Journal, further: Further, made: Mapping[str, Any]
 ) -> None:
-    """Write the table of a complete journal, which is not needed any more then.
+    """Write the table of a complete journal to where it was asked for, a file or as JSON.
 
     As JSON it also holds what was `made` of all points together.
     """
+    head = finite({**made_of(journal.study.scenario), **made})
+    if arguments.out is not None:
+        _write_table(arguments.out, journal, further, head)
+    if arguments.json:
+        write_json(sys.stdout, journal, further, head)
+
+
+def _write_table(path: Path, journal: Journal, further: Further, head: Mapping[str, Any]) -> None:
+    """Write the table of a journal, which need not be kept any more then."""
     new = path.with_name(f"{path.name}.new")
     with writing("--out", path), new.open("w", encoding="utf-8", newline="") as stream:
         if path.suffix.lower() == ".csv":
             write_csv(stream, journal, further)
         else:
-            head = {**made_of(journal.study.scenario), **(made or {})}
-            write_json(stream, journal, further, finite(head))
+            write_json(stream, journal, further, head)
         stream.flush()
         os.fsync(stream.fileno())
     new.replace(path)
@@ -133,10 +141,7 @@ def write_table(
 def _refuse_table(path: Path) -> None:
     if path.suffix.lower() not in _TABLES:
         raise InvalidInputError(f"--out {path}: must end in one of {', '.join(_TABLES)}")
-    if path.exists():
-        raise InvalidInputError(f"--out {path}: exists already, and is left as it is")
-    if not path.absolute().parent.is_dir():
-        raise InvalidInputError(f"--out {path}: there is no directory {path.parent}")
+    check_new("--out", path)
 
 
 def _workers(text: str) -> int:

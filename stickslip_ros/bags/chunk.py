@@ -15,16 +15,10 @@ from stickslip_ros.bags.compression import ZSTD_MAGIC, unpack_message
 from stickslip_ros.bags.records import HEAD, DamageError, records_in
 from stickslip_ros.messages.codec import joined
 
-_MESSAGE_FIELDS = {
-    "opcode": ("u1", 0),
-    "length": ("<u8", 1),
-    "channel": ("<u2", 9),
-    "sequence": ("<u4", 11),
-    "log_time": ("<u8", 15),
-    "publish_time": ("<u8", 23),
-}
-"""Type of each field of a message record, and where it stands."""
-MESSAGE_SIZE = 31
+_MESSAGE = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")
+_MESSAGE.names = "opcode", "length", "channel", "sequence", "log_time", "publish_time"
+"""A message record, up to the message."""
+MESSAGE_SIZE = _MESSAGE.itemsize
 MESSAGE_LENGTH = MESSAGE_SIZE - HEAD.size
 """Of a message record's content, without the message."""
 WINDOW = 1 << 20
@@ -106,11 +100,9 @@ class MessageBlock:
             yield as_block(records)
 
     def _field(self, name: str) -> NDArray[Any]:
-        """Return a field of the records' heads."""
-        kind, place = _MESSAGE_FIELDS[name]
-        count = len(self.data) - np.dtype(kind).itemsize + 1
-        values = np.ndarray((max(0, count),), kind, self.data, strides=(1,))
-        return values[self.begin - (MESSAGE_SIZE - place)]
+        count = max(0, len(self.data) - MESSAGE_SIZE + 1)
+        records = np.ndarray((count,), _MESSAGE, self.data, strides=(1,))  # one at each byte
+        return records[name][self.begin - MESSAGE_SIZE]
 
 
 class OpenChunk(NamedTuple):

@@ -45,13 +45,8 @@ from stickslip_ros.bags.compression import LARGEST, unpack
 from stickslip_ros.bags.records import FIELDS, HEAD, DamageError, ParsedT, parse, records_in
 from stickslip_ros.errors import BagError
 
-_INDEX_HEAD = 6
-"""Bytes of a message index before its pairs of log time and offset."""
 _INDEX_ENTRY = 16
-_ATTACHMENT_TIMES = 16
-"""Bytes of an attachment before its name."""
-_FOOTER_CHECKED = 16
-"""Bytes of a footer that its checksum is of."""
+"""Bytes of a log time and an offset in a message index."""
 _DATA_END = HEAD.pack(Opcode.DATA_END, 4)
 _OPCODES = frozenset((*FIELDS, Opcode.MESSAGE))
 _PRIVATE = 0x80
@@ -231,7 +226,7 @@ class McapFile:
         if not 0 <= end - start <= LARGEST or self._read(before, len(_DATA_END)) != _DATA_END:
             return False
         summary = self._read(start, end - start)
-        checked = self._read(end, HEAD.size + _FOOTER_CHECKED)
+        checked = self._read(end, HEAD.size + 16)  # without the checksum itself
         if footer.summary_crc not in (0, zlib.crc32(checked, zlib.crc32(summary))):
             return False
         try:
@@ -270,7 +265,7 @@ class McapFile:
                     index = parse(MetadataIndex.read, content)
                     self._tables[index.offset] = index.name
                 case Opcode.ATTACHMENT:
-                    self._attachments[start] = _text_at(_ATTACHMENT_TIMES, content)
+                    self._attachments[start] = _text_at(16, content)  # behind its times
                 case Opcode.ATTACHMENT_INDEX:
                     index = parse(AttachmentIndex.read, content)
                     self._attachments[index.offset] = index.name
@@ -361,11 +356,11 @@ class McapFile:
         offsets = [np.empty(0, np.int64)]
         room = len(data) // MESSAGE_SIZE * _INDEX_ENTRY
         while (record := self._record(position)) and record.opcode == Opcode.MESSAGE_INDEX:
-            size = record.length - _INDEX_HEAD
+            size = record.length - 6  # without channel and size of the entries
             room -= size
             if size % _INDEX_ENTRY or room < 0:
                 return None
-            entries = self._read(record.content + _INDEX_HEAD, size)
+            entries = self._read(record.end - size, size)
             offsets.append(np.frombuffer(entries, "<i8").reshape(-1, 2)[:, 1])
             position = record.end
         return np.sort(np.concatenate(offsets), kind="stable")
