@@ -14,7 +14,7 @@ from stickslip_ros.app.arguments import (
     writing,
 )
 from stickslip_ros.app.output import print_table
-from stickslip_ros.app.studying import add_running, course_of, done, give_out
+from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.units import Units
@@ -79,13 +79,13 @@ def run(arguments: argparse.Namespace) -> int:
     )
     check_picture(arguments.plot)
     label = f"basins of {scenario.name}, {study.plan.size} starts"
-    with done(arguments, study, label) as journal:
+    with computed(arguments, study, label) as journal:
         basins = Basins.of(journal.points())
         further: Further = {"attractor": basins.place}
         made = {"attractors": [asdict(attractor) for attractor in basins.attractors]}
         if arguments.plot is not None:
             _draw(arguments, journal, basins)
-        give_out(arguments, journal, further, made)
+        write_results(arguments, journal, further, made)
         if not arguments.json:
             title = f"{scenario.name}, {study.plan.size} starts"
             _print(title, basins, Units.of(scenario.plant.as_drive()))

@@ -15,7 +15,7 @@ from stickslip_ros.app.arguments import (
     writing,
 )
 from stickslip_ros.app.output import print_table
-from stickslip_ros.app.studying import add_running, course_of, done, give_out
+from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.units import Units
@@ -88,12 +88,12 @@ def run(arguments: argparse.Namespace) -> int:
     further: Further = {}
     if plan.carried:
         further = {"direction": lambda point: plan.direction(point.number)}
-    with done(arguments, study, label) as journal:
+    with computed(arguments, study, label) as journal:
         if arguments.plot is not None:
             _draw(arguments, journal)
         theory = transitions(study, plan.axes[0]) if len(plan.axes) == 1 else {}
         made = {"transitions": {name.lower().replace(" ", "_"): theory[name] for name in theory}}
-        give_out(arguments, journal, further, made)
+        write_results(arguments, journal, further, made)
         if not arguments.json:
             _print(journal, plan)
             units = _units(journal, plan)

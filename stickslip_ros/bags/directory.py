@@ -78,20 +78,20 @@ def _listed(metadata: Path) -> set[str]:
     raise ValueError
 
 
-def undescribed(directory: Path, files: Sequence[Path]) -> str:
-    """Return in what the `metadata.yaml` of a bag fails to list its files, or nothing."""
+def metadata_faults(directory: Path, files: Sequence[Path]) -> list[str]:
+    """Return in what the `metadata.yaml` of a bag fails to list its files."""
     try:
         listed = _listed(directory / METADATA_FILE)
     except FileNotFoundError:
-        return f"{METADATA_FILE} is missing: the recorder is still at work or was killed"
+        return [f"{METADATA_FILE} is missing: the recorder is still at work or was killed"]
     except (OSError, ValueError, yaml.YAMLError):
-        return f"{METADATA_FILE} cannot be understood"
+        return [f"{METADATA_FILE} cannot be understood"]
     present = {file.name for file in files}
     if gone := sorted(listed - present):
-        return f"{', '.join(gone)} is listed in {METADATA_FILE} but not there"
+        return [f"{', '.join(gone)} is listed in {METADATA_FILE} but not there"]
     if new := sorted(present - listed):
-        return f"{METADATA_FILE} does not list {', '.join(new)}: the recorder did not finish"
-    return ""
+        return [f"{METADATA_FILE} does not list {', '.join(new)}: the recorder did not finish"]
+    return []
 
 
 def _not_mcap(path: Path) -> BagError:

@@ -12,7 +12,7 @@ import numpy as np
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.bags.chunk import MessageBlock
-from stickslip_ros.bags.directory import mcap_files, undescribed, unpacked
+from stickslip_ros.bags.directory import mcap_files, metadata_faults, unpacked
 from stickslip_ros.bags.mcap_file import McapFile
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import Refused, joint_states_in, wrenches_in
@@ -75,7 +75,7 @@ class Recording:
             self.files = [opened.enter_context(closing(file)) for file in files]
             """The MCAP files in their order; those that cannot be read are left out."""
             self._opened = opened.pop_all()
-        self._undescribed = undescribed(self.path, paths) if self.path.is_dir() else ""
+        self._metadata_faults = metadata_faults(self.path, paths) if self.path.is_dir() else []
         self.topics = {
             channel.topic: file.schemas[channel.schema_id].name
             for file in self.files
@@ -96,7 +96,7 @@ class Recording:
         That is an end that no recorder wrote, damage, and messages that could not be understood.
         """
         sentences = [
-            *([self._undescribed] if self._undescribed else []),
+            *self._metadata_faults,
             *self._unreadable,
             *(sentence for file in self.files for sentence in file.damage),
             *(

@@ -171,7 +171,7 @@ class Recorder:
         self._background = ThreadPoolExecutor(1, f"recorder of {self.directory.name}")
         self._tasks: deque[Future[None]] = deque()
         self._sync: Future[None] | None = None
-        self._do_later(_sync_directories, [*(new.parent for new in made), self.directory])
+        self._in_background(_sync_directories, [*(new.parent for new in made), self.directory])
 
     def add_topic(self, name: str, type_name: str, qos: QosProfile) -> int:
         """Add a topic, such as `/feed_drive/joint_states`, and return its channel for `write`.
@@ -252,7 +252,7 @@ class Recorder:
                 self._next_sync = now + _SYNC_PERIOD
                 # One that has not begun yet sees to this flush, too.
                 if self._sync is None or self._sync.running() or self._sync.done():
-                    self._sync = self._do_later(self._stream.sync)
+                    self._sync = self._in_background(self._stream.sync)
 
     def attach(
         self, name: str, data: bytes, media_type: str, log_time: int = 0, create_time: int = 0
@@ -281,7 +281,7 @@ class Recorder:
         if self._closed:
             return
         with self._writing():
-            self._do_later(self._finish, self._writer, self._stream)
+            self._in_background(self._finish, self._writer, self._stream)
             self._wait_for_tasks(at_most=0)
         self._end()
 
@@ -294,7 +294,7 @@ class Recorder:
     def _open_file(self) -> None:
         """Begin the next file with all that is known by now; where that fails, there is none."""
         path = self.directory / f"{self.directory.name}_{self._files}.mcap"
-        stream = _RecordStream(path, self._begin_another)
+        stream = _RecordStream(path, self._on_full)
         try:
             writer = Writer(stream, compression=self._compression)
             writer.start(profile="ros2")
@@ -326,7 +326,7 @@ class Recorder:
                 finished = self._writer, self._stream
                 self._stream.limit = inf
                 self._open_file()
-                self._do_later(self._finish, *finished)
+                self._in_background(self._finish, *finished)
                 self._sync = None
         if self._max_size and self._earliest == _LAST_STAMP:
             # A file grows with chunks only: what a limit below its beginning lets in is one.
@@ -335,7 +335,7 @@ class Recorder:
         if self._max_duration:
             self._latest = min(self._earliest + self._max_duration, _LAST_STAMP)
 
-    def _begin_another(self) -> None:
+    def _on_full(self) -> None:
         """Let no further message into the file at hand."""
         self._latest = -1
 
@@ -353,7 +353,7 @@ class Recorder:
         self._description.write(self.directory)
         _sync_directories([self.directory])
 
-    def _do_later(self, task: Callable[..., None], *arguments: Any) -> Future[None]:
+    def _in_background(self, task: Callable[..., None], *arguments: Any) -> Future[None]:
         """Have something done in the background, behind what is to be done there already."""
         self._tasks.append(self._background.submit(task, *arguments))
         return self._tasks[-1]
@@ -378,10 +378,10 @@ class Recorder:
         self._end()
         self._stream.cut()
         raise BagError(
-            f"the bag {self.directory} cannot be written any more ({error}); {self._left()}"
+            f"the bag {self.directory} cannot be written any more ({error}); {self._what_is_left()}"
         ) from error
 
-    def _left(self) -> str:
+    def _what_is_left(self) -> str:
         """Say what a bag that failed holds: the first messages may have been too many for it."""
         with suppress(BagError), Recording(self.directory) as recording:
             for _ in recording.messages(*self._topics):

@@ -74,7 +74,7 @@ def course_of(arguments: argparse.Namespace, default: Course) -> Course:
 
 
 @contextmanager
-def done(arguments: argparse.Namespace, study: Study, label: str) -> Generator[Journal]:
+def computed(arguments: argparse.Namespace, study: Study, label: str) -> Generator[Journal]:
     """Compute what is missing of the study, and provide its journal, complete."""
     out: Path | None = arguments.out
     if out is not None:
@@ -110,7 +110,7 @@ def done(arguments: argparse.Namespace, study: Study, label: str) -> Generator[J
         yield journal
 
 
-def give_out(
+def write_results(
     arguments: argparse.Namespace, journal: Journal, further: Further, made: Mapping[str, Any]
 ) -> None:
     """Write the table of a complete journal to where it was asked for, a file or as JSON.
