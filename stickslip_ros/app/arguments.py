@@ -67,6 +67,11 @@ def add_namespace(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_network(parser: argparse.ArgumentParser, meaning: str) -> None:
+    """Add --network."""
+    parser.add_argument("--network", action="store_true", help=meaning)
+
+
 def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
     """Add --plot, which draws what is `shown`."""
     parser.add_argument(
@@ -79,21 +84,20 @@ def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
 
 def check_picture(path: Path | None) -> None:
     """Refuse what no picture can be written to, before anything is computed."""
-    if path is None:
-        return
-    if path.suffix.lower() not in _PICTURES:
-        raise InvalidInputError(f"--plot {path}: must end in one of {', '.join(_PICTURES)}")
-    check_writable("--plot", path)
+    if path is not None:
+        if path.suffix.lower() not in _PICTURES:
+            raise InvalidInputError(f"--plot {path}: must end in one of {', '.join(_PICTURES)}")
+        _check_writable("--plot", path)
 
 
 def check_new(option: str, path: Path) -> None:
     """Refuse `path`, given with `option`, where there is a file, or none can be written."""
     if path.exists():
         raise InvalidInputError(f"{option} {path}: exists already, and is left as it is")
-    check_writable(option, path)
+    _check_writable(option, path)
 
 
-def check_writable(option: str, path: Path) -> None:
+def _check_writable(option: str, path: Path) -> None:
     """Refuse `path`, given with `option`, where no file can be written, and leave it as it is."""
     if not path.absolute().parent.is_dir():
         raise InvalidInputError(f"{option} {path}: there is no directory {path.parent}")

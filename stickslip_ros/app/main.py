@@ -33,9 +33,6 @@ _COMMANDS = (
 _NEGATIVE = re.compile(r"-(\.?\d|inf)")
 _LONG_OPTION = re.compile(r"--[\w-]+")
 
-_PASSING_ON = ("run",)
-"""Those that pass on to others what follows `--`, in the attribute `further`."""
-
 
 def _load(name: str) -> ModuleType:
     """Import a command, which some do for seconds, when it is asked for."""
@@ -75,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = sys.argv[1:] if arguments is None else list(arguments)
     command = " ".join(given[:1])
     further: list[str] = []
-    if command in _PASSING_ON and "--" in given:
+    if command == "run" and "--" in given:  # what follows is for the controller
         end = given.index("--")
         given, further = given[:end], given[end + 1 :]
     given = _with_negative_values(given)

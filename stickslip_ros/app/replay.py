@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from stickslip_ros.app import INTERRUPTED
-from stickslip_ros.app.arguments import seconds
+from stickslip_ros.app.arguments import add_network, seconds
 from stickslip_ros.app.optional import loading_ros
 from stickslip_ros.app.output import progress_bar
 from stickslip_ros.text import printable
@@ -69,11 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NODE",
         help="begin when these nodes read the topics (default: when somebody does)",
     )
-    parser.add_argument(
-        "--network",
-        action="store_true",
-        help="let other machines see the topics (default: they are kept on this one)",
-    )
+    add_network(parser, "let other machines see the topics (default: they are kept on this one)")
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -15,6 +15,7 @@ from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.arguments import (
     add_json,
     add_namespace,
+    add_network,
     add_scenario,
     made_of,
     namespace_of,
@@ -34,9 +35,6 @@ from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, Scenario
 from stickslip_ros.scenarios.parameters import Pace, WashoutControllerParameters
 from stickslip_ros.text import printable
-
-_PAGE_TIMEOUT = 5.0
-"""Time, s, that a dashboard has to end."""
 
 _LAW_OF_OURS = [f"washout_controller.{name}" for name in WashoutControllerParameters.law_names()]
 
@@ -82,11 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="show the run on a web page, as `stickslip dashboard` does; the page ends with it",
     )
-    parser.add_argument(
-        "--network",
-        action="store_true",
-        help="let other machines see the nodes (default: they are kept on this one)",
-    )
+    add_network(parser, "let other machines see the nodes (default: they are kept on this one)")
     add_json(parser)
 
 
@@ -192,7 +186,7 @@ def _dashboard(namespace: str) -> Generator[None]:
     finally:
         process.terminate()
         with suppress(subprocess.TimeoutExpired):
-            process.wait(_PAGE_TIMEOUT)
+            process.wait(5.0)
         process.kill()
         process.wait()
 

@@ -78,7 +78,9 @@ def computed(arguments: argparse.Namespace, study: Study, label: str) -> Generat
     """Compute what is missing of the study, and provide its journal, complete."""
     out: Path | None = arguments.out
     if out is not None:
-        _refuse_table(out)
+        if out.suffix.lower() not in _TABLES:
+            raise InvalidInputError(f"--out {out}: must end in one of {', '.join(_TABLES)}")
+        check_new("--out", out)
     part = None if out is None else out.with_name(f"{out.name}.part")
     with Journal(study, part) as journal:
         kept = "; without --out nothing is kept"
@@ -136,12 +138,6 @@ def _write_table(path: Path, journal: Journal, further: Further, head: Mapping[s
         os.fsync(stream.fileno())
     new.replace(path)
     journal.discard()
-
-
-def _refuse_table(path: Path) -> None:
-    if path.suffix.lower() not in _TABLES:
-        raise InvalidInputError(f"--out {path}: must end in one of {', '.join(_TABLES)}")
-    check_new("--out", path)
 
 
 def _workers(text: str) -> int:

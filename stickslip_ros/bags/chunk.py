@@ -127,12 +127,12 @@ def as_block(records: list[bytes]) -> MessageBlock:
     return MessageBlock(data, starts)
 
 
-def open_chunk(data: bytes, starts: IntArray | None) -> OpenChunk:
-    """Return what is in a chunk of which an index, if there is one, says where messages start.
+def open_chunk(data: bytes, starts: IntArray) -> OpenChunk:
+    """Return what is in a chunk whose messages start there, by its indexes.
 
-    Where that is not right it goes from record to record. Raises DamageError where there are none.
+    Where these are not right it goes from record to record; DamageError where there are none.
     """
-    return (starts is not None and _indexed(data, starts)) or _walked(data)
+    return _indexed(data, starts) or _walked(data)
 
 
 def _indexed(data: bytes, starts: IntArray) -> OpenChunk | None:

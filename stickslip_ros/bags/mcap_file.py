@@ -347,19 +347,19 @@ class McapFile:
             data = unpack(chunk.compression, chunk.data, chunk.uncompressed_size)
             if data is None or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
                 return None
-            return open_chunk(data, self._indexed(data, record.end))
+            return open_chunk(data, self._indexed_starts(data, record.end))
         except DamageError:
             return None
 
-    def _indexed(self, data: bytes, position: int) -> IntArray | None:
-        """Return where messages of a chunk start, by its indexes; None if these are damaged."""
+    def _indexed_starts(self, data: bytes, position: int) -> IntArray:
+        """Return where messages of a chunk start, by its indexes; none if these are damaged."""
         offsets = [np.empty(0, np.int64)]
         room = len(data) // MESSAGE_SIZE * _INDEX_ENTRY
         while (record := self._record(position)) and record.opcode == Opcode.MESSAGE_INDEX:
             size = record.length - 6  # without channel and size of the entries
             room -= size
             if size % _INDEX_ENTRY or room < 0:
-                return None
+                return np.empty(0, np.int64)
             entries = self._read(record.end - size, size)
             offsets.append(np.frombuffer(entries, "<i8").reshape(-1, 2)[:, 1])
             position = record.end

@@ -1,5 +1,8 @@
 """Reading a bag: a directory of MCAP files as rosbag2 lays it out, or one such file."""
 
+import os
+import re
+import tempfile
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
@@ -12,12 +15,16 @@ import numpy as np
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.bags.chunk import MessageBlock
-from stickslip_ros.bags.directory import mcap_files, metadata_faults, unpacked
+from stickslip_ros.bags.compression import unpack_file
 from stickslip_ros.bags.mcap_file import McapFile
+from stickslip_ros.bags.metadata import metadata_faults
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import Refused, joint_states_in, wrenches_in
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.text import printable
+
+_PACKED = ".mcap.zstd"
+"""Ending of the files that rosbag2 packs as a whole."""
 
 _JOINT_STATES = "joint_states"
 _CONTROL_FORCE = "control_force"
@@ -69,9 +76,9 @@ class Recording:
         self._unreadable: list[str] = []
         self._refused: Counter[str] = Counter()
         self._reasons: dict[str, str] = {}
-        paths = mcap_files(self.path)
+        paths = _mcap_files(self.path)
         with ExitStack() as opened:
-            files = self._readable_files([unpacked(path, opened) for path in paths])
+            files = self._readable_files([_unpacked(path, opened) for path in paths])
             self.files = [opened.enter_context(closing(file)) for file in files]
             """The MCAP files in their order; those that cannot be read are left out."""
             self._opened = opened.pop_all()
@@ -291,3 +298,45 @@ def _joined(kind: type[ColumnsT], blocks: Sequence[ColumnsT]) -> ColumnsT:
         return blocks[0]
     names = [field.name for field in fields(kind)]
     return kind(*(np.concatenate([getattr(block, name) for block in blocks]) for name in names))
+
+
+def _mcap_files(path: Path) -> list[Path]:
+    """Return the files of a bag in the order in which they were recorded."""
+    if not os.path.exists(path):
+        raise BagError(f"the bag {path} does not exist")
+    if not path.is_dir():
+        if path.suffix == ".db3":
+            raise _not_mcap(path)
+        return [path]
+    files = sorted([*path.glob("*.mcap"), *path.glob(f"*{_PACKED}")], key=_place_in_bag)
+    if not files:
+        if next(path.glob("*.db3"), None):
+            raise _not_mcap(path)
+        raise BagError(f"the directory {path} is not a bag: it holds no .mcap file")
+    return files
+
+
+def _unpacked(path: Path, opened: ExitStack) -> Path:
+    """Return a file as MCAP: what rosbag2 packed as a whole is unpacked until the bag closes."""
+    if not path.name.endswith(_PACKED):
+        return path
+    directory = opened.enter_context(tempfile.TemporaryDirectory(prefix="stickslip_ros_"))
+    unpacked = Path(directory, path.name.removesuffix(".zstd"))
+    try:
+        unpack_file(path, unpacked)
+    except OSError as error:
+        raise BagError(f"the file {path} cannot be unpacked: {error.strerror}") from error
+    return unpacked
+
+
+def _place_in_bag(file: Path) -> tuple[int, str]:
+    """Sort `bag_2.mcap` before `bag_10.mcap`, as rosbag2 numbers the files of a bag it splits."""
+    number = re.search(r"_(\d+)\.mcap", file.name)
+    return (int(number[1]) if number else 0), file.name
+
+
+def _not_mcap(path: Path) -> BagError:
+    return BagError(
+        f"the bag {path} is stored as sqlite3, and only MCAP can be read; "
+        "`ros2 bag convert` makes one of the other"
+    )

@@ -32,18 +32,7 @@ from stickslip_ros.stamps import NANOSECONDS
 
 Compression = Literal["lz4", "zstd", "none"]
 
-_COMPRESSION_TYPES: dict[Compression, CompressionType] = {
-    "lz4": CompressionType.LZ4,
-    "zstd": CompressionType.ZSTD,
-    "none": CompressionType.NONE,
-}
 _LAST_STAMP = 2**63 - 1
-_DEFINITIONS_SHARE = 0.02
-"""Of a file, at most, for definitions outside the chunks: damage may be to the first of them."""
-_SYNC_PERIOD = 0.1
-"""Least time, s, from one handing to the disk to the next: what it costs slows down who writes."""
-_MOST_TASKS = 3
-"""For the disk, which may be slower than one who splits a bag all the time."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +135,7 @@ class Recorder:
         """
         check_new_bag(directory)
         self.directory = _absolute(directory)
-        self._compression = _COMPRESSION_TYPES[compression]
+        self._compression = CompressionType[compression.upper()]
         self._max_size = max_bag_size
         self._max_duration = round(max_bag_duration * NANOSECONDS)
         self._description = BagDescription()
@@ -243,13 +232,14 @@ class Recorder:
         with self._writing():
             self._writer.flush()
             grown = self._stream.size - self._defined_size
-            if _DEFINITIONS_SHARE * grown > len(self._definition_records):
+            # Repeated outside the chunks, as damage may be to the first: at most 2 % of a file.
+            if 0.02 * grown > len(self._definition_records):
                 self._stream.write(self._definition_records)
                 self._defined_size = self._stream.size
             now = time.monotonic()
             if self._stream.size > self._synced_size and now >= self._next_sync:
                 self._synced_size = self._stream.size
-                self._next_sync = now + _SYNC_PERIOD
+                self._next_sync = now + 0.1  # s: what it costs slows down who writes
                 # One that has not begun yet sees to this flush, too.
                 if self._sync is None or self._sync.running() or self._sync.done():
                     self._sync = self._in_background(self._stream.sync)
@@ -321,7 +311,7 @@ class Recorder:
             self._refuse_stamp(stamp)
         if stamp > self._latest:
             with self._writing():
-                self._wait_for_tasks(at_most=_MOST_TASKS)
+                self._wait_for_tasks(at_most=3)  # of a disk that is slower than who splits
                 self._writer.flush()
                 finished = self._writer, self._stream
                 self._stream.limit = inf

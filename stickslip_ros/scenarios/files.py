@@ -189,19 +189,15 @@ def _parse_override(override: str) -> tuple[str, str, Any]:
         for node, model in NODE_PARAMETERS.items()
         for name in known_parameters(model)
     ]
+    given = f"-p {override:.80}"
+    if equals and target in known:
+        return node, parameter, ros_yaml.parse(text, f"{given}: the value")
     if not equals or not parameter:
-        raise InvalidInputError(
-            f"-p {override:.80}: must be NODE.PARAMETER=VALUE; "
-            + did_you_mean(target, known, "as in -p plant.belt_speed=0.2")
-        )
+        meant = did_you_mean(target, known, "as in -p plant.belt_speed=0.2")
+        raise InvalidInputError(f"{given}: must be NODE.PARAMETER=VALUE; {meant}")
     if node not in NODE_PARAMETERS:
-        raise InvalidInputError(
-            f"-p {override:.80}: unknown node {node:.80}; {did_you_mean(node, NODE_PARAMETERS)}"
-        )
-    if target not in known:
-        every = f"{node} has {', '.join(sorted(known_parameters(NODE_PARAMETERS[node])))}"
-        raise InvalidInputError(
-            f"-p {override:.80}: unknown parameter {parameter:.80}; "
-            + did_you_mean(target, known, every)
-        )
-    return node, parameter, ros_yaml.parse(text, f"-p {override:.80}: the value")
+        meant = did_you_mean(node, NODE_PARAMETERS)
+        raise InvalidInputError(f"{given}: unknown node {node:.80}; {meant}")
+    every = f"{node} has {', '.join(sorted(known_parameters(NODE_PARAMETERS[node])))}"
+    meant = did_you_mean(target, known, every)
+    raise InvalidInputError(f"{given}: unknown parameter {parameter:.80}; {meant}")

@@ -22,6 +22,8 @@ from stickslip_ros.text import shown
 
 _SHORTEST = 1e-3
 """Shortest time, s, that a node looks at the clock for."""
+_OF_DRIVE = [each.name for each in fields(Drive) if each.name != "friction"]
+"""Parameters of the plant that are those of the drive as they stand."""
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
 
@@ -114,11 +116,10 @@ class NodeParameters(ParameterGroup):
     def _names_are_possible(self) -> Self:
         """Refuse to wait for a node of a name that none can have."""
         if not all(_NODE_NAME.fullmatch(name) for name in self.wait_for):
-            message = (
+            raise ValueError(
                 f"wait_for = {shown(self.wait_for)} is refused: must be names of nodes, "
                 "of letters, digits and _, not beginning with a digit"
             )
-            raise ValueError(message)
         return self
 
 
@@ -186,11 +187,10 @@ class PlantParameters(NodeParameters):
     def _delay_is_bounded(self) -> Self:
         """Refuse a delay that would keep more than a million forces waiting."""
         if (self.force_delay + self.force_jitter) * self.rate > 1e6:
-            message = (
+            raise ValueError(
                 f"force_delay = {self.force_delay} s and force_jitter = {self.force_jitter} s "
                 "must not exceed 1e6 periods of rate together"
             )
-            raise ValueError(message)
         return self
 
     @model_validator(mode="after")
@@ -212,20 +212,14 @@ class PlantParameters(NodeParameters):
 
     def as_drive(self) -> Drive:
         """Return the drive."""
-        return Drive(
-            mass=self.mass,
-            damping=self.damping,
-            stiffness=self.stiffness,
-            normal_force=self.normal_force,
-            belt_speed=self.belt_speed,
-            friction=self.friction.as_law(),
-        )
+        values = {name: getattr(self, name) for name in _OF_DRIVE}
+        return Drive(**values, friction=self.friction.as_law())
 
     def drive_names(self) -> list[str]:
         """Return the flat names of what makes the drive: those that its friction law uses, too."""
         constants = LAWS[self.friction.law].constants()
         return [
-            *(each.name for each in fields(Drive) if each.name != "friction"),
+            *_OF_DRIVE,
             "friction.law",
             *(f"friction.{name}" for name in constants),
         ]

@@ -4,7 +4,7 @@ import argparse
 import os
 from contextlib import suppress
 
-from stickslip_ros.app.arguments import add_namespace, namespace_of
+from stickslip_ros.app.arguments import add_namespace, add_network, namespace_of
 from stickslip_ros.app.optional import check_dashboard, loading_ros
 from stickslip_ros.nodes.base.child_process import die_with_parent
 from stickslip_ros.nodes.base.domain_ports import LARGEST_PORT
@@ -27,11 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PORT",
         help=f"port of the page on this machine (default: {DEFAULT_PORT}, or the next free one)",
     )
-    parser.add_argument(
-        "--network",
-        action="store_true",
-        help="listen to nodes on other machines, too; the page stays on this one",
-    )
+    add_network(parser, "listen to nodes on other machines, too; the page stays on this one")
 
 
 def run(arguments: argparse.Namespace) -> int:
