@@ -1,6 +1,6 @@
 """The exception family of the package: everything it raises on purpose derives from one class."""
 
-from stickslip_ros.printable import printable
+from stickslip_ros.text import printable
 
 
 class StickslipError(Exception):

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.suggestions import did_you_mean
+from stickslip_ros.text import did_you_mean
 
 _MARKERS = "share/ament_index/resource_index/packages"
 
@@ -20,29 +20,28 @@ def prefixes() -> list[Path]:
     return [Path(prefix) for prefix in [*filter(None, given), sys.prefix]]
 
 
-def find_executable(name: str, source: str) -> Path:
+def find_executable(name: str) -> Path:
     """Return the file of the executable PACKAGE/EXECUTABLE, found as `ros2 run` finds it.
 
-    Raises InvalidInputError, naming `source`, for one that is not installed.
+    Raises InvalidInputError for one that is not installed.
     """
     package, _, executable = name.partition("/")
     if not package or not executable or "/" in executable:
         raise InvalidInputError(
-            f"{source} {name}: must be PACKAGE/EXECUTABLE, "
-            "such as stickslip_ros/washout_controller_node"
+            f"{name}: must be PACKAGE/EXECUTABLE, such as stickslip_ros/washout_controller_node"
         )
     prefix = next((p for p in prefixes() if (p / _MARKERS / package).is_file()), None)
     if prefix is None:
         known = {marker.name for p in prefixes() for marker in (p / _MARKERS).glob("*")}
         places = "the places are those of AMENT_PREFIX_PATH and the Python environment"
         raise InvalidInputError(
-            f"{source} {name}: no package {package} in {', '.join(map(str, prefixes()))}; "
+            f"{name}: no package {package} in {', '.join(map(str, prefixes()))}; "
             f"{did_you_mean(package, known, places)}"
         )
     files = {file.name: file for file in _executables(prefix / "lib" / package)}
     if executable not in files:
         raise InvalidInputError(
-            f"{source} {name}: the package {package} in {prefix} has no executable {executable}; "
+            f"{name}: the package {package} in {prefix} has no executable {executable}; "
             + did_you_mean(executable, files, f"it has {', '.join(sorted(files)) or 'none'}")
         )
     return files[executable]

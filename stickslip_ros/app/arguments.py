@@ -10,14 +10,15 @@ from tempfile import TemporaryFile
 from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.printable import printable
 from stickslip_ros.scenarios.files import (
     DEFAULT_NAMESPACE,
     LONGEST_NAMESPACE,
     Scenario,
     load_scenario,
 )
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, known_parameters, shown
+from stickslip_ros.scenarios.parameter import known_parameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.text import printable, shown
 from stickslip_ros.versions import versions
 
 _PICTURES = (".png", ".svg", ".pdf")
@@ -66,6 +67,11 @@ def add_namespace(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_network(parser: argparse.ArgumentParser, meaning: str) -> None:
+    """Add --network."""
+    parser.add_argument("--network", action="store_true", help=meaning)
+
+
 def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
     """Add --plot, which draws what is `shown`."""
     parser.add_argument(
@@ -76,14 +82,22 @@ def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
     )
 
 
-def check_picture(path: Path) -> None:
+def check_picture(path: Path | None) -> None:
     """Refuse what no picture can be written to, before anything is computed."""
-    if path.suffix.lower() not in _PICTURES:
-        raise InvalidInputError(f"--plot {path}: must end in one of {', '.join(_PICTURES)}")
-    check_writable("--plot", path)
+    if path is not None:
+        if path.suffix.lower() not in _PICTURES:
+            raise InvalidInputError(f"--plot {path}: must end in one of {', '.join(_PICTURES)}")
+        _check_writable("--plot", path)
 
 
-def check_writable(option: str, path: Path) -> None:
+def check_new(option: str, path: Path) -> None:
+    """Refuse `path`, given with `option`, where there is a file, or none can be written."""
+    if path.exists():
+        raise InvalidInputError(f"{option} {path}: exists already, and is left as it is")
+    _check_writable(option, path)
+
+
+def _check_writable(option: str, path: Path) -> None:
     """Refuse `path`, given with `option`, where no file can be written, and leave it as it is."""
     if not path.absolute().parent.is_dir():
         raise InvalidInputError(f"{option} {path}: there is no directory {path.parent}")
@@ -92,6 +106,15 @@ def check_writable(option: str, path: Path) -> None:
             path.open("ab").close()
         else:
             TemporaryFile(dir=path.absolute().parent).close()
+
+
+@contextmanager
+def naming(option: str) -> Generator[None]:
+    """Name in a refusal the option that it is about."""
+    try:
+        yield
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{option} {error}") from None
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 """`stickslip basin`: which motion a start leads to."""
 
 import argparse
-import sys
 from dataclasses import asdict
 
 import numpy as np
@@ -11,12 +10,11 @@ from stickslip_ros.app.arguments import (
     add_plot,
     add_scenario,
     check_picture,
-    made_of,
     scenario_of,
     writing,
 )
-from stickslip_ros.app.output import finite, print_table
-from stickslip_ros.app.studying import add_running, course_of, done, write_table
+from stickslip_ros.app.output import print_table
+from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.units import Units
@@ -30,7 +28,7 @@ from stickslip_ros.studies.basin import (
     basin_study,
     default_axes,
 )
-from stickslip_ros.studies.columns import Columns, Further, write_json
+from stickslip_ros.studies.columns import Columns, Further
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Grid, Plan, Sample
 
@@ -79,20 +77,16 @@ def run(arguments: argparse.Namespace) -> int:
         course=course_of(arguments, COURSE),
         continuous=arguments.continuous_control,
     )
-    if arguments.plot is not None:
-        check_picture(arguments.plot)
+    check_picture(arguments.plot)
     label = f"basins of {scenario.name}, {study.plan.size} starts"
-    with done(arguments, study, label) as journal:
+    with computed(arguments, study, label) as journal:
         basins = Basins.of(journal.points())
         further: Further = {"attractor": basins.place}
         made = {"attractors": [asdict(attractor) for attractor in basins.attractors]}
         if arguments.plot is not None:
             _draw(arguments, journal, basins)
-        if arguments.out is not None:
-            write_table(arguments.out, journal, further, made)
-        if arguments.json:
-            write_json(sys.stdout, journal, further, finite({**made_of(scenario), **made}))
-        else:
+        write_results(arguments, journal, further, made)
+        if not arguments.json:
             title = f"{scenario.name}, {study.plan.size} starts"
             _print(title, basins, Units.for_drive(scenario.plant.as_drive()))
     return 0

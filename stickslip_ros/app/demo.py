@@ -2,7 +2,7 @@
 
 import sys
 
-from stickslip_ros.app.optional import ros_nodes
+from stickslip_ros.app.optional import loading_ros
 from stickslip_ros.app.output import print_figures
 from stickslip_ros.app.run import default_bag, record
 from stickslip_ros.bags import Recording
@@ -40,7 +40,9 @@ def _demonstrate() -> None:
     scenario = load_scenario(_SCENARIO, ["plant.pace=lockstep", f"plant.duration={_DURATION}"])
     switched_on = scenario.washout_controller.start_after
     bag = default_bag(_SCENARIO)
-    reach = ros_nodes("nodes.base.network").keep_on_this_machine(network=False)
+    with loading_ros():
+        from stickslip_ros.nodes.base.network import keep_on_this_machine
+    reach = keep_on_this_machine(network=False)
     print(
         f"{_DURATION:g} s of {_SCENARIO} in lockstep: plant, washout controller and analyzer as "
         f"ROS 2 nodes, {reach}; the controller acts from {switched_on:g} s on"

@@ -3,9 +3,8 @@
 import argparse
 import shlex
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -13,18 +12,18 @@ from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
     add_scenario,
+    check_new,
     check_picture,
-    check_writable,
     made_of,
     scenario_of,
     writing,
 )
-from stickslip_ros.app.output import print_json, print_table, progress_bar
+from stickslip_ros.app.output import finite, print_json, print_table, progress_bar
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.theory.stability_map import StabilityMap
 from stickslip_ros.plots.units import Units
-from stickslip_ros.printable import printable
 from stickslip_ros.studies.design import OWN_SPEED_RANGE, Design, Task, design
+from stickslip_ros.text import printable
 
 HELP = "propose corner frequency and gains that damp the vibration within a force limit"
 
@@ -88,9 +87,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise InvalidInputError("plant.expects_control = False: without control there are no gains")
     task = Task.of(scenario, _belt_speeds(arguments.belt_speed))
     if arguments.out is not None:
-        _refuse_unless_new(arguments.out)
-    if arguments.plot is not None:
-        check_picture(arguments.plot)
+        check_new("--out", arguments.out)
+    check_picture(arguments.plot)
     with progress_bar(f"designing for {scenario.name}", 1.0) as progress:
         found = design(task, progress)
     if scenario.plant.force_jitter > 0.0:
@@ -116,12 +114,6 @@ def _belt_speeds(text: str | None) -> tuple[float, float] | None:
     if len(speeds) not in (1, 2):
         raise InvalidInputError(f"--belt-speed {text!r}: must be LOW:HIGH, or one speed, in m/s")
     return speeds[0], speeds[-1]
-
-
-def _refuse_unless_new(path: Path) -> None:
-    if path.exists():
-        raise InvalidInputError(f"--out {path}: exists already, and is left as it is")
-    check_writable("--out", path)
 
 
 def _write(path: Path, found: Design) -> None:
@@ -171,25 +163,22 @@ def _largest(values: Iterable[float | None]) -> float | None:
     return max((value for value in values if value is not None), default=None)
 
 
+def _rows(
+    figures: Mapping[str, Any], labels: Mapping[str, tuple[str, str]], units: Units
+) -> list[list[str]]:
+    return [[label, units.text(figures[key], unit)] for key, (label, unit) in labels.items()]
+
+
 def _print(name: str, found: Design, *, written: bool) -> None:
     units = Units.for_drive(found.task.drive)
     speeds = units.texts(sorted({*found.task.belt_speeds}), "m/s")
     task = f"{name}, belt speed {' to '.join(speeds)}"
     if found.controller is not None:
-        figures = {
-            name: value if isfinite(value) else None
-            for name, value in asdict(found.controller).items()
-        }
-        rows = [
-            [label, units.text(figures[key], unit)] for key, (label, unit) in _CONTROLLER.items()
-        ]
-        print_table(task, ["proposal", ""], rows)
+        proposed = _rows(finite(asdict(found.controller)), _CONTROLLER, units)
+        print_table(task, ["proposal", ""], proposed)
         if found.margins is not None:
-            figures = asdict(found.margins)
-            rows = [
-                [label, units.text(figures[key], unit)] for key, (label, unit) in _MARGINS.items()
-            ]
-            print_table("to instability at any of these belt speeds", ["margins", ""], rows)
+            margins = _rows(asdict(found.margins), _MARGINS, units)
+            print_table("to instability at any of these belt speeds", ["margins", ""], margins)
         checks = [asdict(check) for check in found.checks]
         columns = [
             units.texts([check[key] for check in checks], unit)

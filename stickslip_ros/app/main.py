@@ -6,14 +6,14 @@ import os
 import re
 import sys
 from collections.abc import Sequence
-from importlib import import_module
+from types import ModuleType
 
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.optional import interrupts_kept
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.interrupts import raise_interrupts
 from stickslip_ros.streams import nowhere, open_closed_streams
-from stickslip_ros.suggestions import did_you_mean
+from stickslip_ros.text import did_you_mean
 from stickslip_ros.versions import versions
 
 _COMMANDS = (
@@ -29,13 +29,39 @@ _COMMANDS = (
     "replay",
     "paper",
 )
-"""Each is a module here, imported when it is asked for: some import what takes seconds."""
 
 _NEGATIVE = re.compile(r"-(\.?\d|inf)")
 _LONG_OPTION = re.compile(r"--[\w-]+")
 
-_PASSING_ON = ("run",)
-"""Those that pass on to others what follows `--`, in the attribute `further`."""
+
+def _load(name: str) -> ModuleType:
+    """Import a command, which some do for seconds, when it is asked for."""
+    match name:
+        case "run":
+            from stickslip_ros.app import run as command
+        case "dashboard":
+            from stickslip_ros.app import dashboard as command
+        case "simulate":
+            from stickslip_ros.app import simulate as command
+        case "stability":
+            from stickslip_ros.app import stability as command
+        case "design":
+            from stickslip_ros.app import design as command
+        case "sweep":
+            from stickslip_ros.app import sweep as command
+        case "basin":
+            from stickslip_ros.app import basin as command
+        case "report":
+            from stickslip_ros.app import report as command
+        case "repair":
+            from stickslip_ros.app import repair as command
+        case "replay":
+            from stickslip_ros.app import replay as command
+        case "paper":
+            from stickslip_ros.app import paper as command
+        case _:
+            raise AssertionError(name)
+    return command
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -46,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = sys.argv[1:] if arguments is None else list(arguments)
     command = " ".join(given[:1])
     further: list[str] = []
-    if command in _PASSING_ON and "--" in given:
+    if command == "run" and "--" in given:  # what follows is for the controller
         end = given.index("--")
         given, further = given[:end], given[end + 1 :]
     given = _with_negative_values(given)
@@ -108,22 +134,18 @@ def _reason(error: OSError) -> str:
     return str(error)
 
 
-def _version() -> str:
-    """Return the versions of the package and of what its results depend on."""
-    return ", ".join(f"{name} {version}" for name, version in versions().items())
-
-
 def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     """Return the parser of the command that was given, or of all if none was."""
     parser = argparse.ArgumentParser(
         prog="stickslip",
         description="Stick-slip vibration of a feed drive: run, simulate and measure it.",
     )
-    parser.add_argument("--version", action="version", version=_version())
+    version = ", ".join(f"{name} {version}" for name, version in versions().items())
+    parser.add_argument("--version", action="version", version=version)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in [name for name in _COMMANDS if name in given[:1]] or _COMMANDS:
         with interrupts_kept():
-            command = import_module(f"stickslip_ros.app.{name}")
+            command = _load(name)
         subparser = commands.add_parser(name, help=command.HELP, description=command.HELP)
         command.add_arguments(subparser)
         subparser.set_defaults(run=command.run, parser=subparser)

@@ -3,22 +3,20 @@
 import signal
 from collections.abc import Generator
 from contextlib import contextmanager
-from importlib import import_module
 from importlib.util import find_spec
-from types import ModuleType
 
 from stickslip_ros.errors import RunError
 
 
-def ros_nodes(module: str) -> ModuleType:
-    """Return a module of `nodes`; the commands that need no ROS do without.
+@contextmanager
+def loading_ros() -> Generator[None]:
+    """Import in it what needs ROS; raises RunError where ROS cannot be loaded."""
+    from stickslip_ros.nodes.base.shared_memory import check_shared_memory
 
-    Raises RunError where ROS cannot be loaded.
-    """
     try:
         with interrupts_kept():
-            import_module("stickslip_ros.nodes.base.shared_memory").check_shared_memory()
-            return import_module(f"stickslip_ros.{module}")
+            check_shared_memory()
+            yield
     except ModuleNotFoundError as error:
         raise RunError(
             f"running nodes needs ROS 2, of which {error.name} is not installed: "

@@ -14,7 +14,7 @@ from rich.text import Text
 
 from stickslip_ros.physics.measures.cycles import Regime, with_trend
 from stickslip_ros.plots.units import NOISE, SI, Units
-from stickslip_ros.printable import printable
+from stickslip_ros.text import printable
 
 _LABELS: dict[str, tuple[str, str]] = {
     "regime": ("regime", ""),

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from stickslip_ros.app import INTERRUPTED
-from stickslip_ros.app.arguments import seconds
-from stickslip_ros.app.optional import ros_nodes
+from stickslip_ros.app.arguments import add_network, seconds
+from stickslip_ros.app.optional import loading_ros
 from stickslip_ros.app.output import progress_bar
-from stickslip_ros.printable import printable
+from stickslip_ros.text import printable
 
 HELP = "publish the messages of a bag again, as they were spaced"
 DESCRIPTION = (
@@ -69,16 +69,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NODE",
         help="begin when these nodes read the topics (default: when somebody does)",
     )
-    parser.add_argument(
-        "--network",
-        action="store_true",
-        help="let other machines see the topics (default: they are kept on this one)",
-    )
+    add_network(parser, "let other machines see the topics (default: they are kept on this one)")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    reach = ros_nodes("nodes.base.network").keep_on_this_machine(arguments.network)
+    with loading_ros():
+        from stickslip_ros.nodes.base.network import keep_on_this_machine
+        from stickslip_ros.running.bag_replay import replay_bag
+    reach = keep_on_this_machine(arguments.network)
 
     def offering(topics: Sequence[str]) -> None:
         wait = f"until {', '.join(arguments.wait_for) or 'somebody'} reads them"
@@ -88,5 +87,5 @@ def run(arguments: argparse.Namespace) -> int:
     names = ("rate", "loop", "start", "duration", "topics", "clock", "wait_for")
     parameters = {name: getattr(arguments, name) for name in names} | {"bag": str(arguments.bag)}
     with progress_bar(f"replaying {arguments.bag}", None if arguments.loop else 1.0) as progress:
-        interrupted = ros_nodes("running.bag_replay").replay_bag(parameters, offering, progress)
+        interrupted = replay_bag(parameters, offering, progress)
     return INTERRUPTED if interrupted else 0

@@ -16,8 +16,9 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycles import Measures
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.units import Units
-from stickslip_ros.printable import printable
-from stickslip_ros.scenarios.parameters import PlantParameters, known_parameters
+from stickslip_ros.scenarios.parameter import known_parameters
+from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.text import printable
 from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ import argparse
 import shlex
 import subprocess
 import sys
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from datetime import UTC, datetime
 from itertools import count
@@ -15,14 +15,16 @@ from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.arguments import (
     add_json,
     add_namespace,
+    add_network,
     add_scenario,
     made_of,
     namespace_of,
+    naming,
     scenario_of,
     seconds,
 )
 from stickslip_ros.app.no_cycle import why_no_cycle
-from stickslip_ros.app.optional import check_dashboard, ros_nodes
+from stickslip_ros.app.optional import check_dashboard, loading_ros
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import check_new_bag
@@ -30,12 +32,9 @@ from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed import find_executable
 from stickslip_ros.plots.units import Units
-from stickslip_ros.printable import printable
 from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, Scenario
 from stickslip_ros.scenarios.parameters import Pace, WashoutControllerParameters
-
-_PAGE_TIMEOUT = 5.0
-"""Time, s, that a dashboard has to end."""
+from stickslip_ros.text import printable
 
 _LAW_OF_OURS = [f"washout_controller.{name}" for name in WashoutControllerParameters.law_names()]
 
@@ -81,11 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="show the run on a web page, as `stickslip dashboard` does; the page ends with it",
     )
-    parser.add_argument(
-        "--network",
-        action="store_true",
-        help="let other machines see the nodes (default: they are kept on this one)",
-    )
+    add_network(parser, "let other machines see the nodes (default: they are kept on this one)")
     add_json(parser)
 
 
@@ -113,7 +108,9 @@ def run(arguments: argparse.Namespace) -> int:
     check_new_bag(bag)
     if arguments.dashboard:
         check_dashboard()
-    reach = ros_nodes("nodes.base.network").keep_on_this_machine(arguments.network)
+    with loading_ros():
+        from stickslip_ros.nodes.base.network import keep_on_this_machine
+    reach = keep_on_this_machine(arguments.network)
     _tell(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}")
     with _dashboard(namespace) if arguments.dashboard else nullcontext():
         figures, interrupted = record(
@@ -153,9 +150,11 @@ def record(
     """
     duration = scenario.plant.duration
     total = duration if duration < float("inf") else None
+    with loading_ros():
+        from stickslip_ros.running.bringup import run_nodes
     with progress_bar(f"running {scenario.name}", total) as progress:
         try:
-            outcome = ros_nodes("running.bringup").run_nodes(
+            outcome = run_nodes(
                 scenario,
                 namespace=namespace,
                 bag=bag,
@@ -167,7 +166,7 @@ def record(
         except RunError as error:
             raise RunError(f"{error}; {_state_of(bag)}") from None
     try:
-        return _figures(bag, outcome), outcome.interrupted
+        return _figures(bag, outcome.controller, outcome.plant), outcome.interrupted
     except BagError as error:
         if outcome.interrupted:  # before the first sample
             left = f"; {bag} holds nothing" if bag.exists() else ""
@@ -178,21 +177,16 @@ def record(
 @contextmanager
 def _dashboard(namespace: str) -> Generator[None]:
     """Serve the page in a process of its own, which has no part in whether the run succeeds."""
-    command = [
-        sys.executable,
-        "-m",
-        "stickslip_ros.app.main",
-        "dashboard",
-        "--namespace",
-        namespace,
-    ]
-    process = ros_nodes("nodes.base.child_process").start_child(command)
+    from stickslip_ros.nodes.base.child_process import start_child
+
+    command = "-m", "stickslip_ros.app.main", "dashboard", "--namespace", namespace
+    process = start_child([sys.executable, *command])
     try:
         yield
     finally:
         process.terminate()
         with suppress(subprocess.TimeoutExpired):
-            process.wait(_PAGE_TIMEOUT)
+            process.wait(5.0)
         process.kill()
         process.wait()
 
@@ -224,7 +218,8 @@ def _bag_of(scenario: Scenario) -> Path | None:
 def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
     """Return the command of the controller in place of ours, empty if somebody else starts it."""
     if arguments.controller is not None:
-        return [str(find_executable(arguments.controller, "--controller")), *arguments.further]
+        with naming("--controller"):
+            return [str(find_executable(arguments.controller)), *arguments.further]
     if arguments.further:
         raise InvalidInputError(
             f"-- {shlex.join(arguments.further)}: what follows -- is for --controller, "
@@ -233,11 +228,11 @@ def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
     return [] if arguments.external_controller else None
 
 
-def _figures(bag: Path, outcome: Any) -> dict[str, Any]:
-    report, plant = report_of_bag(bag), outcome.plant
+def _figures(bag: Path, controller: str | None, plant: Mapping[str, str]) -> dict[str, Any]:
+    report = report_of_bag(bag)
     return {
         "bag": str(bag),
-        "controller": outcome.controller,
+        "controller": controller,
         "report": report,
         "samples": report["samples"],
         "lost_samples": report["lost_samples"],

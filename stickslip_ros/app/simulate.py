@@ -21,6 +21,7 @@ from stickslip_ros.physics.model.disturbance import DisturbanceKind
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.studies.settled import check_continuous
 from stickslip_ros.studies.simulate import simulate
 
 HELP = "run a scenario without ROS and measure its motion"
@@ -56,8 +57,10 @@ def run(arguments: argparse.Namespace) -> int:
     elif duration is None:
         duration = _DEFAULT_PERIODS * scenario.plant.as_drive().natural_period
     plot: Path | None = arguments.plot
-    if plot is not None:
-        check_picture(plot)
+    check_picture(plot)
+    if arguments.continuous_control:
+        with naming("--continuous-control:"):
+            check_continuous(scenario)
     history = None if plot is None else RunHistory()
     units = Units.for_drive(scenario.plant.as_drive())
     shown = f"{duration:g} {units.of_unit('s')}".rstrip()

@@ -1,27 +1,25 @@
 """`stickslip sweep`: what a scenario settles on over the values of one parameter or two."""
 
 import argparse
-import sys
 from collections import Counter
 from collections.abc import Iterator
 from itertools import groupby, islice
-from typing import NamedTuple, Self
 
 from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
     add_scenario,
     check_picture,
-    made_of,
+    naming,
     scenario_of,
     writing,
 )
-from stickslip_ros.app.output import finite, print_table
-from stickslip_ros.app.studying import add_running, course_of, done, write_table
+from stickslip_ros.app.output import print_table
+from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.units import Units
-from stickslip_ros.studies.columns import Columns, Further, write_json
+from stickslip_ros.studies.columns import Columns, Further
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.settled import Course
@@ -72,7 +70,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    axes = [_axis(text) for text in arguments.over]
+    with naming("--over"):
+        axes = [Axis.parse(text) for text in arguments.over]
     if len(axes) == 1 and arguments.colour != "regime":
         raise InvalidInputError(f"--colour {arguments.colour}: is for maps, of two parameters")
     study = sweep_study(
@@ -82,36 +81,25 @@ def run(arguments: argparse.Namespace) -> int:
         course=course_of(arguments, Course()),
         continuous=arguments.continuous_control,
     )
-    if arguments.plot is not None:
-        check_picture(arguments.plot)
+    check_picture(arguments.plot)
     plan = study.plan
     assert isinstance(plan, Grid)
     label = f"sweep of {study.scenario.name}, {plan.size} points"
     further: Further = {}
     if plan.carried:
         further = {"direction": lambda point: plan.direction(point.number)}
-    with done(arguments, study, label) as journal:
+    with computed(arguments, study, label) as journal:
         if arguments.plot is not None:
             _draw(arguments, journal)
         theory = transitions(study, plan.axes[0]) if len(plan.axes) == 1 else {}
         made = {"transitions": {name.lower().replace(" ", "_"): theory[name] for name in theory}}
-        if arguments.out is not None:
-            write_table(arguments.out, journal, further, made)
-        if arguments.json:
-            write_json(sys.stdout, journal, further, finite({**made_of(study.scenario), **made}))
-        else:
+        write_results(arguments, journal, further, made)
+        if not arguments.json:
             _print(journal, plan)
             units = _units(journal, plan)
             for name, values in theory.items():
                 print(f"{name}: {', '.join(units.texts(values, plan.axes[0].unit))}")
     return 0
-
-
-def _axis(text: str) -> Axis:
-    try:
-        return Axis.parse(text)
-    except InvalidInputError as error:
-        raise InvalidInputError(f"--over {error}") from None
 
 
 def _draw(arguments: argparse.Namespace, journal: Journal) -> None:
@@ -126,18 +114,12 @@ def _draw(arguments: argparse.Namespace, journal: Journal) -> None:
             draw_map(arguments.plot, columns, journal.study, arguments.colour)
 
 
-class _Kind(NamedTuple):
-    """What the points of a row of the table on the screen have in common."""
-
-    direction: str
-    regime: str
-
-    @classmethod
-    def of(cls, point: Point, plan: Grid) -> Self:
-        regime = point.reason or Regime.label(point.measures.regime)
-        if point.reason is None and not point.steady:
-            regime += ", not steady"
-        return cls(str(plan.direction(point.number) or ""), regime)
+def _direction_and_regime(point: Point, plan: Grid) -> str:
+    """Return what the points of a row of the table on the screen have in common."""
+    regime = point.reason or Regime.label(point.measures.regime)
+    if point.reason is None and not point.steady:
+        regime += ", not steady"
+    return f"{plan.direction(point.number) or ''} {regime}".lstrip()
 
 
 def _print(journal: Journal, plan: Grid) -> None:
@@ -149,15 +131,15 @@ def _print(journal: Journal, plan: Grid) -> None:
             headings = ["regime", plan.parameters[0], "points", "amplitude", "stick fraction"]
             print_table(title, headings, rows)
             return
-    counts = Counter(_Kind.of(point, plan) for point in journal.points())
-    rows = [[" ".join(filter(None, kind)), str(count)] for kind, count in counts.items()]
+    counts = Counter(_direction_and_regime(point, plan) for point in journal.points())
+    rows = [[kind, str(count)] for kind, count in counts.items()]
     print_table(title, ["regime", "points"], rows)
 
 
 def _ranges(journal: Journal, plan: Grid) -> Iterator[list[str]]:
     unit, units = plan.axes[0].unit, _units(journal, plan)
     largest = max((point.measures.amplitude or 0.0 for point in journal.points()), default=0.0)
-    for kind, points in groupby(journal.points(), lambda point: _Kind.of(point, plan)):
+    for kind, points in groupby(journal.points(), lambda point: _direction_and_regime(point, plan)):
         values, amplitudes, stick_fractions = _Extremes(), _Extremes(), _Extremes()
         count = 0
         for point in points:
@@ -166,7 +148,7 @@ def _ranges(journal: Journal, plan: Grid) -> Iterator[list[str]]:
             amplitudes.add(point.measures.amplitude)
             stick_fractions.add(point.measures.stick_fraction)
         yield [
-            " ".join(filter(None, kind)),
+            kind,
             values.shown(unit, units),
             str(count),
             amplitudes.shown("m", units, largest),

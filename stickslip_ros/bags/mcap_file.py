@@ -7,19 +7,14 @@ the reading goes on at the next sound chunk.
 """
 
 import re
-import struct
 import zlib
-from array import array
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator
-from copy import copy
-from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
@@ -33,157 +28,39 @@ from mcap.records import (
     Statistics,
 )
 from mcap.writer import MCAP0_MAGIC
-from numpy.typing import NDArray
 
 from stickslip_ros.arrays import IntArray
-from stickslip_ros.bags.compression import LARGEST, ZSTD_MAGIC, unpack, unpack_message
+from stickslip_ros.bags.chunk import (
+    DEFINITIONS,
+    LARGEST_TABLE,
+    MESSAGE_LENGTH,
+    MESSAGE_SIZE,
+    WINDOW,
+    MessageBlock,
+    OpenChunk,
+    as_block,
+    open_chunk,
+)
+from stickslip_ros.bags.compression import LARGEST, unpack
+from stickslip_ros.bags.records import FIELDS, HEAD, DamageError, ParsedT, parse, records_in
 from stickslip_ros.errors import BagError
-from stickslip_ros.messages.cdr import joined
 
-_HEAD = struct.Struct("<BQ")
-_MESSAGE_FIELDS = {
-    "opcode": ("u1", 0),
-    "length": ("<u8", 1),
-    "channel": ("<u2", 9),
-    "sequence": ("<u4", 11),
-    "log_time": ("<u8", 15),
-    "publish_time": ("<u8", 23),
-}
-"""Type of each field of a message record, and where it stands."""
-_MESSAGE_SIZE = 31
-_MESSAGE_LENGTH = _MESSAGE_SIZE - _HEAD.size
-"""Of a message record's content, without the message."""
-_INDEX_HEAD = 6
-"""Bytes of a message index before its pairs of log time and offset."""
 _INDEX_ENTRY = 16
-_ATTACHMENT_TIMES = 16
-"""Bytes of an attachment before its name."""
-_FOOTER_LENGTH = 20
-_FOOTER_CHECKED = 16
-_DATA_END = _HEAD.pack(Opcode.DATA_END, 4)
-
-# The fields of a record: so many bytes or, where negative, what its own size of so many precedes.
-_FIELDS: dict[int, tuple[int, ...]] = {
-    Opcode.HEADER: (-4, -4),
-    Opcode.FOOTER: (_FOOTER_LENGTH,),
-    Opcode.SCHEMA: (2, -4, -4, -4),
-    Opcode.CHANNEL: (4, -4, -4, -4),
-    Opcode.CHUNK: (28, -4, -8),
-    Opcode.MESSAGE_INDEX: (2, -4),
-    Opcode.CHUNK_INDEX: (32, -4, 8, -4, 16),
-    Opcode.ATTACHMENT: (16, -4, -4, -8, 4),
-    Opcode.ATTACHMENT_INDEX: (40, -4, -4),
-    Opcode.STATISTICS: (42, -4),
-    Opcode.METADATA: (-4, -4),
-    Opcode.METADATA_INDEX: (16, -4),
-    Opcode.SUMMARY_OFFSET: (17,),
-    Opcode.DATA_END: (4,),
-}
-_OPCODES = frozenset((*_FIELDS, Opcode.MESSAGE))
+"""Bytes of a log time and an offset in a message index."""
+_DATA_END = HEAD.pack(Opcode.DATA_END, 4)
+_OPCODES = frozenset((*FIELDS, Opcode.MESSAGE))
 _PRIVATE = 0x80
 """Opcodes from here on mean what a program likes."""
-_INVENTORY = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA, Opcode.ATTACHMENT))
+_INVENTORY = frozenset((*DEFINITIONS, Opcode.METADATA, Opcode.ATTACHMENT))
 """What stands between the messages and tells what they are or how they came about."""
-_LARGEST_TABLE = 16 << 20
-"""Bytes of the largest record of texts that is taken apart: that takes many times its size."""
-_MOST_NOTED = 32 << 20
-_NOTE = 200
-"""Bytes of memory for all that is noted of a file's inventory, and what a note takes itself."""
+_LARGEST_DEFINITIONS = 32 << 20
+"""Bytes of all definitions that are kept."""
 _MOST_GAPS_TOLD = 20
-_CHECKED = 1_000_000
-"""Weight of a definition with a checksum against those without."""
 
 _CHUNK_HEAD = re.compile(
     rb"\x06.{5}\0\0\0.{28}(?:\0\0\0\0|\x03\0\0\0lz4|\x04\0\0\0zstd)", re.DOTALL
 )
 _CHUNK_HEAD_SIZE = 9 + 28 + 8
-_WINDOW = 1 << 20
-
-_Parsed = TypeVar("_Parsed")
-_Place = tuple[int, int, int]
-"""Opcode of a record; begin and end of its content."""
-
-
-class _DamageError(Exception):
-    """A record is not what it says."""
-
-
-class MessageBlock:
-    """Messages that stand together in a file, such as those of one chunk: arrays of shape (n,).
-
-    The serialized message i is `data[begin[i] : end[i]]`.
-    """
-
-    def __init__(self, data: bytes, starts: IntArray) -> None:
-        """Take the message records that start there; raises _DamageError where there is none."""
-        if len(starts) > 0 and not 0 <= starts.min() <= starts.max() <= len(data) - _MESSAGE_SIZE:
-            raise _DamageError
-        self.data = data
-        self.begin = starts + _MESSAGE_SIZE
-        lengths = self._field("length").astype(np.int64)
-        self.end = self.begin + (lengths - _MESSAGE_LENGTH)
-        sound = (self._field("opcode") == Opcode.MESSAGE) & (lengths >= _MESSAGE_LENGTH)
-        if not (sound & (lengths <= len(data)) & (self.end <= len(data))).all():
-            raise _DamageError
-
-    def __len__(self) -> int:
-        return len(self.begin)
-
-    @property
-    def channel(self) -> NDArray[np.uint16]:
-        """Ids of the channels."""
-        return self._field("channel")
-
-    @property
-    def sequence(self) -> NDArray[np.uint32]:
-        """Numbers given by the recorder; zero where it gave none."""
-        return self._field("sequence")
-
-    @property
-    def log_time(self) -> IntArray:
-        """In ns."""
-        return self._field("log_time").astype(np.int64)
-
-    @property
-    def publish_time(self) -> IntArray:
-        """In ns."""
-        return self._field("publish_time").astype(np.int64)
-
-    def on(self, channels: Collection[int]) -> "MessageBlock":
-        """Return those on these channels."""
-        chosen = np.zeros(1 << 16, bool)
-        chosen[list(channels)] = True
-        wanted = chosen[self.channel]
-        if wanted.all():
-            return self
-        part = copy(self)
-        part.begin, part.end = self.begin[wanted], self.end[wanted]
-        return part
-
-    def unpacked(self) -> Iterator["MessageBlock"]:
-        """Yield them, unpacked and in smaller blocks if rosbag2 packed each message by itself."""
-        if len(self) == 0 or not self.data.startswith(ZSTD_MAGIC, int(self.begin[0])):
-            yield self
-            return
-        records: list[bytes] = []
-        size = 0
-        for begin, end in zip(self.begin.tolist(), self.end.tolist(), strict=True):
-            message = unpack_message(self.data[begin:end])
-            head = _HEAD.pack(Opcode.MESSAGE, _MESSAGE_LENGTH + len(message))
-            records.append(head + self.data[begin - _MESSAGE_LENGTH : begin] + message)
-            size += len(records[-1])
-            if size > _WINDOW:
-                yield _as_block(records)
-                records, size = [], 0
-        if records:
-            yield _as_block(records)
-
-    def _field(self, name: str) -> NDArray[Any]:
-        """Return a field of the records' heads."""
-        kind, place = _MESSAGE_FIELDS[name]
-        count = len(self.data) - np.dtype(kind).itemsize + 1
-        values = np.ndarray((max(0, count),), kind, self.data, strides=(1,))
-        return values[self.begin - (_MESSAGE_SIZE - place)]
 
 
 class _Record(NamedTuple):
@@ -196,25 +73,11 @@ class _Record(NamedTuple):
 
     @property
     def content(self) -> int:
-        return self.start + _HEAD.size
+        return self.start + HEAD.size
 
     @property
     def end(self) -> int:
         return self.content + self.length
-
-
-class _OpenChunk(NamedTuple):
-    """What is in a chunk."""
-
-    messages: MessageBlock
-    others_end: int
-    """Up to there the data of the messages may hold other records."""
-
-    @property
-    def others(self) -> Iterator[_Place]:
-        """Its records that tell what the messages are or how they came about."""
-        records = _records_in(self.messages.data[: self.others_end])
-        return (record for record in records if record[0] in _INVENTORY)
 
 
 class McapFile:
@@ -233,7 +96,7 @@ class McapFile:
         self._channel_ids: set[int] = set()
         self._tables: dict[int, str] = {}
         self._attachments: dict[int, str] = {}
-        self._noted = 0
+        self._definitions_size = 0
         self._chunked = False
         self._gaps: dict[int, int] = {}
         self._lost: dict[int, int] = {}
@@ -278,19 +141,11 @@ class McapFile:
 
     def tables(self, name: str | None = None) -> Iterator[Metadata]:
         """Yield the readable metadata records, of that name or all, in file order."""
-        for start, found in sorted(self._tables.items()):
-            if name in (None, found):
-                table = self._parsed(start, Opcode.METADATA, Metadata.read)
-                if table is not None:
-                    yield table
+        return self._named(self._tables, name, Opcode.METADATA, Metadata.read)
 
     def attachments(self, name: str | None = None) -> Iterator[Attachment]:
         """Yield the readable attachments, of that name or all, in file order."""
-        for start, found in sorted(self._attachments.items()):
-            if name in (None, found):
-                attachment = self._parsed(start, Opcode.ATTACHMENT, Attachment.read)
-                if attachment is not None:
-                    yield attachment
+        return self._named(self._attachments, name, Opcode.ATTACHMENT, Attachment.read)
 
     def blocks(self, channels: Collection[int]) -> Iterator[MessageBlock]:
         """Yield the messages on those channels in file order, those of a chunk at a time.
@@ -319,15 +174,15 @@ class McapFile:
             if record.opcode == Opcode.MESSAGE:
                 loose.append(self._read(record.start, record.end - record.start))
                 size += len(loose[-1])
-            if loose and (record.opcode != Opcode.MESSAGE or size > _WINDOW):
-                yield _as_block(loose)
+            if loose and (record.opcode != Opcode.MESSAGE or size > WINDOW):
+                yield as_block(loose)
                 loose, size = [], 0
             if chunk is not None:
                 yield chunk.messages
             elif record.opcode == Opcode.DATA_END:
                 return
         if loose:
-            yield _as_block(loose)
+            yield as_block(loose)
 
     def _read_inventory(self) -> bool:
         """Find what the file holds; return whether it begins and ends as it should."""
@@ -341,13 +196,11 @@ class McapFile:
             for record, chunk in self._records(data_start):
                 if chunk is not None:
                     self._chunked = True
-                    data = chunk.messages.data
-                    for opcode, begin, end in chunk.others:
-                        content = data[begin : min(end, begin + _LARGEST_TABLE)]
-                        self._note(opcode, record.start, content, _CHECKED)
+                    for opcode, content in chunk.definitions:
+                        self._note(opcode, record.start, content, checked=True)
                 elif record.opcode in _INVENTORY:
-                    content = self._read(record.content, min(record.length, _LARGEST_TABLE))
-                    self._note(record.opcode, record.start, content, 1)
+                    content = self._read(record.content, min(record.length, LARGEST_TABLE))
+                    self._note(record.opcode, record.start, content, checked=False)
             self._define()
         return begins_well and ends_well
 
@@ -359,7 +212,7 @@ class McapFile:
 
     def _read_summary(self) -> bool:
         """Note what the summary tells; return whether the file ends as its writer leaves it."""
-        end = self._size - len(MCAP0_MAGIC) - _FOOTER_LENGTH - _HEAD.size
+        end = self._size - len(MCAP0_MAGIC) - FIELDS[Opcode.FOOTER][0] - HEAD.size
         if end < 0 or self._read(self._size - len(MCAP0_MAGIC), 8) != MCAP0_MAGIC:
             return False
         footer = self._parsed(end, Opcode.FOOTER, Footer.read)
@@ -373,19 +226,19 @@ class McapFile:
         if not 0 <= end - start <= LARGEST or self._read(before, len(_DATA_END)) != _DATA_END:
             return False
         summary = self._read(start, end - start)
-        checked = self._read(end, _HEAD.size + _FOOTER_CHECKED)
+        checked = self._read(end, HEAD.size + 16)  # without the checksum itself
         if footer.summary_crc not in (0, zlib.crc32(checked, zlib.crc32(summary))):
             return False
         try:
-            for opcode, begin, stop in _records_in(summary):
-                content = summary[begin : min(stop, begin + _LARGEST_TABLE)]
-                self._note(opcode, start, content, _CHECKED)
-        except _DamageError:
+            for opcode, begin, stop in records_in(summary):
+                content = summary[begin : min(stop, begin + LARGEST_TABLE)]
+                self._note(opcode, start, content, checked=True)
+        except DamageError:
             return False
         self._define()
         return True
 
-    def _note(self, opcode: int, start: int, content: bytes, weight: int) -> None:
+    def _note(self, opcode: int, start: int, content: bytes, *, checked: bool) -> None:
         """Note what a record, or the one with it in it that starts there, tells of the file.
 
         Of one that is too large the content is cut short: the name of an attachment still is there.
@@ -398,62 +251,47 @@ class McapFile:
                         self._channel_ids.add(number)
                     definition = opcode, number, content
                     if definition not in self._definitions:
-                        self._account_for(content)
-                    self._definitions[definition] += weight
+                        self._definitions_size += len(content)
+                        if self._definitions_size > _LARGEST_DEFINITIONS:
+                            raise DamageError
+                    # One with a checksum counts for more than any number of those without.
+                    self._definitions[definition] += 1_000_000 if checked else 1
                 case Opcode.STATISTICS:
-                    self.statistics = _parse(Statistics.read, content)
+                    self.statistics = parse(Statistics.read, content)
                     self._chunked = self.statistics.chunk_count > 0
                 case Opcode.METADATA:
-                    self._tables[start] = self._name_in(content, 0)
+                    self._tables[start] = _text_at(0, content)
                 case Opcode.METADATA_INDEX:
-                    index = _parse(MetadataIndex.read, content)
-                    self._account_for(index.name)
+                    index = parse(MetadataIndex.read, content)
                     self._tables[index.offset] = index.name
                 case Opcode.ATTACHMENT:
-                    self._attachments[start] = self._name_in(content, _ATTACHMENT_TIMES)
+                    self._attachments[start] = _text_at(16, content)  # behind its times
                 case Opcode.ATTACHMENT_INDEX:
-                    index = _parse(AttachmentIndex.read, content)
-                    self._account_for(index.name)
+                    index = parse(AttachmentIndex.read, content)
                     self._attachments[index.offset] = index.name
                 case _:
                     pass
-        except _DamageError:
-            self._add_gap(start, start + _HEAD.size + len(content))
-
-    def _name_in(self, content: bytes, place: int) -> str:
-        """Return the text at a place of a record; raises _DamageError where there is none."""
-        name = _parse(lambda stream: stream.read_prefixed_string(), content[place:])
-        self._account_for(name)
-        return name
-
-    def _account_for(self, noted: bytes | str) -> None:
-        """Raise _DamageError if there is no room to note this."""
-        if self._noted + len(noted) + _NOTE > _MOST_NOTED:
-            raise _DamageError
-        self._noted += len(noted) + _NOTE
+        except DamageError:
+            self._add_gap(start, start + HEAD.size + len(content))
 
     def _add_gap(self, start: int, end: int) -> None:
-        """Note that this cannot be read, within what was found before if that touches it."""
-        last = next(reversed(self._gaps), start)
-        if last <= start <= self._gaps.get(last, -1):
-            self._gaps[last] = max(end, self._gaps[last])
-        else:
-            self._gaps[start] = end
+        """Note that this cannot be read."""
+        self._gaps[start] = max(end, self._gaps.get(start, end))
 
     def _define(self) -> None:
         """Take of each schema and channel the definition found in a sound chunk, or most often."""
         for (opcode, _, content), _ in reversed(self._definitions.most_common()):
             try:
                 if opcode == Opcode.SCHEMA:
-                    schema = _parse(Schema.read, content)
+                    schema = parse(Schema.read, content)
                     self.schemas[schema.id] = schema
                 else:
-                    channel = _parse(Channel.read, content)
+                    channel = parse(Channel.read, content)
                     self.channels[channel.id] = channel
-            except _DamageError:
+            except DamageError:
                 continue
 
-    def _records(self, position: int) -> Iterator[tuple[_Record, _OpenChunk | None]]:
+    def _records(self, position: int) -> Iterator[tuple[_Record, OpenChunk | None]]:
         """Yield the sound records from a position on; behind damage go on at the next chunk."""
         before = checked = position
         while position < self._size:
@@ -474,24 +312,24 @@ class McapFile:
 
     def _record(self, position: int) -> _Record | None:
         """Return the record at a position if its fields fill it, and it lies within the file."""
-        head = self._read(position, _HEAD.size)
-        if len(head) < _HEAD.size:
+        head = self._read(position, HEAD.size)
+        if len(head) < HEAD.size:
             return None
-        record = _Record(position, *_HEAD.unpack(head))
+        record = _Record(position, *HEAD.unpack(head))
         if record.end > self._size:
             return None
         if record.opcode == Opcode.MESSAGE:
             channel = int.from_bytes(self._read(record.content, 2), "little")
             # Where there are chunks all messages are in them; this is something else, damaged.
-            sound = channel in self._channel_ids and _MESSAGE_LENGTH <= record.length <= LARGEST
+            sound = channel in self._channel_ids and MESSAGE_LENGTH <= record.length <= LARGEST
             return record if sound and not self._chunked else None
-        if record.opcode not in _FIELDS:
+        if record.opcode not in FIELDS:
             # Another program's own kind, if another record follows.
             following = self._read(record.end, 1)
             followed = bool(following) and (following[0] in _OPCODES or following[0] >= _PRIVATE)
             return record if record.opcode >= _PRIVATE and followed else None
         place = record.content
-        for field in _FIELDS[record.opcode]:
+        for field in FIELDS[record.opcode]:
             if field < 0:
                 place += int.from_bytes(self._read(place, -field), "little") - field
             else:
@@ -500,56 +338,44 @@ class McapFile:
                 return None
         return record if place == record.end else None
 
-    def _opened(self, record: _Record) -> _OpenChunk | None:
+    def _opened(self, record: _Record) -> OpenChunk | None:
         """Return what is in a chunk, None if that is not what was written."""
         if record.length > LARGEST + _CHUNK_HEAD_SIZE:
             return None
         try:
-            chunk = _parse(Chunk.read, self._read(record.content, record.length))
+            chunk = parse(Chunk.read, self._read(record.content, record.length))
             data = unpack(chunk.compression, chunk.data, chunk.uncompressed_size)
             if data is None or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
                 return None
-            return self._indexed(data, record.end) or _walked(data)
-        except _DamageError:
+            return open_chunk(data, self._indexed_starts(data, record.end))
+        except DamageError:
             return None
 
-    def _indexed(self, data: bytes, position: int) -> _OpenChunk | None:
-        """Find the messages of a chunk by the indexes behind it; None if these are not right."""
-        offsets: list[IntArray] = []
-        room = len(data) // _MESSAGE_SIZE * _INDEX_ENTRY
+    def _indexed_starts(self, data: bytes, position: int) -> IntArray:
+        """Return where messages of a chunk start, by its indexes; none if these are damaged."""
+        offsets = [np.empty(0, np.int64)]
+        room = len(data) // MESSAGE_SIZE * _INDEX_ENTRY
         while (record := self._record(position)) and record.opcode == Opcode.MESSAGE_INDEX:
-            size = record.length - _INDEX_HEAD
+            size = record.length - 6  # without channel and size of the entries
             room -= size
             if size % _INDEX_ENTRY or room < 0:
-                return None
-            entries = self._read(record.content + _INDEX_HEAD, size)
+                return np.empty(0, np.int64)
+            entries = self._read(record.end - size, size)
             offsets.append(np.frombuffer(entries, "<i8").reshape(-1, 2)[:, 1])
             position = record.end
-        if not offsets:
-            return None
-        starts = np.sort(np.concatenate(offsets), kind="stable")
-        if len(starts) == 0:
-            return None
-        try:
-            messages = MessageBlock(data, starts)
-            chunk = _OpenChunk(messages, int(starts[0]))
-            deque(chunk.others, maxlen=0)  # each of them has to be sound
-        except _DamageError:
-            return None
-        joined = np.array_equal(messages.end[:-1], starts[1:]) and messages.end[-1] == len(data)
-        return chunk if joined else None
+        return np.sort(np.concatenate(offsets), kind="stable")
 
     def _next_chunk(self, position: int) -> int:
         """Return where the next chunk from a position on seems to start, or the file's size."""
         while position < self._size:
-            window = self._read(position, _WINDOW + _CHUNK_HEAD_SIZE)
+            window = self._read(position, WINDOW + _CHUNK_HEAD_SIZE)
             match = _CHUNK_HEAD.search(window)
-            while match and match.start() < _WINDOW:
+            while match and match.start() < WINDOW:
                 start = position + match.start()
                 if self._record(start) is not None:
                     return start
                 match = _CHUNK_HEAD.search(window, match.start() + 1)
-            position += _WINDOW
+            position += WINDOW
         return self._size
 
     def _merged_gaps(self) -> list[tuple[int, int]]:
@@ -561,17 +387,28 @@ class McapFile:
                 merged.append((start, end))
         return merged
 
+    def _named(
+        self,
+        places: dict[int, str],
+        name: str | None,
+        opcode: Opcode,
+        read: Callable[[ReadDataStream], ParsedT],
+    ) -> Iterator[ParsedT]:
+        for start, found in sorted(places.items()):
+            if name in (None, found) and (parsed := self._parsed(start, opcode, read)) is not None:
+                yield parsed
+
     def _parsed(
-        self, start: int | None, opcode: Opcode, read: Callable[[ReadDataStream], _Parsed]
-    ) -> _Parsed | None:
-        record = None if start is None else self._record(start)
+        self, start: int, opcode: Opcode, read: Callable[[ReadDataStream], ParsedT]
+    ) -> ParsedT | None:
+        record = self._record(start)
         if record is None or record.opcode != opcode:
             return None
         try:
-            if record.length > (LARGEST if opcode == Opcode.ATTACHMENT else _LARGEST_TABLE):
-                raise _DamageError
-            return _parse(read, self._read(record.content, record.length))
-        except _DamageError:
+            if record.length > (LARGEST if opcode == Opcode.ATTACHMENT else LARGEST_TABLE):
+                raise DamageError
+            return parse(read, self._read(record.content, record.length))
+        except DamageError:
             self._add_gap(record.start, record.end)
             return None
 
@@ -583,36 +420,6 @@ class McapFile:
             raise BagError(f"the file {self.path} cannot be read: {error.strerror}") from error
 
 
-def _as_block(messages: list[bytes]) -> MessageBlock:
-    """Return message records as a block."""
-    data, starts, _ = joined(messages)
-    return MessageBlock(data, starts)
-
-
-def _walked(data: bytes) -> _OpenChunk:
-    """Find the messages of a chunk by going from record to record."""
-    messages = (begin for opcode, begin, _ in _records_in(data) if opcode == Opcode.MESSAGE)
-    starts = np.array(array("q", messages), np.int64) - _HEAD.size
-    return _OpenChunk(MessageBlock(data, starts), len(data))
-
-
-def _records_in(data: bytes) -> Iterator[_Place]:
-    """Yield the records that the data are made of; raises _DamageError where they are not."""
-    position = 0
-    while position < len(data):
-        try:
-            opcode, length = _HEAD.unpack_from(data, position)
-        except struct.error as error:
-            raise _DamageError from error
-        begin = position + _HEAD.size
-        position = begin + length
-        if opcode == 0 or position > len(data):
-            raise _DamageError
-        yield opcode, begin, position
-
-
-def _parse(read: Callable[[ReadDataStream], _Parsed], content: bytes) -> _Parsed:
-    try:
-        return read(ReadDataStream(BytesIO(content)))
-    except (EndOfFile, struct.error, UnicodeDecodeError, OverflowError, ValueError) as error:
-        raise _DamageError from error
+def _text_at(place: int, content: bytes) -> str:
+    """Return the text at a place of a record; raises DamageError where there is none."""
+    return parse(lambda stream: stream.read_prefixed_string(), content[place:])

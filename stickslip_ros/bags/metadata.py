@@ -5,6 +5,8 @@ and after a recorder was killed, too: so a bag that was closed properly can be t
 """
 
 import os
+from collections.abc import Iterator, Sequence
+from itertools import pairwise, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +17,13 @@ from stickslip_ros.bags.mcap_file import McapFile
 
 METADATA_FILE = "metadata.yaml"
 
+_LARGEST = 4_000_000
+"""Characters of a `metadata.yaml` that is read: that of a bag of some ten thousand files."""
 _LARGEST_QOS = 100_000
 """Characters of the YAML of a topic's profiles that is read: that of some hundred publishers."""
 
-# That of libyaml is five times as fast, which counts with thousands of files.
+# Those of libyaml are five and ten times as fast, which counts with thousands of files.
+_LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _DUMPER: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 # What rosbag2 writes where there is no message yet.
@@ -80,6 +85,22 @@ class BagDescription:
         except OSError:
             temporary.unlink(missing_ok=True)
             raise
+
+
+def metadata_faults(directory: Path, files: Sequence[Path]) -> list[str]:
+    """Return in what the `metadata.yaml` of a bag fails to list its files."""
+    try:
+        listed = _listed(directory / METADATA_FILE)
+    except FileNotFoundError:
+        return [f"{METADATA_FILE} is missing: the recorder is still at work or was killed"]
+    except (OSError, ValueError, yaml.YAMLError):
+        return [f"{METADATA_FILE} cannot be understood"]
+    present = {file.name for file in files}
+    if gone := sorted(listed - present):
+        return [f"{', '.join(gone)} is listed in {METADATA_FILE} but not there"]
+    if new := sorted(present - listed):
+        return [f"{METADATA_FILE} does not list {', '.join(new)}: the recorder did not finish"]
+    return []
 
 
 def _as_yaml(information: dict[str, Any]) -> str:
@@ -145,3 +166,21 @@ def _information(
         "custom_data": {},
         "ros_distro": "jazzy",
     }
+
+
+def _listed(metadata: Path) -> set[str]:
+    """Return the files that a `metadata.yaml` lists."""
+    if metadata.exists() and not metadata.is_file():
+        raise ValueError
+    with metadata.open(encoding="utf-8") as file:
+        text = file.read(_LARGEST + 1)
+    if len(text) > _LARGEST:
+        raise ValueError
+    # Only this list is made, and of texts only, whatever the file asks for.
+    events: Iterator[Any] = yaml.parse(text, _LOADER)
+    for key, value in pairwise(events):
+        named = isinstance(key, yaml.ScalarEvent) and key.value == "relative_file_paths"
+        if named and isinstance(value, yaml.SequenceStartEvent):
+            listed = takewhile(lambda event: isinstance(event, yaml.ScalarEvent), events)
+            return {event.value for event in listed}
+    raise ValueError

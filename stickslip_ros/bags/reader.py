@@ -7,18 +7,16 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from functools import cached_property
-from itertools import pairwise, takewhile
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple, Self, TypeVar
 
 import numpy as np
-import yaml
 
 from stickslip_ros.arrays import IntArray
+from stickslip_ros.bags.chunk import MessageBlock
 from stickslip_ros.bags.compression import unpack_file
-from stickslip_ros.bags.mcap_file import McapFile, MessageBlock
-from stickslip_ros.bags.metadata import METADATA_FILE
+from stickslip_ros.bags.mcap_file import McapFile
+from stickslip_ros.bags.metadata import metadata_faults
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.cdr import Refused
 from stickslip_ros.messages.codec import joint_states_in, wrenches_in
@@ -30,17 +28,12 @@ from stickslip_ros.messages.topics import (
     RECORDED_TOPICS,
     Topic,
 )
-from stickslip_ros.printable import printable
 from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.text import printable
 
 _PACKED = ".mcap.zstd"
 """Ending of the files that rosbag2 packs as a whole."""
 
-_LARGEST_METADATA = 4_000_000
-"""Characters of a `metadata.yaml` that is read: that of a bag of some ten thousand files."""
-
-_LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
-"""That of libyaml is ten times as fast."""
 
 ColumnsT = TypeVar("ColumnsT", SampleColumns, ForceColumns)
 _Decode = Callable[[bytes, IntArray, IntArray], tuple[ColumnsT, Refused]]
@@ -82,13 +75,11 @@ class Recording:
         self._reasons: dict[str, str] = {}
         paths = _mcap_files(self.path)
         with ExitStack() as opened:
-            unpacked = [_unpacked(path, opened) for path in paths]
-            self.files = [
-                opened.enter_context(closing(file)) for file in self._readable_files(unpacked)
-            ]
+            files = self._readable_files([_unpacked(path, opened) for path in paths])
+            self.files = [opened.enter_context(closing(file)) for file in files]
             """The MCAP files in their order; those that cannot be read are left out."""
             self._opened = opened.pop_all()
-        self._undescribed = _undescribed(self.path, paths) if self.path.is_dir() else ""
+        self._metadata_faults = metadata_faults(self.path, paths) if self.path.is_dir() else []
         self.topics = {
             channel.topic: file.schemas[channel.schema_id].name
             for file in self.files
@@ -109,7 +100,7 @@ class Recording:
         That is an end that no recorder wrote, damage, and messages that could not be understood.
         """
         sentences = [
-            *([self._undescribed] if self._undescribed else []),
+            *self._metadata_faults,
             *self._unreadable,
             *(sentence for file in self.files for sentence in file.damage),
             *(
@@ -214,12 +205,7 @@ class Recording:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        exception_type: type[BaseException] | None,
-        exception: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         self.close()
 
     def _readable_files(self, paths: Sequence[Path]) -> Iterator[McapFile]:
@@ -336,40 +322,6 @@ def _place_in_bag(file: Path) -> tuple[int, str]:
     """Sort `bag_2.mcap` before `bag_10.mcap`, as rosbag2 numbers the files of a bag it splits."""
     number = re.search(r"_(\d+)\.mcap", file.name)
     return (int(number[1]) if number else 0), file.name
-
-
-def _listed(metadata: Path) -> set[str]:
-    """Return the files that a `metadata.yaml` lists."""
-    if metadata.exists() and not metadata.is_file():
-        raise ValueError
-    with metadata.open(encoding="utf-8") as file:
-        text = file.read(_LARGEST_METADATA + 1)
-    if len(text) > _LARGEST_METADATA:
-        raise ValueError
-    # Only this list is made, and of texts only, whatever the file asks for.
-    events: Iterator[Any] = yaml.parse(text, _LOADER)
-    for key, value in pairwise(events):
-        named = isinstance(key, yaml.ScalarEvent) and key.value == "relative_file_paths"
-        if named and isinstance(value, yaml.SequenceStartEvent):
-            listed = takewhile(lambda event: isinstance(event, yaml.ScalarEvent), events)
-            return {event.value for event in listed}
-    raise ValueError
-
-
-def _undescribed(directory: Path, files: Sequence[Path]) -> str:
-    """Return in what the `metadata.yaml` of a bag fails to list its files, or nothing."""
-    try:
-        listed = _listed(directory / METADATA_FILE)
-    except FileNotFoundError:
-        return f"{METADATA_FILE} is missing: the recorder is still at work or was killed"
-    except (OSError, ValueError, yaml.YAMLError):
-        return f"{METADATA_FILE} cannot be understood"
-    present = {file.name for file in files}
-    if gone := sorted(listed - present):
-        return f"{', '.join(gone)} is listed in {METADATA_FILE} but not there"
-    if new := sorted(present - listed):
-        return f"{METADATA_FILE} does not list {', '.join(new)}: the recorder did not finish"
-    return ""
 
 
 def _not_mcap(path: Path) -> BagError:

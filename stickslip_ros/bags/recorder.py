@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from io import BufferedWriter, FileIO
 from math import inf
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal, NoReturn, Self
 
 import yaml
@@ -33,18 +32,7 @@ from stickslip_ros.stamps import NANOSECONDS
 
 Compression = Literal["lz4", "zstd", "none"]
 
-_COMPRESSION_TYPES: dict[Compression, CompressionType] = {
-    "lz4": CompressionType.LZ4,
-    "zstd": CompressionType.ZSTD,
-    "none": CompressionType.NONE,
-}
 _LAST_STAMP = 2**63 - 1
-_DEFINITIONS_SHARE = 0.02
-"""Of a file, at most, for definitions outside the chunks: damage may be to the first of them."""
-_SYNC_PERIOD = 0.1
-"""Least time, s, from one handing to the disk to the next: what it costs slows down who writes."""
-_MOST_TASKS = 3
-"""For the disk, which may be slower than one who splits a bag all the time."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +135,7 @@ class Recorder:
         """
         check_new_bag(directory)
         self.directory = _absolute(directory)
-        self._compression = _COMPRESSION_TYPES[compression]
+        self._compression = CompressionType[compression.upper()]
         self._max_size = max_bag_size
         self._max_duration = round(max_bag_duration * NANOSECONDS)
         self._description = BagDescription()
@@ -172,7 +160,7 @@ class Recorder:
         self._background = ThreadPoolExecutor(1, f"recorder of {self.directory.name}")
         self._tasks: deque[Future[None]] = deque()
         self._sync: Future[None] | None = None
-        self._do_later(_sync_directories, [*(new.parent for new in made), self.directory])
+        self._in_background(_sync_directories, [*(new.parent for new in made), self.directory])
 
     def add_topic(self, name: str, type_name: str, qos: QosProfile) -> int:
         """Add a topic, such as `/feed_drive/joint_states`, and return its channel for `write`.
@@ -244,16 +232,17 @@ class Recorder:
         with self._writing():
             self._writer.flush()
             grown = self._stream.size - self._defined_size
-            if _DEFINITIONS_SHARE * grown > len(self._definition_records):
+            # Repeated outside the chunks, as damage may be to the first: at most 2 % of a file.
+            if 0.02 * grown > len(self._definition_records):
                 self._stream.write(self._definition_records)
                 self._defined_size = self._stream.size
             now = time.monotonic()
             if self._stream.size > self._synced_size and now >= self._next_sync:
                 self._synced_size = self._stream.size
-                self._next_sync = now + _SYNC_PERIOD
+                self._next_sync = now + 0.1  # s: what it costs slows down who writes
                 # One that has not begun yet sees to this flush, too.
                 if self._sync is None or self._sync.running() or self._sync.done():
-                    self._sync = self._do_later(self._stream.sync)
+                    self._sync = self._in_background(self._stream.sync)
 
     def attach(
         self, name: str, data: bytes, media_type: str, log_time: int = 0, create_time: int = 0
@@ -282,25 +271,20 @@ class Recorder:
         if self._closed:
             return
         with self._writing():
-            self._do_later(self._finish, self._writer, self._stream)
+            self._in_background(self._finish, self._writer, self._stream)
             self._wait_for_tasks(at_most=0)
         self._end()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        exception_type: type[BaseException] | None,
-        exception: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         self.close()
 
     def _open_file(self) -> None:
         """Begin the next file with all that is known by now; where that fails, there is none."""
         path = self.directory / f"{self.directory.name}_{self._files}.mcap"
-        stream = _RecordStream(path, self._begin_another)
+        stream = _RecordStream(path, self._on_full)
         try:
             writer = Writer(stream, compression=self._compression)
             writer.start(profile="ros2")
@@ -327,12 +311,12 @@ class Recorder:
             self._refuse_stamp(stamp)
         if stamp > self._latest:
             with self._writing():
-                self._wait_for_tasks(at_most=_MOST_TASKS)
+                self._wait_for_tasks(at_most=3)  # of a disk that is slower than who splits
                 self._writer.flush()
                 finished = self._writer, self._stream
                 self._stream.limit = inf
                 self._open_file()
-                self._do_later(self._finish, *finished)
+                self._in_background(self._finish, *finished)
                 self._sync = None
         if self._max_size and self._earliest == _LAST_STAMP:
             # A file grows with chunks only: what a limit below its beginning lets in is one.
@@ -341,7 +325,7 @@ class Recorder:
         if self._max_duration:
             self._latest = min(self._earliest + self._max_duration, _LAST_STAMP)
 
-    def _begin_another(self) -> None:
+    def _on_full(self) -> None:
         """Let no further message into the file at hand."""
         self._latest = -1
 
@@ -359,7 +343,7 @@ class Recorder:
         self._description.write(self.directory)
         _sync_directories([self.directory])
 
-    def _do_later(self, task: Callable[..., None], *arguments: Any) -> Future[None]:
+    def _in_background(self, task: Callable[..., None], *arguments: Any) -> Future[None]:
         """Have something done in the background, behind what is to be done there already."""
         self._tasks.append(self._background.submit(task, *arguments))
         return self._tasks[-1]
@@ -384,10 +368,10 @@ class Recorder:
         self._end()
         self._stream.cut()
         raise BagError(
-            f"the bag {self.directory} cannot be written any more ({error}); {self._left()}"
+            f"the bag {self.directory} cannot be written any more ({error}); {self._what_is_left()}"
         ) from error
 
-    def _left(self) -> str:
+    def _what_is_left(self) -> str:
         """Say what a bag that failed holds: the first messages may have been too many for it."""
         with suppress(BagError), Recording(self.directory) as recording:
             for _ in recording.messages(*self._topics):

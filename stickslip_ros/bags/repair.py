@@ -11,7 +11,7 @@ from stickslip_ros.bags.metadata import METADATA_FILE
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import Recorder, check_new_bag
 from stickslip_ros.errors import BagError
-from stickslip_ros.printable import printable
+from stickslip_ros.text import printable
 
 _Definition = tuple[object, ...]
 _ROSBAG2 = "rosbag2"

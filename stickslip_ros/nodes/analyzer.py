@@ -42,9 +42,10 @@ from stickslip_ros.nodes.base.polling import waiting_messages
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.base.service_call import parameters_call
 from stickslip_ros.physics.measures.run_meter import RunMeter
-from stickslip_ros.prefixes import quantity
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters, known_parameters
+from stickslip_ros.scenarios.parameter import known_parameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters
 from stickslip_ros.stamps import END_OF_TIME
+from stickslip_ros.text import quantity
 from stickslip_ros.versions import versions
 
 ColumnsT = TypeVar("ColumnsT")

@@ -12,7 +12,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from PIL import Image
 
-from stickslip_ros.printable import printable
+from stickslip_ros.text import printable
 
 BLUE, ORANGE, GREEN, SKY_BLUE, GREY = "#0072B2", "#D55E00", "#009E73", "#56B4E9", "#999999"
 """Of Okabe and Ito's palette, which the colour-blind can tell apart, and a grey."""

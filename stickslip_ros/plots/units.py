@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.prefixes import prefix_for
+from stickslip_ros.text import prefix_for
 
 NOISE = 1e-9
 """Share of the largest value below which a value is rounding, and is shown as 0."""

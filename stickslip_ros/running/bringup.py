@@ -27,7 +27,8 @@ from stickslip_ros.running.lifecycle_client import ACTIVE, NEXT_TRANSITION, Life
 from stickslip_ros.running.namespace_lock import lock_namespace
 from stickslip_ros.running.run_monitor import Notify, OnSimulatedTime, RunMonitor
 from stickslip_ros.running.spinner import Spinner
-from stickslip_ros.scenarios.files import Scenario, parameter_file, section_matches
+from stickslip_ros.scenarios.files import Scenario, parameter_file
+from stickslip_ros.scenarios.sections import section_matches
 
 _READY_TIMEOUT = 30.0
 _ANSWER_TIMEOUT = 15.0

@@ -4,7 +4,6 @@ import logging
 from collections.abc import Generator
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from importlib import import_module
 from typing import Any
 
 from stickslip_ros.errors import InvalidInputError, RunError
@@ -13,32 +12,36 @@ from stickslip_ros.studies.runner import IN_FLIGHT
 _TIMEOUT = "10s"
 
 
+class DaskError(RunError):
+    """A task has ended several workers of a cluster."""
+
+
 @contextmanager
 def dask_executor(address: str) -> Generator[tuple[Executor, int]]:
     """Connect to the scheduler at `address`; provide the executor and how many tasks it may hold.
 
     A task whose worker dies is computed again by another one. Raises InvalidInputError where
-    nothing answers, or distributed is not installed, and RunError for a task that has killed
+    nothing answers, or distributed is not installed, and DaskError for a task that has killed
     several workers.
     """
     try:
-        distributed: Any = import_module("distributed")
+        from distributed import Client, KilledWorker
     except ImportError:
         raise InvalidInputError(
-            f"--dask {address}: Dask is not installed: pip install 'stickslip_ros[dask]'"
+            f"{address}: Dask is not installed: pip install 'stickslip_ros[dask]'"
         ) from None
     with _silent_log():
         try:
-            client = distributed.Client(address, timeout=_TIMEOUT)
+            client = Client(address, timeout=_TIMEOUT)
         except (OSError, ValueError) as error:
             reason = " ".join(str(error).split()) or "nothing answers"
-            raise InvalidInputError(f"--dask {address}: no scheduler found: {reason}") from None
+            raise InvalidInputError(f"{address}: no scheduler found: {reason}") from None
         with client:
-            threads = sum(client.nthreads().values())
+            threads: Any = client.nthreads()
             try:
-                yield client.get_executor(), max(2 * threads, IN_FLIGHT)
-            except distributed.KilledWorker as error:
-                raise RunError(f"--dask {address}: {error}") from None
+                yield client.get_executor(), max(2 * sum(threads.values()), IN_FLIGHT)
+            except KilledWorker as error:
+                raise DaskError(f"{address}: {error}") from None
 
 
 @contextmanager

@@ -11,8 +11,9 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, Parameter, known_parameters
-from stickslip_ros.suggestions import did_you_mean
+from stickslip_ros.scenarios.parameter import Parameter, known_parameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.text import did_you_mean
 
 MOST_POINTS = 1_000_000_000
 """Points of a study: what is to be kept of them has to go into a file."""

@@ -114,7 +114,7 @@ def check_continuous(scenario: Scenario) -> None:
     ):
         if value != needed:
             raise InvalidInputError(
-                f"--continuous-control knows no {name}: it is {value}, and must be {needed}"
+                f"continuous control knows no {name}: it is {value}, and must be {needed}"
             )
 
 

@@ -22,8 +22,8 @@ from stickslip_ros.physics.theory.sampled import (
 )
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
 from stickslip_ros.physics.theory.sticking import sticking_onset
-from stickslip_ros.prefixes import quantity
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.text import quantity
 
 Section = dict[str, Any]
 Notes = dict[str, str]

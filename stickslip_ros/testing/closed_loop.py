@@ -31,8 +31,8 @@ from stickslip_ros.scenarios.files import (
     Scenario,
     load_scenario,
 )
-from stickslip_ros.scenarios.parameters import shown
 from stickslip_ros.testing.result import Diagnostics, RunResult, result_of
+from stickslip_ros.text import shown
 
 Controller = Callable[..., Node] | Sequence[str] | Literal["washout", "external"] | None
 """What is to control: a class or function that makes an rclpy node, a command that starts one,

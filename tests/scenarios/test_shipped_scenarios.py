@@ -6,8 +6,9 @@ from typing import Any
 import pytest
 import yaml
 
-from stickslip_ros.scenarios.files import load_scenario, number_in, parameter_file
+from stickslip_ros.scenarios.files import load_scenario, parameter_file
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.scenarios.ros_yaml import number_in
 
 ROOT = Path(__file__).parents[2]
 CONFIG = ROOT / "config"

@@ -4,8 +4,9 @@ import argparse
 import os
 from contextlib import suppress
 
-from stickslip_ros.app.arguments import add_namespace, namespace_of
-from stickslip_ros.app.optional import check_dashboard, ros_nodes
+from stickslip_ros.app.arguments import add_namespace, add_network, namespace_of
+from stickslip_ros.app.optional import check_dashboard, loading_ros
+from stickslip_ros.nodes.base.child_process import die_with_parent
 from stickslip_ros.nodes.base.domain_ports import LARGEST_PORT
 
 HELP = "show a running loop on a web page, live, and act on it"
@@ -26,19 +27,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PORT",
         help=f"port of the page on this machine (default: {DEFAULT_PORT}, or the next free one)",
     )
-    parser.add_argument(
-        "--network",
-        action="store_true",
-        help="listen to nodes on other machines, too; the page stays on this one",
-    )
+    add_network(parser, "listen to nodes on other machines, too; the page stays on this one")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     namespace = namespace_of(arguments.namespace)
     check_dashboard()
-    reach = ros_nodes("nodes.base.network").keep_on_this_machine(arguments.network)
-    ros_nodes("nodes.base.child_process").die_with_parent()
+    with loading_ros():
+        from stickslip_ros.nodes.base.network import keep_on_this_machine
+    reach = keep_on_this_machine(arguments.network)
+    die_with_parent()
     with suppress(OSError):
         os.nice(_NICENESS)
     from stickslip_ros.app.dashboard.server import serve  # it needs NiceGUI, and takes seconds

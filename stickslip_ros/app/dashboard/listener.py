@@ -43,7 +43,8 @@ from stickslip_ros.nodes.base.qos import qos_profile
 from stickslip_ros.nodes.base.service_call import ANSWER_TIME, ServiceCall, parameters_call
 from stickslip_ros.running.controller_search import DASHBOARD
 from stickslip_ros.samples import ForceColumns, SampleColumns
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, known_parameters
+from stickslip_ros.scenarios.parameter import known_parameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.stamps import NANOSECONDS
 
 SILENCE = 2.5

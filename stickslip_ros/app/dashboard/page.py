@@ -20,7 +20,8 @@ from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.style import BLUE, GREY, ORANGE
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, Fixed, known_parameters
+from stickslip_ros.scenarios.parameter import Fixed, known_parameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 
 _CONTROLLER = "washout_controller"
 _FIRST = (

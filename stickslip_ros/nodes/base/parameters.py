@@ -16,9 +16,12 @@ from rclpy.parameter import Parameter
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.base.ros_errors import RCLError, first_line
-from stickslip_ros.scenarios import parameters
-from stickslip_ros.scenarios.files import LONGEST_NAMESPACE, number_in
-from stickslip_ros.scenarios.parameters import Fixed, NodeParameters, shown
+from stickslip_ros.scenarios.files import LONGEST_NAMESPACE
+from stickslip_ros.scenarios.parameter import Fixed, known_parameters
+from stickslip_ros.scenarios.parameter import Parameter as ModelParameter
+from stickslip_ros.scenarios.parameters import NodeParameters
+from stickslip_ros.scenarios.ros_yaml import number_in
+from stickslip_ros.text import shown
 
 ParametersT = TypeVar("ParametersT", bound=NodeParameters)
 
@@ -70,7 +73,7 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
         self.active = False
         """Whether the node is in the state active."""
         self._model = model
-        self._known = parameters.known_parameters(model)
+        self._known = known_parameters(model)
         self.parameters = self._declare()
         """The parameters in force."""
 
@@ -161,7 +164,7 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
         ]
 
 
-def _descriptor(parameter: parameters.Parameter) -> ParameterDescriptor:
+def _descriptor(parameter: ModelParameter) -> ParameterDescriptor:
     unit = f" [{parameter.unit}]" if parameter.unit else ""
     descriptor = ParameterDescriptor(
         name=parameter.name,

@@ -21,7 +21,8 @@ from stickslip_ros.nodes.base.machine import check_machine, domain_of_environmen
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.base.network import prefer_prompt_middleware
 from stickslip_ros.nodes.base.ros_errors import first_line
-from stickslip_ros.scenarios.parameters import NodeParameters, parameters_of
+from stickslip_ros.scenarios.parameter import parameters_of
+from stickslip_ros.scenarios.parameters import NodeParameters
 from stickslip_ros.streams import open_closed_streams
 
 ROS_ARGUMENTS = ["--ros-args", "--log-level", "warn", "--disable-external-lib-logs"]

@@ -15,9 +15,9 @@ from stickslip_ros.messages.topics import CLOCK, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.replaying.player import Message
 from stickslip_ros.nodes.replaying.recorded_qos import installed_message_class, recorded_profile
 from stickslip_ros.nodes.replaying.timeline import JITTER, Timeline
-from stickslip_ros.printable import printable
 from stickslip_ros.scenarios.parameters import ReplayParameters
 from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.text import printable
 
 
 class ReplayedTopic(NamedTuple):

@@ -9,11 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from stickslip_ros.app.arguments import made_of, writing
+from stickslip_ros.app.arguments import check_new, made_of, naming, writing
 from stickslip_ros.app.output import finite, progress_bar
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.studies.columns import Further, write_csv, write_json
-from stickslip_ros.studies.dask_cluster import dask_executor
+from stickslip_ros.studies.dask_cluster import DaskError, dask_executor
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.runner import run, run_here
 from stickslip_ros.studies.settled import Course
@@ -74,11 +74,13 @@ def course_of(arguments: argparse.Namespace, default: Course) -> Course:
 
 
 @contextmanager
-def done(arguments: argparse.Namespace, study: Study, label: str) -> Generator[Journal]:
+def computed(arguments: argparse.Namespace, study: Study, label: str) -> Generator[Journal]:
     """Compute what is missing of the study, and provide its journal, complete."""
     out: Path | None = arguments.out
     if out is not None:
-        _refuse_table(out)
+        if out.suffix.lower() not in _TABLES:
+            raise InvalidInputError(f"--out {out}: must end in one of {', '.join(_TABLES)}")
+        check_new("--out", out)
     part = None if out is None else out.with_name(f"{out.name}.part")
     with Journal(study, part) as journal:
         kept = "; without --out nothing is kept"
@@ -89,7 +91,10 @@ def done(arguments: argparse.Namespace, study: Study, label: str) -> Generator[J
                 if arguments.dask is None:
                     run_here(journal, arguments.workers, progress)
                 else:
-                    with dask_executor(arguments.dask) as (executor, in_flight):
+                    with (
+                        naming("--dask"),
+                        dask_executor(arguments.dask) as (executor, in_flight),
+                    ):
                         run(journal, executor, in_flight=in_flight, progress=progress)
         except KeyboardInterrupt:
             print(
@@ -100,38 +105,39 @@ def done(arguments: argparse.Namespace, study: Study, label: str) -> Generator[J
             raise
         except OSError as error:
             raise RunError(f"{part or 'temporary file'}: {error.strerror}{kept}") from None
+        except DaskError as error:
+            raise RunError(f"--dask {error}{kept}") from None
         except RunError as error:
             raise RunError(f"{error}{kept}") from None
         yield journal
 
 
-def write_table(
-    path: Path, journal: Journal, further: Further, made: Mapping[str, Any] | None = None
+def write_results(
+    arguments: argparse.Namespace, journal: Journal, further: Further, made: Mapping[str, Any]
 ) -> None:
-    """Write the table of a complete journal, which is not needed any more then.
+    """Write the table of a complete journal to where it was asked for, a file or as JSON.
 
     As JSON it also holds what was `made` of all points together.
     """
+    head = finite({**made_of(journal.study.scenario), **made})
+    if arguments.out is not None:
+        _write_table(arguments.out, journal, further, head)
+    if arguments.json:
+        write_json(sys.stdout, journal, further, head)
+
+
+def _write_table(path: Path, journal: Journal, further: Further, head: Mapping[str, Any]) -> None:
+    """Write the table of a journal, which need not be kept any more then."""
     new = path.with_name(f"{path.name}.new")
     with writing("--out", path), new.open("w", encoding="utf-8", newline="") as stream:
         if path.suffix.lower() == ".csv":
             write_csv(stream, journal, further)
         else:
-            head = {**made_of(journal.study.scenario), **(made or {})}
-            write_json(stream, journal, further, finite(head))
+            write_json(stream, journal, further, head)
         stream.flush()
         os.fsync(stream.fileno())
     new.replace(path)
     journal.discard()
-
-
-def _refuse_table(path: Path) -> None:
-    if path.suffix.lower() not in _TABLES:
-        raise InvalidInputError(f"--out {path}: must end in one of {', '.join(_TABLES)}")
-    if path.exists():
-        raise InvalidInputError(f"--out {path}: exists already, and is left as it is")
-    if not path.absolute().parent.is_dir():
-        raise InvalidInputError(f"--out {path}: there is no directory {path.parent}")
 
 
 def _workers(text: str) -> int:

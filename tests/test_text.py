@@ -2,7 +2,7 @@
 
 import pytest
 
-from stickslip_ros.suggestions import did_you_mean
+from stickslip_ros.text import did_you_mean
 
 KNOWN = ("plant.mass", "plant.rate", "plant.friction.static", "washout_controller.linear_gain")
 

@@ -1,11 +1,47 @@
-"""What somebody may have meant by a name that does not exist."""
+"""Text as messages, tables and pictures show it."""
 
 from collections.abc import Iterable
 from difflib import SequenceMatcher
+from typing import Any
 
+_PREFIXES = {1e9: "G", 1e6: "M", 1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
 _LONGEST, _MOST = 80, 3
 _ALIKE = 0.6
 """Ratio of `SequenceMatcher` from which on two names are close."""
+
+
+def printable(text: str) -> str:
+    """Return a text on one line, with what would steer a terminal shown as its escape sequence.
+
+    So a name in somebody's bag or scenario cannot move the cursor, set the window's title, or
+    pretend to be a line of ours.
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        character if character.isprintable() else ascii(character)[1:-1] for character in text
+    )
+
+
+def shown(value: Any) -> str:
+    """Return a value as messages show it, a long one cut."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+
+
+def quantity(value: float, unit: str) -> str:
+    """Return a value, rounded, with the prefix that suits it and its unit."""
+    scale, prefix = prefix_for(value)
+    return f"{value / scale:.4g} {prefix}{unit}"
+
+
+def prefix_for(largest: float) -> tuple[float, str]:
+    """Return what to divide by, and the prefix, so that a value of that magnitude is 1 or more.
+
+    What is smaller than the smallest prefix, zero included, gets none.
+    """
+    magnitude = abs(largest)
+    return next(((scale, p) for scale, p in _PREFIXES.items() if magnitude >= scale), (1.0, ""))
 
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str | None = None) -> str:

@@ -1,0 +1,156 @@
+"""What is in a chunk of an MCAP file: messages, as columns, and definitions among them."""
+
+from array import array
+from collections import deque
+from collections.abc import Collection, Iterator
+from copy import copy
+from typing import Any, NamedTuple
+
+import numpy as np
+from mcap.opcode import Opcode
+from numpy.typing import NDArray
+
+from stickslip_ros.arrays import IntArray
+from stickslip_ros.bags.compression import ZSTD_MAGIC, unpack_message
+from stickslip_ros.bags.records import HEAD, DamageError, records_in
+from stickslip_ros.messages.cdr import joined
+
+_MESSAGE = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")
+_MESSAGE.names = "opcode", "length", "channel", "sequence", "log_time", "publish_time"
+"""A message record, up to the message."""
+MESSAGE_SIZE = _MESSAGE.itemsize
+MESSAGE_LENGTH = MESSAGE_SIZE - HEAD.size
+"""Of a message record's content, without the message."""
+WINDOW = 1 << 20
+"""Bytes of a block of messages that are read, or unpacked, one by one."""
+DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
+"""Records that tell what messages are."""
+LARGEST_TABLE = 16 << 20
+"""Bytes of the largest record of texts that is taken apart: that takes many times its size."""
+
+
+class MessageBlock:
+    """Messages that stand together in a file, such as those of one chunk: arrays of shape (n,).
+
+    The serialized message i is `data[begin[i] : end[i]]`.
+    """
+
+    def __init__(self, data: bytes, starts: IntArray) -> None:
+        """Take the message records that start there; raises DamageError where there is none."""
+        if len(starts) > 0 and not 0 <= starts.min() <= starts.max() <= len(data) - MESSAGE_SIZE:
+            raise DamageError
+        self.data = data
+        self.begin = starts + MESSAGE_SIZE
+        lengths = self._field("length").astype(np.int64)
+        self.end = self.begin + (lengths - MESSAGE_LENGTH)
+        sound = (self._field("opcode") == Opcode.MESSAGE) & (lengths >= MESSAGE_LENGTH)
+        if not (sound & (lengths <= len(data)) & (self.end <= len(data))).all():
+            raise DamageError
+
+    def __len__(self) -> int:
+        return len(self.begin)
+
+    @property
+    def channel(self) -> NDArray[np.uint16]:
+        """Ids of the channels."""
+        return self._field("channel")
+
+    @property
+    def sequence(self) -> NDArray[np.uint32]:
+        """Numbers given by the recorder; zero where it gave none."""
+        return self._field("sequence")
+
+    @property
+    def log_time(self) -> IntArray:
+        """In ns."""
+        return self._field("log_time").astype(np.int64)
+
+    @property
+    def publish_time(self) -> IntArray:
+        """In ns."""
+        return self._field("publish_time").astype(np.int64)
+
+    def on(self, channels: Collection[int]) -> "MessageBlock":
+        """Return those on these channels."""
+        chosen = np.zeros(1 << 16, bool)
+        chosen[list(channels)] = True
+        wanted = chosen[self.channel]
+        if wanted.all():
+            return self
+        part = copy(self)
+        part.begin, part.end = self.begin[wanted], self.end[wanted]
+        return part
+
+    def unpacked(self) -> Iterator["MessageBlock"]:
+        """Yield them, unpacked and in smaller blocks if rosbag2 packed each message by itself."""
+        if len(self) == 0 or not self.data.startswith(ZSTD_MAGIC, int(self.begin[0])):
+            yield self
+            return
+        records: list[bytes] = []
+        size = 0
+        for begin, end in zip(self.begin.tolist(), self.end.tolist(), strict=True):
+            message = unpack_message(self.data[begin:end])
+            head = HEAD.pack(Opcode.MESSAGE, MESSAGE_LENGTH + len(message))
+            records.append(head + self.data[begin - MESSAGE_LENGTH : begin] + message)
+            size += len(records[-1])
+            if size > WINDOW:
+                yield as_block(records)
+                records, size = [], 0
+        if records:
+            yield as_block(records)
+
+    def _field(self, name: str) -> NDArray[Any]:
+        count = max(0, len(self.data) - MESSAGE_SIZE + 1)
+        records = np.ndarray((count,), _MESSAGE, self.data, strides=(1,))  # one at each byte
+        return records[name][self.begin - MESSAGE_SIZE]
+
+
+class OpenChunk(NamedTuple):
+    """What is in a chunk."""
+
+    messages: MessageBlock
+    others_end: int
+    """Up to there the data of the messages may hold other records."""
+
+    @property
+    def definitions(self) -> Iterator[tuple[int, bytes]]:
+        """Opcode and content of each definition in it."""
+        data = self.messages.data
+        for opcode, begin, end in records_in(data[: self.others_end]):
+            if opcode in DEFINITIONS:
+                yield opcode, data[begin : min(end, begin + LARGEST_TABLE)]
+
+
+def as_block(records: list[bytes]) -> MessageBlock:
+    """Return message records as a block."""
+    data, starts, _ = joined(records)
+    return MessageBlock(data, starts)
+
+
+def open_chunk(data: bytes, starts: IntArray) -> OpenChunk:
+    """Return what is in a chunk whose messages start there, by its indexes.
+
+    Where these are not right it goes from record to record; DamageError where there are none.
+    """
+    return _indexed(data, starts) or _walked(data)
+
+
+def _indexed(data: bytes, starts: IntArray) -> OpenChunk | None:
+    """Take the messages that start there, which must follow each other up to the end."""
+    if len(starts) == 0:
+        return None
+    try:
+        messages = MessageBlock(data, starts)
+        chunk = OpenChunk(messages, int(starts[0]))
+        deque(chunk.definitions, maxlen=0)  # each of them has to be sound
+    except DamageError:
+        return None
+    joined = np.array_equal(messages.end[:-1], starts[1:]) and messages.end[-1] == len(data)
+    return chunk if joined else None
+
+
+def _walked(data: bytes) -> OpenChunk:
+    """Find the messages by going from record to record."""
+    messages = (begin for opcode, begin, _ in records_in(data) if opcode == Opcode.MESSAGE)
+    starts = np.array(array("q", messages), np.int64) - HEAD.size
+    return OpenChunk(MessageBlock(data, starts), len(data))

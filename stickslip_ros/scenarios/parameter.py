@@ -1,0 +1,122 @@
+"""What a parameter is: unit, bounds, default, meaning, and from when on it is fixed."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cache
+from typing import Any
+
+from pydantic import BaseModel, Field
+from pydantic.fields import FieldInfo
+
+SMALLEST, LARGEST = 1e-30, 1e30
+"""Magnitudes, in SI units, between which no product or power in the physics overflows."""
+
+_COMPARISONS = {"ge": "at least", "le": "at most"}
+_UNTOLD = (LARGEST, 2**62)
+"""Limits that only a mistake meets."""
+
+
+class Fixed(StrEnum):
+    """From which state of the node on a parameter cannot be changed."""
+
+    NEVER = ""
+    ACTIVE = "active"
+    CONFIGURED = "configured"
+
+    @property
+    def changes(self) -> str:
+        """When it can be changed, in words."""
+        return {"": "at any time", "active": "while inactive", "configured": "before configured"}[
+            self
+        ]
+
+
+def field(
+    default: Any,
+    meaning: str,
+    unit: str | None = None,
+    *,
+    fixed: Fixed = Fixed.NEVER,
+    choices: Iterable[str] = (),
+    **bounds: Any,
+) -> Any:
+    """Describe a parameter."""
+    extra: Any = {"unit": unit, "fixed": fixed, "choices": tuple(choices)}
+    if isinstance(default, float) and "allow_inf_nan" not in bounds:
+        bounds = {"ge": -LARGEST, "le": LARGEST} | bounds
+    return Field(default, description=meaning, json_schema_extra=extra, **bounds)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What is known of one parameter."""
+
+    name: str
+    """Flat name, such as friction.static."""
+    kind: type
+    """bool, int, float, str or list (of str)."""
+    default: Any
+    unit: str | None
+    meaning: str
+    fixed: Fixed
+    choices: tuple[str, ...]
+    """What a parameter of kind str may be; empty: anything."""
+    bounds: str
+    """What is allowed, in words, but for limits that only a mistake meets; empty: anything."""
+    limits: str
+    """What is allowed, with those."""
+    finite: bool
+    """Whether a number must be finite."""
+    range: tuple[float, float] | None
+    """Least and largest value of a number, if it has both and they are not those of any."""
+
+
+def parameters_of(model: type[BaseModel], prefix: str = "") -> Iterator[Parameter]:
+    """Yield the parameters of a node's model in the order of their definition."""
+    for name, info in model.model_fields.items():
+        kind = info.annotation
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            yield from parameters_of(kind, f"{prefix}{name}.")
+        else:
+            yield _parameter(prefix + name, info)
+
+
+@cache
+def known_parameters(model: type[BaseModel]) -> Mapping[str, Parameter]:
+    """Return the parameters of a node's model by their flat names."""
+    return {parameter.name: parameter for parameter in parameters_of(model)}
+
+
+def _parameter(name: str, info: FieldInfo) -> Parameter:
+    extra: Any = info.json_schema_extra
+    choices = tuple(str(choice) for choice in extra["choices"])
+    one_of = f"one of {', '.join(choices)}" if choices else ""
+    kind: Any = str if choices else list if info.annotation == list[str] else info.annotation
+    limits = {
+        comparison: getattr(constraint, comparison)
+        for constraint in info.metadata
+        for comparison in _COMPARISONS
+        if hasattr(constraint, comparison)
+    }
+    told = {name: limit for name, limit in limits.items() if abs(limit) not in _UNTOLD}
+    return Parameter(
+        name=name,
+        kind=kind,
+        default=str(info.default) if kind is str else info.default,
+        unit=extra["unit"],
+        meaning=info.description or "",
+        fixed=extra["fixed"],
+        choices=choices,
+        bounds=one_of or _in_words(told).replace(f"at least {SMALLEST:g}", "above 0"),
+        limits=one_of or _in_words(limits),
+        finite=not any(getattr(each, "allow_inf_nan", False) for each in info.metadata),
+        range=(limits["ge"], limits["le"]) if told and len(limits) == 2 else None,
+    )
+
+
+def _in_words(limits: Mapping[str, Any]) -> str:
+    return " and ".join(
+        f"{_COMPARISONS[name]} {f'{limit:g}' if isinstance(limit, float) else limit}"
+        for name, limit in limits.items()
+    )

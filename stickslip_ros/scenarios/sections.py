@@ -1,0 +1,143 @@
+"""A scenario file read: sections of node name patterns, each with parameters."""
+
+import re
+from collections.abc import Iterator, Mapping
+from itertools import chain
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.scenarios import ros_yaml
+from stickslip_ros.scenarios.parameter import known_parameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.text import did_you_mean, shown
+
+PARAMETERS_KEY = "ros__parameters"
+_LARGEST = 1_000_000
+"""Characters of a scenario file."""
+_SCENARIO = "scenario"
+"""Last part of the name of the section that is for no node, but says what completes the file."""
+
+
+class ScenarioFile(NamedTuple):
+    """What a scenario file says."""
+
+    path: Path
+    values: dict[str, dict[str, Any]]
+    """By node and flat name."""
+    other_sections: list[str]
+    base: str | None
+
+
+def read_file(path: Path, namespace: str, *, other_nodes: bool) -> ScenarioFile:
+    """Read what a scenario file says of the nodes in `namespace`.
+
+    Raises InvalidInputError for anything unknown; with `other_nodes`, but for unknown nodes.
+    """
+    values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
+    other_sections: list[str] = []
+    base: str | None = None
+    for pattern, parameters in _sections(path):
+        own = section_matches(pattern, f"{namespace.rstrip('/')}/{_SCENARIO}")
+        if own and pattern.endswith(f"/{_SCENARIO}"):
+            base = _base_of(path, pattern, parameters)
+        elif other_nodes and not _matching(pattern, namespace):
+            other_sections.append(pattern)
+        else:
+            _apply(values, path, pattern, parameters, namespace)
+    return ScenarioFile(path, values, other_sections, base)
+
+
+def section_matches(pattern: str, node: str) -> bool:
+    """Return whether a section applies to the node of that full name, as ROS has it."""
+    tokens = {"**": r"(/\w+)*", "*": r"/\w+"}
+    expression = "".join(tokens.get(t, "/" + re.escape(t)) for t in pattern.split("/")[1:])
+    return re.fullmatch(expression, node) is not None
+
+
+def _matching(pattern: str, namespace: str) -> list[str]:
+    """Return the nodes in `namespace` to which a section applies."""
+    return [n for n in NODE_PARAMETERS if section_matches(pattern, f"{namespace.rstrip('/')}/{n}")]
+
+
+def _base_of(path: Path, pattern: str, parameters: Mapping[str, Any]) -> str:
+    for name in parameters:
+        if name != "base":
+            raise InvalidInputError(
+                f"{path}: section {pattern}: unknown parameter {name:.80}; known is base"
+            )
+    base = parameters.get("base")
+    if not isinstance(base, str) or not base:
+        raise InvalidInputError(
+            f"{path}: section {pattern}: base = {shown(base)} is refused: must be the name or the "
+            "path of a scenario"
+        )
+    return base
+
+
+def _apply(
+    values: dict[str, dict[str, Any]],
+    path: Path,
+    pattern: str,
+    parameters: Mapping[str, Any],
+    namespace: str,
+) -> None:
+    """Give the parameters of a section to every node that it matches."""
+    nodes = _matching(pattern, namespace)
+    if not nodes:
+        node = pattern.rpartition("/")[2]
+        raise InvalidInputError(
+            f"{path}: section {pattern} matches no node; "
+            + did_you_mean(
+                node,
+                NODE_PARAMETERS.keys() - {node},
+                f"in namespace {namespace} there are {', '.join(NODE_PARAMETERS)}",
+            )
+        )
+    known = {node: known_parameters(NODE_PARAMETERS[node]) for node in nodes}
+    for name, value in parameters.items():
+        takers = [node for node in nodes if len(nodes) == 1 or name in known[node]]
+        if not takers:
+            raise InvalidInputError(
+                f"{path}: section {pattern}: no node has a parameter {name:.80}; "
+                + did_you_mean(name, {*chain(*known.values())}, "docs/parameters.md has them all")
+            )
+        for node in takers:
+            values[node][name] = value
+
+
+def _sections(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the node name pattern and the parameters, flat, of each section of the file."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            text = file.read(_LARGEST + 1)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidInputError(f"cannot read scenario {path}: {error}") from None
+    if len(text) > _LARGEST:
+        raise InvalidInputError(
+            f"cannot read scenario {path}: it is longer than {_LARGEST} characters"
+        )
+    yield from _walk(ros_yaml.parse(text, str(path)), "", path)
+
+
+def _walk(tree: Any, name: str, path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    if not isinstance(tree, dict) or not tree:
+        raise InvalidInputError(
+            f"{path}: expected node names with {PARAMETERS_KEY} below, found {tree!r:.60} "
+            f"at {name or 'the top'}"
+        )
+    for key, below in cast(dict[Any, Any], tree).items():
+        if key != PARAMETERS_KEY:
+            yield from _walk(below, f"{name}/{str(key).strip('/')}", path)
+        elif isinstance(below, dict):
+            yield name, dict(_flatten(cast(dict[Any, Any], below)))
+        else:
+            raise InvalidInputError(f"{path}: {name}: {PARAMETERS_KEY} must be names and values")
+
+
+def _flatten(values: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in values.items():
+        if isinstance(value, dict):
+            yield from _flatten(cast(dict[Any, Any], value), f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value

@@ -1,0 +1,108 @@
+"""Values of parameters, checked: a refusal names the parameter, its value and what is allowed."""
+
+from collections.abc import Iterator, Mapping
+from enum import StrEnum
+from math import inf
+from typing import Any, Self
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.scenarios.parameter import LARGEST, SMALLEST, known_parameters
+from stickslip_ros.text import did_you_mean, shown
+
+_KIND_NAMES = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a number",
+    str: "a string",
+    list: "a list of strings",
+}
+
+
+class ParameterGroup(BaseModel):
+    """Parameters that belong together: those of a node, or a part of these."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True
+    )
+
+    @classmethod
+    def validated(cls, values: Mapping[str, Any], source: str) -> Self:
+        """Return the parameters given by their flat names, the rest at their defaults.
+
+        Raises InvalidInputError naming `source`, parameter, value and what is allowed.
+        """
+        known = known_parameters(cls)
+        for name, value in values.items():
+            if name not in known:
+                raise InvalidInputError(
+                    f"{source}: unknown parameter {name:.80} = {shown(value)}; "
+                    f"{did_you_mean(name, known)}"
+                )
+        try:
+            return cls.model_validate(_nested(values))
+        except ValidationError as error:
+            raise InvalidInputError(f"{source}: {_explain(cls, error, values)}") from None
+
+    @classmethod
+    def check_bounds(cls, name: str, value: Any) -> None:
+        """Refuse a value that is out of its bounds whatever the other parameters are.
+
+        Raises InvalidInputError naming parameter, value and what is allowed.
+        """
+        try:
+            cls.model_validate(_nested({name: value}))
+        except ValidationError as error:
+            if any(".".join(map(str, detail["loc"])) == name for detail in error.errors()):
+                raise InvalidInputError(_explain(cls, error, {name: value})) from None
+
+    def flat(self) -> dict[str, Any]:
+        """Return the values by their flat names, as plain Python types."""
+        return dict(_flat(self.model_dump(mode="python")))
+
+
+def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str, Any]) -> str:
+    """Return in one line which values are refused, and what is allowed."""
+    known = known_parameters(model)
+    complaints: list[str] = []
+    for detail in error.errors():
+        place = [part for part in detail["loc"] if isinstance(part, str)]
+        name = ".".join(place)
+        if name not in known:
+            complaints.append(detail["msg"].removeprefix("Value error, "))
+            continue
+        parameter = known[name]
+        allowed = _KIND_NAMES[parameter.kind]
+        if parameter.kind is float and parameter.finite:
+            allowed = "a finite number"
+        value = values.get(name, detail["input"])
+        bounds = parameter.limits if _is_extreme(value) else parameter.bounds
+        if bounds:
+            allowed = bounds if parameter.choices else f"{allowed} {bounds}"
+        unit = f"{'' if bounds else ' in'} {parameter.unit}" if parameter.unit else ""
+        text = ", not text" if isinstance(value, str) and parameter.kind is not str else ""
+        complaints.append(f"{name} = {shown(value)} is refused: must be {allowed}{unit}{text}")
+    return "; ".join(complaints)
+
+
+def _is_extreme(value: Any) -> bool:
+    """Return whether a number is beyond limits that are not told otherwise."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and (LARGEST < abs(value) < inf or 0 < value < SMALLEST)
+
+
+def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    nested: dict[str, Any] = {}
+    for name, value in values.items():
+        group, _, rest = name.rpartition(".")
+        (nested.setdefault(group, {}) if group else nested)[rest] = value
+    return nested
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{name}.")
+        else:
+            yield prefix + name, str(value) if isinstance(value, StrEnum) else value
