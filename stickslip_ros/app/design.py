@@ -86,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
     scenario = scenario_of(arguments, unused=_PROPOSED)
     if not scenario.plant.expects_control:
         raise InvalidInputError("plant.expects_control = False: without control there are no gains")
-    task = Task.of(scenario, _belt_speeds(arguments.belt_speed))
+    task = Task.from_scenario(scenario, _belt_speeds(arguments.belt_speed))
     if arguments.out is not None:
         _refuse_unless_new(arguments.out)
     if arguments.plot is not None:

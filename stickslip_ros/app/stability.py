@@ -293,7 +293,7 @@ def _why_no_gain(drive: Drive, gains: WashoutGains) -> str:
 def _sampled_loop(
     drive: Drive, gains: WashoutGains | None, rate: float, force_delay: float, notes: Notes
 ) -> Section:
-    loop = LinearSampledLoop.of(drive, rate, force_delay)
+    loop = LinearSampledLoop.from_drive(drive, rate, force_delay)
     if gains is None or loop is None:
         reason = why_no_linear_loop(drive, rate, force_delay)
         notes["sampled_loop"] = _NO_CONTROL if gains is None else reason or ""
@@ -324,7 +324,7 @@ def _closed_forms(drive: Drive, gains: WashoutGains | None) -> Section | None:
 
     What does not exist is left out.
     """
-    cubic = CubicLoop.of(drive)
+    cubic = CubicLoop.from_drive(drive)
     if cubic is None:
         return None
     speed, force = drive.speed_scale, drive.normal_force
@@ -378,7 +378,7 @@ def _draw(path: Path, scenario: Scenario) -> None:
 
     plant = scenario.plant
     drive, gains = plant.as_drive(), scenario.washout_controller.as_washout().gains
-    loop = LinearSampledLoop.of(drive, plant.rate, plant.force_delay)
+    loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay)
     assert loop is not None
     rates = plant.rate * np.array(_DRAWN_RATES)
     latest = min(_DRAWN_DELAY * drive.natural_period, LONGEST_DELAY / rates.max())

@@ -16,13 +16,13 @@ from stickslip_ros.studies.columns import Further, write_csv, write_json
 from stickslip_ros.studies.dask_cluster import dask_executor
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.runner import run, run_here
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import SettlingCourse
 from stickslip_ros.studies.study import Study
 
 _TABLES = (".csv", ".json")
 
 
-def add_running(parser: argparse.ArgumentParser, course: Course) -> None:
+def add_running(parser: argparse.ArgumentParser, course: SettlingCourse) -> None:
     """Add how each point is followed, by default as in `course`, where, and what is kept of it."""
     parser.add_argument(
         "--continuous-control",
@@ -68,7 +68,7 @@ def add_running(parser: argparse.ArgumentParser, course: Course) -> None:
     )
 
 
-def course_of(arguments: argparse.Namespace, default: Course) -> Course:
+def course_of(arguments: argparse.Namespace, default: SettlingCourse) -> SettlingCourse:
     """Return how each point is to be followed, what cannot be asked for being as in `default`."""
     return replace(default, transient=arguments.transient, cycles=arguments.cycles)
 

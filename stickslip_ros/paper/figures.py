@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.portraits import Case, Portrait, portraits
-from stickslip_ros.physics.loop.simulation import Progress
+from stickslip_ros.paper.portraits import Portrait, PortraitCase, portraits
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
+from stickslip_ros.progress import Progress
 from stickslip_ros.studies.bifurcation import (
     COURSE,
     BifurcationDiagram,
@@ -119,7 +119,7 @@ class _Bifurcation(NamedTuple):
 
 class _Portraits(NamedTuple):
     title: str
-    panels: Mapping[str, Sequence[Case]]
+    panels: Mapping[str, Sequence[PortraitCase]]
 
 
 def _bifurcation_figure(
@@ -145,28 +145,31 @@ def _portrait_figure(number: int, plan: _Portraits, progress: Progress) -> Portr
 
 def _belt_speeds(
     speeds: Sequence[float], *, damping: float = 0.02, duration: float | None = None
-) -> list[Case]:
+) -> list[PortraitCase]:
     return [
-        Case(f"v0 = {v0:g}", unit_drive(v0, damping=damping), duration=duration) for v0 in speeds
+        PortraitCase(f"v0 = {v0:g}", unit_drive(v0, damping=damping), duration=duration)
+        for v0 in speeds
     ]
 
 
 def _dampings(
     betas: Sequence[float], belt_speed: float, friction: FrictionLaw = STRIBECK
-) -> list[Case]:
+) -> list[PortraitCase]:
     return [
-        Case(f"β = {beta:g}", unit_drive(belt_speed, damping=2.0 * beta, friction=friction))
+        PortraitCase(f"β = {beta:g}", unit_drive(belt_speed, damping=2.0 * beta, friction=friction))
         for beta in betas
     ]
 
 
-def _stiffnesses(stiffnesses: Sequence[float], belt_speed: float) -> list[Case]:
-    return [Case(f"stiffness {k:g}", unit_drive(belt_speed, stiffness=k)) for k in stiffnesses]
-
-
-def _minima(minima: Sequence[float], belt_speed: float) -> list[Case]:
+def _stiffnesses(stiffnesses: Sequence[float], belt_speed: float) -> list[PortraitCase]:
     return [
-        Case(f"μm = {minimum:g}", unit_drive(belt_speed, friction=_stribeck(minimum)))
+        PortraitCase(f"stiffness {k:g}", unit_drive(belt_speed, stiffness=k)) for k in stiffnesses
+    ]
+
+
+def _minima(minima: Sequence[float], belt_speed: float) -> list[PortraitCase]:
+    return [
+        PortraitCase(f"μm = {minimum:g}", unit_drive(belt_speed, friction=_stribeck(minimum)))
         for minimum in minima
     ]
 
@@ -187,9 +190,9 @@ def _of_friction_ratio(ratio: float) -> Drive:
     return unit_drive(0.4, friction=_stribeck(STRIBECK.static / ratio))
 
 
-def _gains(corner_frequency: float, gains: Sequence[tuple[float, float]]) -> list[Case]:
+def _gains(corner_frequency: float, gains: Sequence[tuple[float, float]]) -> list[PortraitCase]:
     return [
-        Case(
+        PortraitCase(
             f"k1 = {k1:g}, k2 = {k2:g}",
             unit_drive(0.4),
             WashoutGains(corner_frequency, k1, k2),

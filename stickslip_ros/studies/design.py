@@ -15,7 +15,6 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.loop.simulation import Progress
 from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.physics.model.drive import Drive
@@ -27,6 +26,7 @@ from stickslip_ros.physics.theory.sampled import (
     settling_time,
     why_no_linear_loop,
 )
+from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario, parameter_file
 from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
 from stickslip_ros.studies.trial import FILTER_SETTLED, Bench, Vibration
@@ -94,7 +94,9 @@ class Task:
     """What sets the task, if a scenario does."""
 
     @classmethod
-    def of(cls, scenario: Scenario, belt_speeds: tuple[float, float] | None = None) -> Self:
+    def from_scenario(
+        cls, scenario: Scenario, belt_speeds: tuple[float, float] | None = None
+    ) -> Self:
         """Return the task that a scenario sets, by default within 10 % of its own belt speed.
 
         Raises InvalidInputError for speeds that are no range above zero.
@@ -367,7 +369,7 @@ class _Candidates:
         self.loops = [
             loop
             for vibration in vibrations
-            if (loop := LinearSampledLoop.of(vibration.drive, task.rate, task.force_delay))
+            if (loop := LinearSampledLoop.from_drive(vibration.drive, task.rate, task.force_delay))
         ]
         self.task = task
         # The loops differ in one number, the slope of the friction: those at its ends tell all.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from itertools import product
 from math import isfinite, prod
-from typing import Protocol, Self
+from typing import ClassVar, Protocol, Self
 
 import numpy as np
 
@@ -144,6 +144,9 @@ def _numbers(*nodes: str) -> Iterator[str]:
 class Plan(Protocol):
     """The points of a study, by their index from 0 on."""
 
+    kind: ClassVar[str]
+    """Name of the kind of plan in journals and tables."""
+
     @property
     def parameters(self) -> tuple[str, ...]:
         """NODE.PARAMETER of what varies."""
@@ -180,6 +183,7 @@ class Grid:
     direction: all points of the one, then all of the other.
     """
 
+    kind: ClassVar[str] = "grid"
     axes: tuple[Axis, ...]
     carry: Carry | None = None
 
@@ -245,7 +249,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Sample:
+class RandomSample:
     """Values that are uniformly distributed between the ends of some axes, independent of another.
 
     Between those of a logarithmic axis it is their logarithms that are.
@@ -254,6 +258,7 @@ class Sample:
     with the smaller.
     """
 
+    kind: ClassVar[str] = "sample"
     axes: tuple[Axis, ...]
     """Whose counts do not matter."""
     size: int

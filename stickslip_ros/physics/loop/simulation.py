@@ -1,16 +1,12 @@
 """The closed loop without ROS, sampled or continuous as in the paper, and its measures."""
 
-from collections.abc import Callable
-
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycles import CycleMeter, Measures
 from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.progress import Progress
 
 BLOCK_SAMPLES = 1000
-
-Progress = Callable[[float], None]
-"""Told now and then what share (0 to 1) of the work is done."""
 
 
 def simulate_sampled(

@@ -348,7 +348,7 @@ class Motion:
         if self._continuous_control:
             variables[2] = self._w
         taylor.time = now
-        if self._sudden_speed == inf:
+        if self._characteristic_speed == inf:
             reached = taylor.propagate_until(end, self._steps_left)
         else:
             reached = taylor.propagate_until(end, self._steps_left, self._longest_step())
@@ -382,7 +382,7 @@ class Motion:
         to nothing there, and rises before the step ends, would not be seen.
         """
         acceleration = abs(self._reaction()) + abs(self._x) + abs(self._y) + self._static
-        return self._sudden_speed / acceleration if acceleration > 0.0 else inf
+        return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
 
     def _append_breakpoint(self, now: float, x: float, y: float, *, sticking: bool) -> None:
         if self._recording:
@@ -447,7 +447,9 @@ class Motion:
         self._belt_speed = values["belt_speed"]
         self._damping = values["damping"]
         self._static = values["static"]
-        self._sudden_speed = self._drive.friction.sudden_speed / self._drive.speed_scale
+        self._characteristic_speed = (
+            self._drive.friction.characteristic_speed / self._drive.speed_scale
+        )
         values |= vars(self._gains)
         indices = self._equations.index
         for integrator in (self._slipping, self._sticking):

@@ -53,7 +53,7 @@ def limit_cycle_from_hopf(drive: Drive, gains: WashoutGains) -> LimitCycle | Non
 def _by_normal_form(drive: Drive, gains: WashoutGains, sigma: float) -> FloatArray | None:
     """Return displacement (m) and filter state (m) at the upward turning point, and period (s)."""
     expansion = expand(drive, gains)
-    pair = None if expansion is None else ComplexPair.of(expansion)
+    pair = None if expansion is None else ComplexPair.from_expansion(expansion)
     if pair is None or sigma * pair.growth >= 0.0:
         return None
     # Y = r cos(theta) is zero and rises at -pi/2.

@@ -175,7 +175,7 @@ class _ReturnMap:
     def __init__(self, drive: Drive) -> None:
         self._motion = SensitiveMotion(drive)
         self._equilibrium = float(self._motion.rate[SPEED])
-        speed = min(abs(drive.belt_speed), drive.friction.sudden_speed) / drive.speed_scale
+        speed = min(abs(drive.belt_speed), drive.friction.characteristic_speed) / drive.speed_scale
         self._innermost = max(_INNERMOST * min(speed, 1.0), least_cycle(drive) or 0.0)
         self._outermost = _outermost(drive)
 

@@ -108,7 +108,7 @@ def _net_force(drive: Drive) -> tuple[FloatArray, FloatArray]:
     """Return speeds y on either side of rest and of the belt's speed, and g there."""
     law = drive.friction.scaled(drive.speed_scale)
     belt_speed = abs(drive.belt_speed) / drive.speed_scale
-    least = _LEAST_SPEED * min(belt_speed, drive.friction.sudden_speed / drive.speed_scale)
+    least = _LEAST_SPEED * min(belt_speed, drive.friction.characteristic_speed / drive.speed_scale)
     distances = np.geomspace(least, UNBOUNDED_SPEED, _SPEEDS)
     relative_speed = np.concatenate(
         [-belt_speed - distances, [-belt_speed], -distances, distances,

@@ -82,7 +82,7 @@ class LinearSampledLoop:
     """Of the open loop, dimensionless (see `theory.linear`); shape (2, 2)."""
 
     @classmethod
-    def of(cls, drive: Drive, rate: float, force_delay: float = 0.0) -> Self | None:
+    def from_drive(cls, drive: Drive, rate: float, force_delay: float = 0.0) -> Self | None:
         """Return the loop at `rate` (Hz) with `force_delay` (s); None as `why_no_linear_loop`."""
         expansion = expand(drive)
         if expansion is None or why_no_linear_loop(drive, rate, force_delay):
