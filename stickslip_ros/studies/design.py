@@ -18,8 +18,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
-from stickslip_ros.physics.theory.linear import SPEED
+from stickslip_ros.physics.model.equations import SPEED, WashoutGains
 from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.physics.theory.sampled import (
     LinearSampledLoop,

@@ -7,11 +7,11 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.equations import SPEED, WashoutGains
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.physics.theory.hopf import ComplexPair
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, shoot
-from stickslip_ros.physics.theory.linear import SPEED, expand
+from stickslip_ros.physics.theory.linear import expand
 
 _STEPS = 16
 """Gains between the critical one and the one that is wanted, closest where the cycle is small."""

@@ -17,10 +17,10 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.measures.cycles import EQUILIBRIUM_SPEED, CycleMeter, Measures
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
-from stickslip_ros.physics.motion.motion import UNBOUNDED_SPEED
+from stickslip_ros.physics.model.equations import SPEED, WashoutGains
+from stickslip_ros.physics.motion.integrator import UNBOUNDED_SPEED
+from stickslip_ros.physics.motion.variational import SensitiveMotion, TooStiffError
 from stickslip_ros.physics.theory.averaging import averaged_growth
-from stickslip_ros.physics.theory.linear import SPEED
 from stickslip_ros.physics.theory.returns import (
     follow,
     largest_cycle,
@@ -29,7 +29,6 @@ from stickslip_ros.physics.theory.returns import (
     release_position,
 )
 from stickslip_ros.physics.theory.roots import zero_between
-from stickslip_ros.physics.theory.sensitivity import SensitiveMotion, TooStiffError
 
 _ROUNDING = 1e-13
 """Share of the displacement below which a difference is rounding."""

@@ -15,7 +15,8 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
-from stickslip_ros.physics.motion.motion import UNBOUNDED_SPEED, Motion
+from stickslip_ros.physics.motion.integrator import UNBOUNDED_SPEED
+from stickslip_ros.physics.motion.motion import Motion
 
 _LEAST_SPEED, _SPEEDS = 1e-6, 2048
 """Least speed at which g is looked at, in the smallest that matters, and how many there are."""
