@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from stickslip_ros.paper.claims import CHAPTERS, CLAIMS, Claim, Evidence, Finding, Verdict
 from stickslip_ros.paper.claims.claim import (
-    Chapter,
     Correction,
     Formula,
     Number,
@@ -174,20 +173,12 @@ def test_a_number_agrees_with_what_it_rounds_to(units: int, digits: int, rest: f
     assert not agrees(printed, printed + (rest + 1.0) * unit)
 
 
-def judged(chapter: Chapter) -> Finding:
-    (claim,) = chapter.claims
-    return claim.check(Evidence(no_figure))
-
-
 @pytest.mark.parametrize(
     ("value", "corrected", "verdict"),
     [(0.4944, 0.1, HOLDS), (0.48876, 0.49441, CORRECTED), (0.48876, 0.4943, FAILS)],
 )
 def test_verdict_on_a_number(value: float, corrected: float, verdict: Verdict) -> None:
-    chapter = Chapter("")
-    number = Number(value, [Correction("With x", corrected)], "So it is.")
-    chapter.number("a", "eq. 1", "a number", 0.4944)(lambda _: number)
-    finding = judged(chapter)
+    finding = Number(value, [Correction("With x", corrected)], "So it is.").finding(0.4944)
     assert finding.verdict is verdict
     assert finding.computed == value
     assert finding.remark.startswith("With x: 0.49441.") == (verdict is CORRECTED)
@@ -210,10 +201,7 @@ def test_verdict_on_a_formula(
     verdict: Verdict,
     difference: float | None,
 ) -> None:
-    chapter = Chapter("")
-    formula = Formula(printed, [1.0, 2.0], [Correction("With x", corrected)])
-    chapter.formula("a", "eq. 1", "a formula", "a = b")(lambda: formula)
-    finding = judged(chapter)
+    finding = Formula(printed, [1.0, 2.0], [Correction("With x", corrected)]).finding("a = b")
     assert (finding.verdict, finding.difference) == (verdict, difference)
 
 
@@ -222,9 +210,7 @@ def test_verdict_on_a_formula(
     [(True, False, HOLDS), (True, True, HOLDS), (False, True, CORRECTED), (False, False, FAILS)],
 )
 def test_verdict_on_a_statement(holds: bool, corrected: bool, verdict: Verdict) -> None:
-    chapter = Chapter("")
-    chapter.statement("a", "eq. 1", "so it is")(lambda _: Observation("", holds, corrected))
-    assert judged(chapter).verdict is verdict
+    assert Observation("", holds, corrected).finding(None).verdict is verdict
 
 
 def sigma_of_coefficients(q: Nonlinearity) -> float:

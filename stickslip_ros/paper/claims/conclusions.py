@@ -5,22 +5,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import Chapter, Evidence, Observation
-from stickslip_ros.paper.claims.control import controlled_amplitude, critical
+from stickslip_ros.paper.claims.claim import (
+    Computations,
+    Evidence,
+    Observation,
+)
 from stickslip_ros.paper.claims.reference import (
     DAMPING,
     FILTER,
+    controlled_amplitude,
+    critical,
     cycles,
     expansion,
     hopf_point,
     trace,
 )
-from stickslip_ros.paper.claims.simulations import VIBRATING, amplitude, falling, listed
+from stickslip_ros.paper.claims.summaries import VIBRATING, amplitude, falling, listed
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.linear import expand
 
-CHAPTER = Chapter("The abstract and the conclusions")
+computes = Computations()
+
 
 _STILL_ON_ITS_WAY = 0.02
 """Trace so small that a motion is not settled when a bifurcation diagram looks at it."""
@@ -32,11 +38,7 @@ def _p(drive: Drive) -> float:
     return float(np.trace(found.jacobian))
 
 
-@CHAPTER.statement(
-    "critical-speed-confirmed",
-    "abstract, section 5",
-    "The critical speed by the first approximation agrees with the simulations",
-)
+@computes("critical-speed-confirmed")
 def _(evidence: Evidence) -> Observation:
     figures = [evidence.bifurcation(number) for number in (2, 3, 4, 5)]
     agree = [
@@ -54,11 +56,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "curvature-confirmed",
-    "abstract",
-    "The curvature coefficient tells whether the limit cycle is stable",
-)
+@computes("curvature-confirmed")
 def _(_: Evidence) -> Observation:
     sigma = hopf_point().first_lyapunov_coefficient
     distances = (2e-2, 2e-3, 2e-4)
@@ -88,11 +86,7 @@ def _listed(values: Sequence[float]) -> str:
     return ", ".join(f"{value:.5f}" for value in values)
 
 
-@CHAPTER.statement(
-    "main-factors",
-    "abstract",
-    "Feed speed, damping and ratio of friction coefficients are the main factors",
-)
+@computes("main-factors")
 def _(_: Evidence) -> Observation:
     base = unit_drive(0.4)
     changed = {
@@ -112,11 +106,7 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "what-inhibits",
-    "section 5",
-    "A fast belt, much damping and a small gap of coefficients inhibit the vibration",
-)
+@computes("what-inhibits")
 def _(evidence: Evidence) -> Observation:
     ends = [evidence.bifurcation(number).diagram for number in (2, 3, 5)]
     slow = int(np.searchsorted(evidence.bifurcation(2).values, 1.0 / 3.0))
@@ -132,9 +122,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "amplitude-reduced", "abstract, section 5", "The washout filter reduces the amplitude"
-)
+@computes("amplitude-reduced")
 def _(evidence: Evidence) -> Observation:
     linear, cubic, slow = evidence.portraits(13).panels
     sizes = [
@@ -161,11 +149,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "topology",
-    "abstract, section 5",
-    "The washout filter improves the topology of the phase portrait",
-)
+@computes("topology")
 def _(evidence: Evidence) -> Observation:
     linear, cubic, slow = evidence.portraits(13).panels
     portraits = [*linear.portraits[1:], *cubic.portraits, *slow.portraits]
@@ -180,11 +164,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "more-effective",
-    "abstract, section 5",
-    "The washout filter is a comparatively effective method",
-)
+@computes("more-effective")
 def _(_: Evidence) -> Observation:
     # A force k1 y on the speed itself adds to p and leaves the equilibrium too, since y = 0 there.
     plain = -trace(0.4)
@@ -198,11 +178,3 @@ def _(_: Evidence) -> Observation:
         f"that with d = 2, {washout[1] / plain:.3g} times with d = 0.2 and "
         f"{washout[2] / plain:.5g} times with d = 0.02.",
     )
-
-
-CHAPTER.undecidable(
-    "practical-value",
-    "section 1, section 5",
-    "The work is of use for machine tools in production",
-    "It is a judgement, and the paper has no measurement on a machine.",
-)

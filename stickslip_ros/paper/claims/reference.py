@@ -3,25 +3,30 @@
 Everything is dimensionless, on the unit drive of `figures`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Any, TypeVar
 
 import heyoka as hy
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.paper.claims.claim import Correction, Number
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import Equations, W, WashoutGains, X, Y
 from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.theory.closed_loop import CriticalGains, critical_gains
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
-from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycles
+from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import Expansion, expand
 from stickslip_ros.physics.theory.returns import follow, release_position
 from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.physics.theory.sticking import StickingOnset, sticking_onset
+
+_T = TypeVar("_T")
 
 DAMPING = 0.02
 """Coefficient 2 beta of X' in eq. 5 for the paper's beta of 0.01."""
@@ -34,6 +39,9 @@ TAKEN_FOR_DAMPING = f"With the damping coefficient {TAKEN_DAMPING:g} in place of
 
 PRINTED_HOPF_SPEED = 0.4944
 """v_b1, with which eq. 11 goes on."""
+
+PRINTED_GAIN = -0.0395
+"""Critical linear gain of eq. 21."""
 
 STUDIED_SPEED = 0.49
 """The belt speed of section 4.1, with which eq. 20 to 30 go on."""
@@ -81,6 +89,30 @@ def hopf_point(damping: float = DAMPING) -> HopfPoint:
     return point
 
 
+def printed_trace(belt_speeds: FloatArray) -> FloatArray:
+    """Return 0.44 - 1.8 v0^2, as eq. 8 has it."""
+    return 0.44 - 1.8 * belt_speeds**2
+
+
+def critical_beta(belt_speed: float) -> float:
+    """Return the beta of eq. 5 from which on the equilibrium is stable, p = 0."""
+    return trace(belt_speed, 0.0) / 2.0
+
+
+def for_both(compute: Callable[[float], _T]) -> tuple[_T, _T]:
+    """Return what it gives for the damping of eq. 5, and for that of eq. 8."""
+    return compute(DAMPING), compute(TAKEN_DAMPING)
+
+
+def number_for_both(compute: Callable[[float], float], remark: str = "") -> Number:
+    """Return the number for the damping of eq. 5, corrected to that of eq. 8.
+
+    In the remark "{taken}" stands for the latter.
+    """
+    here, taken = for_both(compute)
+    return Number(here, [Correction(TAKEN_FOR_DAMPING, taken)], remark.format(taken=taken))
+
+
 def overdamped_from() -> float:
     """Return the belt speed from which on the eigenvalues are real, p = -2."""
     return zero_between(lambda speed: trace(speed) + 2.0, hopf_point().belt_speed, 2.0)
@@ -117,6 +149,21 @@ def cycles(
 def only_rest_at(belt_speeds: Sequence[float]) -> bool:
     """Return whether the equilibrium is stable at each of them, and there is no limit cycle."""
     return all(expansion(speed).stable and not cycles(speed) for speed in belt_speeds)
+
+
+@cache
+def critical(belt_speed: float, damping: float, corner_frequency: float = 2.0) -> CriticalGains:
+    """Return the critical gains of the loop without a cubic gain."""
+    gains = replace(FILTER, corner_frequency=corner_frequency)
+    found = critical_gains(unit_drive(belt_speed, damping=damping), gains)
+    assert found is not None
+    return found
+
+
+def controlled_amplitude(belt_speed: float, gains: WashoutGains) -> float:
+    """Return the amplitude of the limit cycle that the motion from rest at X = 0 leads to."""
+    cycle = limit_cycle_of_run(unit_drive(belt_speed), 0.0, gains=gains)
+    return 0.0 if cycle is None else cycle.measures.amplitude or 0.0
 
 
 def arrivals(drive: Drive) -> list[float]:

@@ -1,45 +1,48 @@
-"""Section 3: the simulations, Fig. 2 to 11."""
+"""Sections 3.2 to 3.5: the phase portraits, Fig. 6 to 11."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import groupby, pairwise
+from itertools import groupby
 from math import sqrt
 
 import numpy as np
 
 from stickslip_ros.paper.claims.claim import (
-    Chapter,
+    Computations,
     Correction,
     Evidence,
-    Formula,
     Number,
     Observation,
 )
 from stickslip_ros.paper.claims.reference import (
-    DAMPING,
     FASTER,
     PRINTED_HOPF_SPEED,
     SLOWER,
-    STATES,
-    TAKEN_DAMPING,
-    TAKEN_FOR_DAMPING,
     approximate_onset,
     arrivals,
+    critical_beta,
     cycles,
     exact_onset,
     expansion,
     hopf_point,
     only_rest_at,
     overdamped_from,
-    rates,
     stays,
     trace,
+)
+from stickslip_ros.paper.claims.summaries import (
+    VIBRATING,
+    amplitude,
+    border,
+    falling,
+    listed,
+    regimes,
+    stick_fractions,
 )
 from stickslip_ros.paper.figures import (
     PRINTED_SLOPE,
     STRIBECK,
     TANGENT_SLOPE,
-    BifurcationFigure,
     Panel,
     unit_drive,
 )
@@ -47,314 +50,22 @@ from stickslip_ros.paper.portraits import Portrait
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Linear, Stribeck
-from stickslip_ros.physics.theory.hopf import hopf_points
+from stickslip_ros.physics.theory.hopf import (
+    hopf_points,
+)
 from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.roots import zero_between
 
-CHAPTER = Chapter("Section 3: simulations")
+computes = Computations()
+
 
 _PRINTED_ONSET = 0.4372
 """v_b0."""
 
-_SAME_POINT = 1e-6
-"""Distance of turning points that are one."""
 
-_CLEAR_OF_HOPF = 0.98
-"""Share of the Hopf speed beyond which a diagram looks at motions that are still on their way."""
-
-_SOFTEST, _STIFFEST = 1e-3, 1e5
-"""Stiffnesses beyond those of Fig. 4."""
-
-VIBRATING = (Regime.STICK_SLIP, Regime.PURE_SLIP)
-
-
-def falling(values: Sequence[float]) -> bool:
-    """Return whether each value is below the one before."""
-    return all(later < earlier for earlier, later in pairwise(values))
-
-
-def border(holds: Callable[[float], bool], low: float, high: float) -> float:
-    """Return up to where it holds, between `low`, where it does, and `high`, where it does not."""
-    while high - low > 1e-4:
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low
-
-
-def listed(values: Sequence[float]) -> str:
-    """Return the values as a list in words."""
-    return ", ".join(f"{value:.4g}" for value in values)
-
-
-def regimes(portraits: Sequence[Portrait]) -> list[Regime | None]:
-    """Return the regime that each motion ends in."""
-    return [portrait.measures.regime for portrait in portraits]
-
-
-def amplitude(portrait: Portrait) -> float:
-    """Return the displacement amplitude that a motion ends with, zero at rest."""
-    at_rest = portrait.measures.regime is Regime.EQUILIBRIUM
-    return 0.0 if at_rest else portrait.measures.amplitude or 0.0
-
-
-def stick_fractions(portraits: Sequence[Portrait]) -> list[float]:
-    """Return the stick fractions of those motions that vibrate."""
-    return [
-        portrait.measures.stick_fraction or 0.0
-        for portrait in portraits
-        if portrait.measures.regime in VIBRATING
-    ]
-
-
-def _rows(figure: BifurcationFigure, chosen: Callable[[float, Regime | None], bool]) -> list[int]:
-    measures = figure.diagram.measures
-    return [
-        row
-        for row, (value, measure) in enumerate(zip(figure.values.tolist(), measures, strict=True))
-        if chosen(value, measure.regime)
-    ]
-
-
-def _turning_points(figure: BifurcationFigure, row: int) -> int:
-    """Return how many different turning points a row of the diagram has."""
-    found = np.sort(figure.diagram.position[figure.diagram.row == row])
-    return 1 + int(np.sum(np.diff(found) > _SAME_POINT))
-
-
-def _periodicity(figure: BifurcationFigure, end: float) -> Observation:
-    """Observe whether the motions that vibrate, up to some value, are other than periodic."""
-    rows = _rows(figure, lambda value, regime: regime in VIBRATING and value < end)
-    counts = {_turning_points(figure, row) for row in rows}
-    return Observation(
-        f"{listed(sorted(counts))} turning points",
-        min(counts) > 2,
-        remark=f"Each of the {len(rows)} motions up to {end:.4g} repeats the same maximum and "
-        "minimum: they are periodic. A planar autonomous system has no quasi-periodic motion "
-        "(Poincare and Bendixson).",
-    )
-
-
-@CHAPTER.statement("hopf-notion", "section 3.1", "A stable focus becomes an unstable one")
-def _(_: Evidence) -> Observation:
-    speed = hopf_point().belt_speed
-    inside, outside = (expansion(speed + step).eigenvalues[0] for step in (-0.01, 0.01))
-    return Observation(
-        f"real part {inside.real:.5f} below, {outside.real:.5f} above",
-        inside.real > 0.0 > outside.real and min(inside.imag, outside.imag) > 0.0,
-        remark=f"0.01 to both sides of v_b1; imaginary part {inside.imag:.5f}.",
-    )
-
-
-@CHAPTER.formula("gamma", "section 3.1", "What gamma is", "gamma = 1, in no equation")
-def _() -> Formula:
-    gamma, belt_speed = 2.0, 0.4
-    drive = unit_drive(belt_speed, stiffness=gamma)
-    position, speed = STATES[0] * drive.length_scale, STATES[1] * drive.speed_scale
-    friction = STRIBECK.coefficient(speed - belt_speed, np.sign(speed - belt_speed))
-    return Formula(
-        None,
-        rates(drive, STATES[:2])[1],
-        [
-            Correction(
-                "With gamma X for X in eq. 5, the stiffness at fixed scales,",
-                friction - DAMPING * speed - gamma * position,
-            )
-        ],
-        "Eq. 2 has made the stiffness one.",
-    )
-
-
-@CHAPTER.number(
-    "fig-2-end", "section 3.1, Fig. 2", "Belt speed at which the vibration ends", 0.4944
-)
-def _(evidence: Evidence) -> Number:
-    figure = evidence.bifurcation(2)
-    rows = _rows(
-        figure,
-        lambda value, regime: (
-            regime is Regime.PURE_SLIP and value < _CLEAR_OF_HOPF * hopf_point().belt_speed
-        ),
-    )
-    amplitudes = [figure.diagram.measures[row].velocity_amplitude or 0.0 for row in rows]
-    # By averaging r^2 = 4 (v_b1^2 - v0^2) near the Hopf point; higher orders bend the line.
-    quadratic = np.polyfit(np.square(amplitudes), figure.values[rows] ** 2, 2)
-    return Number(
-        sqrt(float(quadratic[-1])),
-        [Correction(TAKEN_FOR_DAMPING, hopf_point(TAKEN_DAMPING).belt_speed)],
-        "From Fig. 2: where the speed amplitudes of pure slip extrapolate to zero. Theory with the "
-        f"same damping has {hopf_point().belt_speed:.4f}.",
-    )
-
-
-@CHAPTER.statement(
-    "fig-2-direction",
-    "section 3.1, Fig. 2",
-    "As the belt speed rises past v_b1 the equilibrium loses its stability and the cycle vanishes",
-)
-def _(_: Evidence) -> Observation:
-    speed = hopf_point().belt_speed
-    below, above = expansion(speed - 0.01).stable, expansion(speed + 0.01).stable
-    vanishes = len(cycles(speed - 2e-3)) == 1 and not cycles(speed + 2e-3)
-    return Observation(
-        f"{'stable' if below else 'unstable'} below, {'stable' if above else 'unstable'} above",
-        below and not above and vanishes,
-        above and not below and vanishes,
-        "The other way round: it is as the speed falls that stability is lost; the cycle vanishes "
-        "as the speed rises.",
-    )
-
-
-@CHAPTER.statement(
-    "fig-2-quasi-periodic", "section 3.1, Fig. 2", "Below v_b1 the motion is quasi-periodic"
-)
-def _(evidence: Evidence) -> Observation:
-    return _periodicity(evidence.bifurcation(2), _CLEAR_OF_HOPF * hopf_point().belt_speed)
-
-
-@CHAPTER.statement(
-    "fig-2-single-valued", "section 3.1, Fig. 2", "From 0.4944 to 1 the diagram is a single curve"
-)
-def _(evidence: Evidence) -> Observation:
-    figure = evidence.bifurcation(2)
-    rows = _rows(figure, lambda value, _: value > PRINTED_HOPF_SPEED)
-    counts = [_turning_points(figure, row) for row in rows]
-    return Observation(
-        f"{counts.count(1)} of {len(rows)} belt speeds",
-        set(counts) == {1},
-        remark=f"With beta = 0.01 in eq. 5 it is single from {hopf_point().belt_speed:.4f} on.",
-    )
-
-
-@CHAPTER.statement(
-    "fig-2-verifies", "section 3.1, Fig. 2", "The diagram confirms the stability analysis"
-)
-def _(evidence: Evidence) -> Observation:
-    figure, speed = evidence.bifurcation(2), hopf_point().belt_speed
-    below = _rows(figure, lambda v, _: 0.0 < v < _CLEAR_OF_HOPF * speed)
-    above = _rows(figure, lambda v, _: v > speed / _CLEAR_OF_HOPF)
-    measures = figure.diagram.measures
-    agree = [measures[row].regime in VIBRATING for row in below]
-    agree += [measures[row].regime is Regime.EQUILIBRIUM for row in above]
-    return Observation(
-        f"{sum(agree)} of {len(agree)} belt speeds",
-        all(agree),
-        remark=f"Vibrating up to {_CLEAR_OF_HOPF:g} v_b1, at rest from v_b1/{_CLEAR_OF_HOPF:g} on, "
-        f"with v_b1 = {speed:.5f} for the damping that the motion has.",
-    )
-
-
-@CHAPTER.statement(
-    "fig-3-region", "section 3.1, Fig. 3", "Little damping lets the slide vibrate, much does not"
-)
-def _(evidence: Evidence) -> Observation:
-    figure = evidence.bifurcation(3)
-    critical = _critical_beta(figure.diagram.drives[0].belt_speed)
-    vibrating = [measure.regime in VIBRATING for measure in figure.diagram.measures]
-    edges = sum(a != b for a, b in pairwise(vibrating))
-    return Observation(
-        f"from beta = {critical:.4f} on at rest",
-        vibrating[0] and not vibrating[-1] and edges == 1,
-        remark=f"At v0 = {figure.diagram.drives[0].belt_speed:g}, by p = 0; the diagram has the "
-        f"last vibration, still dying out, at {figure.values[vibrating].max():.4f}.",
-    )
-
-
-@CHAPTER.number("fig-3-end", "section 3.1, Fig. 3", "beta at which the vibration ends", 0.02)
-def _(evidence: Evidence) -> Number:
-    belt_speed = evidence.bifurcation(3).diagram.drives[0].belt_speed
-    # At v0 = 0.4, which the other figures use, and with v0 chosen to make it so.
-    fitting = zero_between(lambda v: _critical_beta(v) - 0.02, 0.1, 0.499)
-    return Number(
-        _critical_beta(0.4),
-        [
-            Correction(
-                f"With the belt speed {belt_speed:g} in place of 0.4", _critical_beta(belt_speed)
-            )
-        ],
-        "The belt speed of the figure is not printed; computed is 0.4, which other figures have. "
-        f"The printed beta belongs to v0 = {fitting:.4f}.",
-    )
-
-
-def _critical_beta(belt_speed: float) -> float:
-    return trace(belt_speed, 0.0) / 2.0
-
-
-@CHAPTER.statement(
-    "fig-3-quasi-periodic",
-    "section 3.1, Fig. 3",
-    "The motion under little damping is quasi-periodic",
-)
-def _(evidence: Evidence) -> Observation:
-    figure = evidence.bifurcation(3)
-    return _periodicity(figure, 0.9 * _critical_beta(figure.diagram.drives[0].belt_speed))
-
-
-@CHAPTER.statement(
-    "fig-4-influence", "section 3.1, Fig. 4", "Stiffness has no great influence on the vibration"
-)
-def _(evidence: Evidence) -> Observation:
-    figure = evidence.bifurcation(4)
-    displacement, speed, stuck = (
-        [getattr(measure, name) for measure in figure.diagram.measures]
-        for name in ("amplitude", "velocity_amplitude", "stick_fraction")
-    )
-    ratios = [max(values) / min(values) for values in (displacement, speed, stuck)]
-    softest, stiffest = (
-        cycles(0.2, stiffness=stiffness)[0].measures.velocity_amplitude or 0.0
-        for stiffness in (_SOFTEST, _STIFFEST)
-    )
-    return Observation(
-        f"amplitude changes by a factor of {ratios[0]:.3g}",
-        max(ratios) < 1.5,
-        softest / stiffest < 2.5,
-        f"On the speed amplitude: over a stiffness of {figure.values[0]:g} to "
-        f"{figure.values[-1]:g} it changes by a factor of {ratios[1]:.3g}, and over one of "
-        f"{_SOFTEST:g} to {_STIFFEST:g} by {softest / stiffest:.3g}. The stick fraction changes by "
-        f"{ratios[2]:.3g}, and goes to zero (see Fig. 10).",
-    )
-
-
-@CHAPTER.statement(
-    "fig-4-no-cure", "section 3.1, Fig. 4", "More stiffness alone does not end the vibration"
-)
-def _(evidence: Evidence) -> Observation:
-    figure = evidence.bifurcation(4)
-    vibrating = [measure.regime in VIBRATING for measure in figure.diagram.measures]
-    return Observation(
-        f"{sum(vibrating)} of {len(vibrating)} stiffnesses vibrate",
-        all(vibrating),
-        remark="The trace p, whose sign decides, does not contain the stiffness.",
-    )
-
-
-@CHAPTER.statement(
-    "fig-5-ratio",
-    "section 3.1, Fig. 5",
-    "A large ratio of friction coefficients makes it vibrate, a small one does not",
-)
-def _(evidence: Evidence) -> Observation:
-    figure = evidence.bifurcation(5)
-    vibrating = [measure.regime in VIBRATING for measure in figure.diagram.measures]
-    edges = sum(a != b for a, b in pairwise(vibrating))
-
-    def p(ratio: float) -> float:
-        law = replace(STRIBECK, minimum=STRIBECK.static / ratio)
-        found = expand(replace(figure.diagram.drives[0], friction=law))
-        assert found is not None
-        return float(np.trace(found.jacobian))
-
-    critical = zero_between(p, float(figure.values[0]), float(figure.values[-1]))
-    slippery = unit_drive(0.4, friction=replace(STRIBECK, minimum=STRIBECK.static / 1000.0))
-    return Observation(
-        f"from mu_s/mu_m = {critical:.4f} on",
-        vibrating[-1] and not vibrating[0] and edges == 1,
-        remark=f"By p = 0, at v0 = {figure.diagram.drives[0].belt_speed:g}; in the diagram from "
-        f"{figure.values[vibrating].min():.4f} on, where a vibration still dies out slowly. A "
-        f"ratio of 1000 too makes it vibrate below v0 = {hopf_points(slippery)[0].belt_speed:.4f} "
-        "only.",
-    )
+def _stick_falls(portraits: Sequence[Portrait]) -> bool:
+    return falling([fraction for fraction in stick_fractions(portraits) if fraction > 0.0])
 
 
 def _of_speed(evidence: Evidence, low: float, high: float) -> list[Portrait]:
@@ -362,11 +73,7 @@ def _of_speed(evidence: Evidence, low: float, high: float) -> list[Portrait]:
     return [p for p in evidence.portraits(6).portraits if low < p.drive.belt_speed < high]
 
 
-@CHAPTER.statement(
-    "fig-6-rest",
-    "section 3.2, Fig. 6",
-    "Above v_b1 it rests, and slips at the belt's speed",
-)
+@computes("fig-6-rest")
 def _(evidence: Evidence) -> Observation:
     above = _of_speed(evidence, hopf_point().belt_speed, 9.0)
     off = max(
@@ -381,9 +88,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "fig-6-settling", "section 3.2, Fig. 6", "Above v_b1 it settles the sooner the faster the belt"
-)
+@computes("fig-6-settling")
 def _(evidence: Evidence) -> Observation:
     above = _of_speed(evidence, hopf_point().belt_speed, 9.0)
     times = [portrait.settling_time or 0.0 for portrait in above]
@@ -406,7 +111,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement("fig-6-unstable", "section 3.2, Fig. 6", "Below v_b1 it vibrates by itself")
+@computes("fig-6-unstable")
 def _(evidence: Evidence) -> Observation:
     below = _of_speed(evidence, 0.0, hopf_point().belt_speed)
     return Observation(
@@ -416,11 +121,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "fig-6-pure-slip",
-    "section 3.2, Fig. 6",
-    "Between v_b0 and v_b1 the least relative speed is above zero: pure slip",
-)
+@computes("fig-6-pure-slip")
 def _(evidence: Evidence) -> Observation:
     between = _of_speed(evidence, exact_onset(), hopf_point().belt_speed)
     least = [portrait.least_relative_speed or 0.0 for portrait in between]
@@ -431,7 +132,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement("fig-6-no-cycle", "section 3.2, Fig. 6", "In pure slip there is no limit cycle")
+@computes("fig-6-no-cycle")
 def _(_: Evidence) -> Observation:
     found = cycles(0.45)
     return Observation(
@@ -444,11 +145,7 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "fig-6-stick-slip",
-    "section 3.2, Fig. 6",
-    "Below v_b0 the limit cycle has a stick phase, where the relative speed is zero",
-)
+@computes("fig-6-stick-slip")
 def _(evidence: Evidence) -> Observation:
     below = _of_speed(evidence, 0.0, exact_onset())
     fractions = stick_fractions(below)
@@ -463,9 +160,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.number(
-    "vb0", "section 3.2", "The speed v_b0 below which it sticks, beta = 0.01", _PRINTED_ONSET
-)
+@computes("vb0")
 def _(_: Evidence) -> Number:
     return Number(
         exact_onset(),
@@ -475,7 +170,7 @@ def _(_: Evidence) -> Number:
     )
 
 
-@CHAPTER.statement("vb0-and-vb1", "section 3.2", "v_b0 and v_b1 belong to one damping")
+@computes("vb0-and-vb1")
 def _(_: Evidence) -> Observation:
     def damping(speed: float, belt_speed: Callable[[float], float]) -> float:
         return zero_between(lambda damping: belt_speed(damping) - speed, 0.0, 0.1)
@@ -493,11 +188,7 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "grazing",
-    "section 3.2",
-    "The least relative speed becomes zero at the border between pure slip and stick-slip",
-)
+@computes("grazing")
 def _(_: Evidence) -> Observation:
     speed = exact_onset()
     fractions = [
@@ -512,10 +203,10 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement("damping-cures", "section 3.3", "Enough damping prevents the vibration")
+@computes("damping-cures")
 def _(evidence: Evidence) -> Observation:
     most = evidence.portraits(7).portraits[-1]
-    critical = _critical_beta(most.drive.belt_speed)
+    critical = critical_beta(most.drive.belt_speed)
     return Observation(
         f"beta above {critical:.4g}",
         most.measures.regime is Regime.EQUILIBRIUM
@@ -524,11 +215,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "critical-speed-of-damping",
-    "section 3.3, eq. 8",
-    "p = 0 of eq. 8 gives the critical speed for whatever beta",
-)
+@computes("critical-speed-of-damping")
 def _(_: Evidence) -> Observation:
     betas = (0.0, 0.01, 0.05, 0.1)
     true = [hopf_point(2.0 * beta).belt_speed for beta in betas]
@@ -542,13 +229,7 @@ def _(_: Evidence) -> Observation:
     )
 
 
-def _stick_falls(portraits: Sequence[Portrait]) -> bool:
-    return falling([fraction for fraction in stick_fractions(portraits) if fraction > 0.0])
-
-
-@CHAPTER.statement(
-    "fig-7-stick", "section 3.3, Fig. 7", "The stick fraction falls as the damping rises"
-)
+@computes("fig-7-stick")
 def _(evidence: Evidence) -> Observation:
     portraits = evidence.portraits(7).portraits
     return Observation(
@@ -558,11 +239,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "fig-7-order",
-    "section 3.3, Fig. 7",
-    "With rising damping sticking ends first, the vibration later",
-)
+@computes("fig-7-order")
 def _(evidence: Evidence) -> Observation:
     return _stages(evidence.portraits(7).portraits)
 
@@ -574,12 +251,7 @@ def _stages(portraits: Sequence[Portrait]) -> Observation:
     return Observation("; ".join(labels), stages == expected)
 
 
-@CHAPTER.number(
-    "linear-slope",
-    "section 3.3",
-    "Slope of the linear law, 3 (mu_s - mu_m) / v_m, for that of the Stribeck law",
-    0.9,
-)
+@computes("linear-slope")
 def _(_: Evidence) -> Number:
     tangent = trace(1e-9, 0.0)
     return Number(
@@ -595,9 +267,7 @@ def _slopes(evidence: Evidence) -> tuple[Panel, Panel, Panel]:
     return tangent, printed, printed_slow
 
 
-@CHAPTER.statement(
-    "fig-8", "section 3.3, Fig. 8", "With Coulomb friction there is no self-excited vibration"
-)
+@computes("fig-8")
 def _(evidence: Evidence) -> Observation:
     portraits = evidence.portraits(8).portraits
     damped = [portrait for portrait in portraits if portrait.drive.damping > 0.0]
@@ -621,11 +291,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "fig-9-vibration",
-    "section 3.3, Fig. 9",
-    "With the linear law the slide vibrates by itself",
-)
+@computes("fig-9-vibration")
 def _(evidence: Evidence) -> Observation:
     tangent, printed, slow = _slopes(evidence)
     least = [panel.portraits[0] for panel in (tangent, printed, slow)]
@@ -650,11 +316,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "fig-9-stick",
-    "section 3.3, Fig. 9",
-    "With the linear law too the stick fraction falls as the damping rises",
-)
+@computes("fig-9-stick")
 def _(evidence: Evidence) -> Observation:
     panels = _slopes(evidence)
     tangent, printed, slow = (stick_fractions(panel.portraits) for panel in panels)
@@ -682,11 +344,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "falling-slope",
-    "section 3.3, Fig. 8 and 9",
-    "Friction that falls with speed is the cause of the self-excited vibration",
-)
+@computes("falling-slope")
 def _(evidence: Evidence) -> Observation:
     laws = (Coulomb(STRIBECK.static), Linear(STRIBECK.static, TANGENT_SLOPE))
     traces: list[float] = []
@@ -704,9 +362,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "stiffness-stability", "section 3.4", "By the stability analysis stiffness improves stability"
-)
+@computes("stiffness-stability")
 def _(_: Evidence) -> Observation:
     stiffnesses = (0.5, 1.0, 2.0, 10.0, 50.0)
     speeds = [hopf_points(unit_drive(0.2, stiffness=k))[0].belt_speed for k in stiffnesses]
@@ -724,9 +380,7 @@ def _of_stiffnesses(evidence: Evidence) -> list[Portrait]:
     return [*usual.portraits, *stiff.portraits]
 
 
-@CHAPTER.statement(
-    "fig-10-stick", "section 3.4, Fig. 10", "The stick fraction falls as the stiffness rises"
-)
+@computes("fig-10-stick")
 def _(evidence: Evidence) -> Observation:
     portraits = _of_stiffnesses(evidence)
     return Observation(
@@ -737,9 +391,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "fig-10-end", "section 3.4, Fig. 10", "Enough stiffness ends the sticking at v0 = 0.2"
-)
+@computes("fig-10-end")
 def _(_: Evidence) -> Observation:
     def beyond_friction(stiffness: float, arrival: int) -> float:
         """Return by how much friction cannot hold a slide that comes to the belt's speed."""
@@ -765,9 +417,7 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "fig-10-size", "section 3.4, Fig. 10", "The limit cycle shrinks as the stiffness rises"
-)
+@computes("fig-10-size")
 def _(evidence: Evidence) -> Observation:
     portraits = _of_stiffnesses(evidence)
     sizes = [amplitude(portrait) for portrait in portraits]
@@ -779,11 +429,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "fig-11-amplitude",
-    "section 3.5, Fig. 11",
-    "The amplitude rises with the gap between the friction coefficients",
-)
+@computes("fig-11-amplitude")
 def _(evidence: Evidence) -> Observation:
     sizes = [amplitude(portrait) for portrait in evidence.portraits(11).portraits]
     at_rest = sizes.count(0.0)
@@ -794,11 +440,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "fig-11-stick",
-    "section 3.5, Fig. 11",
-    "The stick fraction rises with the gap between the friction coefficients",
-)
+@computes("fig-11-stick")
 def _(evidence: Evidence) -> Observation:
     portraits = evidence.portraits(11).portraits
     belt_speed, minima = 0.15, (0.1, 0.02, 0.001)
@@ -818,11 +460,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "fig-11-order",
-    "section 3.5, Fig. 11",
-    "With a smaller gap sticking ends first, the vibration later",
-)
+@computes("fig-11-order")
 def _(evidence: Evidence) -> Observation:
     return _stages(evidence.portraits(11).portraits)
 
@@ -834,12 +472,3 @@ def _of_minima(evidence: Evidence) -> str:
         if isinstance(portrait.drive.friction, Stribeck)
     ]
     return f"At v0 = 0.4 for mu_m = {listed(minima)}: the gap shrinks."
-
-
-CHAPTER.undecidable(
-    "drawings",
-    "Fig. 1 to 13",
-    "What the drawings themselves show",
-    "Only their captions and the text about them remain; the computed figures stand for them, with "
-    "parameter values of our own where the text has none.",
-)
