@@ -4,12 +4,12 @@ import tomllib
 from importlib.resources import files
 
 from stickslip_ros.paper.claims import (
+    bifurcation_diagrams,
     coefficients,
     conclusions,
     control,
-    diagrams,
     model,
-    portraits,
+    phase_portraits,
     stability,
     washout,
 )
@@ -26,8 +26,8 @@ _COMPUTATIONS = (
     model.computes
     | stability.computes
     | coefficients.computes
-    | diagrams.computes
-    | portraits.computes
+    | bifurcation_diagrams.computes
+    | phase_portraits.computes
     | washout.computes
     | control.computes
     | conclusions.computes

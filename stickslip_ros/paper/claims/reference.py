@@ -10,9 +10,10 @@ from typing import Any, TypeVar
 
 import heyoka as hy
 import numpy as np
+import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.claims.claim import Correction, Number
+from stickslip_ros.paper.claims.claim import Correction, Formula, Number
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import Equations, W, WashoutGains, X, Y
@@ -111,6 +112,14 @@ def number_for_both(compute: Callable[[float], float], remark: str = "") -> Numb
     """
     here, taken = for_both(compute)
     return Number(here, [Correction(TAKEN_FOR_DAMPING, taken)], remark.format(taken=taken))
+
+
+def formula_for_both(
+    printed: FloatArray, true: Callable[[float], npt.ArrayLike], remark: str = ""
+) -> Formula:
+    """Return the formula for the damping of eq. 5, corrected to that of eq. 8."""
+    here, taken = for_both(lambda damping: printed - np.asarray(true(damping)))
+    return Formula(here, 0.0, [Correction(TAKEN_FOR_DAMPING, taken)], remark)
 
 
 def overdamped_from() -> float:

@@ -25,7 +25,9 @@ from stickslip_ros.paper.claims.reference import (
     TAKEN_FOR_DAMPING,
     cycles,
     expansion,
+    formula_for_both,
     hopf_point,
+    number_for_both,
     overdamped_from,
     printed_trace,
     rates,
@@ -57,10 +59,6 @@ def _growth(damping: float = DAMPING) -> tuple[float, float]:
 
 def _jacobians(damping: float) -> FloatArray:
     return np.array([expansion(speed, damping).jacobian for speed in BELT_SPEEDS])
-
-
-def _printed_jacobians() -> FloatArray:
-    return np.array([[[0.0, 1.0], [-1.0, p]] for p in printed_trace(BELT_SPEEDS)])
 
 
 @computes("linear-coefficient")
@@ -169,10 +167,8 @@ def _(_: Evidence) -> Formula:
 
 @computes("eq-8-constant")
 def _(_: Evidence) -> Number:
-    return Number(
-        _growth()[0],
-        [Correction(TAKEN_FOR_DAMPING, _growth(TAKEN_DAMPING)[0])],
-        "Eq. 5 has 2 beta, eq. 8 takes beta once.",
+    return number_for_both(
+        lambda damping: _growth(damping)[0], "Eq. 5 has 2 beta, eq. 8 takes beta once."
     )
 
 
@@ -220,9 +216,8 @@ def _(_: Evidence) -> Observation:
 
 @computes("vb1")
 def _(_: Evidence) -> Number:
-    return Number(
-        hopf_point().belt_speed,
-        [Correction(TAKEN_FOR_DAMPING, hopf_point(TAKEN_DAMPING).belt_speed)],
+    return number_for_both(
+        lambda damping: hopf_point(damping).belt_speed,
         "The slip of eq. 8: with the damping of eq. 5 the loop is stable above "
         f"{hopf_point().belt_speed:.5f} already.",
     )
@@ -243,11 +238,8 @@ def _(_: Evidence) -> Observation:
 
 @computes("eq-9-matrix")
 def _(_: Evidence) -> Formula:
-    return Formula(
-        _printed_jacobians() - _jacobians(DAMPING),
-        0.0,
-        [Correction(TAKEN_FOR_DAMPING, _printed_jacobians() - _jacobians(TAKEN_DAMPING))],
-    )
+    printed = np.array([[[0.0, 1.0], [-1.0, p]] for p in printed_trace(BELT_SPEEDS)])
+    return formula_for_both(printed, _jacobians)
 
 
 @computes("eq-9-square")
@@ -290,20 +282,14 @@ def _(_: Evidence) -> Formula:
 
 @computes("eq-10-real")
 def _(_: Evidence) -> Formula:
-    return Formula(
-        printed_trace(BELT_SPEEDS) / 2.0 - _real_parts(DAMPING),
-        0.0,
-        [
-            Correction(
-                TAKEN_FOR_DAMPING, printed_trace(BELT_SPEEDS) / 2.0 - _real_parts(TAKEN_DAMPING)
-            )
-        ],
+    def real_parts(damping: float) -> list[float]:
+        return [expansion(v, damping).eigenvalues.real.mean() for v in BELT_SPEEDS]
+
+    return formula_for_both(
+        printed_trace(BELT_SPEEDS) / 2.0,
+        real_parts,
         f"From v0 = {overdamped_from():.4f} on, where both eigenvalues are real, it is their mean.",
     )
-
-
-def _real_parts(damping: float) -> FloatArray:
-    return np.array([expansion(v, damping).eigenvalues.real.mean() for v in BELT_SPEEDS])
 
 
 @computes("eq-10-imaginary")
@@ -345,11 +331,6 @@ def _(_: Evidence) -> Number:
     )
 
 
-@computes("eq-11-product")
-def _(_: Evidence) -> Number:
-    return Number(-3.6 * PRINTED_HOPF_SPEED, remark="Only the multiplication.")
-
-
 @computes("eq-11-sign")
 def _(_: Evidence) -> Observation:
     crossing = hopf_point().crossing_speed
@@ -376,9 +357,17 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@computes("low-conditions")
-def _(_: Evidence) -> Observation:
-    return _criterion(0.45, 1.0)
+@computes("low-conditions", 0.45, 1.0)
+@computes("high-conditions", 0.495, -1.0)
+def _(_: Evidence, belt_speed: float, sign: float) -> Observation:
+    matrix = expansion(belt_speed).jacobian
+    p, q = float(np.trace(matrix)), float(np.linalg.det(matrix))
+    discriminant = p**2 - 4.0 * q
+    return Observation(
+        f"p = {p:.5f}, p^2 - 4 q = {discriminant:.4f}",
+        p * sign > 0.0 and discriminant < 0.0,
+        remark=f"q, which is not defined, is the determinant {q:.4g}.",
+    )
 
 
 @computes("low-focus")
@@ -417,11 +406,6 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@computes("high-conditions")
-def _(_: Evidence) -> Observation:
-    return _criterion(0.495, -1.0)
-
-
 @computes("high-focus")
 def _(_: Evidence) -> Observation:
     upper = expansion(0.495).eigenvalues[0]
@@ -445,17 +429,6 @@ def _(evidence: Evidence) -> Observation:
         amplitude < 1e-4 and abs(midpoint) < 1e-4,
         amplitude < 1e-4 and abs(midpoint - equilibrium) < 1e-4,
         f"Its deviation does: X ends at the equilibrium {equilibrium:.4f} of eq. 6.",
-    )
-
-
-def _criterion(belt_speed: float, sign: float) -> Observation:
-    matrix = expansion(belt_speed).jacobian
-    p, q = float(np.trace(matrix)), float(np.linalg.det(matrix))
-    discriminant = p**2 - 4.0 * q
-    return Observation(
-        f"p = {p:.5f}, p^2 - 4 q = {discriminant:.4f}",
-        p * sign > 0.0 and discriminant < 0.0,
-        remark=f"q, which is not defined, is the determinant {q:.4g}.",
     )
 
 

@@ -19,12 +19,16 @@ from stickslip_ros.paper.claims.reference import (
     DAMPING,
     FILTER,
     PRINTED_GAIN,
+    PRINTED_HOPF_SPEED,
     STATES,
     STUDIED_SPEED,
     TAKEN_DAMPING,
     TAKEN_FOR_DAMPING,
     critical,
     expansion,
+    for_both,
+    formula_for_both,
+    number_for_both,
     printed_trace,
     rates,
     trace,
@@ -170,49 +174,36 @@ def _(_: Evidence) -> Formula:
 
 @computes("eq-20-trace")
 def _(_: Evidence) -> Number:
-    return Number(
-        trace(STUDIED_SPEED),
-        [Correction(TAKEN_FOR_DAMPING, trace(STUDIED_SPEED, TAKEN_DAMPING))],
+    return number_for_both(
+        lambda damping: trace(STUDIED_SPEED, damping),
         "With the damping of eq. 5 there is nothing to control at v0 = 0.49: p is below zero.",
     )
 
 
-def _coefficient(order: int, printed: Callable[[FloatArray, float], FloatArray]) -> Formula:
+@computes("eq-21-c1", 1, lambda p, k1: 2.0 - (p + k1))
+@computes("eq-21-c2", 2, lambda p, k1: 2.0 * k1 - (p + 1.0))
+@computes("eq-21-c3", 3, lambda p, _: np.full_like(p, 2.0))
+def _(_: Evidence, order: int, printed: Callable[[FloatArray, float], FloatArray]) -> Formula:
     """Compare a coefficient of eq. 21, over belt speeds, with that of the loop's Jacobian."""
-    linear = _SOME_GAINS.linear
-    here, taken = (
-        [
-            np.poly(expansion(speed, damping, _SOME_GAINS).jacobian)[order]
-            for speed in BELT_SPEEDS.tolist()
-        ]
-        for damping in (DAMPING, TAKEN_DAMPING)
-    )
-    values = printed(printed_trace(BELT_SPEEDS), linear)
-    return Formula(values - here, 0.0, [Correction(TAKEN_FOR_DAMPING, values - taken)])
+
+    def coefficients(damping: float) -> list[float]:
+        expansions = (expansion(speed, damping, _SOME_GAINS) for speed in BELT_SPEEDS.tolist())
+        return [np.poly(found.jacobian)[order] for found in expansions]
+
+    values = printed(printed_trace(BELT_SPEEDS), _SOME_GAINS.linear)
+    return formula_for_both(values, coefficients, _of_printed_c2() if order == 2 else "")
 
 
-@computes("eq-21-c1")
-def _(_: Evidence) -> Formula:
-    return _coefficient(1, lambda p, k1: 2.0 - (p + k1))
-
-
-@computes("eq-21-c2")
-def _(_: Evidence) -> Formula:
+def _of_printed_c2() -> str:
     p = trace(STUDIED_SPEED, TAKEN_DAMPING)
     # c1 c2 - c3 = 0 with c1 = 2 - p - k1, c2 = 2 k1 - p - 1, c3 = 2, a square in k1
     discriminant = (5.0 - p) ** 2 - 8.0 * (2.0 + (2.0 - p) * (p + 1.0))
     true = np.poly(_printed_jacobian(p, _SOME_GAINS.linear))[2]
-    return replace(
-        _coefficient(2, lambda p, k1: 2.0 * k1 - (p + 1.0)),
-        remark=f"The matrix of eq. 20 has c2 = 1 - 2 p = {true:.4f} at v0 = {STUDIED_SPEED:g}, "
+    return (
+        f"The matrix of eq. 20 has c2 = 1 - 2 p = {true:.4f} at v0 = {STUDIED_SPEED:g}, "
         "without k1. With the printed c2 the condition c1 c2 = c3 has "
-        f"{'no' if discriminant < 0.0 else 'a'} real root (discriminant {discriminant:.3g}).",
+        f"{'no' if discriminant < 0.0 else 'a'} real root (discriminant {discriminant:.3g})."
     )
-
-
-@computes("eq-21-c3")
-def _(_: Evidence) -> Formula:
-    return _coefficient(3, lambda p, _: np.full_like(p, 2.0))
 
 
 @computes("eq-21-condition")
@@ -273,12 +264,10 @@ def _(_: Evidence) -> Formula:
 
 @computes("eq-22-value")
 def _(_: Evidence) -> Number:
-    here, taken = (_crossing(damping) for damping in (DAMPING, TAKEN_DAMPING))
-    return Number(
-        here,
-        [Correction(TAKEN_FOR_DAMPING, taken)],
+    return number_for_both(
+        _crossing,
         "At the critical gain, by projection onto the eigenvectors; printed is the derivative of "
-        f"the trace of eq. 20. With the damping of eq. 8 it is {taken:.5f}.",
+        "the trace of eq. 20. With the damping of eq. 8 it is {taken:.5f}.",
     )
 
 
@@ -289,12 +278,13 @@ def _crossing(damping: float) -> float:
     return found
 
 
-@computes("eq-22-product")
-def _(_: Evidence) -> Number:
-    return Number(-3.6 * STUDIED_SPEED, remark="Only the multiplication.")
+@computes("eq-11-product", PRINTED_HOPF_SPEED)
+@computes("eq-22-product", STUDIED_SPEED)
+def _(_: Evidence, speed: float) -> Number:
+    return Number(-3.6 * speed, remark="Only the multiplication.")
 
 
 @computes("eq-22-sign")
 def _(_: Evidence) -> Observation:
-    found = [_crossing(damping) for damping in (DAMPING, TAKEN_DAMPING)]
+    found = for_both(_crossing)
     return Observation(listed(found), max(found) < 0.0, remark="For both dampings.")

@@ -239,12 +239,10 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@computes("fig-7-order")
-def _(evidence: Evidence) -> Observation:
-    return _stages(evidence.portraits(7).portraits)
-
-
-def _stages(portraits: Sequence[Portrait]) -> Observation:
+@computes("fig-7-order", 7)
+@computes("fig-11-order", 11)
+def _(evidence: Evidence, figure: int) -> Observation:
+    portraits = evidence.portraits(figure).portraits
     stages = [stage for stage, _ in groupby(regimes(portraits))]
     labels = [f"{p.case.label}: {p.measures.regime}" for p in portraits]
     expected = [Regime.STICK_SLIP, Regime.PURE_SLIP, Regime.EQUILIBRIUM]
@@ -458,11 +456,6 @@ def _(evidence: Evidence) -> Observation:
         f"At v0 = {belt_speed:g}, where it does so below mu_m = {overruns:.4f}, it is "
         f"{listed(fractions)} for mu_m = {listed(minima)}.",
     )
-
-
-@computes("fig-11-order")
-def _(evidence: Evidence) -> Observation:
-    return _stages(evidence.portraits(11).portraits)
 
 
 def _of_minima(evidence: Evidence) -> str:
