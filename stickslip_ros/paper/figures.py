@@ -16,11 +16,7 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
 from stickslip_ros.progress import Progress
-from stickslip_ros.studies.bifurcation import (
-    COURSE,
-    BifurcationDiagram,
-    bifurcation_diagram,
-)
+from stickslip_ros.studies.bifurcation import COURSE, BifurcationDiagram, bifurcation_diagram
 
 STRIBECK = Stribeck(static=0.4, minimum=0.25, minimum_speed=0.5)
 """The paper's friction law with the paper's constants."""

@@ -12,12 +12,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.figures import (
-    BifurcationFigure,
-    Panel,
-    PaperFigure,
-    PortraitFigure,
-)
+from stickslip_ros.paper.figures import BifurcationFigure, Panel, PaperFigure, PortraitFigure
 from stickslip_ros.paper.portraits import LAST_CYCLES, Portrait
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.plots.regimes import REGIMES

@@ -13,14 +13,7 @@ from stickslip_ros.paper.claims import (
     stability,
     washout,
 )
-from stickslip_ros.paper.claims.claim import (
-    Chapter,
-    Claim,
-    Evidence,
-    Finding,
-    Undecidable,
-    Verdict,
-)
+from stickslip_ros.paper.claims.claim import Chapter, Claim, Evidence, Finding, Undecidable, Verdict
 
 _COMPUTATIONS = (
     model.computes

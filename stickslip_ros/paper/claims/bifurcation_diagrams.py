@@ -26,14 +26,12 @@ from stickslip_ros.paper.claims.reference import (
     expansion,
     hopf_point,
     rates,
+    trace_of,
 )
 from stickslip_ros.paper.claims.summaries import VIBRATING, listed
 from stickslip_ros.paper.figures import STRIBECK, BifurcationFigure, unit_drive
 from stickslip_ros.physics.measures.cycles import Regime
-from stickslip_ros.physics.theory.hopf import (
-    hopf_points,
-)
-from stickslip_ros.physics.theory.linear import expand
+from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
@@ -253,9 +251,7 @@ def _(evidence: Evidence) -> Observation:
 
     def p(ratio: float) -> float:
         law = replace(STRIBECK, minimum=STRIBECK.static / ratio)
-        found = expand(replace(figure.diagram.drives[0], friction=law))
-        assert found is not None
-        return float(np.trace(found.jacobian))
+        return trace_of(replace(figure.diagram.drives[0], friction=law))
 
     critical = zero_between(p, float(figure.values[0]), float(figure.values[-1]))
     slippery = unit_drive(0.4, friction=replace(STRIBECK, minimum=STRIBECK.static / 1000.0))

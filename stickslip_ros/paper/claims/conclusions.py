@@ -5,11 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import (
-    Computations,
-    Evidence,
-    Observation,
-)
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Observation
 from stickslip_ros.paper.claims.reference import (
     DAMPING,
     FILTER,
@@ -19,23 +15,16 @@ from stickslip_ros.paper.claims.reference import (
     expansion,
     hopf_point,
     trace,
+    trace_of,
 )
 from stickslip_ros.paper.claims.summaries import VIBRATING, amplitude, falling, listed
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.theory.linear import expand
 
 computes = Computations()
 
 
 _STILL_ON_ITS_WAY = 0.02
 """Trace so small that a motion is not settled when a bifurcation diagram looks at it."""
-
-
-def _p(drive: Drive) -> float:
-    found = expand(drive)
-    assert found is not None
-    return float(np.trace(found.jacobian))
 
 
 @computes("critical-speed-confirmed")
@@ -45,7 +34,7 @@ def _(evidence: Evidence) -> Observation:
         (measures.regime in VIBRATING) == (p > 0.0)
         for figure in figures
         for measures, drive in zip(figure.diagram.measures, figure.diagram.drives, strict=True)
-        if drive.belt_speed > 0.0 and abs(p := _p(drive)) > _STILL_ON_ITS_WAY
+        if drive.belt_speed > 0.0 and abs(p := trace_of(drive)) > _STILL_ON_ITS_WAY
     ]
     return Observation(
         f"{sum(agree)} of {len(agree)} drives",
@@ -95,7 +84,7 @@ def _(_: Evidence) -> Observation:
         "mu_m 0.39": replace(base, friction=replace(STRIBECK, minimum=0.39)),
         "stiffness 50": replace(base, stiffness=50.0),
     }
-    traces = {name: _p(drive) for name, drive in changed.items()}
+    traces = {name: trace_of(drive) for name, drive in changed.items()}
     stable = [p < 0.0 for p in traces.values()]
     return Observation(
         f"p = {trace(0.4):.4g} at v0 = 0.4",

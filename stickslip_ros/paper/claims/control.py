@@ -4,13 +4,7 @@ from dataclasses import replace
 from functools import cache
 from math import log
 
-from stickslip_ros.paper.claims.claim import (
-    Computations,
-    Correction,
-    Evidence,
-    Number,
-    Observation,
-)
+from stickslip_ros.paper.claims.claim import Computations, Correction, Evidence, Number, Observation
 from stickslip_ros.paper.claims.reference import (
     DAMPING,
     FASTER,
@@ -33,9 +27,7 @@ from stickslip_ros.paper.claims.summaries import VIBRATING, amplitude, border, f
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.physics.theory.hopf import (
-    hopf_points,
-)
+from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run
 
 computes = Computations()

@@ -7,13 +7,7 @@ from math import sqrt
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import (
-    Computations,
-    Correction,
-    Evidence,
-    Number,
-    Observation,
-)
+from stickslip_ros.paper.claims.claim import Computations, Correction, Evidence, Number, Observation
 from stickslip_ros.paper.claims.reference import (
     FASTER,
     PRINTED_HOPF_SPEED,
@@ -29,32 +23,25 @@ from stickslip_ros.paper.claims.reference import (
     overdamped_from,
     stays,
     trace,
+    trace_of,
 )
 from stickslip_ros.paper.claims.summaries import (
     VIBRATING,
     amplitude,
+    belt_speeds,
     border,
     falling,
     listed,
     regimes,
     stick_fractions,
 )
-from stickslip_ros.paper.figures import (
-    PRINTED_SLOPE,
-    STRIBECK,
-    TANGENT_SLOPE,
-    Panel,
-    unit_drive,
-)
+from stickslip_ros.paper.figures import PRINTED_SLOPE, STRIBECK, TANGENT_SLOPE, unit_drive
 from stickslip_ros.paper.portraits import Portrait
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Linear, Stribeck
-from stickslip_ros.physics.theory.hopf import (
-    hopf_points,
-)
+from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles
-from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
@@ -81,7 +68,7 @@ def _(evidence: Evidence) -> Observation:
         for portrait in above
     )
     return Observation(
-        f"v0 = {listed([portrait.drive.belt_speed for portrait in above])}: at rest",
+        f"v0 = {belt_speeds(above)}: at rest",
         set(regimes(above)) == {Regime.EQUILIBRIUM} and off < 1e-3 and only_rest_at(FASTER),
         remark=f"The relative speed deviates from the belt's by {off:.3%} at most. At v0 = "
         f"{listed(FASTER)} too the equilibrium is stable and shooting finds no limit cycle.",
@@ -107,7 +94,7 @@ def _(evidence: Evidence) -> Observation:
         rises,
         f"Only up to v0 = {overdamped:.4f}, where the drive becomes overdamped. The decay rate is "
         f"{rates[0]:.3f} there, {rates[1]:.3f} at 1.5 and {rates[2]:.3f} at 2. Settling times of "
-        f"Fig. 6 for v0 = {listed([portrait.drive.belt_speed for portrait in above])}.",
+        f"Fig. 6 for v0 = {belt_speeds(above)}.",
     )
 
 
@@ -115,7 +102,7 @@ def _(evidence: Evidence) -> Observation:
 def _(evidence: Evidence) -> Observation:
     below = _of_speed(evidence, 0.0, hopf_point().belt_speed)
     return Observation(
-        f"v0 = {listed([portrait.drive.belt_speed for portrait in below])} vibrate",
+        f"v0 = {belt_speeds(below)} vibrate",
         set(regimes(below)) <= set(VIBRATING),
         remark=f"Amplitudes {listed([amplitude(portrait) for portrait in below])}.",
     )
@@ -128,7 +115,7 @@ def _(evidence: Evidence) -> Observation:
     return Observation(
         f"{listed(least)}",
         set(regimes(between)) == {Regime.PURE_SLIP} and min(least) > 0.0,
-        remark=f"At v0 = {listed([portrait.drive.belt_speed for portrait in between])}.",
+        remark=f"At v0 = {belt_speeds(between)}.",
     )
 
 
@@ -155,7 +142,7 @@ def _(evidence: Evidence) -> Observation:
         set(regimes(below)) == {Regime.STICK_SLIP}
         and max(portrait.least_relative_speed or 0.0 for portrait in below) == 0.0
         and min(slower) > 0.0,
-        remark=f"At v0 = {listed([portrait.drive.belt_speed for portrait in below])}; by shooting "
+        remark=f"At v0 = {belt_speeds(below)}; by shooting "
         f"{listed(slower)} at v0 = {listed(SLOWER)}.",
     )
 
@@ -232,10 +219,21 @@ def _(_: Evidence) -> Observation:
 @computes("fig-7-stick")
 def _(evidence: Evidence) -> Observation:
     portraits = evidence.portraits(7).portraits
+    return _falling_stick_fractions(portraits, "of the motions that vibrate")
+
+
+@computes("fig-10-stick")
+def _(evidence: Evidence) -> Observation:
+    portraits = _of_stiffnesses(evidence)
+    stiffnesses = listed([portrait.drive.stiffness for portrait in portraits])
+    return _falling_stick_fractions(portraits, f"stiffness {stiffnesses}")
+
+
+def _falling_stick_fractions(portraits: Sequence[Portrait], which: str) -> Observation:
     return Observation(
         listed(stick_fractions(portraits)),
         _stick_falls(portraits),
-        remark=f"At v0 = {portraits[0].drive.belt_speed:g}, of the motions that vibrate.",
+        remark=f"At v0 = {portraits[0].drive.belt_speed:g}, {which}.",
     )
 
 
@@ -257,12 +255,6 @@ def _(_: Evidence) -> Number:
         remark="Computed is the Stribeck law's slope at zero relative speed, "
         f"{tangent / PRINTED_SLOPE:.4g} times what is printed.",
     )
-
-
-def _slopes(evidence: Evidence) -> tuple[Panel, Panel, Panel]:
-    """Return the panels of Fig. 9: the tangent slope, and the printed one at two belt speeds."""
-    tangent, printed, printed_slow = evidence.portraits(9).panels
-    return tangent, printed, printed_slow
 
 
 @computes("fig-8")
@@ -291,7 +283,8 @@ def _(evidence: Evidence) -> Observation:
 
 @computes("fig-9-vibration")
 def _(evidence: Evidence) -> Observation:
-    tangent, printed, slow = _slopes(evidence)
+    # the tangent slope, and the printed one at two belt speeds
+    tangent, printed, slow = evidence.portraits(9).panels
     least = [panel.portraits[0] for panel in (tangent, printed, slow)]
     vibrates = [portrait.measures.regime in VIBRATING for portrait in least]
     fastest = [
@@ -316,7 +309,7 @@ def _(evidence: Evidence) -> Observation:
 
 @computes("fig-9-stick")
 def _(evidence: Evidence) -> Observation:
-    panels = _slopes(evidence)
+    panels = evidence.portraits(9).panels
     tangent, printed, slow = (stick_fractions(panel.portraits) for panel in panels)
     belt_speed = panels[1].portraits[0].drive.belt_speed
 
@@ -345,13 +338,9 @@ def _(evidence: Evidence) -> Observation:
 @computes("falling-slope")
 def _(evidence: Evidence) -> Observation:
     laws = (Coulomb(STRIBECK.static), Linear(STRIBECK.static, TANGENT_SLOPE))
-    traces: list[float] = []
-    for law in laws:
-        found = expand(unit_drive(0.2, friction=law))
-        assert found is not None
-        traces.append(float(np.trace(found.jacobian)))
+    traces = [trace_of(unit_drive(0.2, friction=law)) for law in laws]
     flat = [p.measures.regime for p in evidence.portraits(8).portraits if p.drive.damping > 0.0]
-    falls = _slopes(evidence)[0].portraits[0].measures.regime
+    falls = evidence.portraits(9).panels[0].portraits[0].measures.regime
     return Observation(
         f"p = {traces[0]:.4g} without it, {traces[1]:.4g} with it",
         traces[0] < 0.0 < traces[1] and falls in VIBRATING and not set(flat) & set(VIBRATING),
@@ -376,17 +365,6 @@ def _of_stiffnesses(evidence: Evidence) -> list[Portrait]:
     """Return the motions of Fig. 10 at v0 = 0.2."""
     usual, stiff, _ = evidence.portraits(10).panels
     return [*usual.portraits, *stiff.portraits]
-
-
-@computes("fig-10-stick")
-def _(evidence: Evidence) -> Observation:
-    portraits = _of_stiffnesses(evidence)
-    return Observation(
-        listed(stick_fractions(portraits)),
-        _stick_falls(portraits),
-        remark=f"At v0 = {portraits[0].drive.belt_speed:g}, stiffness "
-        f"{listed([portrait.drive.stiffness for portrait in portraits])}.",
-    )
 
 
 @computes("fig-10-end")

@@ -80,7 +80,14 @@ def expansion(
 
 def trace(belt_speed: float, damping: float = DAMPING) -> float:
     """Return p of eq. 8."""
-    return float(np.trace(expansion(belt_speed, damping).jacobian))
+    return trace_of(unit_drive(belt_speed, damping=damping))
+
+
+def trace_of(drive: Drive) -> float:
+    """Return p of any drive; where it is above zero the equilibrium is unstable."""
+    found = expand(drive)
+    assert found is not None
+    return float(np.trace(found.jacobian))
 
 
 @cache

@@ -27,6 +27,11 @@ def listed(values: Sequence[float]) -> str:
     return ", ".join(f"{value:.4g}" for value in values)
 
 
+def belt_speeds(portraits: Sequence[Portrait]) -> str:
+    """Return the belt speeds of the motions as a list in words."""
+    return listed([portrait.drive.belt_speed for portrait in portraits])
+
+
 def regimes(portraits: Sequence[Portrait]) -> list[Regime | None]:
     """Return the regime that each motion ends in."""
     return [portrait.measures.regime for portrait in portraits]
