@@ -64,7 +64,7 @@ class Evidence:
 class Computed(Protocol):
     """What the computation gives for a claim."""
 
-    def finding(self, printed: Any) -> Finding:
+    def finding(self, printed: Any, /) -> Finding:
         """Judge what is printed: the number, the formula, or None for a statement in words."""
         ...
 

@@ -177,17 +177,25 @@ def _(_: Evidence) -> Number:
     )
 
 
-@computes("eq-21-c1", 1, lambda p, k1: 2.0 - (p + k1))
-@computes("eq-21-c2", 2, lambda p, k1: 2.0 * k1 - (p + 1.0))
-@computes("eq-21-c3", 3, lambda p, _: np.full_like(p, 2.0))
-def _(_: Evidence, order: int, printed: Callable[[FloatArray, float], FloatArray]) -> Formula:
+_EQ_21: dict[int, Callable[[FloatArray, float], FloatArray]] = {
+    1: lambda p, k1: 2.0 - (p + k1),
+    2: lambda p, k1: 2.0 * k1 - (p + 1.0),
+    3: lambda p, _: np.full_like(p, 2.0),
+}
+"""The coefficients as printed, of p and k1."""
+
+
+@computes("eq-21-c1", 1)
+@computes("eq-21-c2", 2)
+@computes("eq-21-c3", 3)
+def _(_: Evidence, order: int) -> Formula:
     """Compare a coefficient of eq. 21, over belt speeds, with that of the loop's Jacobian."""
 
     def coefficients(damping: float) -> list[float]:
         expansions = (expansion(speed, damping, _SOME_GAINS) for speed in BELT_SPEEDS.tolist())
         return [np.poly(found.jacobian)[order] for found in expansions]
 
-    values = printed(printed_trace(BELT_SPEEDS), _SOME_GAINS.linear)
+    values = _EQ_21[order](printed_trace(BELT_SPEEDS), _SOME_GAINS.linear)
     return formula_for_both(values, coefficients, _of_printed_c2() if order == 2 else "")
 
 
