@@ -24,7 +24,8 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.theory.stability_map import StabilityMap
 from stickslip_ros.plots.units import Units
 from stickslip_ros.printable import printable
-from stickslip_ros.studies.design import OWN_SPEED_RANGE, Design, Task, design
+from stickslip_ros.studies.design import Design, Task, design
+from stickslip_ros.studies.design_task import OWN_SPEED_RANGE
 
 HELP = "propose corner frequency and gains that damp the vibration within a force limit"
 
