@@ -30,7 +30,7 @@ from stickslip_ros.studies.basin import (
     basin_study,
     default_axes,
 )
-from stickslip_ros.studies.columns import Columns, Further, write_json
+from stickslip_ros.studies.columns import Columns, ExtraColumns, write_json
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Grid, Plan, RandomSample
 
@@ -84,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
     label = f"basins of {scenario.name}, {study.plan.size} starts"
     with done(arguments, study, label) as journal:
         basins = Basins.from_points(journal.points())
-        further: Further = {"attractor": basins.place}
+        further: ExtraColumns = {"attractor": basins.place}
         made = {"attractors": [asdict(attractor) for attractor in basins.attractors]}
         if arguments.plot is not None:
             _draw(arguments, journal, basins)

@@ -12,7 +12,7 @@ from typing import Any
 from stickslip_ros.app.arguments import made_of, writing
 from stickslip_ros.app.output import finite, progress_bar
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.studies.columns import Further, write_csv, write_json
+from stickslip_ros.studies.columns import ExtraColumns, write_csv, write_json
 from stickslip_ros.studies.dask_cluster import dask_executor
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.runner import run, run_here
@@ -106,7 +106,7 @@ def done(arguments: argparse.Namespace, study: Study, label: str) -> Generator[J
 
 
 def write_table(
-    path: Path, journal: Journal, further: Further, made: Mapping[str, Any] | None = None
+    path: Path, journal: Journal, further: ExtraColumns, made: Mapping[str, Any] | None = None
 ) -> None:
     """Write the table of a complete journal, which is not needed any more then.
 

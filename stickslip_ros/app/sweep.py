@@ -21,7 +21,7 @@ from stickslip_ros.app.studying import add_running, course_of, done, write_table
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.units import Units
-from stickslip_ros.studies.columns import Columns, Further, write_json
+from stickslip_ros.studies.columns import Columns, ExtraColumns, write_json
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.settled import SettlingCourse
@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
     plan = study.plan
     assert isinstance(plan, Grid)
     label = f"sweep of {study.scenario.name}, {plan.size} points"
-    further: Further = {}
+    further: ExtraColumns = {}
     if plan.carried:
         further = {"direction": lambda point: plan.direction(point.number)}
     with done(arguments, study, label) as journal:

@@ -18,12 +18,6 @@ POSITION, VELOCITY = "plant.initial.position", "plant.initial.velocity"
 COURSE = SettlingCourse(transient=50.0, patience=80)
 """How long a motion is followed, unless told otherwise: most are steady soon."""
 
-_ALIKE = 0.02
-"""Share of the amplitude by which amplitudes and midpoints of one attractor may differ."""
-
-_REACH = 2.0
-"""How far starts go by default, in amplitudes that a vibration has, about."""
-
 
 @dataclass(frozen=True)
 class Attractor:
@@ -59,7 +53,7 @@ class Attractor:
         """
         if (self.regime, self.steady) != (other.regime, other.steady):
             return False
-        allowed = _ALIKE * (self.amplitude or 0.0)
+        allowed = 0.02 * (self.amplitude or 0.0)
         differences = (
             (self.amplitude or 0.0) - (other.amplitude or 0.0),
             (self.midpoint or 0.0) - (other.midpoint or 0.0),
@@ -130,7 +124,7 @@ def default_axes(scenario: Scenario, count: int) -> tuple[Axis, Axis]:
     """
     drive = scenario.plant.as_drive()
     bent = drive.friction.static * drive.length_scale
-    reach = _REACH * max(abs(drive.belt_speed) / drive.angular_frequency, bent)
+    reach = 2.0 * max(abs(drive.belt_speed) / drive.angular_frequency, bent)
     middle, speed = drive.equilibrium_position, reach * drive.angular_frequency
     return (
         Axis(POSITION, middle - reach, middle + reach, count),

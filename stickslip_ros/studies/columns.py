@@ -115,11 +115,11 @@ def compute_columns(
         return Columns.from_journal(journal)
 
 
-Further = Mapping[str, Callable[[Point], Any]]
+ExtraColumns = Mapping[str, Callable[[Point], Any]]
 """Columns of a table before the measures: their names, and what makes them of a point."""
 
 
-def write_csv(stream: TextIO, journal: Journal, further: Further) -> None:
+def write_csv(stream: TextIO, journal: Journal, further: ExtraColumns) -> None:
     """Write a row for each point that is done; turning points are separated by spaces."""
     plan = journal.study.plan
     writer = csv.writer(stream, lineterminator="\n")
@@ -131,7 +131,7 @@ def write_csv(stream: TextIO, journal: Journal, further: Further) -> None:
 
 
 def write_json(
-    stream: TextIO, journal: Journal, further: Further, made_of: Mapping[str, Any]
+    stream: TextIO, journal: Journal, further: ExtraColumns, made_of: Mapping[str, Any]
 ) -> None:
     """Write one object: the parameters, their values, and an array for each column.
 

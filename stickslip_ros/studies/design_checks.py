@@ -12,9 +12,6 @@ from stickslip_ros.studies.design_search import Candidates
 from stickslip_ros.studies.design_task import Task
 from stickslip_ros.studies.trial import Bench
 
-_PHASES = 4
-"""Of a vibration, at which control comes on."""
-
 _THROWN = (3.0, 30.0, 300.0)
 """Dimensionless speeds from which the slide is to come back."""
 
@@ -51,7 +48,7 @@ def check_at_speed(
     peaks: list[float] = []
     if vibration.vibrates:
         patience = 5.0 * predicted + 20.0 * loop.drive.natural_period
-        for outcome in bench.catch(vibration, controller, _PHASES, patience):
+        for outcome in bench.catch(vibration, controller, 4, patience):
             settling_times.append(outcome.settling_time)
             peaks.append(outcome.peak_force)
             if outcome.settling_time is None:

@@ -29,9 +29,6 @@ control where the vibration is large, so that more linear gain fits under the fo
 RESERVE = 0.95
 """Share of what is allowed that the first proposal uses."""
 
-_WORTH_IT = 1.05
-"""Factor in decay rate for which a larger cubic gain is taken."""
-
 _COARSE, _FINE, _GRIDS, _ZOOM = (25, 41), (9, 9), 5, 0.3
 """Corner frequencies and gains of the first grid, and of the next ones that close in on the best;
 how many grids in all, and the extent of each in that before."""
@@ -94,7 +91,7 @@ class Candidates:
                 break
             gains = self._fastest(strength, cubic)
             decay_rate = self.slowest(gains).decay_rate(gains)
-            if decay_rate > fastest * _WORTH_IT:
+            if decay_rate > fastest * 1.05:  # less is not worth a larger cubic gain
                 best, fastest = gains, decay_rate
         return best
 

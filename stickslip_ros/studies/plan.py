@@ -19,9 +19,6 @@ MOST_POINTS = 1_000_000_000
 
 _NODES = ("plant", "washout_controller")
 
-_TRIED = 10
-"""Points of a sample that stand for all of it."""
-
 
 class Carry(StrEnum):
     """In which order along an axis each point begins where its neighbour ended."""
@@ -290,7 +287,7 @@ class RandomSample:
 
     def corners(self) -> Iterator[int]:
         """Yield the first points."""
-        yield from range(min(self.size, _TRIED))
+        yield from range(min(self.size, 10))
 
     def chains(self) -> Iterator[range]:
         """Yield all points at once."""

@@ -69,7 +69,7 @@ def run(
     if executor is None:
         for chain in chains:
             for points in chain:
-                chain.start = _keep(journal, compute(study, points, chain.start), progress)
+                chain.start = _record(journal, compute(study, points, chain.start), progress)
         return
     waiting: dict[Future[Piece], _Chain] = {}
 
@@ -88,7 +88,7 @@ def run(
                 return
             for task in wait(waiting, return_when=FIRST_COMPLETED).done:
                 piece, chain = task.result(), waiting.pop(task)
-                chain.start = _keep(journal, piece, progress)
+                chain.start = _record(journal, piece, progress)
                 if study.plan.carried:
                     submit(chain)
     except (BrokenExecutor, CancelledError) as error:
@@ -214,7 +214,7 @@ def _missing(journal: Journal) -> Iterator[tuple[range, MotionState | None]]:
             first = place + 1
 
 
-def _keep(journal: Journal, piece: Piece, progress: CountPoints) -> MotionState | None:
+def _record(journal: Journal, piece: Piece, progress: CountPoints) -> MotionState | None:
     journal.add(piece)
     progress(journal.count)
     return piece.end

@@ -26,9 +26,6 @@ _NUDGE = EQUILIBRIUM_SPEED / 2.0
 """Share of the belt speed by which a slide at rest is pushed before it is carried on: where the
 next equilibrium is the same but unstable, rounding would take for ever, or be none."""
 
-_SECONDS_PER_PERIOD, _SECONDS_PER_SAMPLE = 2e-5, 1e-5
-"""What a natural period costs, about, and a sample where the loop is sampled."""
-
 
 class Point(NamedTuple):
     """What became of one point."""
@@ -112,8 +109,8 @@ class Study:
         case, _ = self._middle()
         periods = self.course.transient + self.course.cycles + 2
         if case.sampled is None:
-            return periods * _SECONDS_PER_PERIOD
-        return periods * case.drive.natural_period * case.sampled.rate * _SECONDS_PER_SAMPLE
+            return periods * 2e-5
+        return periods * case.drive.natural_period * case.sampled.rate * 1e-5
 
     def _middle(self) -> tuple[ControlledDrive, MotionState]:
         for index in (self.plan.size // 2, 0, self.plan.size - 1):

@@ -18,7 +18,7 @@ from stickslip_ros.physics.measures.cycles import Measures, Regime
 from stickslip_ros.studies.columns import (
     COLUMNS,
     Columns,
-    Further,
+    ExtraColumns,
     compute_columns,
     write_csv,
     write_json,
@@ -95,7 +95,7 @@ def test_a_point_that_is_not_done_has_nothing() -> None:
     assert columns.reason.tolist() == [None] * 3
 
 
-FURTHER: Further = {"twice": lambda point: 2 * point.number}
+FURTHER: ExtraColumns = {"twice": lambda point: 2 * point.number}
 
 
 def test_a_csv_read_back_is_the_columns_to_the_last_bit(journal: Journal) -> None:
@@ -122,7 +122,9 @@ def refuse(constant: str) -> None:
     raise AssertionError(f"{constant} is not JSON")
 
 
-def as_json(journal: Journal, further: Further | None = None, **made_of: Any) -> dict[str, Any]:
+def as_json(
+    journal: Journal, further: ExtraColumns | None = None, **made_of: Any
+) -> dict[str, Any]:
     stream = StringIO()
     write_json(stream, journal, further or {}, made_of)
     read = json.loads(stream.getvalue(), parse_constant=refuse)

@@ -12,9 +12,6 @@ import numpy.typing as npt
 
 from stickslip_ros.paper.figures import BifurcationFigure, PaperFigure, PortraitFigure
 
-_SLACK = 1e-9
-"""Share of half a unit of the last printed digit that rounding may add to it."""
-
 _ROUNDING = 1e-9
 """Share of the largest value, or of one, below which a difference is rounding alone."""
 
@@ -222,7 +219,7 @@ def agrees(printed: float, computed: float) -> bool:
     """Return whether `computed` is what is printed, to half a unit of the last printed digit."""
     exponent = Decimal(repr(printed)).as_tuple().exponent
     assert isinstance(exponent, int)
-    return abs(computed - printed) <= 0.5 * 10.0**exponent * (1.0 + _SLACK)
+    return abs(computed - printed) <= 0.5 * 10.0**exponent * (1.0 + 1e-9)
 
 
 def _distance(values: Any, true: Any) -> float:

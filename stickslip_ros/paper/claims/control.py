@@ -32,9 +32,6 @@ from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run
 
 computes = Computations()
 
-
-_STARTS = ((3.0, 0.0), (-3.0, 0.0), (0.0, 3.0), (0.0, -3.0))
-
 _FIG_12_SPEEDS = (0.48, 0.49, 0.492)
 
 
@@ -293,7 +290,8 @@ def _(evidence: Evidence) -> Observation:
     vibrates = sum(portrait.measures.regime in VIBRATING for portrait in cubic.portraits)
     gains = strongest.case.gains
     assert gains is not None
-    resting = [_comes_to_rest(k1, x, y) for k1 in (-1.0, -10.0) for x, y in _STARTS]
+    starts = ((3.0, 0.0), (-3.0, 0.0), (0.0, 3.0), (0.0, -3.0))
+    resting = [_comes_to_rest(k1, x, y) for k1 in (-1.0, -10.0) for x, y in starts]
     return Observation(
         f"{ends} at {linear.portraits[-1].case.label}",
         ends is Regime.EQUILIBRIUM and all(resting),

@@ -53,9 +53,6 @@ FILTER = WashoutGains(corner_frequency=2.0, linear=0.0, cubic=0.0)
 _ROUNDING = 1e-12
 """Share of the belt's speed within which a speed is that of the belt."""
 
-_LONG = 600.0
-"""Time in which a motion that is going to run away has done so."""
-
 BELT_SPEEDS = np.array([0.1, 0.25, 0.4, STUDIED_SPEED, 0.7, 1.0])
 """Where formulas in the belt speed are evaluated."""
 
@@ -202,7 +199,7 @@ def stays(drive: Drive) -> bool:
     """Return whether the motion from rest at X = 0 does not run away."""
     motion = _motion()
     motion.begin(drive, 0.0, 0.0)
-    motion.advance(_LONG)
+    motion.advance(600.0)  # what is going to run away has done so by then
     return not motion.unbounded
 
 

@@ -12,9 +12,6 @@ from stickslip_ros.physics.motion.motion import Motion
 _GREATEST_EFFORT = 8e6
 """Time of slipping times how stiff it is, dimensionless, to spend on a motion: some seconds."""
 
-_STRETCH = 30.0
-"""Dimensionless time after which the effort is looked at."""
-
 
 class TooStiffError(Exception):
     """The motion takes more steps than are worth taking; not a matter of the machine's speed."""
@@ -83,7 +80,7 @@ class SensitiveMotion(Motion):
 
     def _slip(self, now: float, end: float) -> float:
         sign, start = self._sign, now
-        now = super()._slip(now, min(end, now + _STRETCH))
+        now = super()._slip(now, min(end, now + 30.0))
         self._effort += (now - start) * (1.0 + self._stiffness(sign))
         if self._effort > _GREATEST_EFFORT:
             raise TooStiffError
