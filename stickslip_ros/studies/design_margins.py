@@ -24,7 +24,7 @@ class Margins:
     gain_up: float | None
     """Factor above one that does; None: there is none."""
     delay: float | None
-    """ExtraColumns delay of the force that does, s; None: none within half a natural period, or as far
+    """Further delay of the force that does, s; None: none within half a natural period, or as far
     as theory goes."""
 
 
