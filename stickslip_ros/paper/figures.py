@@ -89,7 +89,10 @@ def compute_figure(
     `points` is the number of drives in a bifurcation diagram.
     """
     if number in _BIFURCATIONS:
-        return _bifurcation_figure(number, _BIFURCATIONS[number], points, progress)
+        plan = _BIFURCATIONS[number]
+        values, drives = bifurcation_drives(number, points)
+        diagram = bifurcation_diagram(drives, progress)
+        return BifurcationFigure(number, plan.title, plan.parameter, values, diagram)
     return _portrait_figure(number, _PORTRAITS[number], progress)
 
 
@@ -105,7 +108,8 @@ def bifurcation_drive(number: int, value: float) -> Drive:
     return _BIFURCATIONS[number].drive(value)
 
 
-class _Bifurcation(NamedTuple):
+@dataclass(frozen=True)
+class _Bifurcation:
     title: str
     parameter: str
     start: float
@@ -116,14 +120,6 @@ class _Bifurcation(NamedTuple):
 class _Portraits(NamedTuple):
     title: str
     panels: Mapping[str, Sequence[PortraitCase]]
-
-
-def _bifurcation_figure(
-    number: int, plan: _Bifurcation, points: int, progress: Progress
-) -> BifurcationFigure:
-    values, drives = bifurcation_drives(number, points)
-    diagram = bifurcation_diagram(drives, progress)
-    return BifurcationFigure(number, plan.title, plan.parameter, values, diagram)
 
 
 def _portrait_figure(number: int, plan: _Portraits, progress: Progress) -> PortraitFigure:
@@ -174,18 +170,6 @@ def _stribeck(minimum: float) -> Stribeck:
     return Stribeck(STRIBECK.static, minimum, STRIBECK.minimum_speed)
 
 
-def _of_damping(beta: float) -> Drive:
-    return unit_drive(0.477, damping=2.0 * beta)
-
-
-def _of_stiffness(stiffness: float) -> Drive:
-    return unit_drive(0.2, stiffness=stiffness)
-
-
-def _of_friction_ratio(ratio: float) -> Drive:
-    return unit_drive(0.4, friction=_stribeck(STRIBECK.static / ratio))
-
-
 def _gains(corner_frequency: float, gains: Sequence[tuple[float, float]]) -> list[PortraitCase]:
     return [
         PortraitCase(
@@ -216,21 +200,21 @@ _BIFURCATIONS = {
         "damping β (the coefficient of dX/dτ is 2β)",
         0.0,
         0.05,
-        _of_damping,
+        lambda beta: unit_drive(0.477, damping=2.0 * beta),
     ),
     4: _Bifurcation(
         f"{_SETTLED_ON}, over the stiffness: v0 = 0.2, β = 0.01",
         "stiffness (at fixed scales)",
         0.2,
         5.0,
-        _of_stiffness,
+        lambda stiffness: unit_drive(0.2, stiffness=stiffness),
     ),
     5: _Bifurcation(
         f"{_SETTLED_ON}, over the ratio of friction coefficients: v0 = 0.4, β = 0.01, μs = 0.4",
         "static over smallest kinetic coefficient μs/μm",
         1.0,
         2.0,
-        _of_friction_ratio,
+        lambda ratio: unit_drive(0.4, friction=_stribeck(STRIBECK.static / ratio)),
     ),
 }
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from itertools import product
 from math import isfinite, prod
-from typing import ClassVar, Protocol, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -138,40 +138,6 @@ def _numbers(*nodes: str) -> Iterator[str]:
                 yield f"{node}.{name}"
 
 
-class Plan(Protocol):
-    """The points of a study, by their index from 0 on."""
-
-    kind: ClassVar[str]
-    """Name of the kind of plan in journals and tables."""
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """NODE.PARAMETER of what varies."""
-        ...
-
-    @property
-    def size(self) -> int:
-        """Number of points."""
-        ...
-
-    @property
-    def carried(self) -> bool:
-        """Whether each point of a chain begins where the one before ended."""
-        ...
-
-    def values(self, index: int) -> tuple[float, ...]:
-        """Return the values of the parameters at a point."""
-        ...
-
-    def corners(self) -> Iterator[int]:
-        """Yield the points at the ends of the axes; of a sample, some."""
-        ...
-
-    def chains(self) -> Iterator[range]:
-        """Yield the points in the order in which they are carried on; else, all at once."""
-        ...
-
-
 @dataclass(frozen=True)
 class Grid:
     """All combinations of the values of one axis or several, the last varying fastest.
@@ -181,6 +147,7 @@ class Grid:
     """
 
     kind: ClassVar[str] = "grid"
+    """Name of such a plan in journals and tables."""
     axes: tuple[Axis, ...]
     carry: Carry | None = None
 
@@ -256,6 +223,7 @@ class RandomSample:
     """
 
     kind: ClassVar[str] = "sample"
+    """Name of such a plan in journals and tables."""
     axes: tuple[Axis, ...]
     """Whose counts do not matter."""
     size: int
@@ -292,6 +260,10 @@ class RandomSample:
     def chains(self) -> Iterator[range]:
         """Yield all points at once."""
         yield range(self.size)
+
+
+Plan = Grid | RandomSample
+"""The points of a study, by their index from 0 on."""
 
 
 def _check_different(parameters: Sequence[str]) -> None:

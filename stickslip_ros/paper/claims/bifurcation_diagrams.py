@@ -36,7 +36,6 @@ from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
 
-
 _SAME_POINT = 1e-6
 """Distance of turning points that are one."""
 
