@@ -14,7 +14,7 @@ from stickslip_ros.studies.transitions import (
 )
 
 
-def marks(figure: BifurcationFigure) -> dict[str, float]:
+def transition_marks(figure: BifurcationFigure) -> dict[str, float]:
     """Return the values of the parameter at the transitions that the diagram shows, by name."""
     release = Release()
     margins: dict[str, Callable[[ControlledDrive], float]] = {
