@@ -10,7 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip_ros.paper.claims import CHAPTERS, CLAIMS, Claim, Evidence, Finding, Verdict
+from stickslip_ros.paper.claims import (
+    CHAPTERS,
+    CLAIMS,
+    COMPUTATIONS,
+    Claim,
+    Evidence,
+    Finding,
+    Verdict,
+)
 from stickslip_ros.paper.claims.claim import (
     Correction,
     Formula,
@@ -103,6 +111,13 @@ def test_claims_have_an_identifier_of_their_own() -> None:
     assert len(set(identifiers)) == len(identifiers)
     assert all(re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", identifier) for identifier in identifiers)
     assert sum(len(chapter.claims) for chapter in CHAPTERS) == len(CLAIMS)
+
+
+def test_what_is_computed_are_the_decidable_claims(without_figures: dict[str, Finding]) -> None:
+    undecidable = [
+        n for n, found in without_figures.items() if found.verdict is Verdict.UNDECIDABLE
+    ]
+    assert sorted([*COMPUTATIONS, *undecidable]) == sorted(claim.identifier for claim in CLAIMS)
 
 
 @pytest.mark.parametrize("number", range(1, 31))

@@ -15,7 +15,7 @@ from stickslip_ros.paper.claims import (
 )
 from stickslip_ros.paper.claims.claim import Chapter, Claim, Evidence, Finding, Undecidable, Verdict
 
-_COMPUTATIONS = (
+COMPUTATIONS = (
     model.computes
     | stability.computes
     | coefficients.computes
@@ -25,6 +25,7 @@ _COMPUTATIONS = (
     | control.computes
     | conclusions.computes
 )
+"""What computes each claim that is decidable, by its identifier."""
 
 
 def _claim(
@@ -36,7 +37,7 @@ def _claim(
 ) -> Claim:
     if undecidable is not None:
         return Claim(identifier, place, statement, printed, lambda _: Undecidable(undecidable))
-    return Claim(identifier, place, statement, printed, _COMPUTATIONS[identifier])
+    return Claim(identifier, place, statement, printed, COMPUTATIONS[identifier])
 
 
 def _chapters() -> tuple[Chapter, ...]:
