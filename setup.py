@@ -49,7 +49,9 @@ setup(
     maintainer_email=MANIFEST.find("maintainer").get("email"),
     license=MANIFEST.findtext("license"),
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed", "app/dashboard/*.js", "nodes/base/*.xml"]},
+    package_data={
+        NAME: ["py.typed", "app/dashboard/*.js", "paper/claims/*.toml", "nodes/base/*.xml"]
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

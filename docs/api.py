@@ -50,8 +50,8 @@ PUBLIC = {
         "stickslip_ros.physics.theory.sampled": ["LinearSampledLoop", "GainInterval"],
     },
     "studies": {
-        "stickslip_ros.studies.plan": ["Axis", "Grid", "Sample", "Carry"],
-        "stickslip_ros.studies.settled": ["Course"],
+        "stickslip_ros.studies.plan": ["Axis", "Grid", "RandomSample", "Carry"],
+        "stickslip_ros.studies.settled": ["SettlingCourse"],
         "stickslip_ros.studies.sweep": ["sweep_study"],
         "stickslip_ros.studies.basin": ["basin_study", "default_axes", "Basins", "Attractor"],
         "stickslip_ros.studies.columns": ["compute_columns", "Columns"],

@@ -94,7 +94,7 @@ def numbers() -> Iterator[str]:
     """Yield what `stickslip stability paper` finds, with the symbols of the page."""
     scenario = load_scenario("paper")
     found, _ = stability(scenario)
-    cubic = CubicLoop.of(scenario.plant.as_drive())
+    cubic = CubicLoop.from_drive(scenario.plant.as_drive())
     assert cubic is not None
     opened, closed, sampled = (found[f"{loop}_loop"] for loop in ("open", "closed", "sampled"))
     (cycle,) = opened["limit_cycles"]

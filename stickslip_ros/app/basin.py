@@ -28,9 +28,9 @@ from stickslip_ros.studies.basin import (
     basin_study,
     default_axes,
 )
-from stickslip_ros.studies.columns import Columns, Further
+from stickslip_ros.studies.columns import Columns, ExtraColumns
 from stickslip_ros.studies.journal import Journal
-from stickslip_ros.studies.plan import Axis, Grid, Plan, Sample
+from stickslip_ros.studies.plan import Axis, Grid, Plan, RandomSample
 
 HELP = "find which motion each start leads to, and the share of starts that each motion gets"
 
@@ -80,8 +80,8 @@ def run(arguments: argparse.Namespace) -> int:
     check_picture(arguments.plot)
     label = f"basins of {scenario.name}, {study.plan.size} starts"
     with computed(arguments, study, label) as journal:
-        basins = Basins.of(journal.points())
-        further: Further = {"attractor": basins.place}
+        basins = Basins.from_points(journal.points())
+        further: ExtraColumns = {"attractor": basins.place}
         made = {"attractors": [asdict(attractor) for attractor in basins.attractors]}
         if arguments.plot is not None:
             _draw(arguments, journal, basins)
@@ -111,7 +111,7 @@ def _plan(arguments: argparse.Namespace, scenario: Scenario) -> Plan:
             raise InvalidInputError(f"--{option}={text}: {reason}") from None
     if arguments.sample is None:
         return Grid(tuple(axes))
-    return Sample(tuple(axes), arguments.sample, arguments.seed or 0)
+    return RandomSample(tuple(axes), arguments.sample, arguments.seed or 0)
 
 
 def _print(title: str, basins: Basins, units: Units) -> None:
@@ -142,7 +142,7 @@ def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> No
     plan, scenario = journal.study.plan, journal.study.scenario
     drive = scenario.plant.as_drive()
     units = Units.for_drive(drive)
-    columns = Columns.of(journal)
+    columns = Columns.from_journal(journal)
     with writing("--plot", arguments.plot):
         draw_basin(
             arguments.plot,

@@ -22,7 +22,8 @@ from stickslip_ros.app.output import finite, print_json, print_table, progress_b
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.theory.stability_map import StabilityMap
 from stickslip_ros.plots.units import Units
-from stickslip_ros.studies.design import OWN_SPEED_RANGE, Design, Task, design
+from stickslip_ros.studies.design import Design, Task, design
+from stickslip_ros.studies.design_task import OWN_SPEED_RANGE
 from stickslip_ros.text import printable
 
 HELP = "propose corner frequency and gains that damp the vibration within a force limit"
@@ -85,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
     scenario = scenario_of(arguments, unused=_PROPOSED)
     if not scenario.plant.expects_control:
         raise InvalidInputError("plant.expects_control = False: without control there are no gains")
-    task = Task.of(scenario, _belt_speeds(arguments.belt_speed))
+    task = Task.from_scenario(scenario, _belt_speeds(arguments.belt_speed))
     if arguments.out is not None:
         check_new("--out", arguments.out)
     check_picture(arguments.plot)

@@ -15,9 +15,9 @@ from stickslip_ros.paper.figures import (
     PaperFigure,
     compute_figure,
 )
-from stickslip_ros.paper.marks import marks
 from stickslip_ros.paper.pictures import draw_paper_figure
 from stickslip_ros.paper.report import as_markdown, report, verdict_counts
+from stickslip_ros.paper.transition_marks import transition_marks
 from stickslip_ros.versions import versions
 
 HELP = "reproduce the paper: its figures 2 to 13, and a report on every number and claim"
@@ -85,7 +85,7 @@ def _draw_figures(folder: Path) -> dict[int, PaperFigure]:
 
 def _draw(number: int, path: Path) -> PaperFigure:
     figure = compute_figure(number)
-    transitions = marks(figure) if isinstance(figure, BifurcationFigure) else {}
+    transitions = transition_marks(figure) if isinstance(figure, BifurcationFigure) else {}
     draw_paper_figure(path, figure, transitions)
     return figure
 

@@ -10,6 +10,7 @@ from stickslip_ros.app.arguments import (
     add_scenario,
     check_picture,
     made_of,
+    naming,
     scenario_of,
     seconds,
     writing,

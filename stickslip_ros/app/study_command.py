@@ -12,17 +12,17 @@ from typing import Any
 from stickslip_ros.app.arguments import check_new, made_of, naming, writing
 from stickslip_ros.app.output import finite, progress_bar
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.studies.columns import Further, write_csv, write_json
+from stickslip_ros.studies.columns import ExtraColumns, write_csv, write_json
 from stickslip_ros.studies.dask_cluster import DaskError, dask_executor
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.runner import run, run_here
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import SettlingCourse
 from stickslip_ros.studies.study import Study
 
 _TABLES = (".csv", ".json")
 
 
-def add_running(parser: argparse.ArgumentParser, course: Course) -> None:
+def add_running(parser: argparse.ArgumentParser, course: SettlingCourse) -> None:
     """Add how each point is followed, by default as in `course`, where, and what is kept of it."""
     parser.add_argument(
         "--continuous-control",
@@ -68,7 +68,7 @@ def add_running(parser: argparse.ArgumentParser, course: Course) -> None:
     )
 
 
-def course_of(arguments: argparse.Namespace, default: Course) -> Course:
+def course_of(arguments: argparse.Namespace, default: SettlingCourse) -> SettlingCourse:
     """Return how each point is to be followed, what cannot be asked for being as in `default`."""
     return replace(default, transient=arguments.transient, cycles=arguments.cycles)
 
@@ -113,7 +113,7 @@ def computed(arguments: argparse.Namespace, study: Study, label: str) -> Generat
 
 
 def write_results(
-    arguments: argparse.Namespace, journal: Journal, further: Further, made: Mapping[str, Any]
+    arguments: argparse.Namespace, journal: Journal, further: ExtraColumns, made: Mapping[str, Any]
 ) -> None:
     """Write the table of a complete journal to where it was asked for, a file or as JSON.
 
@@ -126,7 +126,9 @@ def write_results(
         write_json(sys.stdout, journal, further, head)
 
 
-def _write_table(path: Path, journal: Journal, further: Further, head: Mapping[str, Any]) -> None:
+def _write_table(
+    path: Path, journal: Journal, further: ExtraColumns, head: Mapping[str, Any]
+) -> None:
     """Write the table of a journal, which need not be kept any more then."""
     new = path.with_name(f"{path.name}.new")
     with writing("--out", path), new.open("w", encoding="utf-8", newline="") as stream:

@@ -19,10 +19,10 @@ from stickslip_ros.app.study_command import add_running, computed, course_of, wr
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.units import Units
-from stickslip_ros.studies.columns import Columns, Further
+from stickslip_ros.studies.columns import Columns, ExtraColumns
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import SettlingCourse
 from stickslip_ros.studies.study import Point
 from stickslip_ros.studies.sweep import sweep_study
 from stickslip_ros.studies.transitions import transitions
@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "parameter up, down or both ways, which shows hysteresis (default: every point begins in "
         "the scenario's initial state)",
     )
-    add_running(parser, Course())
+    add_running(parser, SettlingCourse())
     add_plot(parser, "the bifurcation diagram, or the map")
     parser.add_argument(
         "--colour",
@@ -78,14 +78,14 @@ def run(arguments: argparse.Namespace) -> int:
         scenario_of(arguments, unused=[axis.parameter for axis in axes]),
         axes,
         carry=None if arguments.carry is None else Carry(arguments.carry),
-        course=course_of(arguments, Course()),
+        course=course_of(arguments, SettlingCourse()),
         continuous=arguments.continuous_control,
     )
     check_picture(arguments.plot)
     plan = study.plan
     assert isinstance(plan, Grid)
     label = f"sweep of {study.scenario.name}, {plan.size} points"
-    further: Further = {}
+    further: ExtraColumns = {}
     if plan.carried:
         further = {"direction": lambda point: plan.direction(point.number)}
     with computed(arguments, study, label) as journal:
@@ -106,7 +106,7 @@ def _draw(arguments: argparse.Namespace, journal: Journal) -> None:
     # Half as long again to import as everything else.
     from stickslip_ros.plots.sweep_picture import draw_diagram, draw_map
 
-    columns = Columns.of(journal)
+    columns = Columns.from_journal(journal)
     with writing("--plot", arguments.plot):
         if len(arguments.over) == 1:
             draw_diagram(arguments.plot, columns, journal.study)

@@ -11,16 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.portraits import Case, Portrait, portraits
-from stickslip_ros.physics.loop.simulation import Progress
+from stickslip_ros.paper.portraits import Portrait, PortraitCase, portraits
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
-from stickslip_ros.studies.bifurcation import (
-    COURSE,
-    BifurcationDiagram,
-    bifurcation_diagram,
-)
+from stickslip_ros.progress import Progress
+from stickslip_ros.studies.bifurcation import COURSE, BifurcationDiagram, bifurcation_diagram
 
 STRIBECK = Stribeck(static=0.4, minimum=0.25, minimum_speed=0.5)
 """The paper's friction law with the paper's constants."""
@@ -93,7 +89,10 @@ def compute_figure(
     `points` is the number of drives in a bifurcation diagram.
     """
     if number in _BIFURCATIONS:
-        return _bifurcation_figure(number, _BIFURCATIONS[number], points, progress)
+        plan = _BIFURCATIONS[number]
+        values, drives = bifurcation_drives(number, points)
+        diagram = bifurcation_diagram(drives, progress)
+        return BifurcationFigure(number, plan.title, plan.parameter, values, diagram)
     return _portrait_figure(number, _PORTRAITS[number], progress)
 
 
@@ -109,7 +108,8 @@ def bifurcation_drive(number: int, value: float) -> Drive:
     return _BIFURCATIONS[number].drive(value)
 
 
-class _Bifurcation(NamedTuple):
+@dataclass(frozen=True)
+class _Bifurcation:
     title: str
     parameter: str
     start: float
@@ -119,15 +119,7 @@ class _Bifurcation(NamedTuple):
 
 class _Portraits(NamedTuple):
     title: str
-    panels: Mapping[str, Sequence[Case]]
-
-
-def _bifurcation_figure(
-    number: int, plan: _Bifurcation, points: int, progress: Progress
-) -> BifurcationFigure:
-    values, drives = bifurcation_drives(number, points)
-    diagram = bifurcation_diagram(drives, progress)
-    return BifurcationFigure(number, plan.title, plan.parameter, values, diagram)
+    panels: Mapping[str, Sequence[PortraitCase]]
 
 
 def _portrait_figure(number: int, plan: _Portraits, progress: Progress) -> PortraitFigure:
@@ -145,28 +137,31 @@ def _portrait_figure(number: int, plan: _Portraits, progress: Progress) -> Portr
 
 def _belt_speeds(
     speeds: Sequence[float], *, damping: float = 0.02, duration: float | None = None
-) -> list[Case]:
+) -> list[PortraitCase]:
     return [
-        Case(f"v0 = {v0:g}", unit_drive(v0, damping=damping), duration=duration) for v0 in speeds
+        PortraitCase(f"v0 = {v0:g}", unit_drive(v0, damping=damping), duration=duration)
+        for v0 in speeds
     ]
 
 
 def _dampings(
     betas: Sequence[float], belt_speed: float, friction: FrictionLaw = STRIBECK
-) -> list[Case]:
+) -> list[PortraitCase]:
     return [
-        Case(f"β = {beta:g}", unit_drive(belt_speed, damping=2.0 * beta, friction=friction))
+        PortraitCase(f"β = {beta:g}", unit_drive(belt_speed, damping=2.0 * beta, friction=friction))
         for beta in betas
     ]
 
 
-def _stiffnesses(stiffnesses: Sequence[float], belt_speed: float) -> list[Case]:
-    return [Case(f"stiffness {k:g}", unit_drive(belt_speed, stiffness=k)) for k in stiffnesses]
-
-
-def _minima(minima: Sequence[float], belt_speed: float) -> list[Case]:
+def _stiffnesses(stiffnesses: Sequence[float], belt_speed: float) -> list[PortraitCase]:
     return [
-        Case(f"μm = {minimum:g}", unit_drive(belt_speed, friction=_stribeck(minimum)))
+        PortraitCase(f"stiffness {k:g}", unit_drive(belt_speed, stiffness=k)) for k in stiffnesses
+    ]
+
+
+def _minima(minima: Sequence[float], belt_speed: float) -> list[PortraitCase]:
+    return [
+        PortraitCase(f"μm = {minimum:g}", unit_drive(belt_speed, friction=_stribeck(minimum)))
         for minimum in minima
     ]
 
@@ -175,21 +170,9 @@ def _stribeck(minimum: float) -> Stribeck:
     return Stribeck(STRIBECK.static, minimum, STRIBECK.minimum_speed)
 
 
-def _of_damping(beta: float) -> Drive:
-    return unit_drive(0.477, damping=2.0 * beta)
-
-
-def _of_stiffness(stiffness: float) -> Drive:
-    return unit_drive(0.2, stiffness=stiffness)
-
-
-def _of_friction_ratio(ratio: float) -> Drive:
-    return unit_drive(0.4, friction=_stribeck(STRIBECK.static / ratio))
-
-
-def _gains(corner_frequency: float, gains: Sequence[tuple[float, float]]) -> list[Case]:
+def _gains(corner_frequency: float, gains: Sequence[tuple[float, float]]) -> list[PortraitCase]:
     return [
-        Case(
+        PortraitCase(
             f"k1 = {k1:g}, k2 = {k2:g}",
             unit_drive(0.4),
             WashoutGains(corner_frequency, k1, k2),
@@ -217,21 +200,21 @@ _BIFURCATIONS = {
         "damping β (the coefficient of dX/dτ is 2β)",
         0.0,
         0.05,
-        _of_damping,
+        lambda beta: unit_drive(0.477, damping=2.0 * beta),
     ),
     4: _Bifurcation(
         f"{_SETTLED_ON}, over the stiffness: v0 = 0.2, β = 0.01",
         "stiffness (at fixed scales)",
         0.2,
         5.0,
-        _of_stiffness,
+        lambda stiffness: unit_drive(0.2, stiffness=stiffness),
     ),
     5: _Bifurcation(
         f"{_SETTLED_ON}, over the ratio of friction coefficients: v0 = 0.4, β = 0.01, μs = 0.4",
         "static over smallest kinetic coefficient μs/μm",
         1.0,
         2.0,
-        _of_friction_ratio,
+        lambda ratio: unit_drive(0.4, friction=_stribeck(STRIBECK.static / ratio)),
     ),
 }
 

@@ -12,22 +12,11 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.figures import (
-    BifurcationFigure,
-    Panel,
-    PaperFigure,
-    PortraitFigure,
-)
+from stickslip_ros.paper.figures import BifurcationFigure, Panel, PaperFigure, PortraitFigure
 from stickslip_ros.paper.portraits import LAST_CYCLES, Portrait
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.style import BLUE, DASHES, GREEN, ORANGE, save, styled
-
-_COLOURS = 128
-"""Of a PNG: these pictures are kept with the sources."""
-
-_TITLE_LETTERS = 95
-"""Of a bifurcation diagram's title in a line: more would be cut off."""
 
 _MOST_COLUMNS, _COLUMNS = 5, 4
 """Portraits in a row at most, and where a panel has more of them."""
@@ -53,13 +42,13 @@ def draw_paper_figure(
         drawn = _bifurcation(figure, marks or {})
     else:
         drawn = _portraits(figure)
-    save(drawn, path, colours=_COLOURS)
+    save(drawn, path, colours=128)  # these pictures are kept with the sources
 
 
 @styled
 def _bifurcation(figure: BifurcationFigure, marks: Mapping[str, float]) -> Figure:
     drawn = Figure(figsize=(8.0, 5.5))
-    drawn.suptitle(fill(figure.title, _TITLE_LETTERS), fontsize=11)
+    drawn.suptitle(fill(figure.title, 95), fontsize=11)
     above, below = drawn.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
     diagram = figure.diagram
     regimes = [measures.regime for measures in diagram.measures]

@@ -25,7 +25,7 @@ SETTLED = 0.01
 """Share of the belt speed by which the speed amplitude of a settled cycle may still differ."""
 
 
-class Case(NamedTuple):
+class PortraitCase(NamedTuple):
     """A motion from rest at X = 0."""
 
     label: str
@@ -41,7 +41,7 @@ class Case(NamedTuple):
 class Portrait:
     """The trajectory of a case, and its measures."""
 
-    case: Case
+    case: PortraitCase
     trajectory: Breakpoints
     """The motion from rest, finely sampled, to its end or to where it runs away."""
     measures: Measures
@@ -85,7 +85,7 @@ class Portrait:
         return float(np.interp(speed, speeds[samples], self.trajectory.time[samples]))
 
 
-def portraits(cases: Iterable[Case]) -> Iterator[Portrait]:
+def portraits(cases: Iterable[PortraitCase]) -> Iterator[Portrait]:
     """Yield the portraits of the cases, one after the other.
 
     Integrators are compiled anew only where the friction law becomes another one.
@@ -100,7 +100,7 @@ def portraits(cases: Iterable[Case]) -> Iterator[Portrait]:
         yield _portrait(case, motions[controlled])
 
 
-def _portrait(case: Case, motion: Motion) -> Portrait:
+def _portrait(case: PortraitCase, motion: Motion) -> Portrait:
     drive, gains = case.drive, case.gains
     motion.drive = drive
     if gains is not None:

@@ -9,20 +9,14 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.plan import Axis, Plan
-from stickslip_ros.studies.settled import CYCLES, Course
+from stickslip_ros.studies.settled import CYCLES, SettlingCourse
 from stickslip_ros.studies.study import Point, Study
 
 POSITION, VELOCITY = "plant.initial.position", "plant.initial.velocity"
 """What a start is made of; the washout filter is at rest."""
 
-COURSE = Course(transient=50.0, patience=80)
+COURSE = SettlingCourse(transient=50.0, patience=80)
 """How long a motion is followed, unless told otherwise: most are steady soon."""
-
-_ALIKE = 0.02
-"""Share of the amplitude by which amplitudes and midpoints of one attractor may differ."""
-
-_REACH = 2.0
-"""How far starts go by default, in amplitudes that a vibration has, about."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +39,7 @@ class Attractor:
     """Of the share of a random sample of n, sqrt(S (1 - S) / n); a grid's is smaller, as a rule."""
 
     @classmethod
-    def of(cls, point: Point) -> Self:
+    def from_point(cls, point: Point) -> Self:
         """Return the attractor that a motion has come to, for all that is known."""
         measures, steady = point.measures, point.steady
         if steady and measures.regime in CYCLES:
@@ -59,7 +53,7 @@ class Attractor:
         """
         if (self.regime, self.steady) != (other.regime, other.steady):
             return False
-        allowed = _ALIKE * (self.amplitude or 0.0)
+        allowed = 0.02 * (self.amplitude or 0.0)
         differences = (
             (self.amplitude or 0.0) - (other.amplitude or 0.0),
             (self.midpoint or 0.0) - (other.midpoint or 0.0),
@@ -79,12 +73,12 @@ class Basins:
     """The attractors in that order."""
 
     @classmethod
-    def of(cls, points: Iterable[Point]) -> Self:
+    def from_points(cls, points: Iterable[Point]) -> Self:
         """Return what the points of a study, taken one at a time, have come to."""
         found: list[Attractor] = []
         counts: list[int] = []
         for point in points:
-            attractor = Attractor.of(point)
+            attractor = Attractor.from_point(point)
             place = _place(attractor, found)
             if place == len(found):
                 found.append(attractor)
@@ -99,14 +93,14 @@ class Basins:
 
     def place(self, point: Point) -> int:
         """Return the place in `attractors` of that which a point has come to."""
-        return self.order[_place(Attractor.of(point), self.found)]
+        return self.order[_place(Attractor.from_point(point), self.found)]
 
 
 def basin_study(
     scenario: Scenario,
     plan: Plan,
     *,
-    course: Course | None = None,
+    course: SettlingCourse | None = None,
     continuous: bool = False,
 ) -> Study:
     """Return the study of the starts in `plan`, a grid or a sample over `POSITION` and `VELOCITY`.
@@ -130,7 +124,7 @@ def default_axes(scenario: Scenario, count: int) -> tuple[Axis, Axis]:
     """
     drive = scenario.plant.as_drive()
     bent = drive.friction.static * drive.length_scale
-    reach = _REACH * max(abs(drive.belt_speed) / drive.angular_frequency, bent)
+    reach = 2.0 * max(abs(drive.belt_speed) / drive.angular_frequency, bent)
     middle, speed = drive.equilibrium_position, reach * drive.angular_frequency
     return (
         Axis(POSITION, middle - reach, middle + reach, count),

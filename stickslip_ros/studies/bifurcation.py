@@ -7,12 +7,18 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.loop.simulation import Progress
 from stickslip_ros.physics.measures.cycles import Measures
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.studies.settled import Case, Course, Settled, Settler, State
+from stickslip_ros.progress import Progress
+from stickslip_ros.studies.settled import (
+    ControlledDrive,
+    MotionState,
+    Settled,
+    Settler,
+    SettlingCourse,
+)
 
-COURSE = Course(transient=300.0, cycles=6)
+COURSE = SettlingCourse(transient=300.0, cycles=6)
 """How long a motion from rest is followed, unless told otherwise."""
 
 
@@ -33,13 +39,13 @@ class BifurcationDiagram:
 def bifurcation_diagram(
     drives: Sequence[Drive],
     progress: Progress = lambda _: None,
-    course: Course = COURSE,
+    course: SettlingCourse = COURSE,
 ) -> BifurcationDiagram:
     """Return what each drive settles on from rest at X = 0."""
     settler = Settler()
     settled: list[Settled] = []
     for drive in drives:
-        settled.append(settler.settle(Case(drive), State(0.0, 0.0), course))
+        settled.append(settler.settle(ControlledDrive(drive), MotionState(0.0, 0.0), course))
         progress(len(settled) / len(drives))
     counts = [len(motion.turning_points) for motion in settled]
     return BifurcationDiagram(

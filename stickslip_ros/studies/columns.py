@@ -15,10 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.loop.simulation import Progress
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Grid, Plan
-from stickslip_ros.studies.runner import IN_FLIGHT, run, run_here
+from stickslip_ros.studies.runner import IN_FLIGHT, CountPoints, run, run_here
 from stickslip_ros.studies.study import MEASURES, Point, Study
 
 COLUMNS = (*MEASURES, "steady", "turning_points", "reason")
@@ -59,7 +58,7 @@ class Columns:
     """Why a point has no cycle to measure, in words, or None."""
 
     @classmethod
-    def of(cls, journal: Journal) -> Self:
+    def from_journal(cls, journal: Journal) -> Self:
         """Return what a journal holds."""
         plan = journal.study.plan
         count = plan.size
@@ -93,7 +92,7 @@ def compute_columns(
     executor: Executor | None = None,
     in_flight: int = IN_FLIGHT,
     path: Path | None = None,
-    progress: Progress = lambda _: None,
+    progress: CountPoints = lambda _: None,
 ) -> Columns:
     """Compute a study and return what became of its points.
 
@@ -113,14 +112,14 @@ def compute_columns(
             run(journal, executor, in_flight=in_flight, progress=progress)
         else:
             run_here(journal, workers, progress)
-        return Columns.of(journal)
+        return Columns.from_journal(journal)
 
 
-Further = Mapping[str, Callable[[Point], Any]]
+ExtraColumns = Mapping[str, Callable[[Point], Any]]
 """Columns of a table before the measures: their names, and what makes them of a point."""
 
 
-def write_csv(stream: TextIO, journal: Journal, further: Further) -> None:
+def write_csv(stream: TextIO, journal: Journal, further: ExtraColumns) -> None:
     """Write a row for each point that is done; turning points are separated by spaces."""
     plan = journal.study.plan
     writer = csv.writer(stream, lineterminator="\n")
@@ -132,7 +131,7 @@ def write_csv(stream: TextIO, journal: Journal, further: Further) -> None:
 
 
 def write_json(
-    stream: TextIO, journal: Journal, further: Further, made_of: Mapping[str, Any]
+    stream: TextIO, journal: Journal, further: ExtraColumns, made_of: Mapping[str, Any]
 ) -> None:
     """Write one object: the parameters, their values, and an array for each column.
 

@@ -15,7 +15,7 @@ from typing import Any, BinaryIO, Self
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.studies.settled import State
+from stickslip_ros.studies.settled import MotionState
 from stickslip_ros.studies.study import Piece, Point, Study
 from stickslip_ros.versions import versions
 
@@ -41,7 +41,7 @@ class Journal:
         """How many points are done."""
         self._done = bytearray((study.plan.size + 7) // 8)
         self._firsts, self._offsets = array("Q"), array("Q")
-        self._ends: dict[int, State | None] = {}
+        self._ends: dict[int, MotionState | None] = {}
         self._path = path
         try:
             self._file = _opened(path)
@@ -72,7 +72,7 @@ class Journal:
         """Return whether a point is done."""
         return bool(self._done[index >> 3] & 1 << (index & 7))
 
-    def state_after(self, index: int) -> State | None:
+    def state_after(self, index: int) -> MotionState | None:
         """Return where the newest point of a chain ended."""
         return self._ends[index]
 
@@ -98,7 +98,7 @@ class Journal:
         if self._path is not None:
             self._path.unlink()
 
-    def _enter(self, offset: int, indices: Sequence[int], end: State | None) -> None:
+    def _enter(self, offset: int, indices: Sequence[int], end: MotionState | None) -> None:
         for index in indices:
             self._done[index >> 3] |= 1 << (index & 7)
         self.count += len(indices)
@@ -127,7 +127,7 @@ class Journal:
                 break
             try:
                 read = _parsed(line)
-                end = None if read["end"] is None else State(*read["end"])
+                end = None if read["end"] is None else MotionState(*read["end"])
                 indices = [Point.from_json(values).number for values in read["points"]]
                 if not 0 <= min(indices) <= max(indices) < self.study.plan.size:
                     raise ValueError

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from itertools import product
 from math import isfinite, prod
-from typing import Protocol, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -19,9 +19,6 @@ MOST_POINTS = 1_000_000_000
 """Points of a study: what is to be kept of them has to go into a file."""
 
 _NODES = ("plant", "washout_controller")
-
-_TRIED = 10
-"""Points of a sample that stand for all of it."""
 
 
 class Carry(StrEnum):
@@ -142,37 +139,6 @@ def _numbers(*nodes: str) -> Iterator[str]:
                 yield f"{node}.{name}"
 
 
-class Plan(Protocol):
-    """The points of a study, by their index from 0 on."""
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """NODE.PARAMETER of what varies."""
-        ...
-
-    @property
-    def size(self) -> int:
-        """Number of points."""
-        ...
-
-    @property
-    def carried(self) -> bool:
-        """Whether each point of a chain begins where the one before ended."""
-        ...
-
-    def values(self, index: int) -> tuple[float, ...]:
-        """Return the values of the parameters at a point."""
-        ...
-
-    def corners(self) -> Iterator[int]:
-        """Yield the points at the ends of the axes; of a sample, some."""
-        ...
-
-    def chains(self) -> Iterator[range]:
-        """Yield the points in the order in which they are carried on; else, all at once."""
-        ...
-
-
 @dataclass(frozen=True)
 class Grid:
     """All combinations of the values of one axis or several, the last varying fastest.
@@ -181,6 +147,8 @@ class Grid:
     direction: all points of the one, then all of the other.
     """
 
+    kind: ClassVar[str] = "grid"
+    """Name of such a plan in journals and tables."""
     axes: tuple[Axis, ...]
     carry: Carry | None = None
 
@@ -246,7 +214,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Sample:
+class RandomSample:
     """Values that are uniformly distributed between the ends of some axes, independent of another.
 
     Between those of a logarithmic axis it is their logarithms that are.
@@ -255,6 +223,8 @@ class Sample:
     with the smaller.
     """
 
+    kind: ClassVar[str] = "sample"
+    """Name of such a plan in journals and tables."""
     axes: tuple[Axis, ...]
     """Whose counts do not matter."""
     size: int
@@ -286,11 +256,15 @@ class Sample:
 
     def corners(self) -> Iterator[int]:
         """Yield the first points."""
-        yield from range(min(self.size, _TRIED))
+        yield from range(min(self.size, 10))
 
     def chains(self) -> Iterator[range]:
         """Yield all points at once."""
         yield range(self.size)
+
+
+Plan = Grid | RandomSample
+"""The points of a study, by their index from 0 on."""
 
 
 def _check_different(parameters: Sequence[str]) -> None:

@@ -1,7 +1,7 @@
 """Running a study: in this process, in several here, or wherever an executor takes its tasks."""
 
 import signal
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -18,9 +18,8 @@ from threading import Thread
 from typing import Self
 
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.physics.loop.simulation import Progress
 from stickslip_ros.studies.journal import Journal
-from stickslip_ros.studies.settled import State
+from stickslip_ros.studies.settled import MotionState
 from stickslip_ros.studies.study import Piece, compute, pieces_of
 
 IN_FLIGHT = 64
@@ -39,6 +38,10 @@ _DEATHS = 3
 """So often in a row may workers die without a piece having been done."""
 
 
+CountPoints = Callable[[int], None]
+"""Takes how many points are done."""
+
+
 class WorkersDiedError(RunError):
     """An executor has lost those that do its work."""
 
@@ -48,7 +51,7 @@ def run(
     executor: Executor | None = None,
     *,
     in_flight: int = IN_FLIGHT,
-    progress: Progress = lambda _: None,
+    progress: CountPoints = lambda _: None,
 ) -> None:
     """Compute the points of the journal's study that it does not have yet.
 
@@ -66,7 +69,7 @@ def run(
     if executor is None:
         for chain in chains:
             for points in chain:
-                chain.start = _keep(journal, compute(study, points, chain.start), progress)
+                chain.start = _record(journal, compute(study, points, chain.start), progress)
         return
     waiting: dict[Future[Piece], _Chain] = {}
 
@@ -85,7 +88,7 @@ def run(
                 return
             for task in wait(waiting, return_when=FIRST_COMPLETED).done:
                 piece, chain = task.result(), waiting.pop(task)
-                chain.start = _keep(journal, piece, progress)
+                chain.start = _record(journal, piece, progress)
                 if study.plan.carried:
                     submit(chain)
     except (BrokenExecutor, CancelledError) as error:
@@ -100,7 +103,7 @@ def run(
             task.cancel()
 
 
-def run_here(journal: Journal, workers: int, progress: Progress = lambda _: None) -> None:
+def run_here(journal: Journal, workers: int, progress: CountPoints = lambda _: None) -> None:
     """Do as `run` does, in so many processes of this machine.
 
     Should one be killed, others take its place. Raises RunError if they keep dying.
@@ -172,7 +175,7 @@ def _end_with_parent() -> None:
 class _Chain:
     """Pieces that are computed one after the other; an iterator of them."""
 
-    def __init__(self, points: range, size: int, start: State | None) -> None:
+    def __init__(self, points: range, size: int, start: MotionState | None) -> None:
         self.start = start
         """Where the next piece begins."""
         self._pieces = pieces_of(points, size)
@@ -194,7 +197,7 @@ def _parallel(chains: Iterator[_Chain], *, carried: bool) -> Iterator[_Chain]:
                 yield _Chain(piece, len(piece), None)
 
 
-def _missing(journal: Journal) -> Iterator[tuple[range, State | None]]:
+def _missing(journal: Journal) -> Iterator[tuple[range, MotionState | None]]:
     """Yield runs of points that are not done, and where the first one of each begins."""
     carried = journal.study.plan.carried
     chains = journal.study.plan.chains()
@@ -211,7 +214,7 @@ def _missing(journal: Journal) -> Iterator[tuple[range, State | None]]:
             first = place + 1
 
 
-def _keep(journal: Journal, piece: Piece, progress: Progress) -> State | None:
+def _record(journal: Journal, piece: Piece, progress: CountPoints) -> MotionState | None:
     journal.add(piece)
     progress(journal.count)
     return piece.end

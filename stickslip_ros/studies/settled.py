@@ -34,7 +34,7 @@ _TWICE_THE_SAME = 1e-4
 
 
 @dataclass(frozen=True)
-class State:
+class MotionState:
     """Where a motion stands; SI units."""
 
     position: float
@@ -44,7 +44,7 @@ class State:
 
 
 @dataclass(frozen=True)
-class Course:
+class SettlingCourse:
     """How long a motion is followed."""
 
     transient: float = 200.0
@@ -72,7 +72,7 @@ class Course:
 
 
 @dataclass(frozen=True)
-class Case:
+class ControlledDrive:
     """A drive, and how it is controlled and sampled, if it is."""
 
     drive: Drive
@@ -82,7 +82,7 @@ class Case:
     """How the loop is sampled; None: not at all, control being continuous (eq. 19)."""
 
     @classmethod
-    def of(cls, scenario: Scenario, *, continuous: bool = False) -> "Case":
+    def from_scenario(cls, scenario: Scenario, *, continuous: bool = False) -> "ControlledDrive":
         """Return the case of a scenario, its control `continuous` if asked for.
 
         Without controller and disturbance there is nothing to sample: the motion is the same.
@@ -125,7 +125,7 @@ class Settled(NamedTuple):
     turning_points: FloatArray
     """Displacements at which the velocity is zero, m: the Poincare section x' = 0. In equilibrium
     the one place of rest; none where the motion runs away."""
-    end: State
+    end: MotionState
     """Where the motion ended."""
 
     @property
@@ -143,7 +143,7 @@ class Settler:
     def __init__(self) -> None:
         self._motions: dict[bool, Motion] = {}
 
-    def settle(self, case: Case, start: State, course: Course) -> Settled:
+    def settle(self, case: ControlledDrive, start: MotionState, course: SettlingCourse) -> Settled:
         """Follow the motion from `start` and measure what is left after the transient.
 
         Raises RunError for a motion too stiff to be followed.
@@ -209,7 +209,7 @@ class Settler:
         if law is not None and loop is not None:
             law.answer(loop.sample.stamp, loop.sample.velocity)
             low_passed = law.low_passed
-        return section.settled(State(motion.position, motion.velocity, low_passed))
+        return section.settled(MotionState(motion.position, motion.velocity, low_passed))
 
     def _motion(self, drive: Drive, continuous: bool) -> Motion:
         if continuous not in self._motions:
@@ -219,7 +219,7 @@ class Settler:
         return self._motions[continuous]
 
 
-def _begin_control(motion: Motion, washout: WashoutParameters, start: State) -> None:
+def _begin_control(motion: Motion, washout: WashoutParameters, start: MotionState) -> None:
     """Let the filter run for `start_after`, and the controller act from then on."""
     gains = (washout.linear_gain, washout.cubic_gain)
     motion.set_gains(
@@ -266,7 +266,7 @@ class _Section:
         """Whether there are cycles enough, or no more will come."""
         return self._missing <= 0 or self.meter.measures().regime in _RESTS
 
-    def settled(self, end: State) -> Settled:
+    def settled(self, end: MotionState) -> Settled:
         """Return what was found, the motion having come to `end`."""
         measures = self.meter.measures()
         section = np.concatenate(self._sections)

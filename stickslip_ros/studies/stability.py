@@ -8,13 +8,13 @@ from typing import Any, cast
 import numpy as np
 
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.equations import SPEED, WashoutGains
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
 from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycle_of_run, limit_cycles
-from stickslip_ros.physics.theory.linear import SPEED, Expansion, expand
+from stickslip_ros.physics.theory.linear import Expansion, expand
 from stickslip_ros.physics.theory.sampled import (
     LONGEST_DELAY,
     LinearSampledLoop,
@@ -216,7 +216,7 @@ def _why_no_gain(drive: Drive, gains: WashoutGains) -> str:
 def _sampled_loop(
     drive: Drive, gains: WashoutGains | None, rate: float, force_delay: float, notes: Notes
 ) -> Section:
-    loop = LinearSampledLoop.of(drive, rate, force_delay)
+    loop = LinearSampledLoop.from_drive(drive, rate, force_delay)
     if gains is None or loop is None:
         reason = why_no_linear_loop(drive, rate, force_delay)
         notes["sampled_loop"] = _NO_CONTROL if gains is None else reason or ""
@@ -248,7 +248,7 @@ def _closed_forms(drive: Drive, gains: WashoutGains | None) -> Section | None:
 
     What does not exist is left out.
     """
-    cubic = CubicLoop.of(drive)
+    cubic = CubicLoop.from_drive(drive)
     if cubic is None:
         return None
     speed, force = drive.speed_scale, drive.normal_force
@@ -304,7 +304,7 @@ def stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]
     """
     plant = scenario.plant
     drive, gains = plant.as_drive(), scenario.washout_controller.as_washout().gains
-    loop = LinearSampledLoop.of(drive, plant.rate, plant.force_delay)
+    loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay)
     assert loop is not None
     rates = plant.rate * np.array(_MAP_RATES)
     latest = min(_MAP_DELAY * drive.natural_period, LONGEST_DELAY / rates.max())

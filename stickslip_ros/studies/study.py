@@ -9,7 +9,13 @@ from stickslip_ros.errors import StickslipError
 from stickslip_ros.physics.measures.cycles import EQUILIBRIUM_SPEED, Measures, Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.plan import Plan
-from stickslip_ros.studies.settled import Case, Course, Settled, Settler, State
+from stickslip_ros.studies.settled import (
+    ControlledDrive,
+    MotionState,
+    Settled,
+    Settler,
+    SettlingCourse,
+)
 
 MEASURES = tuple(
     measure.name for measure in fields(Measures) if measure.name not in ("steady", "trend")
@@ -19,9 +25,6 @@ MEASURES = tuple(
 _NUDGE = EQUILIBRIUM_SPEED / 2.0
 """Share of the belt speed by which a slide at rest is pushed before it is carried on: where the
 next equilibrium is the same but unstable, rounding would take for ever, or be none."""
-
-_SECONDS_PER_PERIOD, _SECONDS_PER_SAMPLE = 2e-5, 1e-5
-"""What a natural period costs, about, and a sample where the loop is sampled."""
 
 
 class Point(NamedTuple):
@@ -55,7 +58,7 @@ class Piece(NamedTuple):
     """Points of a study that one task has computed, in the order of the task."""
 
     points: list[Point]
-    end: State | None
+    end: MotionState | None
     """Where what follows the last one begins; None: in its own initial state, since that one ran
     away or failed, or since nothing is carried on."""
 
@@ -72,11 +75,11 @@ class Study:
 
     scenario: Scenario
     plan: Plan
-    course: Course = field(default_factory=Course)
+    course: SettlingCourse = field(default_factory=SettlingCourse)
     continuous: bool = False
     """Whether control acts without sampling (eq. 19)."""
 
-    def case(self, index: int) -> tuple[Case, State]:
+    def case(self, index: int) -> tuple[ControlledDrive, MotionState]:
         """Return the drive and loop of a point, and its initial state.
 
         Raises InvalidInputError where its values are out of bounds or do not go together.
@@ -84,7 +87,7 @@ class Study:
         values = dict(zip(self.plan.parameters, self.plan.values(index), strict=True))
         scenario = self.scenario.changed(values)
         initial = scenario.plant.initial
-        return Case.of(scenario, continuous=self.continuous), State(
+        return ControlledDrive.from_scenario(scenario, continuous=self.continuous), MotionState(
             initial.position, initial.velocity
         )
 
@@ -106,23 +109,25 @@ class Study:
         case, _ = self._middle()
         periods = self.course.transient + self.course.cycles + 2
         if case.sampled is None:
-            return periods * _SECONDS_PER_PERIOD
-        return periods * case.drive.natural_period * case.sampled.rate * _SECONDS_PER_SAMPLE
+            return periods * 2e-5
+        return periods * case.drive.natural_period * case.sampled.rate * 1e-5
 
-    def _middle(self) -> tuple[Case, State]:
+    def _middle(self) -> tuple[ControlledDrive, MotionState]:
         for index in (self.plan.size // 2, 0, self.plan.size - 1):
             try:
                 return self.case(index)
             except StickslipError:
                 continue
-        return Case.of(self.scenario, continuous=self.continuous), State(0.0, 0.0)
+        return ControlledDrive.from_scenario(
+            self.scenario, continuous=self.continuous
+        ), MotionState(0.0, 0.0)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what the result depends on, ready for JSON."""
         plan: Any = self.plan
         return {
             "scenario": self.scenario.as_dict(),
-            "plan": {"kind": type(plan).__name__.lower(), **asdict(plan)},
+            "plan": {"kind": plan.kind, **asdict(plan)},
             "course": asdict(self.course),
             "continuous_control": self.continuous,
         }
@@ -138,7 +143,7 @@ class _Settlers(local):
 _SETTLERS = _Settlers()
 
 
-def compute(study: Study, points: Sequence[int], start: State | None) -> Piece:
+def compute(study: Study, points: Sequence[int], start: MotionState | None) -> Piece:
     """Return what becomes of some points, in their order; a pure function, for any process.
 
     Where the plan carries on, the first one begins in `start`; without, in its initial state, as
@@ -152,7 +157,9 @@ def compute(study: Study, points: Sequence[int], start: State | None) -> Piece:
     return Piece(found, end if carried else None)
 
 
-def _compute_point(study: Study, index: int, start: State | None) -> tuple[Point, State | None]:
+def _compute_point(
+    study: Study, index: int, start: MotionState | None
+) -> tuple[Point, MotionState | None]:
     try:
         case, initial = study.case(index)
         if start is not None and case.washout is not None:
@@ -172,7 +179,7 @@ def _compute_point(study: Study, index: int, start: State | None) -> tuple[Point
     return point, _carried_on(settled, case)
 
 
-def _carried_on(settled: Settled, case: Case) -> State | None:
+def _carried_on(settled: Settled, case: ControlledDrive) -> MotionState | None:
     """Return where the next point of a chain begins."""
     end, regime = settled.end, settled.measures.regime
     if regime is Regime.UNBOUNDED:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import SettlingCourse
 from stickslip_ros.studies.study import Study
 
 MOST_AXES = 2
@@ -16,7 +16,7 @@ def sweep_study(
     axes: Sequence[Axis],
     *,
     carry: Carry | None = None,
-    course: Course | None = None,
+    course: SettlingCourse | None = None,
     continuous: bool = False,
 ) -> Study:
     """Return the study of what a scenario settles on at each combination of the axes' values.
@@ -30,6 +30,6 @@ def sweep_study(
     without = [axis for axis in axes if axis.parameter.startswith("washout_controller.")]
     if without and not scenario.plant.expects_control:
         raise InvalidInputError(f"{without[0]}: without control there is no controller")
-    study = Study(scenario, Grid(tuple(axes), carry), course or Course(), continuous)
+    study = Study(scenario, Grid(tuple(axes), carry), course or SettlingCourse(), continuous)
     study.check()
     return study

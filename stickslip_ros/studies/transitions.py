@@ -14,7 +14,7 @@ from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.physics.theory.sampled import LinearSampledLoop
 from stickslip_ros.physics.theory.sticking import Release
 from stickslip_ros.studies.plan import Axis
-from stickslip_ros.studies.settled import Case
+from stickslip_ros.studies.settled import ControlledDrive
 from stickslip_ros.studies.study import Study
 
 HOPF_POINT = "Hopf point"
@@ -44,7 +44,7 @@ class TransitionMap:
     """By the name of a transition, what is zero there; NaN where theory has no say. (n, m)"""
 
 
-def hopf_margin(case: Case, *, coarse: bool = False) -> float:
+def hopf_margin(case: ControlledDrive, *, coarse: bool = False) -> float:
     """Return what is above zero where the equilibrium is stable, and zero at the Hopf bifurcation.
 
     Without sampling it is the least Hurwitz determinant: of two or three eigenvalues only a pair
@@ -56,13 +56,13 @@ def hopf_margin(case: Case, *, coarse: bool = False) -> float:
     if washout is None or plant is None:
         expansion = expand(drive, None if washout is None else washout.gains)
         return nan if expansion is None else float(hurwitz_determinants(expansion.jacobian).min())
-    loop = LinearSampledLoop.of(drive, plant.rate, plant.force_delay)
+    loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay)
     if loop is None or plant.force_jitter > 0.0 or washout.force_limit == 0.0:
         return nan
     return 1.0 - (loop.coarsened() if coarse else loop).spectral_radius(washout.gains)
 
 
-def stick_margin(case: Case, release: Release) -> float:
+def stick_margin(case: ControlledDrive, release: Release) -> float:
     """Return what is above zero where a slide that stuck sticks again, and zero at the limit.
 
     NaN on a belt at rest, and under control or a disturbance, for which there is no such theory.
@@ -91,7 +91,7 @@ def transitions(study: Study, axis: Axis) -> dict[str, list[float]]:
     found: dict[str, list[float]] = {}
     for name, margin in _margins(study).items():
 
-        def at(value: float, margin: Callable[[Case], float] = margin) -> float:
+        def at(value: float, margin: Callable[[ControlledDrive], float] = margin) -> float:
             return _at(study, {axis.parameter: value}, margin)
 
         if places := list(sign_changes(at, values)):
@@ -112,7 +112,9 @@ def transition_map(study: Study, axes: tuple[Axis, Axis]) -> TransitionMap:
     return TransitionMap(first, second, margins)
 
 
-def _margins(study: Study, *, coarse: bool = False) -> dict[str, Callable[[Case], float]]:
+def _margins(
+    study: Study, *, coarse: bool = False
+) -> dict[str, Callable[[ControlledDrive], float]]:
     release = Release()
     sampled = study.scenario.plant.expects_control and not study.continuous
     return {
@@ -121,10 +123,14 @@ def _margins(study: Study, *, coarse: bool = False) -> dict[str, Callable[[Case]
     }
 
 
-def _at(study: Study, values: Mapping[str, float], margin: Callable[[Case], float]) -> float:
+def _at(
+    study: Study, values: Mapping[str, float], margin: Callable[[ControlledDrive], float]
+) -> float:
     """Return the margin where parameters have these values; NaN where they cannot, or it cannot."""
     try:
-        case = Case.of(study.scenario.changed(values), continuous=study.continuous)
+        case = ControlledDrive.from_scenario(
+            study.scenario.changed(values), continuous=study.continuous
+        )
         return margin(case)
     except (StickslipError, ArithmeticError, np.linalg.LinAlgError):
         return nan

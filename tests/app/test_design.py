@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.physics.loop.simulation import Progress
+from stickslip_ros.progress import Progress
 from stickslip_ros.studies.design import Design, Task, design
 from tests.app.conftest import Run
 

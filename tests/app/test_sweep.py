@@ -13,7 +13,7 @@ import pytest
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.columns import compute_columns
 from stickslip_ros.studies.plan import Axis
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import SettlingCourse
 from stickslip_ros.studies.sweep import sweep_study
 from tests.app.conftest import Run
 from tests.nodes.graph import PATIENCE
@@ -27,7 +27,9 @@ def test_the_table_has_what_the_python_interface_returns(stickslip: Run, tmp_pat
     done = stickslip(*FREE, *SPEEDS, "--out", "table.csv", "--plot", "diagram.png")
     assert done.returncode == 0, done.stderr
     scenario = load_scenario("paper", ["plant.expects_control=false"])
-    study = sweep_study(scenario, [Axis("plant.belt_speed", 0.2, 0.6, 5)], course=Course(100.0))
+    study = sweep_study(
+        scenario, [Axis("plant.belt_speed", 0.2, 0.6, 5)], course=SettlingCourse(100.0)
+    )
     found = compute_columns(study)
     with (tmp_path / "table.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))

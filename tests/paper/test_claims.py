@@ -10,9 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip_ros.paper.claims import CHAPTERS, CLAIMS, Claim, Evidence, Finding, Verdict
+from stickslip_ros.paper.claims import (
+    CHAPTERS,
+    CLAIMS,
+    COMPUTATIONS,
+    Claim,
+    Evidence,
+    Finding,
+    Verdict,
+)
 from stickslip_ros.paper.claims.claim import (
-    Chapter,
     Correction,
     Formula,
     Number,
@@ -32,7 +39,7 @@ from stickslip_ros.paper.figures import (
     bifurcation_drive,
     unit_drive,
 )
-from stickslip_ros.paper.portraits import Case, portraits
+from stickslip_ros.paper.portraits import PortraitCase, portraits
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
@@ -106,6 +113,13 @@ def test_claims_have_an_identifier_of_their_own() -> None:
     assert sum(len(chapter.claims) for chapter in CHAPTERS) == len(CLAIMS)
 
 
+def test_what_is_computed_are_the_decidable_claims(without_figures: dict[str, Finding]) -> None:
+    undecidable = [
+        n for n, found in without_figures.items() if found.verdict is Verdict.UNDECIDABLE
+    ]
+    assert sorted([*COMPUTATIONS, *undecidable]) == sorted(claim.identifier for claim in CLAIMS)
+
+
 @pytest.mark.parametrize("number", range(1, 31))
 def test_every_equation_has_a_claim(number: int) -> None:
     assert any(re.search(rf"eq\. {number}\b", claim.place) for claim in CLAIMS)
@@ -174,20 +188,12 @@ def test_a_number_agrees_with_what_it_rounds_to(units: int, digits: int, rest: f
     assert not agrees(printed, printed + (rest + 1.0) * unit)
 
 
-def judged(chapter: Chapter) -> Finding:
-    (claim,) = chapter.claims
-    return claim.check(Evidence(no_figure))
-
-
 @pytest.mark.parametrize(
     ("value", "corrected", "verdict"),
     [(0.4944, 0.1, HOLDS), (0.48876, 0.49441, CORRECTED), (0.48876, 0.4943, FAILS)],
 )
 def test_verdict_on_a_number(value: float, corrected: float, verdict: Verdict) -> None:
-    chapter = Chapter("")
-    number = Number(value, [Correction("With x", corrected)], "So it is.")
-    chapter.number("a", "eq. 1", "a number", 0.4944)(lambda _: number)
-    finding = judged(chapter)
+    finding = Number(value, [Correction("With x", corrected)], "So it is.").finding(0.4944)
     assert finding.verdict is verdict
     assert finding.computed == value
     assert finding.remark.startswith("With x: 0.49441.") == (verdict is CORRECTED)
@@ -210,10 +216,7 @@ def test_verdict_on_a_formula(
     verdict: Verdict,
     difference: float | None,
 ) -> None:
-    chapter = Chapter("")
-    formula = Formula(printed, [1.0, 2.0], [Correction("With x", corrected)])
-    chapter.formula("a", "eq. 1", "a formula", "a = b")(lambda: formula)
-    finding = judged(chapter)
+    finding = Formula(printed, [1.0, 2.0], [Correction("With x", corrected)]).finding("a = b")
     assert (finding.verdict, finding.difference) == (verdict, difference)
 
 
@@ -222,9 +225,7 @@ def test_verdict_on_a_formula(
     [(True, False, HOLDS), (True, True, HOLDS), (False, True, CORRECTED), (False, False, FAILS)],
 )
 def test_verdict_on_a_statement(holds: bool, corrected: bool, verdict: Verdict) -> None:
-    chapter = Chapter("")
-    chapter.statement("a", "eq. 1", "so it is")(lambda _: Observation("", holds, corrected))
-    assert judged(chapter).verdict is verdict
+    assert Observation("", holds, corrected).finding(None).verdict is verdict
 
 
 def sigma_of_coefficients(q: Nonlinearity) -> float:
@@ -274,7 +275,7 @@ def test_enough_stiffness_ends_the_sticking(without_figures: dict[str, Finding])
     assert finding.computed == f"from stiffness {never:g} on"
     # From rest, without shooting: what the slide does on either side of these stiffnesses.
     stiffnesses = (overruns - 0.1, overruns + 0.1, never - 1.0, never + 1.0)
-    ends = list(portraits(Case("", unit_drive(0.2, stiffness=k)) for k in stiffnesses))
+    ends = list(portraits(PortraitCase("", unit_drive(0.2, stiffness=k)) for k in stiffnesses))
     fastest = [float(end.last_cycles.velocity.max()) for end in ends]
     assert fastest[0] == pytest.approx(0.2, rel=1e-12)
     assert all(speed > 0.2 * (1.0 + 1e-9) for speed in fastest[1:])
@@ -282,7 +283,9 @@ def test_enough_stiffness_ends_the_sticking(without_figures: dict[str, Finding])
 
 
 def test_the_friction_of_a_stick_is_that_from_the_landing_on() -> None:
-    only = PortraitFigure(6, "", (Panel("", tuple(portraits([Case("", unit_drive(0.2))]))),))
+    only = PortraitFigure(
+        6, "", (Panel("", tuple(portraits([PortraitCase("", unit_drive(0.2))]))),)
+    )
     finding = verdict("eq-5-stick", only)
     # A stick ends at mu_s = 0.4. It takes 0.285506954 of a period of 7.06772953, at the speed 0.2.
     landing = 0.4 - 0.2 * 0.285506954 * 7.06772953
@@ -301,7 +304,10 @@ def test_under_the_printed_slope_the_stick_fraction_rises_with_the_damping_and_f
     law = Linear(STRIBECK.static, PRINTED_SLOPE)
     betas = (0.12, 0.15, 0.17, 0.18, 0.2, 0.3)
     drives = [unit_drive(0.2, damping=2.0 * beta, friction=law) for beta in betas]
-    ends = [portrait.measures.stick_fraction for portrait in portraits(Case("", d) for d in drives)]
+    ends = [
+        portrait.measures.stick_fraction
+        for portrait in portraits(PortraitCase("", d) for d in drives)
+    ]
     assert ends == sorted(ends[:4]) + sorted(ends[4:], reverse=True)
     assert [len(arrivals(drive)) for drive in drives] == [2, 2, 2, 1, 1, 1]
 
@@ -319,7 +325,7 @@ def test_verdicts_survive_ten_times_the_range() -> None:
     assert verdict("fig-4-influence", stiffnesses).verdict is CORRECTED
     minima = (0.001, 0.01, 0.1, 0.25, 0.37, 0.39, 0.399)
     drives = [unit_drive(0.4, friction=replace(STRIBECK, minimum=m)) for m in minima]
-    gaps = tuple(portraits(Case("", drive) for drive in drives))
+    gaps = tuple(portraits(PortraitCase("", drive) for drive in drives))
     figure = PortraitFigure(11, "", (Panel("", gaps),))
     assert verdict("fig-11-amplitude", figure).verdict is HOLDS
     wide = {

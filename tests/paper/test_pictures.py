@@ -10,18 +10,18 @@ from PIL import Image
 
 from stickslip_ros.paper.figures import Panel, PortraitFigure, compute_figure
 from stickslip_ros.paper.pictures import draw_paper_figure
-from stickslip_ros.paper.portraits import Case, portraits
+from stickslip_ros.paper.portraits import PortraitCase, portraits
 from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.plots.style import BLUE, GREEN, ORANGE
 from tests.physics.drives import PAPER
 
-STICKS = Case("it sticks", replace(PAPER, belt_speed=0.2), duration=100.0)
-RESTS = Case("it rests", replace(PAPER, belt_speed=0.7), duration=200.0)
-RUNS_AWAY = Case("it runs", replace(PAPER, belt_speed=0.2, friction=Linear(0.4, 0.9)))
-TOO_SHORT = Case("it ends", PAPER, duration=3.0)
+STICKS = PortraitCase("it sticks", replace(PAPER, belt_speed=0.2), duration=100.0)
+RESTS = PortraitCase("it rests", replace(PAPER, belt_speed=0.7), duration=200.0)
+RUNS_AWAY = PortraitCase("it runs", replace(PAPER, belt_speed=0.2, friction=Linear(0.4, 0.9)))
+TOO_SHORT = PortraitCase("it ends", PAPER, duration=3.0)
 
 
-def figure_of(*panels: list[Case]) -> PortraitFigure:
+def figure_of(*panels: list[PortraitCase]) -> PortraitFigure:
     drawn = tuple(Panel("panel", tuple(portraits(cases))) for cases in panels)
     return PortraitFigure(99, "a title", drawn)
 

@@ -6,7 +6,7 @@ from math import log
 import numpy as np
 import pytest
 
-from stickslip_ros.paper.portraits import SETTLED, Case, Portrait, portraits
+from stickslip_ros.paper.portraits import SETTLED, Portrait, PortraitCase, portraits
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Linear
@@ -16,11 +16,13 @@ from tests.physics.drives import LIMIT_CYCLES, PAPER, LimitCycle
 DECAY = 0.05
 """Beta of a slide that only slips under Coulomb friction: the belt is faster than it ever gets."""
 
-DECAYING = Case("decays", replace(PAPER, damping=2 * DECAY, belt_speed=0.6, friction=Coulomb(0.4)))
-RUNS_AWAY = Case("runs away", replace(PAPER, belt_speed=0.2, friction=Linear(0.4, 0.9)))
+DECAYING = PortraitCase(
+    "decays", replace(PAPER, damping=2 * DECAY, belt_speed=0.6, friction=Coulomb(0.4))
+)
+RUNS_AWAY = PortraitCase("runs away", replace(PAPER, belt_speed=0.2, friction=Linear(0.4, 0.9)))
 
 
-def portrait(case: Case) -> Portrait:
+def portrait(case: PortraitCase) -> Portrait:
     (only,) = portraits([case])
     return only
 
@@ -53,7 +55,7 @@ def test_settling_time_of_a_decaying_vibration() -> None:
 
 @pytest.mark.parametrize("cycle", LIMIT_CYCLES, ids=lambda cycle: f"belt speed {cycle.belt_speed}")
 def test_last_cycles_are_the_limit_cycle(cycle: LimitCycle) -> None:
-    found = portrait(Case("", replace(PAPER, belt_speed=cycle.belt_speed)))
+    found = portrait(PortraitCase("", replace(PAPER, belt_speed=cycle.belt_speed)))
     last = found.last_cycles
     assert found.measures.amplitude == pytest.approx(cycle.amplitude, rel=1e-8)
     assert found.measures.stick_fraction == pytest.approx(cycle.stick_fraction, abs=1e-8)
@@ -67,12 +69,12 @@ def test_last_cycles_are_the_limit_cycle(cycle: LimitCycle) -> None:
 def test_what_still_changes_has_no_settling_time() -> None:
     # At the Hopf speed itself the amplitude falls as one over the root of time.
     hopf = replace(PAPER, belt_speed=(0.43 / 1.8) ** 0.5)
-    assert portrait(Case("", hopf, duration=600.0)).settling_time is None
-    assert portrait(Case("", replace(PAPER, belt_speed=0.3), duration=600.0)).settling_time
+    assert portrait(PortraitCase("", hopf, duration=600.0)).settling_time is None
+    assert portrait(PortraitCase("", replace(PAPER, belt_speed=0.3), duration=600.0)).settling_time
 
 
 def test_what_runs_away_ends_there_and_leaves_the_others_alone() -> None:
-    calm = Case("", replace(PAPER, belt_speed=0.3), duration=100.0)
+    calm = PortraitCase("", replace(PAPER, belt_speed=0.3), duration=100.0)
     before, away, after = portraits([calm, RUNS_AWAY, calm])
     assert away.runs_away
     assert away.settling_time is None
@@ -96,14 +98,14 @@ def test_the_critical_gain_separates_vibration_from_rest(
     corner_frequency: float, gain: float, rests: bool
 ) -> None:
     gains = WashoutGains(corner_frequency, gain, 0.0)
-    found = portrait(Case("", PAPER, gains, duration=3000.0))
+    found = portrait(PortraitCase("", PAPER, gains, duration=3000.0))
     assert (found.measures.regime is Regime.EQUILIBRIUM) == rests
 
 
 def test_a_controlled_case_may_follow_one_without_control() -> None:
-    free = Case("", PAPER, duration=100.0)
-    idle = Case("", PAPER, WashoutGains(2.0, 0.0, 0.0), duration=100.0)
-    strong = Case("", PAPER, WashoutGains(2.0, -1.5, 0.0), duration=100.0)
+    free = PortraitCase("", PAPER, duration=100.0)
+    idle = PortraitCase("", PAPER, WashoutGains(2.0, 0.0, 0.0), duration=100.0)
+    strong = PortraitCase("", PAPER, WashoutGains(2.0, -1.5, 0.0), duration=100.0)
     first, controlled, second, third = portraits([free, strong, idle, free])
     amplitudes = [other.measures.amplitude for other in (second, third)]
     assert amplitudes == pytest.approx([first.measures.amplitude] * 2, rel=1e-9)
@@ -111,7 +113,7 @@ def test_a_controlled_case_may_follow_one_without_control() -> None:
 
 
 def test_a_run_too_short_for_a_cycle() -> None:
-    found = portrait(Case("", PAPER, duration=3.0))
+    found = portrait(PortraitCase("", PAPER, duration=3.0))
     assert found.measures.regime is None
     assert found.settling_time is None
     assert len(found.last_cycles) == len(found.trajectory)

@@ -18,7 +18,7 @@ GAINS = WashoutGains(20.0, -3000.0, 0.0)
 
 
 def map_of(force_delay: float = 0.0025, gains: WashoutGains = GAINS) -> StabilityMap:
-    loop = LinearSampledLoop.of(FEED_DRIVE, 1000.0, force_delay)
+    loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0, force_delay)
     assert loop is not None
     return StabilityMap.around(loop, gains, points=21)
 
@@ -45,7 +45,7 @@ def test_decay_rates_change_sign_at_the_critical_gain() -> None:
 
 def test_the_continuous_loop_has_its_closed_form() -> None:
     found = map_of()
-    cubic = CubicLoop.of(PAPER)
+    cubic = CubicLoop.from_drive(PAPER)
     assert cubic is not None
     expected = [cubic.critical_linear_gain(d / 100.0) for d in found.corner_frequencies.tolist()]
     assert found.continuous == pytest.approx(1e4 * np.array(expected), rel=1e-9)
@@ -63,7 +63,7 @@ def test_critical_gains_over_rate_and_delay() -> None:
     found = CriticalGainCurves.over(FEED_DRIVE, 20.0, rates, delays)
     for row, rate in enumerate(rates):
         for column, delay in enumerate(delays):
-            loop = LinearSampledLoop.of(FEED_DRIVE, rate, delay)
+            loop = LinearSampledLoop.from_drive(FEED_DRIVE, rate, delay)
             assert loop is not None
             critical = loop.critical_linear_gain(20.0)
             assert found.linear_gains[row, column] == pytest.approx(critical or np.nan, nan_ok=True)
@@ -105,7 +105,7 @@ def test_curves_are_told_apart_without_colour() -> None:
 
 
 def test_for_the_unit_drive_it_is_dimensionless() -> None:
-    loop = LinearSampledLoop.of(PAPER, 100.0, 0.0)
+    loop = LinearSampledLoop.from_drive(PAPER, 100.0, 0.0)
     assert loop is not None
     found = StabilityMap.around(loop, WashoutGains(2.0, -1.0, -1.0), points=11)
     axes, bar = stability_figure(found, None).axes
@@ -115,7 +115,7 @@ def test_for_the_unit_drive_it_is_dimensionless() -> None:
 
 
 def test_where_nothing_is_stable_there_is_a_picture_all_the_same(tmp_path: Path) -> None:
-    loop = LinearSampledLoop.of(replace(FEED_DRIVE, belt_speed=0.02), 1000.0, 0.015)
+    loop = LinearSampledLoop.from_drive(replace(FEED_DRIVE, belt_speed=0.02), 1000.0, 0.015)
     assert loop is not None
     found = StabilityMap.around(loop, replace(GAINS, linear=0.0), points=11)
     assert -inf < found.decay_rates.max() < 0.0

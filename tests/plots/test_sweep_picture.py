@@ -14,7 +14,7 @@ from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.runner import run
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import SettlingCourse
 from stickslip_ros.studies.study import Study
 
 pytestmark = pytest.mark.usefixtures("coarse_maps")
@@ -35,10 +35,10 @@ Swept = tuple[Columns, Study]
 
 def swept(*over: str, overrides: tuple[str, ...] = (FREE,), carry: Carry | None = None) -> Swept:
     axes = tuple(Axis.parse(text) for text in over)
-    study = Study(load_scenario("paper", overrides), Grid(axes, carry), Course(60.0, 3))
+    study = Study(load_scenario("paper", overrides), Grid(axes, carry), SettlingCourse(60.0, 3))
     with Journal(study) as journal:
         run(journal)
-        return Columns.of(journal), study
+        return Columns.from_journal(journal), study
 
 
 @pytest.fixture(scope="module")

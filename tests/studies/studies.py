@@ -1,12 +1,12 @@
 """Scenarios and studies of the tests: short ones, in which everything happens that can."""
 
-from stickslip_ros.physics.loop.simulation import Progress
+from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import SettlingCourse
 from stickslip_ros.studies.study import Study
 
-SHORT = Course(transient=5.0, cycles=2)
+SHORT = SettlingCourse(transient=5.0, cycles=2)
 """Long enough to tell one motion from another."""
 
 EXPONENTIAL = (

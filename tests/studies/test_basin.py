@@ -21,9 +21,9 @@ from stickslip_ros.studies.basin import (
     default_axes,
 )
 from stickslip_ros.studies.journal import Journal
-from stickslip_ros.studies.plan import Axis, Carry, Grid, Plan, Sample
+from stickslip_ros.studies.plan import Axis, Carry, Grid, Plan, RandomSample
 from stickslip_ros.studies.runner import run
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import SettlingCourse
 from stickslip_ros.studies.study import Point
 from tests.studies.studies import EXPONENTIAL, free, paper
 
@@ -54,7 +54,7 @@ QUICK = (1.175, 1.5)
 def basins_of(scenario: Scenario, plan: Plan, *, continuous: bool = False) -> Basins:
     with Journal(basin_study(scenario, plan, continuous=continuous)) as journal:
         run(journal)
-        return Basins.of(journal.points())
+        return Basins.from_points(journal.points())
 
 
 def share(basins: Basins, *regimes: Regime) -> float:
@@ -65,7 +65,7 @@ def share(basins: Basins, *regimes: Regime) -> float:
 
 def _check_published(belt_speed: float, count: int) -> None:
     scenario = free(*EXPONENTIAL, f"plant.belt_speed={belt_speed}")
-    basins = basins_of(scenario, Sample(STARTS, count, 1))
+    basins = basins_of(scenario, RandomSample(STARTS, count, 1))
     cycle, expected = share(basins, Regime.STICK_SLIP), PUBLISHED[belt_speed]
     variance = expected * (1.0 - expected)
     assert abs(cycle - expected) <= 3.5 * sqrt(variance / count + variance / 5000)
@@ -185,7 +185,7 @@ def test_the_order_of_the_points_changes_no_count(counts: list[int], random: Ran
     ]
     places = list(range(len(points)))
     random.shuffle(places)
-    basins = Basins.of(points[place] for place in places)
+    basins = Basins.from_points(points[place] for place in places)
     total = sum(counts)
     assert [attractor.count for attractor in basins.attractors] == sorted(counts, reverse=True)
     for attractor in basins.attractors:
@@ -203,7 +203,7 @@ def test_the_order_of_the_points_changes_no_count(counts: list[int], random: Ran
 def test_what_is_not_known_and_what_is_not_steady_stand_apart() -> None:
     later = point(Regime.PURE_SLIP, amplitude=0.1, steady=False)
     stopped = point(None, amplitude=0.2, steady=False)
-    basins = Basins.of([GROWING, later, FAILED, stopped, SMALL, SMALL, SMALL])
+    basins = Basins.from_points([GROWING, later, FAILED, stopped, SMALL, SMALL, SMALL])
     assert [(a.regime, a.steady, a.count) for a in basins.attractors] == [
         (Regime.PURE_SLIP, True, 3),
         (Regime.PURE_SLIP, False, 2),
@@ -213,7 +213,7 @@ def test_what_is_not_known_and_what_is_not_steady_stand_apart() -> None:
 
 
 def test_no_points_have_no_attractors() -> None:
-    assert Basins.of([]).attractors == ()
+    assert Basins.from_points([]).attractors == ()
 
 
 @pytest.mark.parametrize(
@@ -226,7 +226,7 @@ def test_no_points_have_no_attractors() -> None:
 )
 def test_a_basin_over_anything_else_is_refused(axes: Sequence[Axis]) -> None:
     message = f"over {POSITION} and {VELOCITY}, not {', '.join(axis.parameter for axis in axes)}"
-    for plan in (Grid(tuple(axes)), Sample(tuple(axes), 5)):
+    for plan in (Grid(tuple(axes)), RandomSample(tuple(axes), 5)):
         with pytest.raises(InvalidInputError, match=message):
             basin_study(free(), plan)
 
@@ -244,7 +244,7 @@ def test_a_basin_that_is_carried_on_is_refused() -> None:
 def test_by_default_starts_reach_beyond_the_vibration(overrides: Sequence[str]) -> None:
     scenario = free(*overrides)
     position, velocity = default_axes(scenario, 5)
-    study = basin_study(scenario, Grid((position, velocity)), course=Course(100.0))
+    study = basin_study(scenario, Grid((position, velocity)), course=SettlingCourse(100.0))
     with Journal(study) as journal:
         run(journal)
         found = [point.measures for point in journal.points()]

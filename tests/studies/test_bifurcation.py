@@ -10,7 +10,7 @@ from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear
 from stickslip_ros.studies.bifurcation import BifurcationDiagram, bifurcation_diagram
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import SettlingCourse
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
 
 RUNS_AWAY = replace(PAPER, belt_speed=0.2, friction=Linear(0.4, 0.9))
@@ -67,7 +67,7 @@ def test_what_runs_away_has_no_points_and_leaves_the_other_rows_alone() -> None:
 
 
 def test_a_motion_may_run_away_after_the_transient() -> None:
-    diagram = bifurcation_diagram([RUNS_AWAY], course=Course(1.0, 10))
+    diagram = bifurcation_diagram([RUNS_AWAY], course=SettlingCourse(1.0, 10))
     assert diagram.measures[0].regime is Regime.UNBOUNDED
     assert len(diagram.position) == 0
 

@@ -18,15 +18,15 @@ from stickslip_ros.physics.measures.cycles import Measures, Regime
 from stickslip_ros.studies.columns import (
     COLUMNS,
     Columns,
-    Further,
+    ExtraColumns,
     compute_columns,
     write_csv,
     write_json,
 )
 from stickslip_ros.studies.journal import Journal
-from stickslip_ros.studies.plan import Axis, Carry, Grid, Sample
+from stickslip_ros.studies.plan import Axis, Carry, Grid, RandomSample
 from stickslip_ros.studies.runner import run
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import SettlingCourse
 from stickslip_ros.studies.study import MEASURES, Piece, Point, Study
 from tests.studies.studies import SHORT, free, speeds
 
@@ -41,9 +41,11 @@ STARTS = (
 STUDIES = {
     "grid": Study(free(), Grid((MINIMUM, SPEED)), SHORT),
     "both ways": Study(free(), Grid((MINIMUM, SPEED), Carry.BOTH), SHORT),
-    "sample": Study(free(), Sample(STARTS, 9, 4), SHORT),
+    "sample": Study(free(), RandomSample(STARTS, 9, 4), SHORT),
     "running away": Study(
-        free("plant.friction.law=linear", "plant.belt_speed=0.2"), Grid((SLOPE,)), Course(40.0, 2)
+        free("plant.friction.law=linear", "plant.belt_speed=0.2"),
+        Grid((SLOPE,)),
+        SettlingCourse(40.0, 2),
     ),
 }
 
@@ -64,7 +66,7 @@ def bits(values: Any) -> list[bytes]:
 
 
 def test_columns_are_the_points_in_their_order(journal: Journal) -> None:
-    columns, points = Columns.of(journal), list(journal.points())
+    columns, points = Columns.from_journal(journal), list(journal.points())
     assert len(points) == journal.study.plan.size
     for name in NUMBERS:
         expected = [getattr(point.measures, name) for point in points]
@@ -84,7 +86,7 @@ def test_a_point_that_is_not_done_has_nothing() -> None:
     done = Measures(0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 2, Regime.PURE_SLIP)
     with Journal(study) as journal:
         journal.add(Piece([Point(1, done, True, (0.5,), None)], None))
-        columns = Columns.of(journal)
+        columns = Columns.from_journal(journal)
     assert bits(columns.amplitude) == bits([None, 0.1, None])
     assert columns.regime.tolist() == [None, Regime.PURE_SLIP, None]
     assert columns.steady.tolist() == [False, True, False]
@@ -93,13 +95,13 @@ def test_a_point_that_is_not_done_has_nothing() -> None:
     assert columns.reason.tolist() == [None] * 3
 
 
-FURTHER: Further = {"twice": lambda point: 2 * point.number}
+FURTHER: ExtraColumns = {"twice": lambda point: 2 * point.number}
 
 
 def test_a_csv_read_back_is_the_columns_to_the_last_bit(journal: Journal) -> None:
     stream = StringIO()
     write_csv(stream, journal, FURTHER)
-    columns, plan = Columns.of(journal), journal.study.plan
+    columns, plan = Columns.from_journal(journal), journal.study.plan
     read = csv.DictReader(StringIO(stream.getvalue()))
     rows = list(read)
     assert read.fieldnames == [*plan.parameters, "twice", *COLUMNS]
@@ -120,7 +122,9 @@ def refuse(constant: str) -> None:
     raise AssertionError(f"{constant} is not JSON")
 
 
-def as_json(journal: Journal, further: Further | None = None, **made_of: Any) -> dict[str, Any]:
+def as_json(
+    journal: Journal, further: ExtraColumns | None = None, **made_of: Any
+) -> dict[str, Any]:
     stream = StringIO()
     write_json(stream, journal, further or {}, made_of)
     read = json.loads(stream.getvalue(), parse_constant=refuse)
@@ -129,7 +133,7 @@ def as_json(journal: Journal, further: Further | None = None, **made_of: Any) ->
 
 
 def test_a_json_read_back_is_the_columns_to_the_last_bit(journal: Journal) -> None:
-    read, columns = as_json(journal, FURTHER), Columns.of(journal)
+    read, columns = as_json(journal, FURTHER), Columns.from_journal(journal)
     for name in (*NUMBERS, "cycles"):
         assert bits(read[name]) == bits(getattr(columns, name)), name
     assert read["regime"] == columns.regime.tolist()
@@ -142,7 +146,10 @@ def test_a_json_read_back_is_the_columns_to_the_last_bit(journal: Journal) -> No
 def test_the_arrays_of_a_grid_are_row_major_over_the_values_of_its_axes() -> None:
     with Journal(STUDIES["both ways"]) as journal:
         run(journal)
-        read, columns = as_json(journal, scenario={"plant.mass": 1.0}), Columns.of(journal)
+        read, columns = (
+            as_json(journal, scenario={"plant.mass": 1.0}),
+            Columns.from_journal(journal),
+        )
     assert read["parameters"] == ["plant.friction.minimum", "plant.belt_speed"]
     assert read["values"] == [MINIMUM.values().tolist(), SPEED.values().tolist()]
     amplitude = np.array(read["amplitude"], dtype=float).reshape(2, 4, 5)

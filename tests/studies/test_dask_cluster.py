@@ -21,7 +21,7 @@ from stickslip_ros.studies.dask_cluster import dask_executor
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry
 from stickslip_ros.studies.runner import WorkersDiedError, run
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import SettlingCourse
 from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.sweep import sweep_study
 
@@ -82,7 +82,7 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
 def study(carry: Carry | None = None) -> Study:
     scenario = load_scenario("paper", ["plant.expects_control=false"])
     axes = [Axis("plant.damping", 0.0, 0.05, 8), Axis("plant.belt_speed", 0.1, 0.6, 100)]
-    return sweep_study(scenario, axes, carry=carry, course=Course(transient=100.0))
+    return sweep_study(scenario, axes, carry=carry, course=SettlingCourse(transient=100.0))
 
 
 @pytest.mark.parametrize("carry", [None, Carry.DOWN])

@@ -109,7 +109,7 @@ def test_nothing_near_a_proposal_is_much_faster() -> None:
     found = designed(FEED)
     gains = proposal(found).gains
     loops = [
-        LinearSampledLoop.of(replace(FEED_DRIVE, belt_speed=speed), 1000.0)
+        LinearSampledLoop.from_drive(replace(FEED_DRIVE, belt_speed=speed), 1000.0)
         for speed in (0.036, 0.04, 0.044)
     ]
     corners = gains.corner_frequency * np.linspace(0.5, 2.0, 31)
@@ -120,7 +120,7 @@ def test_nothing_near_a_proposal_is_much_faster() -> None:
 
 
 def test_margins_lead_to_the_edge_of_stability() -> None:
-    loop = LinearSampledLoop.of(FEED_DRIVE, 1000.0, 0.0025)
+    loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0, 0.0025)
     assert loop is not None
     gains = proposal(designed(replace(FEED, force_delay=0.0025))).gains
     found = margins([loop], gains)
@@ -141,7 +141,7 @@ def test_margins_are_the_tightest_of_the_range() -> None:
     assert tightest is not None
     assert tightest.gain_down is not None
     for speed in np.linspace(*task.belt_speeds, 9).tolist():
-        loop = LinearSampledLoop.of(replace(FEED_DRIVE, belt_speed=speed), FEED.rate)
+        loop = LinearSampledLoop.from_drive(replace(FEED_DRIVE, belt_speed=speed), FEED.rate)
         assert loop is not None
         one = margins([loop], proposal(found).gains)
         assert (one.gain_down or 0.0) <= tightest.gain_down < 1.0
@@ -150,7 +150,9 @@ def test_margins_are_the_tightest_of_the_range() -> None:
 
 
 def test_without_damping_no_share_of_the_gain_is_unstable() -> None:
-    loop = LinearSampledLoop.of(replace(FEED_DRIVE, friction=Coulomb(0.4), damping=0.0), 1000.0)
+    loop = LinearSampledLoop.from_drive(
+        replace(FEED_DRIVE, friction=Coulomb(0.4), damping=0.0), 1000.0
+    )
     assert loop is not None
     assert margins([loop], WashoutGains(20.0, -3000.0, 0.0)).gain_down is None
 
@@ -302,7 +304,9 @@ def test_of_a_scenario_it_is_that_scenario_with_the_gains(
 ) -> None:
     overrides = (f"plant.belt_speed={belt_speed}", "plant.mass=90", "analyzer.window=7")
     scenario = load_scenario("feed_drive", overrides)
-    text = Design(Task.of(scenario, belt_speeds), WashoutParameters(3.0, -2.0, 0.0)).parameter_file
+    text = Design(
+        Task.from_scenario(scenario, belt_speeds), WashoutParameters(3.0, -2.0, 0.0)
+    ).parameter_file
     assert text is not None
     read = load_scenario(scenario_file(tmp_path, text))
     assert (read.plant.mass, read.plant.stiffness, read.analyzer.window) == (90.0, 1e6, 7)
@@ -315,12 +319,12 @@ def test_of_a_scenario_it_is_that_scenario_with_the_gains(
 @pytest.mark.parametrize("belt_speeds", [(2.0, 1.0), (0.0, 1.0), (-1.0, 1.0), (0.1, inf)])
 def test_no_range_of_belt_speeds(belt_speeds: tuple[float, float]) -> None:
     with pytest.raises(InvalidInputError, match="above zero"):
-        Task.of(load_scenario("feed_drive"), belt_speeds)
+        Task.from_scenario(load_scenario("feed_drive"), belt_speeds)
     with pytest.raises(InvalidInputError, match="must be given"):
-        Task.of(load_scenario("feed_drive", ["plant.belt_speed=0"]))
+        Task.from_scenario(load_scenario("feed_drive", ["plant.belt_speed=0"]))
 
 
 @pytest.mark.parametrize("direction", ["", "-"])
 def test_the_range_is_about_the_belt_speed_of_the_scenario(direction: str) -> None:
     scenario = load_scenario("feed_drive", [f"plant.belt_speed={direction}0.04"])
-    assert Task.of(scenario).belt_speeds == pytest.approx((0.036, 0.044))
+    assert Task.from_scenario(scenario).belt_speeds == pytest.approx((0.036, 0.044))

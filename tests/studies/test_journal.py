@@ -16,7 +16,7 @@ from stickslip_ros.physics.measures.cycles import Measures
 from stickslip_ros.studies import runner
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settled import Course, State
+from stickslip_ros.studies.settled import MotionState, SettlingCourse
 from stickslip_ros.studies.study import Piece, Point, Study
 from tests.studies.studies import SHORT, free, speeds, stop_at
 
@@ -163,7 +163,7 @@ def test_what_follows_a_cut_is_written_in_its_place(path: Path) -> None:
     ("other", "difference"),
     [
         (replace(speeds(5), continuous=True), "continuous_control (True, not False)"),
-        (replace(speeds(5), course=Course(7.0, 2)), "course.transient (7.0, not 5.0)"),
+        (replace(speeds(5), course=SettlingCourse(7.0, 2)), "course.transient (7.0, not 5.0)"),
         (speeds(6), "plan.axes"),
         (speeds(5, carry=Carry.UP), "plan.carry ('up', not None)"),
         (replace(speeds(5), scenario=free("plant.mass=2.0")), "plant.mass (2.0, not 1.0)"),
@@ -331,7 +331,7 @@ def test_memory_is_a_few_numbers_for_each_piece(
         try:
             for first in range(0, count, piece):
                 points = [point._replace(number=first + n) for n in range(piece)]
-                journal.add(Piece(points, State(0.1 + first, 0.2 + first, 0.3 + first)))
+                journal.add(Piece(points, MotionState(0.1 + first, 0.2 + first, 0.3 + first)))
             held, _ = tracemalloc.get_traced_memory()
         finally:
             tracemalloc.stop()

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.studies.plan import MOST_POINTS, Axis, Carry, Grid, Sample
+from stickslip_ros.studies.plan import MOST_POINTS, Axis, Carry, Grid, RandomSample
 
 SPEED = "plant.belt_speed"
 AXES = [
@@ -198,7 +198,7 @@ def test_a_grid_refuses_one_parameter_twice_and_too_many_points() -> None:
 
 
 def test_a_larger_sample_begins_with_the_smaller_one() -> None:
-    small, large = Sample(tuple(AXES), 10, 3), Sample(tuple(AXES), 1000, 3)
+    small, large = RandomSample(tuple(AXES), 10, 3), RandomSample(tuple(AXES), 1000, 3)
     assert [small.values(index) for index in range(10)] == [
         large.values(index) for index in range(10)
     ]
@@ -207,14 +207,14 @@ def test_a_larger_sample_begins_with_the_smaller_one() -> None:
 
 
 def test_samples_of_two_seeds_and_two_points_have_nothing_in_common() -> None:
-    samples = [Sample(tuple(AXES), 200, seed) for seed in (0, 1, 2, 2**32, 2**40)]
+    samples = [RandomSample(tuple(AXES), 200, seed) for seed in (0, 1, 2, 2**32, 2**40)]
     values = [value for sample in samples for i in range(200) for value in sample.values(i)]
     assert len(set(values)) == len(values)
 
 
 def test_a_sample_is_uniform_and_its_axes_are_independent() -> None:
     axes = (Axis(SPEED, -2.0, 2.0, 2), Axis("plant.damping", 0.0, 2.0, 2))
-    sample = Sample(axes, 4000, 7)
+    sample = RandomSample(axes, 4000, 7)
     values = np.array([sample.values(index) for index in range(sample.size)])
     shares = (values - [-2.0, 0.0]) / [4.0, 2.0]
     assert shares.min() >= 0.0
@@ -230,11 +230,11 @@ def test_a_sample_is_uniform_and_its_axes_are_independent() -> None:
 @pytest.mark.parametrize("size", [0, -1, MOST_POINTS + 1])
 def test_a_sample_of_no_points_or_too_many_is_refused(size: int) -> None:
     with pytest.raises(InvalidInputError, match=f"^{size} points are not from 1 to 1,000,000,000"):
-        Sample((AXES[0],), size)
+        RandomSample((AXES[0],), size)
 
 
 def test_a_sample_refuses_a_seed_below_zero_and_one_parameter_twice() -> None:
     with pytest.raises(InvalidInputError, match="seed -1: must be 0 or more"):
-        Sample((AXES[0],), 5, -1)
+        RandomSample((AXES[0],), 5, -1)
     with pytest.raises(InvalidInputError, match="belt_speed: must be different parameters"):
-        Sample((AXES[0], AXES[0]), 5)
+        RandomSample((AXES[0], AXES[0]), 5)

@@ -22,7 +22,7 @@ from stickslip_ros.studies import runner
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.runner import local_processes, run, run_here
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import SettlingCourse
 from stickslip_ros.studies.study import Piece, Point, Study, compute
 from tests.studies.studies import SHORT, free, paper, speeds, stop_at
 
@@ -35,7 +35,7 @@ STUDIES = {
     "each alone": Study(free(), Grid((MINIMUM, SPEED)), SHORT),
     "up and down": Study(free(), Grid((SPEED, MINIMUM), Carry.BOTH), SHORT),
     "running away": Study(
-        free("plant.friction.law=linear"), Grid((SPEED, SLOPE), Carry.DOWN), Course(20.0, 2)
+        free("plant.friction.law=linear"), Grid((SPEED, SLOPE), Carry.DOWN), SettlingCourse(20.0, 2)
     ),
     "sampled": Study(
         paper("plant.rate=20.0", "plant.force_jitter=0.1"), Grid((GAIN,), Carry.UP), SHORT
@@ -179,7 +179,7 @@ class _Forgetful(Journal):
 
 def test_a_million_points_are_a_few_thousand_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.undo()
-    study = Study(free(), speeds(1_000_000).plan, Course(10.0, 2))
+    study = Study(free(), speeds(1_000_000).plan, SettlingCourse(10.0, 2))
     executor = _Instant()
     with _Forgetful(study) as journal:
         run(journal, executor)

@@ -15,26 +15,28 @@ from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.settled import (
     LONGEST,
-    Case,
-    Course,
+    ControlledDrive,
+    MotionState,
     Settled,
     Settler,
-    State,
+    SettlingCourse,
     check_continuous,
 )
 from stickslip_ros.studies.simulate import simulate
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, LimitCycle
 from tests.studies.studies import EXPONENTIAL, paper
 
-REST = State(0.0, 0.0)
+REST = MotionState(0.0, 0.0)
 SETTLER = Settler()
 
 WEAK = ("washout_controller.linear_gain=-0.05", "washout_controller.cubic_gain=0.0")
 """A controller under which the paper's drive still vibrates."""
 
 
-def settle(case: Case, start: State = REST, course: Course | None = None) -> Settled:
-    return SETTLER.settle(case, start, course or Course(cycles=6))
+def settle(
+    case: ControlledDrive, start: MotionState = REST, course: SettlingCourse | None = None
+) -> Settled:
+    return SETTLER.settle(case, start, course or SettlingCourse(cycles=6))
 
 
 def in_units(mass: float, length: float, time: float) -> Drive:
@@ -53,7 +55,8 @@ def in_units(mass: float, length: float, time: float) -> Drive:
 @pytest.mark.parametrize("cycle", LIMIT_CYCLES, ids=lambda cycle: str(cycle.belt_speed))
 def test_it_is_the_reference_limit_cycle(cycle: LimitCycle) -> None:
     measures = settle(
-        Case(replace(PAPER, belt_speed=cycle.belt_speed)), course=Course(300.0, 6)
+        ControlledDrive(replace(PAPER, belt_speed=cycle.belt_speed)),
+        course=SettlingCourse(300.0, 6),
     ).measures
     for name in ("amplitude", "velocity_amplitude", "stick_fraction", "midpoint"):
         assert getattr(measures, name) == pytest.approx(getattr(cycle, name), abs=1e-9), name
@@ -70,7 +73,7 @@ def test_in_other_units_it_is_the_same_cycle(
 ) -> None:
     drive = in_units(mass, length, time)
     drive = replace(drive, belt_speed=cycle.belt_speed * length / time)
-    settled = settle(Case(drive), course=Course(300.0, 6))
+    settled = settle(ControlledDrive(drive), course=SettlingCourse(300.0, 6))
     measures = settled.measures
     assert settled.steady
     assert measures.amplitude == pytest.approx(cycle.amplitude * length, rel=1e-8)
@@ -85,28 +88,36 @@ def test_in_other_units_it_is_the_same_cycle(
 def test_the_feed_drive_is_the_papers_in_other_units() -> None:
     # Of those units the damping and so the drive differ by rounding only.
     assert in_units(100.0, 1e-3, 1e-2).belt_speed == pytest.approx(FEED_DRIVE.belt_speed)
-    one, other = settle(Case(PAPER)).measures, settle(Case(FEED_DRIVE)).measures
+    one, other = (
+        settle(ControlledDrive(PAPER)).measures,
+        settle(ControlledDrive(FEED_DRIVE)).measures,
+    )
     assert one.amplitude is not None
     assert other.amplitude == pytest.approx(1e-3 * one.amplitude, rel=1e-9)
 
 
-def _case(*overrides: str, continuous: bool = False, **drive: Any) -> Case:
-    case = Case.of(paper("plant.rate=20.0", *overrides), continuous=continuous)
+def _case(*overrides: str, continuous: bool = False, **drive: Any) -> ControlledDrive:
+    case = ControlledDrive.from_scenario(
+        paper("plant.rate=20.0", *overrides), continuous=continuous
+    )
     return replace(case, drive=replace(case.drive, **drive))
 
 
-STIFF = Case(replace(PAPER, damping=1e9))
-MIXED: list[tuple[Case, State]] = [
-    (Case(PAPER), REST),
-    (Case(FEED_DRIVE), State(1e-4, 0.02)),
-    (Case(replace(PAPER, friction=Coulomb(0.4))), State(1.0, -0.3)),
-    (Case(replace(PAPER, friction=Exponential(0.4, 0.25, 0.1, 0.0), stiffness=2.0)), REST),
-    (Case(replace(PAPER, friction=Linear(0.4, 0.9), belt_speed=0.2)), REST),  # runs away
-    (Case(replace(PAPER, belt_speed=0.0)), State(2.0, 0.0)),
-    (Case(replace(PAPER, belt_speed=-0.3)), REST),
+STIFF = ControlledDrive(replace(PAPER, damping=1e9))
+MIXED: list[tuple[ControlledDrive, MotionState]] = [
+    (ControlledDrive(PAPER), REST),
+    (ControlledDrive(FEED_DRIVE), MotionState(1e-4, 0.02)),
+    (ControlledDrive(replace(PAPER, friction=Coulomb(0.4))), MotionState(1.0, -0.3)),
+    (
+        ControlledDrive(replace(PAPER, friction=Exponential(0.4, 0.25, 0.1, 0.0), stiffness=2.0)),
+        REST,
+    ),
+    (ControlledDrive(replace(PAPER, friction=Linear(0.4, 0.9), belt_speed=0.2)), REST),  # runs away
+    (ControlledDrive(replace(PAPER, belt_speed=0.0)), MotionState(2.0, 0.0)),
+    (ControlledDrive(replace(PAPER, belt_speed=-0.3)), REST),
     (STIFF, REST),
     (_case(*WEAK), REST),
-    (_case(*WEAK, "plant.force_delay=0.07", "plant.force_jitter=0.09"), State(0.0, 0.2, 0.1)),
+    (_case(*WEAK, "plant.force_delay=0.07", "plant.force_jitter=0.09"), MotionState(0.0, 0.2, 0.1)),
     (_case("washout_controller.linear_gain=50.0"), REST),  # runs away
     (
         _case(
@@ -117,17 +128,20 @@ MIXED: list[tuple[Case, State]] = [
         REST,
     ),
     (_case(*WEAK, continuous=True), REST),
-    (_case(*WEAK, "washout_controller.start_after=7.0", continuous=True), State(0.1, 0.2, -0.3)),
+    (
+        _case(*WEAK, "washout_controller.start_after=7.0", continuous=True),
+        MotionState(0.1, 0.2, -0.3),
+    ),
     (_case("washout_controller.linear_gain=50.0", continuous=True), REST),  # runs away
-    (_case(continuous=True, friction=Exponential(0.4, 0.25, 0.1, 0.0)), State(0.3, 0.1)),
+    (_case(continuous=True, friction=Exponential(0.4, 0.25, 0.1, 0.0)), MotionState(0.3, 0.1)),
     (_case(continuous=True, damping=1e9), REST),  # too stiff
 ]
 """Laws, units, control and ends of every kind."""
 
 
-def _found(settler: Settler, case: Case, start: State) -> object:
+def _found(settler: Settler, case: ControlledDrive, start: MotionState) -> object:
     try:
-        settled = settler.settle(case, start, Course(5.0, 2, 2))
+        settled = settler.settle(case, start, SettlingCourse(5.0, 2, 2))
     except RunError as error:
         return str(error)
     return settled._replace(turning_points=settled.turning_points.tolist())  # pyright: ignore
@@ -171,7 +185,7 @@ def test_the_mixed_cases_are_of_every_kind(alone: list[object]) -> None:
 )
 def test_a_sampled_loop_settles_on_what_simulate_measures(overrides: tuple[str, ...]) -> None:
     scenario = paper("plant.belt_speed=0.3", "analyzer.window=6", *overrides)
-    settled = settle(Case.of(scenario), course=Course(20.0, 6))
+    settled = settle(ControlledDrive.from_scenario(scenario), course=SettlingCourse(20.0, 6))
     duration = 27.0 * scenario.plant.as_drive().natural_period
     measures = simulate(
         scenario,
@@ -187,7 +201,9 @@ def test_a_sampled_loop_settles_on_what_simulate_measures(overrides: tuple[str, 
 
 def test_continuous_control_settles_on_what_simulate_measures() -> None:
     scenario = paper("plant.belt_speed=0.3", "analyzer.window=6", *WEAK)
-    settled = settle(Case.of(scenario, continuous=True), course=Course(100.0, 6))
+    settled = settle(
+        ControlledDrive.from_scenario(scenario, continuous=True), course=SettlingCourse(100.0, 6)
+    )
     duration = 107.0 * scenario.plant.as_drive().natural_period
     measures = simulate(scenario, duration, continuous=True, progress=lambda _: None)
     assert measures.regime is Regime.STICK_SLIP
@@ -195,12 +211,12 @@ def test_continuous_control_settles_on_what_simulate_measures() -> None:
     assert settled.measures.period == pytest.approx(measures.period, rel=1e-9)
 
 
-def _in_two_halves(case: Case) -> tuple[Settled, Settled]:
+def _in_two_halves(case: ControlledDrive) -> tuple[Settled, Settled]:
     """Return what a motion comes to at once, and carried on from its first half."""
-    start = State(0.1, 0.05)
-    once = settle(case, start, Course(4.0, 1, 2))
-    half = settle(case, start, Course(4.0, 1))
-    return once, settle(case, half.end, Course(4.0, 1))
+    start = MotionState(0.1, 0.05)
+    once = settle(case, start, SettlingCourse(4.0, 1, 2))
+    half = settle(case, start, SettlingCourse(4.0, 1))
+    return once, settle(case, half.end, SettlingCourse(4.0, 1))
 
 
 @pytest.mark.parametrize("continuous", [False, True], ids=["sampled", "continuous"])
@@ -221,32 +237,32 @@ def test_the_filter_is_carried_on(continuous: bool) -> None:
     assert halves.end.low_passed == pytest.approx(once.end.low_passed, abs=exact)
     rested = settle(
         case,
-        replace(settle(case, State(0.1, 0.05), Course(4.0, 1)).end, low_passed=None),
-        Course(4.0, 1),
+        replace(settle(case, MotionState(0.1, 0.05), SettlingCourse(4.0, 1)).end, low_passed=None),
+        SettlingCourse(4.0, 1),
     )
     assert rested.end.low_passed != pytest.approx(once.end.low_passed, abs=10 * exact)
 
 
 def test_a_free_motion_is_carried_on() -> None:
-    once, halves = _in_two_halves(Case(PAPER))
+    once, halves = _in_two_halves(ControlledDrive(PAPER))
     assert halves.end.position == pytest.approx(once.end.position, abs=1e-9)
     assert halves.end.velocity == pytest.approx(once.end.velocity, abs=1e-9)
     assert halves.end.low_passed is None
 
 
 def test_on_a_belt_at_rest_the_slide_sticks_where_friction_holds_it() -> None:
-    settled = settle(Case(replace(PAPER, belt_speed=0.0)), State(0.3, 0.0))
+    settled = settle(ControlledDrive(replace(PAPER, belt_speed=0.0)), MotionState(0.3, 0.0))
     assert settled.measures.regime is Regime.STUCK
     assert settled.measures.midpoint == 0.3
     assert settled.steady
-    moved = settle(Case(replace(PAPER, belt_speed=0.0)), State(3.0, 0.0))
+    moved = settle(ControlledDrive(replace(PAPER, belt_speed=0.0)), MotionState(3.0, 0.0))
     assert moved.measures.regime is Regime.STUCK
     assert abs(moved.end.position) < 0.4
 
 
 def test_a_negative_belt_mirrors_the_motion() -> None:
-    one = settle(Case(replace(PAPER, belt_speed=0.3)), State(0.1, -0.2))
-    other = settle(Case(replace(PAPER, belt_speed=-0.3)), State(-0.1, 0.2))
+    one = settle(ControlledDrive(replace(PAPER, belt_speed=0.3)), MotionState(0.1, -0.2))
+    other = settle(ControlledDrive(replace(PAPER, belt_speed=-0.3)), MotionState(-0.1, 0.2))
     assert one.measures.midpoint is not None
     assert other.measures.midpoint == pytest.approx(-one.measures.midpoint, rel=1e-9)
     assert other.measures.amplitude == pytest.approx(one.measures.amplitude, rel=1e-9)
@@ -256,7 +272,7 @@ def test_a_negative_belt_mirrors_the_motion() -> None:
 
 @pytest.mark.parametrize("belt_speed", [1e-3, -1e-3, 3e-4])
 def test_a_slow_belt_loads_the_spring_and_then_the_slide_cycles(belt_speed: float) -> None:
-    settled = settle(Case(replace(PAPER, belt_speed=belt_speed)))
+    settled = settle(ControlledDrive(replace(PAPER, belt_speed=belt_speed)))
     assert settled.measures.regime is Regime.STICK_SLIP
     assert settled.measures.cycles == 6
     assert settled.steady
@@ -264,14 +280,14 @@ def test_a_slow_belt_loads_the_spring_and_then_the_slide_cycles(belt_speed: floa
 
 @pytest.mark.parametrize("belt_speed", [2e-4, 1e-6, 1e-12])
 def test_however_slow_the_belt_is_its_cycles_are_waited_for(belt_speed: float) -> None:
-    settled = settle(Case(replace(PAPER, belt_speed=belt_speed)))
+    settled = settle(ControlledDrive(replace(PAPER, belt_speed=belt_speed)))
     assert settled.measures.regime is Regime.STICK_SLIP
-    assert settled.measures.cycles >= Course.cycles
+    assert settled.measures.cycles >= SettlingCourse.cycles
 
 
 def test_a_slide_that_only_rode_the_belt_is_not_in_equilibrium() -> None:
     washout = WashoutParameters(corner_frequency=2.0, linear_gain=0.0, cubic_gain=0.0)
-    settled = settle(Case(replace(PAPER, belt_speed=1e-6), washout))
+    settled = settle(ControlledDrive(replace(PAPER, belt_speed=1e-6), washout))
     assert settled.measures.regime is None
     assert not settled.steady
 
@@ -279,7 +295,7 @@ def test_a_slide_that_only_rode_the_belt_is_not_in_equilibrium() -> None:
 def _decaying(belt_speed: float) -> Settled:
     """Return a small motion of the paper's drive near its Hopf point, at 0.4888 m/s."""
     drive = replace(PAPER, belt_speed=belt_speed)
-    return settle(Case(drive), State(drive.equilibrium_position + 0.05, 0.0))
+    return settle(ControlledDrive(drive), MotionState(drive.equilibrium_position + 0.05, 0.0))
 
 
 def test_a_decaying_vibration_is_not_steady_and_a_limit_cycle_is() -> None:
@@ -288,16 +304,16 @@ def test_a_decaying_vibration_is_not_steady_and_a_limit_cycle_is() -> None:
     assert not dying.steady
     assert living.measures.regime is Regime.PURE_SLIP
     assert living.steady
-    assert settle(Case(PAPER)).steady
+    assert settle(ControlledDrive(PAPER)).steady
 
 
 def test_a_vibration_that_grows_out_of_rest_is_not_steady() -> None:
     drive = replace(PAPER, belt_speed=0.485)
-    small = State(drive.equilibrium_position + 1e-5, 0.0)
-    growing = settle(Case(drive), small, Course(20.0, 6))
+    small = MotionState(drive.equilibrium_position + 1e-5, 0.0)
+    growing = settle(ControlledDrive(drive), small, SettlingCourse(20.0, 6))
     assert growing.measures.regime is Regime.EQUILIBRIUM
     assert not growing.steady
-    at_rest = settle(Case(replace(PAPER, belt_speed=0.6)), small)
+    at_rest = settle(ControlledDrive(replace(PAPER, belt_speed=0.6)), small)
     assert at_rest.measures.regime is Regime.EQUILIBRIUM
     assert at_rest.steady
 
@@ -312,18 +328,18 @@ UNSTABLE_CYCLE = 0.3154795877
 def test_with_patience_a_start_near_an_unstable_cycle_ends_where_it_belongs(
     beyond: float, regime: Regime
 ) -> None:
-    case = Case.of(paper(*EXPONENTIAL, "plant.belt_speed=1.175"))
-    start = State(case.drive.equilibrium_position + UNSTABLE_CYCLE + beyond, 0.0)
-    soon = settle(case, start, Course(50.0))
+    case = ControlledDrive.from_scenario(paper(*EXPONENTIAL, "plant.belt_speed=1.175"))
+    start = MotionState(case.drive.equilibrium_position + UNSTABLE_CYCLE + beyond, 0.0)
+    soon = settle(case, start, SettlingCourse(50.0))
     assert soon.measures.regime is Regime.PURE_SLIP
-    late = settle(case, start, Course(50.0, patience=80))
+    late = settle(case, start, SettlingCourse(50.0, patience=80))
     assert late.measures.regime is regime
     assert late.steady
 
 
 def test_patience_ends_when_the_motion_is_steady() -> None:
     # Without that it would be followed for a billion periods.
-    settled = settle(Case(PAPER), course=Course(1000.0, patience=1_000_000))
+    settled = settle(ControlledDrive(PAPER), course=SettlingCourse(1000.0, patience=1_000_000))
     assert settled.steady
 
 
@@ -339,7 +355,7 @@ def test_patience_ends_when_the_motion_is_steady() -> None:
 )
 def test_a_course_that_cannot_be_is_refused(values: dict[str, Any], message: str) -> None:
     with pytest.raises(InvalidInputError, match=message):
-        Course(**values)
+        SettlingCourse(**values)
 
 
 @pytest.mark.parametrize(
@@ -357,12 +373,15 @@ def test_continuous_control_refuses_what_it_does_not_have(override: str) -> None
     with pytest.raises(InvalidInputError, match=f"no {name}: it is {value}, and must be"):
         check_continuous(scenario)
     with pytest.raises(InvalidInputError, match=name):
-        Case.of(scenario, continuous=True)
+        ControlledDrive.from_scenario(scenario, continuous=True)
 
 
 def test_without_control_and_disturbance_nothing_is_sampled() -> None:
     without = "plant.expects_control=false"
-    assert Case.of(paper(without)) == Case(PAPER)
-    assert Case.of(paper(without, "plant.disturbance.kind=step")).sampled is not None
-    assert Case.of(paper()).sampled is not None
-    assert Case.of(paper(), continuous=True).sampled is None
+    assert ControlledDrive.from_scenario(paper(without)) == ControlledDrive(PAPER)
+    assert (
+        ControlledDrive.from_scenario(paper(without, "plant.disturbance.kind=step")).sampled
+        is not None
+    )
+    assert ControlledDrive.from_scenario(paper()).sampled is not None
+    assert ControlledDrive.from_scenario(paper(), continuous=True).sampled is None

@@ -14,7 +14,7 @@ from stickslip_ros.physics.measures.cycles import Measures, Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.columns import Columns, compute_columns
 from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settled import Course, State
+from stickslip_ros.studies.settled import MotionState, SettlingCourse
 from stickslip_ros.studies.study import Point, Study, compute, pieces_of
 from stickslip_ros.studies.sweep import sweep_study
 from tests.studies.studies import CYCLE_LOST_SPEED, EXPONENTIAL, HOPF_SPEED, SHORT, free, paper
@@ -32,7 +32,7 @@ LINEAR = free("plant.friction.law=linear", "plant.belt_speed=0.2")
 
 MIXED = [
     Study(free(), Grid((MINIMUM,)), SHORT),
-    Study(LINEAR, Grid((SLOPE,)), Course(40.0, 2)),
+    Study(LINEAR, Grid((SLOPE,)), SettlingCourse(40.0, 2)),
     Study(free(), Grid((DAMPING, Axis("plant.belt_speed", 0.2, 0.3, 2))), SHORT),
 ]
 
@@ -91,7 +91,7 @@ CHAINS = [
 def test_a_chain_begins_anew_after_a_point_that_failed(
     axis: Axis, carry: Carry, scenario: Scenario, failing: int
 ) -> None:
-    alone = Study(scenario, Grid((axis,)), Course(40.0, 2))
+    alone = Study(scenario, Grid((axis,)), SettlingCourse(40.0, 2))
     study = replace(alone, plan=Grid((axis,), carry))
     (chain,) = study.plan.chains()
     piece = compute(study, chain, None)
@@ -100,7 +100,7 @@ def test_a_chain_begins_anew_after_a_point_that_failed(
     assert all(point.reason is None for point in found)
     assert compute(alone, [first.number], None).points == [first]
     assert piece.end is not None
-    only_failed = compute(study, chain[:failing], State(1.0, 0.0))
+    only_failed = compute(study, chain[:failing], MotionState(1.0, 0.0))
     assert only_failed.end is None
 
 
@@ -121,13 +121,15 @@ def test_a_chain_in_pieces_is_the_chain_at_once() -> None:
 def test_the_filter_is_carried_on_and_the_control_does_not_begin_anew() -> None:
     scenario = paper("plant.rate=20.0", "washout_controller.start_after=100.0")
     gain = Axis("washout_controller.linear_gain", -2.0, -1.9, 2)
-    study = Study(scenario, Grid((gain,), Carry.UP), Course(5.0, 1))
-    start = State(scenario.plant.as_drive().equilibrium_position, 0.0, 0.0)
+    study = Study(scenario, Grid((gain,), Carry.UP), SettlingCourse(5.0, 1))
+    start = MotionState(scenario.plant.as_drive().equilibrium_position, 0.0, 0.0)
     at_rest = compute(study, [1], start).points[0].measures
     assert at_rest.regime is Regime.EQUILIBRIUM
     # Without control that is not stable; with it, a filter that is not at rest pushes.
     alone = compute(study, [1], None).points[0].measures
-    pushed = compute(replace(study, course=Course(0.0, 1)), [1], replace(start, low_passed=1.0))
+    pushed = compute(
+        replace(study, course=SettlingCourse(0.0, 1)), [1], replace(start, low_passed=1.0)
+    )
     assert alone.amplitude is not None
     assert alone.amplitude > 1e-3
     (point,) = pushed.points

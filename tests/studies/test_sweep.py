@@ -9,7 +9,7 @@ from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.studies.columns import compute_columns
 from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settled import Course
+from stickslip_ros.studies.settled import SettlingCourse
 from stickslip_ros.studies.sweep import sweep_study
 from tests.physics.drives import LIMIT_CYCLES
 from tests.studies.studies import free, paper
@@ -21,7 +21,7 @@ GAIN = Axis("washout_controller.linear_gain", -2.0, 0.0, 6)
 
 
 def test_a_map_has_the_reference_cycles_where_its_axes_have_their_drives() -> None:
-    found = compute_columns(sweep_study(free(), [DAMPING, SPEED], course=Course(300.0, 6)))
+    found = compute_columns(sweep_study(free(), [DAMPING, SPEED], course=SettlingCourse(300.0, 6)))
     rows = slice(3, 6)
     assert found.values["plant.damping"][rows] == pytest.approx(0.02)
     for name in ("amplitude", "stick_fraction", "period", "midpoint"):

@@ -12,7 +12,7 @@ from stickslip_ros.physics.theory.sampled import LinearSampledLoop
 from stickslip_ros.physics.theory.sticking import Release, sticking_onset
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.plan import Axis, Grid
-from stickslip_ros.studies.settled import Case
+from stickslip_ros.studies.settled import ControlledDrive
 from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.transitions import (
     HOPF_POINT,
@@ -107,7 +107,7 @@ def test_under_continuous_control_it_is_the_critical_gain_and_there_is_no_onset_
 
 def test_a_sampled_loop_has_the_limit_that_its_critical_gain_says() -> None:
     places = found("washout_controller.linear_gain=-1.5:0.5:5", "plant.force_delay=0.2")
-    loop = LinearSampledLoop.of(PAPER, 100.0, 0.2)
+    loop = LinearSampledLoop.from_drive(PAPER, 100.0, 0.2)
     assert loop is not None
     assert places == {STABILITY_LIMIT: [pytest.approx(loop.critical_linear_gain(2.0), rel=1e-9)]}
 
@@ -134,7 +134,7 @@ def test_a_gain_that_only_its_last_determinant_likes_is_not_stable() -> None:
     """With such a corner frequency and gain, c1 and c2 are below zero and their product above."""
     overrides = ["washout_controller.corner_frequency=20", "washout_controller.linear_gain=60"]
     scenario = load_scenario("paper", [*overrides, "plant.belt_speed=0.2"])
-    case = Case.of(scenario, continuous=True)
+    case = ControlledDrive.from_scenario(scenario, continuous=True)
     assert case.washout is not None
     expansion = expand(case.drive, case.washout.gains)
     assert expansion is not None
@@ -195,7 +195,7 @@ def test_a_map_of_a_sampled_loop_with_a_long_delay_has_the_sides_of_its_limit() 
     over = transition_map(Study(load_scenario("paper"), Grid(axes)), axes)
     assert over.margins.keys() == {STABILITY_LIMIT}
     for row in (0, -1):
-        loop = LinearSampledLoop.of(PAPER, 100.0, float(over.first[row]))
+        loop = LinearSampledLoop.from_drive(PAPER, 100.0, float(over.first[row]))
         assert loop is not None
         (interval,) = loop.stable_linear_gains(2.0)
         inside = (over.second > interval.low) & (over.second < interval.high)

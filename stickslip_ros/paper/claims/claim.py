@@ -5,15 +5,12 @@ from dataclasses import dataclass
 from decimal import Decimal
 from enum import StrEnum
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.paper.figures import BifurcationFigure, PaperFigure, PortraitFigure
-
-_SLACK = 1e-9
-"""Share of half a unit of the last printed digit that rounding may add to it."""
 
 _ROUNDING = 1e-9
 """Share of the largest value, or of one, below which a difference is rounding alone."""
@@ -61,6 +58,14 @@ class Evidence:
         return figure
 
 
+class Computed(Protocol):
+    """What the computation gives for a claim."""
+
+    def finding(self, printed: Any, /) -> Finding:
+        """Judge what is printed: the number, the formula, or None for a statement in words."""
+        ...
+
+
 @dataclass(frozen=True)
 class Claim:
     """A number, a formula or a statement of the paper."""
@@ -73,12 +78,38 @@ class Claim:
     """What it says, in our words."""
     printed: float | str | None
     """The number or the formula as printed, None for a statement in words."""
-    judge: Callable[[Any, Evidence], Finding]
-    """Judges what is printed."""
+    compute: Callable[[Evidence], Computed]
+    """Computes what the claim is about."""
 
     def check(self, evidence: Evidence) -> Finding:
         """Compute what the claim is about, and judge it."""
-        return self.judge(self.printed, evidence)
+        return self.compute(evidence).finding(self.printed)
+
+
+class Chapter(NamedTuple):
+    """The claims of a part of the paper, in its order."""
+
+    title: str
+    claims: tuple[Claim, ...]
+
+
+_Computation = TypeVar("_Computation", bound=Callable[..., Computed])
+
+
+class Computations(dict[str, Callable[[Evidence], Computed]]):
+    """What computes the claims that a file is about, by their identifier."""
+
+    def __call__(self, claim: str, *arguments: Any) -> Callable[[_Computation], _Computation]:
+        """Return a decorator for the function that computes what a claim is about.
+
+        It takes the evidence and the further `arguments`; with others it may compute other claims.
+        """
+
+        def add(compute: _Computation) -> _Computation:
+            self[claim] = lambda evidence: compute(evidence, *arguments)
+            return compute
+
+        return add
 
 
 @dataclass(frozen=True)
@@ -93,17 +124,39 @@ class Correction:
 
 @dataclass(frozen=True)
 class Number:
-    """What the equations give for a printed number."""
+    """What the equations give for a printed number.
+
+    It holds if the computed number is the printed one when rounded to its last digit.
+    """
 
     value: float
     corrections: Sequence[Correction] = ()
     """The first one that gives what is printed counts."""
     remark: str = ""
 
+    def finding(self, printed: float) -> Finding:
+        """Judge the printed number."""
+        verdict, remark = Verdict.FAILS, self.remark
+        if agrees(printed, self.value):
+            verdict = Verdict.HOLDS
+        else:
+            for correction in self.corrections:
+                if agrees(printed, correction.value):
+                    verdict = Verdict.CORRECTED
+                    remark = f"{correction.description}: {correction.value:.6g}. {remark}"
+                    break
+        difference = self.value - printed
+        if abs(difference) <= _ROUNDING * max(1.0, abs(printed)):
+            difference = 0.0
+        return Finding(self.value, difference, verdict, remark.strip())
+
 
 @dataclass(frozen=True)
 class Formula:
-    """The values of a printed formula at some points, and what they must be."""
+    """The values of a printed formula at some points, and what they must be.
+
+    It holds if its values are the true ones but for rounding.
+    """
 
     printed: npt.ArrayLike | None
     """None if it cannot be evaluated as it stands."""
@@ -112,6 +165,23 @@ class Formula:
     corrections: Sequence[Correction] = ()
     """Values of corrected formulas; the first one that agrees with the true ones counts."""
     remark: str = ""
+
+    def finding(self, _: Any) -> Finding:
+        """Judge the printed formula by its values."""
+        true = np.asarray(self.true)
+        rounding = _ROUNDING * max(1.0, float(np.abs(true).max()))
+        difference = None if self.printed is None else _distance(self.printed, true)
+        verdict, remark = Verdict.FAILS, self.remark
+        if difference is not None and difference <= rounding:
+            verdict, found, difference = Verdict.HOLDS, "the same", 0.0
+        else:
+            found = "cannot be evaluated" if difference is None else "something else"
+            for correction in self.corrections:
+                if _distance(correction.value, true) <= rounding:
+                    verdict = Verdict.CORRECTED
+                    remark = f"{correction.description} it agrees. {remark}"
+                    break
+        return Finding(found, difference, verdict, remark.strip())
 
 
 @dataclass(frozen=True)
@@ -124,110 +194,33 @@ class Observation:
     """Whether it holds with the correction that the remark states."""
     remark: str = ""
 
+    def finding(self, _: Any) -> Finding:
+        """Judge the statement."""
+        verdict = Verdict.FAILS
+        if self.holds:
+            verdict = Verdict.HOLDS
+        elif self.holds_corrected:
+            verdict = Verdict.CORRECTED
+        return Finding(self.found, None, verdict, self.remark)
 
-class Chapter:
-    """The claims of a part of the paper, in its order.
 
-    Its methods make decorators for the function that computes what a claim is about.
-    """
+@dataclass(frozen=True)
+class Undecidable:
+    """Nothing: no computation can say anything of the statement."""
 
-    def __init__(self, title: str) -> None:
-        self.title = title
-        self.claims: list[Claim] = []
+    why: str
 
-    def number(
-        self, identifier: str, place: str, statement: str, printed: float
-    ) -> Callable[[Callable[[Evidence], Number]], None]:
-        """Add a number, which holds if the computed one is it when rounded to its last digit."""
-
-        def add(compute: Callable[[Evidence], Number]) -> None:
-            def judge(printed: float, evidence: Evidence) -> Finding:
-                return _judge_number(printed, compute(evidence))
-
-            self.claims.append(Claim(identifier, place, statement, printed, judge))
-
-        return add
-
-    def formula(
-        self, identifier: str, place: str, statement: str, printed: str
-    ) -> Callable[[Callable[[], Formula]], None]:
-        """Add a formula, which holds if its values are the true ones but for rounding."""
-
-        def add(compute: Callable[[], Formula]) -> None:
-            def judge(_: str, __: Evidence) -> Finding:
-                return _judge_formula(compute())
-
-            self.claims.append(Claim(identifier, place, statement, printed, judge))
-
-        return add
-
-    def statement(
-        self, identifier: str, place: str, statement: str
-    ) -> Callable[[Callable[[Evidence], Observation]], None]:
-        """Add a statement in words."""
-
-        def add(compute: Callable[[Evidence], Observation]) -> None:
-            def judge(_: None, evidence: Evidence) -> Finding:
-                return _judge_observation(compute(evidence))
-
-            self.claims.append(Claim(identifier, place, statement, None, judge))
-
-        return add
-
-    def undecidable(self, identifier: str, place: str, statement: str, why: str) -> None:
-        """Add a statement of which no computation can say anything."""
-        finding = Finding(None, None, Verdict.UNDECIDABLE, why)
-        self.claims.append(Claim(identifier, place, statement, None, lambda _, __: finding))
+    def finding(self, _: Any) -> Finding:
+        """Return that it is not decidable, and why."""
+        return Finding(None, None, Verdict.UNDECIDABLE, self.why)
 
 
 def agrees(printed: float, computed: float) -> bool:
     """Return whether `computed` is what is printed, to half a unit of the last printed digit."""
     exponent = Decimal(repr(printed)).as_tuple().exponent
     assert isinstance(exponent, int)
-    return abs(computed - printed) <= 0.5 * 10.0**exponent * (1.0 + _SLACK)
-
-
-def _judge_number(printed: float, number: Number) -> Finding:
-    verdict, remark = Verdict.FAILS, number.remark
-    if agrees(printed, number.value):
-        verdict = Verdict.HOLDS
-    else:
-        for correction in number.corrections:
-            if agrees(printed, correction.value):
-                verdict = Verdict.CORRECTED
-                remark = f"{correction.description}: {correction.value:.6g}. {remark}"
-                break
-    difference = number.value - printed
-    if abs(difference) <= _ROUNDING * max(1.0, abs(printed)):
-        difference = 0.0
-    return Finding(number.value, difference, verdict, remark.strip())
-
-
-def _judge_formula(formula: Formula) -> Finding:
-    true = np.asarray(formula.true)
-    rounding = _ROUNDING * max(1.0, float(np.abs(true).max()))
-    difference = None if formula.printed is None else _distance(formula.printed, true)
-    verdict, remark = Verdict.FAILS, formula.remark
-    if difference is not None and difference <= rounding:
-        verdict, found, difference = Verdict.HOLDS, "the same", 0.0
-    else:
-        found = "cannot be evaluated" if difference is None else "something else"
-        for correction in formula.corrections:
-            if _distance(correction.value, true) <= rounding:
-                verdict = Verdict.CORRECTED
-                remark = f"{correction.description} it agrees. {remark}"
-                break
-    return Finding(found, difference, verdict, remark.strip())
+    return abs(computed - printed) <= 0.5 * 10.0**exponent * (1.0 + 1e-9)
 
 
 def _distance(values: Any, true: Any) -> float:
     return float(np.abs(np.asarray(values) - true).max())
-
-
-def _judge_observation(observation: Observation) -> Finding:
-    verdict = Verdict.FAILS
-    if observation.holds:
-        verdict = Verdict.HOLDS
-    elif observation.holds_corrected:
-        verdict = Verdict.CORRECTED
-    return Finding(observation.found, None, verdict, observation.remark)

@@ -5,45 +5,36 @@ from dataclasses import replace
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import Chapter, Evidence, Observation
-from stickslip_ros.paper.claims.control import controlled_amplitude, critical
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Observation
 from stickslip_ros.paper.claims.reference import (
     DAMPING,
     FILTER,
+    controlled_amplitude,
+    critical,
     cycles,
     expansion,
     hopf_point,
     trace,
+    trace_of,
 )
-from stickslip_ros.paper.claims.simulations import VIBRATING, amplitude, falling, listed
+from stickslip_ros.paper.claims.summaries import VIBRATING, amplitude, falling, listed
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.theory.linear import expand
 
-CHAPTER = Chapter("The abstract and the conclusions")
+computes = Computations()
+
 
 _STILL_ON_ITS_WAY = 0.02
 """Trace so small that a motion is not settled when a bifurcation diagram looks at it."""
 
 
-def _p(drive: Drive) -> float:
-    found = expand(drive)
-    assert found is not None
-    return float(np.trace(found.jacobian))
-
-
-@CHAPTER.statement(
-    "critical-speed-confirmed",
-    "abstract, section 5",
-    "The critical speed by the first approximation agrees with the simulations",
-)
+@computes("critical-speed-confirmed")
 def _(evidence: Evidence) -> Observation:
     figures = [evidence.bifurcation(number) for number in (2, 3, 4, 5)]
     agree = [
         (measures.regime in VIBRATING) == (p > 0.0)
         for figure in figures
         for measures, drive in zip(figure.diagram.measures, figure.diagram.drives, strict=True)
-        if drive.belt_speed > 0.0 and abs(p := _p(drive)) > _STILL_ON_ITS_WAY
+        if drive.belt_speed > 0.0 and abs(p := trace_of(drive)) > _STILL_ON_ITS_WAY
     ]
     return Observation(
         f"{sum(agree)} of {len(agree)} drives",
@@ -54,11 +45,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "curvature-confirmed",
-    "abstract",
-    "The curvature coefficient tells whether the limit cycle is stable",
-)
+@computes("curvature-confirmed")
 def _(_: Evidence) -> Observation:
     sigma = hopf_point().first_lyapunov_coefficient
     distances = (2e-2, 2e-3, 2e-4)
@@ -88,11 +75,7 @@ def _listed(values: Sequence[float]) -> str:
     return ", ".join(f"{value:.5f}" for value in values)
 
 
-@CHAPTER.statement(
-    "main-factors",
-    "abstract",
-    "Feed speed, damping and ratio of friction coefficients are the main factors",
-)
+@computes("main-factors")
 def _(_: Evidence) -> Observation:
     base = unit_drive(0.4)
     changed = {
@@ -101,7 +84,7 @@ def _(_: Evidence) -> Observation:
         "mu_m 0.39": replace(base, friction=replace(STRIBECK, minimum=0.39)),
         "stiffness 50": replace(base, stiffness=50.0),
     }
-    traces = {name: _p(drive) for name, drive in changed.items()}
+    traces = {name: trace_of(drive) for name, drive in changed.items()}
     stable = [p < 0.0 for p in traces.values()]
     return Observation(
         f"p = {trace(0.4):.4g} at v0 = 0.4",
@@ -112,11 +95,7 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "what-inhibits",
-    "section 5",
-    "A fast belt, much damping and a small gap of coefficients inhibit the vibration",
-)
+@computes("what-inhibits")
 def _(evidence: Evidence) -> Observation:
     ends = [evidence.bifurcation(number).diagram for number in (2, 3, 5)]
     slow = int(np.searchsorted(evidence.bifurcation(2).values, 1.0 / 3.0))
@@ -132,9 +111,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "amplitude-reduced", "abstract, section 5", "The washout filter reduces the amplitude"
-)
+@computes("amplitude-reduced")
 def _(evidence: Evidence) -> Observation:
     linear, cubic, slow = evidence.portraits(13).panels
     sizes = [
@@ -161,11 +138,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "topology",
-    "abstract, section 5",
-    "The washout filter improves the topology of the phase portrait",
-)
+@computes("topology")
 def _(evidence: Evidence) -> Observation:
     linear, cubic, slow = evidence.portraits(13).panels
     portraits = [*linear.portraits[1:], *cubic.portraits, *slow.portraits]
@@ -180,11 +153,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "more-effective",
-    "abstract, section 5",
-    "The washout filter is a comparatively effective method",
-)
+@computes("more-effective")
 def _(_: Evidence) -> Observation:
     # A force k1 y on the speed itself adds to p and leaves the equilibrium too, since y = 0 there.
     plain = -trace(0.4)
@@ -198,11 +167,3 @@ def _(_: Evidence) -> Observation:
         f"that with d = 2, {washout[1] / plain:.3g} times with d = 0.2 and "
         f"{washout[2] / plain:.5g} times with d = 0.02.",
     )
-
-
-CHAPTER.undecidable(
-    "practical-value",
-    "section 1, section 5",
-    "The work is of use for machine tools in production",
-    "It is a judgement, and the paper has no measurement on a machine.",
-)

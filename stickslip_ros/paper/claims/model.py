@@ -5,7 +5,7 @@ from math import isclose, sqrt
 import numpy as np
 
 from stickslip_ros.paper.claims.claim import (
-    Chapter,
+    Computations,
     Correction,
     Evidence,
     Formula,
@@ -24,7 +24,7 @@ from stickslip_ros.paper.claims.reference import (
     time_dependent,
     trace,
 )
-from stickslip_ros.paper.claims.simulations import listed
+from stickslip_ros.paper.claims.summaries import listed
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.physics.model.drive import Drive
@@ -32,7 +32,8 @@ from stickslip_ros.physics.model.equations import Equations
 from stickslip_ros.physics.model.friction import Stribeck
 from stickslip_ros.physics.theory.roots import zero_between
 
-CHAPTER = Chapter("Sections 1 and 2: the model")
+computes = Computations()
+
 
 _SLIDE = Drive(
     mass=3.0,
@@ -59,33 +60,7 @@ def _smallest_kinetic() -> tuple[float, float]:
     return _kinetic(speed), speed
 
 
-CHAPTER.undecidable(
-    "earlier-work",
-    "section 1",
-    "Earlier papers brought several friction models and studies of frictional vibration",
-    "It is about other papers; nothing of it enters the equations.",
-)
-
-CHAPTER.undecidable(
-    "state-of-research",
-    "section 1",
-    "Trains, wings, cutting and oil whip vibrate by self-excitation, not yet fully understood",
-    "It is about other systems and about the literature.",
-)
-
-CHAPTER.undecidable(
-    "difficulties-of-other-models",
-    "section 2",
-    "Other models are hard to build and to simulate, and few studies look beyond the feed speed",
-    "It is about models that the paper neither names nor writes down.",
-)
-
-
-@CHAPTER.statement(
-    "normal-vibration",
-    "section 2, Fig. 1",
-    "The model takes the vibration normal to the belt into account",
-)
+@computes("normal-vibration")
 def _(_: Evidence) -> Observation:
     return Observation(
         "depends on time" if time_dependent() else "constant normal force",
@@ -95,8 +70,8 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.formula("eq-1", "eq. 1", "Balance of forces on the slide", "m x'' + c x' + k x - F = 0")
-def _() -> Formula:
+@computes("eq-1")
+def _(_: Evidence) -> Formula:
     drive = _SLIDE
     position, speed = STATES[0] * drive.length_scale, STATES[1] * drive.speed_scale
     relative_speed = speed - drive.belt_speed
@@ -112,8 +87,8 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.formula("eq-2", "eq. 2", "The balance made dimensionless", "X'' + 2 beta X' + X - mu = 0")
-def _() -> Formula:
+@computes("eq-2")
+def _(_: Evidence) -> Formula:
     law = _SLIDE.friction.scaled(_SLIDE.speed_scale)
     relative_speed = STATES[1] - _SLIDE.belt_speed / _SLIDE.speed_scale
     coefficient = law.coefficient(relative_speed, np.sign(relative_speed))
@@ -123,13 +98,8 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.formula(
-    "scales",
-    "eq. 2",
-    "Scales that make mass, stiffness and normal force one",
-    "omega_0 = sqrt(k/m), tau = omega_0 t, X = x k / N",
-)
-def _() -> Formula:
+@computes("scales")
+def _(_: Evidence) -> Formula:
     time, length = (
         1.0 / sqrt(_SLIDE.stiffness / _SLIDE.mass),
         _SLIDE.normal_force / _SLIDE.stiffness,
@@ -142,8 +112,8 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.formula("scaled-damping", "eq. 2", "Damping made dimensionless", "2 beta = c omega / k")
-def _() -> Formula:
+@computes("scaled-damping")
+def _(_: Evidence) -> Formula:
     read = _SLIDE.damping * sqrt(_SLIDE.stiffness / _SLIDE.mass) / _SLIDE.stiffness
     return Formula(
         None,
@@ -154,10 +124,8 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.formula(
-    "scaled-belt-speed", "eq. 2", "Belt speed made dimensionless", "v0 = v0 / (omega_0 L)"
-)
-def _() -> Formula:
+@computes("scaled-belt-speed")
+def _(_: Evidence) -> Formula:
     length = _SLIDE.normal_force / _SLIDE.stiffness
     read = _SLIDE.belt_speed / (sqrt(_SLIDE.stiffness / _SLIDE.mass) * length)
     parameters = Equations(Stribeck, continuous_control=False).parameters(_SLIDE)
@@ -169,9 +137,7 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.statement(
-    "excitation-frequency", "eq. 2", "The model has an excitation frequency Omega to be scaled"
-)
+@computes("excitation-frequency")
 def _(_: Evidence) -> Observation:
     return Observation(
         "time-dependent" if time_dependent() else "autonomous",
@@ -180,13 +146,8 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.formula(
-    "eq-3",
-    "eq. 3",
-    "The Stribeck law as a cubic",
-    "-mu_s sgn(v) + 3 (mu_s - mu_m) v / (2 v_m) - (mu_s - mu_m) v^3 / (2 v_m^3)",
-)
-def _() -> Formula:
+@computes("eq-3")
+def _(_: Evidence) -> Formula:
     static, minimum, speed = STRIBECK.static, STRIBECK.minimum, STRIBECK.minimum_speed
     v = np.linspace(-1.0, 1.0, 40)
     drop = static - minimum
@@ -201,26 +162,22 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.number("static-coefficient", "eq. 3", "The static friction coefficient used", 0.4)
+@computes("static-coefficient")
 def _(_: Evidence) -> Number:
     return Number(_kinetic(0.0), remark="The law's size as the relative speed goes to zero.")
 
 
-@CHAPTER.number(
-    "smallest-coefficient", "eq. 3", "mu_m, the smallest coefficient while slipping", 0.25
-)
+@computes("smallest-coefficient")
 def _(_: Evidence) -> Number:
     return Number(_smallest_kinetic()[0], remark="Where heyoka's derivative of the law is zero.")
 
 
-@CHAPTER.number("smallest-at", "eq. 3", "v_m, the relative speed of the smallest friction", 0.5)
+@computes("smallest-at")
 def _(_: Evidence) -> Number:
     return Number(_smallest_kinetic()[1], remark="Where heyoka's derivative of the law is zero.")
 
 
-@CHAPTER.statement(
-    "names-of-coefficients", "eq. 3", "mu_s is the dynamic coefficient and mu_m the static one"
-)
+@computes("names-of-coefficients")
 def _(_: Evidence) -> Observation:
     break_away, (smallest, _speed) = _kinetic(0.0), _smallest_kinetic()
     return Observation(
@@ -233,7 +190,7 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement("eq-3-range", "eq. 3", "The law describes friction of machine parts in general")
+@computes("eq-3-range")
 def _(evidence: Evidence) -> Observation:
     smallest_at = _smallest_kinetic()[1]
     end = zero_between(lambda v: _kinetic(v) - STRIBECK.static, smallest_at, _FASTEST)
@@ -250,30 +207,21 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.formula(
-    "eq-4", "eq. 4", "Displacement and speed as the two states", "X = X1, dX/dtau = X2"
-)
-def _() -> Formula:
+@computes("eq-4")
+def _(_: Evidence) -> Formula:
     return Formula(rates(unit_drive(0.4), STATES[:2])[0], STATES[1])
 
 
-@CHAPTER.formula(
-    "eq-5",
-    "eq. 5",
-    "The system of first order, while slipping",
-    "X1' = X2, X2' = -2 beta X2 - X1 - mu_s sgn(v_r) + a v_r - b v_r^3",
-)
-def _() -> Formula:
+@computes("eq-5")
+def _(_: Evidence) -> Formula:
     relative_speed = STATES[1] - 0.4
     friction = STRIBECK.coefficient(relative_speed, np.sign(relative_speed))
     printed = [STATES[1], -DAMPING * STATES[1] - STATES[0] + friction]
     return Formula(printed, rates(unit_drive(0.4), STATES[:2]))
 
 
-@CHAPTER.formula(
-    "eq-5-origin", "eq. 5", "What is made a system of first order", "eq. 3, the friction law"
-)
-def _() -> Formula:
+@computes("eq-5-origin")
+def _(_: Evidence) -> Formula:
     relative_speed = STATES[1] - 0.4
     law = STRIBECK.coefficient(relative_speed, np.sign(relative_speed))
     return Formula(
@@ -287,7 +235,7 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.statement("eq-5-stick", "eq. 5", "The system describes sticking too")
+@computes("eq-5-stick")
 def _(evidence: Evidence) -> Observation:
     portrait = evidence.portraits(6).portraits[0]
     cycle = portrait.last_cycles
@@ -304,11 +252,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement(
-    "rest-at-high-speed",
-    "section 2",
-    "On a fast belt the slide rests, friction and spring in balance, with sgn(v_r) = -1",
-)
+@computes("rest-at-high-speed")
 def _(evidence: Evidence) -> Observation:
     figure = evidence.bifurcation(2)
     fast = [

@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.equations import SPEED
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
-from stickslip_ros.physics.theory.linear import SPEED, Expansion
+from stickslip_ros.physics.theory.linear import Expansion
 
 _FREQUENCY, _THIRD_EIGENVALUE = 1.3, -0.7
 """Of the linear part that goes with a sample; neither is one."""

@@ -3,25 +3,31 @@
 Everything is dimensionless, on the unit drive of `figures`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Any, TypeVar
 
 import heyoka as hy
 import numpy as np
+import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.paper.claims.claim import Correction, Formula, Number
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import Equations, W, WashoutGains, X, Y
 from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.theory.closed_loop import CriticalGains, critical_gains
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
-from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycles
+from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import Expansion, expand
 from stickslip_ros.physics.theory.returns import follow, release_position
 from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.physics.theory.sticking import StickingOnset, sticking_onset
+
+_T = TypeVar("_T")
 
 DAMPING = 0.02
 """Coefficient 2 beta of X' in eq. 5 for the paper's beta of 0.01."""
@@ -35,6 +41,9 @@ TAKEN_FOR_DAMPING = f"With the damping coefficient {TAKEN_DAMPING:g} in place of
 PRINTED_HOPF_SPEED = 0.4944
 """v_b1, with which eq. 11 goes on."""
 
+PRINTED_GAIN = -0.0395
+"""Critical linear gain of eq. 21."""
+
 STUDIED_SPEED = 0.49
 """The belt speed of section 4.1, with which eq. 20 to 30 go on."""
 
@@ -43,9 +52,6 @@ FILTER = WashoutGains(corner_frequency=2.0, linear=0.0, cubic=0.0)
 
 _ROUNDING = 1e-12
 """Share of the belt's speed within which a speed is that of the belt."""
-
-_LONG = 600.0
-"""Time in which a motion that is going to run away has done so."""
 
 BELT_SPEEDS = np.array([0.1, 0.25, 0.4, STUDIED_SPEED, 0.7, 1.0])
 """Where formulas in the belt speed are evaluated."""
@@ -71,7 +77,14 @@ def expansion(
 
 def trace(belt_speed: float, damping: float = DAMPING) -> float:
     """Return p of eq. 8."""
-    return float(np.trace(expansion(belt_speed, damping).jacobian))
+    return trace_of(unit_drive(belt_speed, damping=damping))
+
+
+def trace_of(drive: Drive) -> float:
+    """Return p of any drive; where it is above zero the equilibrium is unstable."""
+    found = expand(drive)
+    assert found is not None
+    return float(np.trace(found.jacobian))
 
 
 @cache
@@ -79,6 +92,38 @@ def hopf_point(damping: float = DAMPING) -> HopfPoint:
     """Return the Hopf point over the belt speed."""
     (point,) = hopf_points(unit_drive(1.0, damping=damping))
     return point
+
+
+def printed_trace(belt_speeds: FloatArray) -> FloatArray:
+    """Return 0.44 - 1.8 v0^2, as eq. 8 has it."""
+    return 0.44 - 1.8 * belt_speeds**2
+
+
+def critical_beta(belt_speed: float) -> float:
+    """Return the beta of eq. 5 from which on the equilibrium is stable, p = 0."""
+    return trace(belt_speed, 0.0) / 2.0
+
+
+def for_both(compute: Callable[[float], _T]) -> tuple[_T, _T]:
+    """Return what it gives for the damping of eq. 5, and for that of eq. 8."""
+    return compute(DAMPING), compute(TAKEN_DAMPING)
+
+
+def number_for_both(compute: Callable[[float], float], remark: str = "") -> Number:
+    """Return the number for the damping of eq. 5, corrected to that of eq. 8.
+
+    In the remark "{taken}" stands for the latter.
+    """
+    here, taken = for_both(compute)
+    return Number(here, [Correction(TAKEN_FOR_DAMPING, taken)], remark.format(taken=taken))
+
+
+def formula_for_both(
+    printed: FloatArray, true: Callable[[float], npt.ArrayLike], remark: str = ""
+) -> Formula:
+    """Return the formula for the damping of eq. 5, corrected to that of eq. 8."""
+    here, taken = for_both(lambda damping: printed - np.asarray(true(damping)))
+    return Formula(here, 0.0, [Correction(TAKEN_FOR_DAMPING, taken)], remark)
 
 
 def overdamped_from() -> float:
@@ -119,6 +164,21 @@ def only_rest_at(belt_speeds: Sequence[float]) -> bool:
     return all(expansion(speed).stable and not cycles(speed) for speed in belt_speeds)
 
 
+@cache
+def critical(belt_speed: float, damping: float, corner_frequency: float = 2.0) -> CriticalGains:
+    """Return the critical gains of the loop without a cubic gain."""
+    gains = replace(FILTER, corner_frequency=corner_frequency)
+    found = critical_gains(unit_drive(belt_speed, damping=damping), gains)
+    assert found is not None
+    return found
+
+
+def controlled_amplitude(belt_speed: float, gains: WashoutGains) -> float:
+    """Return the amplitude of the limit cycle that the motion from rest at X = 0 leads to."""
+    cycle = limit_cycle_of_run(unit_drive(belt_speed), 0.0, gains=gains)
+    return 0.0 if cycle is None else cycle.measures.amplitude or 0.0
+
+
 def arrivals(drive: Drive) -> list[float]:
     """Return the reactions k x + c v0 with which a slide comes to the belt's speed.
 
@@ -139,7 +199,7 @@ def stays(drive: Drive) -> bool:
     """Return whether the motion from rest at X = 0 does not run away."""
     motion = _motion()
     motion.begin(drive, 0.0, 0.0)
-    motion.advance(_LONG)
+    motion.advance(600.0)  # what is going to run away has done so by then
     return not motion.unbounded
 
 

@@ -1,20 +1,18 @@
-"""Section 2 from eq. 6 on: equilibrium, stability and the limit cycle's curvature coefficient."""
+"""Section 2 from eq. 6 on: equilibrium and stability."""
 
-from collections.abc import Callable
 from math import log
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.claims.claim import (
-    Chapter,
+    Computations,
     Correction,
     Evidence,
     Formula,
     Number,
     Observation,
 )
-from stickslip_ros.paper.claims.normal_form import Nonlinearity, samples
 from stickslip_ros.paper.claims.reference import (
     BELT_SPEEDS,
     DAMPING,
@@ -27,17 +25,19 @@ from stickslip_ros.paper.claims.reference import (
     TAKEN_FOR_DAMPING,
     cycles,
     expansion,
+    formula_for_both,
     hopf_point,
+    number_for_both,
     overdamped_from,
+    printed_trace,
     rates,
     trace,
 )
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 
-CHAPTER = Chapter("Section 2: stability")
+computes = Computations()
 
 
 def _second_order() -> float:
@@ -57,38 +57,27 @@ def _growth(damping: float = DAMPING) -> tuple[float, float]:
     return float(constant), float(-slope)
 
 
-def printed_trace(belt_speeds: FloatArray) -> FloatArray:
-    """Return 0.44 - 1.8 v0^2, as eq. 8 has it."""
-    return 0.44 - 1.8 * belt_speeds**2
-
-
 def _jacobians(damping: float) -> FloatArray:
     return np.array([expansion(speed, damping).jacobian for speed in BELT_SPEEDS])
 
 
-def _printed_jacobians() -> FloatArray:
-    return np.array([[[0.0, 1.0], [-1.0, p]] for p in printed_trace(BELT_SPEEDS)])
-
-
-@CHAPTER.number("linear-coefficient", "eq. 6", "The friction's slope at the belt's speed, a", 0.45)
+@computes("linear-coefficient")
 def _(_: Evidence) -> Number:
     return Number(_growth(0.0)[0], remark="From heyoka's derivatives of the equations.")
 
 
-@CHAPTER.number("cubic-coefficient", "eq. 6", "The friction's cubic coefficient, b", 0.6)
+@computes("cubic-coefficient")
 def _(_: Evidence) -> Number:
     return Number(-_third_order(), remark="From heyoka's derivatives of the equations.")
 
 
-@CHAPTER.formula("eq-6-speed", "eq. 6", "Speed at the equilibrium", "X20 = 0")
-def _() -> Formula:
+@computes("eq-6-speed")
+def _(_: Evidence) -> Formula:
     return Formula(0.0, [expansion(speed).equilibrium[1] for speed in BELT_SPEEDS])
 
 
-@CHAPTER.formula(
-    "eq-6-position", "eq. 6", "Displacement at the equilibrium", "X10 = 0.4 - 0.45 v0 + 0.6 v0^3"
-)
-def _() -> Formula:
+@computes("eq-6-position")
+def _(_: Evidence) -> Formula:
     positions = np.array([expansion(speed).equilibrium[0] for speed in BELT_SPEEDS])
     accelerations = [
         abs(float(rates(unit_drive(speed), np.array([[x], [0.0]]))[1, 0]))
@@ -101,13 +90,8 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.formula(
-    "eq-6-friction",
-    "eq. 6",
-    "Friction about the equilibrium, on the left-hand side",
-    "F2 = -0.45 X2 + 0.6 (X2^3 + 3 X2 v_r^2 - 3 X2^2)",
-)
-def _() -> Formula:
+@computes("eq-6-friction")
+def _(_: Evidence) -> Formula:
     speed, belt_speed = STATES[1], 1.2  # so high that no state overtakes the belt
     friction = STRIBECK.coefficient(speed - belt_speed, -1.0)
     at_rest = STRIBECK.at_rest(belt_speed)
@@ -125,15 +109,13 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.formula("eq-6-first", "eq. 6", "The first equation has no nonlinear part", "F1 = 0")
-def _() -> Formula:
+@computes("eq-6-first")
+def _(_: Evidence) -> Formula:
     at_rest = expansion(0.4)
     return Formula(0.0, np.concatenate([at_rest.quadratic[0].ravel(), at_rest.cubic[0].ravel()]))
 
 
-@CHAPTER.statement(
-    "first-approximation", "section 2", "The first approximation decides what small motions do"
-)
+@computes("first-approximation")
 def _(_: Evidence) -> Observation:
     drive = unit_drive(0.45)
     motion = Motion(drive, expansion(0.45).equilibrium[0] - 1e-6, 0.0, record=True)
@@ -153,8 +135,8 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.formula("eq-7", "eq. 7", "The Jacobian", "A = [[0, 1], [a21, a22]] = 0")
-def _() -> Formula:
+@computes("eq-7")
+def _(_: Evidence) -> Formula:
     jacobians = _jacobians(DAMPING)
     structure = jacobians.copy()
     structure[:, 0] = [0.0, 1.0]
@@ -165,10 +147,8 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.formula(
-    "eq-7-place", "eq. 7", "Where the Jacobian is taken", "X1 = 0 and X2 = 0, not the equilibrium"
-)
-def _() -> Formula:
+@computes("eq-7-place")
+def _(_: Evidence) -> Formula:
     drive, step = unit_drive(0.4), 1e-4
 
     def jacobian(position: float) -> FloatArray:
@@ -185,24 +165,20 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.number(
-    "eq-8-constant", "eq. 8", "Constant of the trace p = 0.44 - 1.8 v0^2, beta 0.01", 0.44
-)
+@computes("eq-8-constant")
 def _(_: Evidence) -> Number:
-    return Number(
-        _growth()[0],
-        [Correction(TAKEN_FOR_DAMPING, _growth(TAKEN_DAMPING)[0])],
-        "Eq. 5 has 2 beta, eq. 8 takes beta once.",
+    return number_for_both(
+        lambda damping: _growth(damping)[0], "Eq. 5 has 2 beta, eq. 8 takes beta once."
     )
 
 
-@CHAPTER.number("eq-8-square", "eq. 8", "Coefficient of -v0^2 in the trace p", 1.8)
+@computes("eq-8-square")
 def _(_: Evidence) -> Number:
     return Number(_growth()[1], remark="Three times the cubic coefficient of the law.")
 
 
-@CHAPTER.formula("eq-8-matrix", "eq. 8", "lambda E - A", "[[lambda, 1], [-1, lambda - p]]")
-def _() -> Formula:
+@computes("eq-8-matrix")
+def _(_: Evidence) -> Formula:
     p = trace(0.4)
     eigenvalue = 0.3
     return Formula(
@@ -217,10 +193,8 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.formula(
-    "eq-8-polynomial", "eq. 8", "The characteristic polynomial", "lambda^2 - p lambda + 1"
-)
-def _() -> Formula:
+@computes("eq-8-polynomial")
+def _(_: Evidence) -> Formula:
     return Formula(
         [[1.0, -trace(speed), 1.0] for speed in BELT_SPEEDS],
         [np.poly(expansion(speed).jacobian) for speed in BELT_SPEEDS],
@@ -228,7 +202,7 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.statement("hurwitz", "section 2", "Stability is lost where p = 0")
+@computes("hurwitz")
 def _(_: Evidence) -> Observation:
     speed = hopf_point().belt_speed
     below, above = (expansion(speed * factor).stable for factor in (0.999, 1.001))
@@ -240,17 +214,16 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.number("vb1", "section 2", "The critical speed v_b1 for beta = 0.01", PRINTED_HOPF_SPEED)
+@computes("vb1")
 def _(_: Evidence) -> Number:
-    return Number(
-        hopf_point().belt_speed,
-        [Correction(TAKEN_FOR_DAMPING, hopf_point(TAKEN_DAMPING).belt_speed)],
+    return number_for_both(
+        lambda damping: hopf_point(damping).belt_speed,
         "The slip of eq. 8: with the damping of eq. 5 the loop is stable above "
         f"{hopf_point().belt_speed:.5f} already.",
     )
 
 
-@CHAPTER.statement("vb1-supercritical", "section 2", "The Hopf point at v_b1 is supercritical")
+@computes("vb1-supercritical")
 def _(_: Evidence) -> Observation:
     sigma = hopf_point().first_lyapunov_coefficient
     just_below = cycles(hopf_point().belt_speed - 2e-3)
@@ -263,26 +236,23 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.formula("eq-9-matrix", "eq. 9", "The linear part", "A = [[0, 1], [-1, 0.44 - 1.8 v0^2]]")
-def _() -> Formula:
-    return Formula(
-        _printed_jacobians() - _jacobians(DAMPING),
-        0.0,
-        [Correction(TAKEN_FOR_DAMPING, _printed_jacobians() - _jacobians(TAKEN_DAMPING))],
-    )
+@computes("eq-9-matrix")
+def _(_: Evidence) -> Formula:
+    printed = np.array([[[0.0, 1.0], [-1.0, p]] for p in printed_trace(BELT_SPEEDS)])
+    return formula_for_both(printed, _jacobians)
 
 
-@CHAPTER.number("eq-9-square", "eq. 9", "Q2: the coefficient of v0 y2^2", 1.8)
+@computes("eq-9-square")
 def _(_: Evidence) -> Number:
     return Number(_second_order(), remark="Half the second derivative at v0 = 1.")
 
 
-@CHAPTER.number("eq-9-cube", "eq. 9", "Q2: the coefficient of y2^3", -0.6)
+@computes("eq-9-cube")
 def _(_: Evidence) -> Number:
     return Number(_third_order(), remark="A sixth of the third derivative.")
 
 
-@CHAPTER.statement("eq-9-jordan", "eq. 9", "A linear transformation has brought it to Jordan form")
+@computes("eq-9-jordan")
 def _(_: Evidence) -> Observation:
     def defect(belt_speed: float) -> float:
         matrix = expansion(belt_speed).jacobian
@@ -298,10 +268,8 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.formula(
-    "eq-9-equilibrium", "eq. 9", "The equilibrium", "(y, y') = (0, 0.4 - 0.45 v0 + 0.6 v0^3)"
-)
-def _() -> Formula:
+@computes("eq-9-equilibrium")
+def _(_: Evidence) -> Formula:
     position = 0.4 - 0.45 * BELT_SPEEDS + 0.6 * BELT_SPEEDS**3
     printed = np.array([np.zeros_like(position), position])
     return Formula(
@@ -312,33 +280,20 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.formula(
-    "eq-10-real", "eq. 10", "Real part of the eigenvalues", "alpha = (0.44 - 1.8 v0^2) / 2"
-)
-def _() -> Formula:
-    return Formula(
-        printed_trace(BELT_SPEEDS) / 2.0 - _real_parts(DAMPING),
-        0.0,
-        [
-            Correction(
-                TAKEN_FOR_DAMPING, printed_trace(BELT_SPEEDS) / 2.0 - _real_parts(TAKEN_DAMPING)
-            )
-        ],
+@computes("eq-10-real")
+def _(_: Evidence) -> Formula:
+    def real_parts(damping: float) -> list[float]:
+        return [expansion(v, damping).eigenvalues.real.mean() for v in BELT_SPEEDS]
+
+    return formula_for_both(
+        printed_trace(BELT_SPEEDS) / 2.0,
+        real_parts,
         f"From v0 = {overdamped_from():.4f} on, where both eigenvalues are real, it is their mean.",
     )
 
 
-def _real_parts(damping: float) -> FloatArray:
-    return np.array([expansion(v, damping).eigenvalues.real.mean() for v in BELT_SPEEDS])
-
-
-@CHAPTER.formula(
-    "eq-10-imaginary",
-    "eq. 10",
-    "Imaginary part, in lambda = alpha +- beta",
-    "beta = sqrt(p^2 - 4) / 2, a real number",
-)
-def _() -> Formula:
+@computes("eq-10-imaginary")
+def _(_: Evidence) -> Formula:
     speeds = [*BELT_SPEEDS.tolist(), *FASTER]
     radicands = np.array([trace(speed) ** 2 - 4.0 for speed in speeds])
     halves = np.array([np.ptp(expansion(speed).eigenvalues.real) for speed in speeds]) / 2.0
@@ -358,9 +313,7 @@ def _() -> Formula:
     )
 
 
-@CHAPTER.number(
-    "eq-11-value", "eq. 11", "Crossing speed alpha' = ((0.44 - 1.8 v0^2) / 2)' at v_b1", -1.7798
-)
+@computes("eq-11-value")
 def _(_: Evidence) -> Number:
     step = 1e-5
     speed = PRINTED_HOPF_SPEED
@@ -378,190 +331,13 @@ def _(_: Evidence) -> Number:
     )
 
 
-@CHAPTER.number("eq-11-product", "eq. 11", "-3.6 times 0.4944", -1.7798)
-def _(_: Evidence) -> Number:
-    return Number(-3.6 * PRINTED_HOPF_SPEED, remark="Only the multiplication.")
-
-
-@CHAPTER.statement("eq-11-sign", "eq. 11", "The crossing speed is negative")
+@computes("eq-11-sign")
 def _(_: Evidence) -> Observation:
     crossing = hopf_point().crossing_speed
     return Observation(f"{crossing:.5f}", crossing < 0.0)
 
 
-def _quadratic_value(coefficient: Callable[[Nonlinearity], complex]) -> Number:
-    """Return four times the imaginary part of g20 or g11, which are imaginary at v_b1."""
-    value, taken = (
-        4.0 * coefficient(Nonlinearity.at(expansion(hopf_point(damping).belt_speed, damping))).imag
-        for damping in (DAMPING, TAKEN_DAMPING)
-    )
-    return Number(
-        value,
-        [Correction(TAKEN_FOR_DAMPING, taken)],
-        f"{taken:.5f} with the damping of eq. 8; a slip of the pen, since eq. 11 prints the same "
-        f"product 3.6 v_b1 with the digits {3.6 * PRINTED_HOPF_SPEED:.4f}.",
-    )
-
-
-@CHAPTER.formula(
-    "eq-12-formula",
-    "eq. 12",
-    "g20 from the derivatives of Q",
-    "g20 = (Q1_11 - Q1_22 + 2 Q1_12 + i (Q2_11 - Q2_22 - 2 Q1_12)) / 4",
-)
-def _() -> Formula:
-    return g20_formula()
-
-
-def g20_formula() -> Formula:
-    """Return what eq. 12 and eq. 23 print alike."""
-
-    def printed(q: Nonlinearity, mixed: int) -> complex:
-        real = q.by(1, 1, 1) - q.by(1, 2, 2) + 2.0 * q.by(mixed, 1, 2)
-        return (real + 1j * (q.by(2, 1, 1) - q.by(2, 2, 2) - 2.0 * q.by(1, 1, 2))) / 4.0
-
-    return Formula(
-        [printed(q, 1) for q in samples(2)],
-        [q.g20 for q in samples(2)],
-        [
-            Correction(
-                "With Q2 in place of Q1 in the real part's last term",
-                [printed(q, 2) for q in samples(2)],
-            )
-        ],
-        "Tried on arbitrary nonlinearities; the derivative in question is zero for the drive.",
-    )
-
-
-@CHAPTER.number("eq-12-value", "eq. 12", "g20 at v_b1: four times its imaginary part", -1.7788)
-def _(_: Evidence) -> Number:
-    return _quadratic_value(lambda q: q.g20)
-
-
-@CHAPTER.formula(
-    "eq-13-formula",
-    "eq. 13",
-    "g11 from the derivatives of Q",
-    "g11 = (Q1_11 + Q1_22 + i (Q2_11 + Q2_22)) / 4",
-)
-def _() -> Formula:
-    return g11_formula()
-
-
-def g11_formula() -> Formula:
-    """Return what eq. 13 and eq. 24 print alike."""
-    return Formula(
-        [
-            (q.by(1, 1, 1) + q.by(1, 2, 2) + 1j * (q.by(2, 1, 1) + q.by(2, 2, 2))) / 4.0
-            for q in samples(2)
-        ],
-        [q.g11 for q in samples(2)],
-        remark="Tried on arbitrary nonlinearities.",
-    )
-
-
-@CHAPTER.number("eq-13-value", "eq. 13", "g11 at v_b1: four times its imaginary part", 1.7788)
-def _(_: Evidence) -> Number:
-    return _quadratic_value(lambda q: q.g11)
-
-
-@CHAPTER.formula(
-    "eq-14-real",
-    "eq. 14",
-    "Real part of G21",
-    "(Q1_111 + Q1_122 + Q2_112 + Q2_222) / 8",
-)
-def _() -> Formula:
-    return Formula(
-        [
-            (q.by(1, 1, 1, 1) + q.by(1, 1, 2, 2) + q.by(2, 1, 1, 2) + q.by(2, 2, 2, 2)) / 8.0
-            for q in samples(2)
-        ],
-        [q.cubic.real for q in samples(2)],
-        remark="Tried on arbitrary nonlinearities.",
-    )
-
-
-@CHAPTER.formula(
-    "eq-14-imaginary",
-    "eq. 14",
-    "Imaginary part of G21",
-    "(Q2_111 - Q2_122 - 2 Q1_112) / 8",
-)
-def _() -> Formula:
-    def corrected(q: Nonlinearity) -> float:
-        return (q.by(2, 1, 1, 1) + q.by(2, 1, 2, 2) - q.by(1, 1, 1, 2) - q.by(1, 2, 2, 2)) / 8.0
-
-    return Formula(
-        [(q.by(2, 1, 1, 1) - q.by(2, 1, 2, 2) - 2.0 * q.by(1, 1, 1, 2)) / 8.0 for q in samples(2)],
-        [q.cubic.imag for q in samples(2)],
-        [
-            Correction(
-                "With (Q2_111 + Q2_122 - Q1_112 - Q1_222) / 8", [corrected(q) for q in samples(2)]
-            )
-        ],
-        "Without consequence for sigma, which is made of the real part.",
-    )
-
-
-@CHAPTER.number("eq-14-value", "eq. 14", "G21, printed as -3.6/8", -0.45)
-def _(_: Evidence) -> Number:
-    speed = hopf_point().belt_speed
-    return Number(Nonlinearity.at(expansion(speed)).cubic.real, remark="Whatever the damping.")
-
-
-@CHAPTER.formula(
-    "eq-15-formula",
-    "eq. 15",
-    "The curvature coefficient sigma from g20, g11 and G21",
-    "sigma = Re{g20 g11 / (2 omega_0)} Re{G21 / 2 + ...}",
-)
-def _() -> Formula:
-    printed = [(q.g20 * q.g11 / (2.0 * q.frequency)).real * q.cubic.real / 2.0 for q in samples(2)]
-    summed = [(q.g20 * q.g11 / (2.0 * q.frequency) + q.cubic / 2.0).real for q in samples(2)]
-    corrected = [
-        (1j * q.g20 * q.g11 / (2.0 * q.frequency) + q.cubic / 2.0).real for q in samples(2)
-    ]
-    at_hopf = Nonlinearity.at(expansion(hopf_point().belt_speed))
-    without = (at_hopf.g20 * at_hopf.g11 / 2.0 + at_hopf.cubic / 2.0).real
-    return Formula(
-        printed,
-        [q.sigma for q in samples(2)],
-        [
-            Correction("With a sum in place of the product", summed),
-            Correction("With i in front of g20 g11, and a sum in place of the product,", corrected),
-        ],
-        f"Compared with the projection method. Without i the sum would be {without:.4g} at v_b1.",
-    )
-
-
-@CHAPTER.number("eq-15-value", "eq. 15", "sigma at v_b1, printed as -3.6/16", -0.225)
-def _(_: Evidence) -> Number:
-    sigma = first_lyapunov_coefficient(expansion(hopf_point().belt_speed))
-    assert sigma is not None
-    return Number(sigma, remark="By the projection method, from heyoka's derivatives.")
-
-
-@CHAPTER.number("eq-15-imaginary", "eq. 15", "Imaginary part beside it, 1.7788^2/16", 0.1978)
-def _(_: Evidence) -> Number:
-    value, taken = (
-        (q.g20 * q.g11 * 0.5j).imag
-        for q in (
-            Nonlinearity.at(expansion(hopf_point(damping).belt_speed, damping))
-            for damping in (DAMPING, TAKEN_DAMPING)
-        )
-    )
-    return Number(
-        value,
-        [Correction(TAKEN_FOR_DAMPING, taken)],
-        f"Of i g20 g11 / 2; even with the damping of eq. 8 it is 3.6^2 v_b1^2 / 32 = {taken:.4f}. "
-        "Without consequence for sigma.",
-    )
-
-
-@CHAPTER.statement(
-    "stable-below", "section 2", "Below v_b1 the limit cycle is stable and the equilibrium is not"
-)
+@computes("stable-below")
 def _(_: Evidence) -> Observation:
     speeds = (*SLOWER, 0.2, 0.4, 0.45, 0.48)
     found = [cycles(speed) for speed in speeds]
@@ -581,18 +357,26 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement("low-conditions", "section 2", "At v0 = 0.45: p > 0 and p^2 - 4 q < 0")
-def _(_: Evidence) -> Observation:
-    return _criterion(0.45, 1.0)
+@computes("low-conditions", 0.45, 1.0)
+@computes("high-conditions", 0.495, -1.0)
+def _(_: Evidence, belt_speed: float, sign: float) -> Observation:
+    matrix = expansion(belt_speed).jacobian
+    p, q = float(np.trace(matrix)), float(np.linalg.det(matrix))
+    discriminant = p**2 - 4.0 * q
+    return Observation(
+        f"p = {p:.5f}, p^2 - 4 q = {discriminant:.4f}",
+        p * sign > 0.0 and discriminant < 0.0,
+        remark=f"q, which is not defined, is the determinant {q:.4g}.",
+    )
 
 
-@CHAPTER.statement("low-focus", "section 2", "At v0 = 0.45 the equilibrium is an unstable focus")
+@computes("low-focus")
 def _(_: Evidence) -> Observation:
     upper = expansion(0.45).eigenvalues[0]
     return Observation(_complex(upper), upper.real > 0.0 and upper.imag > 0.0)
 
 
-@CHAPTER.statement("low-cycle", "section 2", "At v0 = 0.45 the motion ends on a stable limit cycle")
+@computes("low-cycle")
 def _(evidence: Evidence) -> Observation:
     (portrait,) = [p for p in evidence.portraits(6).portraits if p.drive.belt_speed == 0.45]
     (cycle,) = cycles(0.45)
@@ -605,7 +389,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement("two-kinds", "section 2", "The vibration is pure slip, or stick-slip")
+@computes("two-kinds")
 def _(evidence: Evidence) -> Observation:
     measures = evidence.bifurcation(2).diagram.measures
     speeds = evidence.bifurcation(2).values
@@ -622,12 +406,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement("high-conditions", "section 2", "At v0 = 0.495: p < 0 and p^2 - 4 q < 0")
-def _(_: Evidence) -> Observation:
-    return _criterion(0.495, -1.0)
-
-
-@CHAPTER.statement("high-focus", "section 2", "At v0 = 0.495 the equilibrium is a stable focus")
+@computes("high-focus")
 def _(_: Evidence) -> Observation:
     upper = expansion(0.495).eigenvalues[0]
     taken = expansion(0.495, TAKEN_DAMPING).eigenvalues[0]
@@ -640,7 +419,7 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@CHAPTER.statement("high-rest", "section 2", "At v0 = 0.495 the solution dies out to zero")
+@computes("high-rest")
 def _(evidence: Evidence) -> Observation:
     (portrait,) = [p for p in evidence.portraits(6).portraits if p.drive.belt_speed == 0.495]
     midpoint, amplitude = portrait.measures.midpoint or 0.0, portrait.measures.amplitude or 0.0
@@ -650,17 +429,6 @@ def _(evidence: Evidence) -> Observation:
         amplitude < 1e-4 and abs(midpoint) < 1e-4,
         amplitude < 1e-4 and abs(midpoint - equilibrium) < 1e-4,
         f"Its deviation does: X ends at the equilibrium {equilibrium:.4f} of eq. 6.",
-    )
-
-
-def _criterion(belt_speed: float, sign: float) -> Observation:
-    matrix = expansion(belt_speed).jacobian
-    p, q = float(np.trace(matrix)), float(np.linalg.det(matrix))
-    discriminant = p**2 - 4.0 * q
-    return Observation(
-        f"p = {p:.5f}, p^2 - 4 q = {discriminant:.4f}",
-        p * sign > 0.0 and discriminant < 0.0,
-        remark=f"q, which is not defined, is the determinant {q:.4g}.",
     )
 
 

@@ -1,7 +1,5 @@
 """The closed loop without ROS, sampled or continuous as in the paper, and its measures."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
@@ -10,9 +8,7 @@ from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycles import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver, RunObserver
 from stickslip_ros.physics.motion.motion import Motion
-
-Progress = Callable[[float], None]
-"""Told now and then what share (0 to 1) of the work is done."""
+from stickslip_ros.progress import Progress
 
 
 def measure_block(motion: Motion, meter: CycleMeter, observer: MotionObserver | None) -> None:

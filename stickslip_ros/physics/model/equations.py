@@ -15,6 +15,9 @@ from stickslip_ros.physics.model.friction import FrictionLaw
 X, Y, W = hy.make_vars("x", "y", "w")
 """Displacement X, speed Y = X' and, under continuous control, the state W of the washout filter."""
 
+SPEED = 1
+"""Where Y stands in a state."""
+
 
 @dataclass(frozen=True)
 class WashoutGains:

@@ -1,32 +1,25 @@
 """The exact stick-slip motion of a drive under a held force, or under continuous control."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from math import copysign, inf, ulp
-from typing import Any, ClassVar, Self
+from typing import ClassVar
 
 import heyoka as hy
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import Equations, WashoutGains
-from stickslip_ros.physics.model.friction import FrictionLaw
-
-# heyoka warns on standard output, which is for results, where a marker's polynomial is nothing but
-# rounding, as in equilibrium.
-hy.set_logger_level_error()
-
-UNBOUNDED_SPEED = 1e3
-"""Dimensionless speed of the slide beyond which the motion is said to run away."""
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.motion.integrator import (
+    BELT_SPEED_REACHED,
+    RUN_AWAY,
+    UNBOUNDED_SPEED,
+    Integrator,
+    Integrators,
+)
 
 _LARGEST_FORCE = 1e100
 """Dimensionless; any that is larger makes the motion run away at once, too, and is taken for it."""
-
-_BELT_SPEED_REACHED, _RUN_AWAY = 0, 1
-"""The terminal events of the slipping motion, in heyoka's numbering."""
 
 _SPARE_STEPS, _STEPS_PER_RADIAN = 4_000_000, 10_000
 """Steps of integration that a motion may take: seconds of work, and a thousand times the usual."""
@@ -39,25 +32,6 @@ _STEPS_OF_A_PHASE = 10
 
 _NO_EVENT = hy.taylor_outcome.time_limit.value
 _NOT_FINITE = hy.taylor_outcome.err_nf_state.value
-
-
-@dataclass(frozen=True, slots=True)
-class _Integrator:
-    """A compiled integrator, and views of its arrays: making them costs as much as a short step.
-
-    An element of a memoryview is read and written in half the time of an array's.
-    """
-
-    taylor: Any
-    state: FloatArray
-    variables: "memoryview[float]"
-    """X, Y and, under continuous control, W: where the state begins."""
-    parameters: "memoryview[float]"
-
-    @classmethod
-    def of(cls, taylor: Any, equations: Equations) -> Self:
-        state = taylor.state
-        return cls(taylor, state, state[: len(equations.slip)].data, taylor.pars.data)
 
 
 class Motion:
@@ -73,8 +47,8 @@ class Motion:
     `advance` and act from then on.
     """
 
-    _more_variables: ClassVar[bool] = False
-    """Whether what is integrated has more variables than the motion (see `_system`)."""
+    _with_derivatives: ClassVar[bool] = False
+    """Whether the variational equations are integrated, too."""
 
     def __init__(
         self,
@@ -95,7 +69,6 @@ class Motion:
         """Whether the motion has run away; it does not advance any further then."""
         self._recording = record
         self._recorded: list[tuple[float, float, float, bool]] = []
-        self._marks: list[tuple[float, float, float]] = []
         self._continuous_control = continuous_control
         self._controller = WashoutGains(drive.angular_frequency, 0.0, 0.0)
         self._gains = self._controller.scaled(drive)
@@ -104,9 +77,11 @@ class Motion:
         self._time = self._breakpoint_time = 0.0
         self._x = self._y = self._w = 0.0
         self._drive = drive
-        self._compiled: dict[type[FrictionLaw], tuple[Equations, _Integrator | None]] = {}
-        self._compiled_slip: dict[tuple[type[FrictionLaw], bool], _Integrator] = {}
-        self._use_law(type(drive.friction))
+        self._integrators = Integrators(
+            continuous_control=continuous_control, with_derivatives=self._with_derivatives
+        )
+        self._marks = self._integrators.marks
+        self._use_law()
         self._set_parameters()
         self.restart(position, velocity)
 
@@ -138,7 +113,7 @@ class Motion:
         old, force = self._drive, self.force
         position, velocity, filter_output = self.position, self.velocity, self._filter_output
         self._drive = drive
-        self._use_law(type(drive.friction))
+        self._use_law()
         if drive.speed_scale != old.speed_scale or drive.length_scale != old.length_scale:
             self._x, self._y = position / drive.length_scale, velocity / drive.speed_scale
         self._scale_controller(filter_output)
@@ -157,7 +132,7 @@ class Motion:
             return
         parameters = self._slipping.parameters
         self._recording = recording
-        self._use_law(type(self._drive.friction))
+        self._use_law()
         self._slipping.parameters[:] = parameters
         self._append_breakpoint(0.0, self._x, self._y, sticking=False)
 
@@ -330,14 +305,14 @@ class Motion:
                 self._x -= copysign(margin, self._sign)
             self._y += copysign(max(ulp(self._belt_speed), ulp(1.0)), self._sign)
         event, now = self._propagate(self._slipping, now, end)
-        if event == _BELT_SPEED_REACHED:
+        if event == BELT_SPEED_REACHED:
             self._y = self._belt_speed
         if self._recording:
             for instant, x, y in self._marks:
                 self._append_breakpoint(instant, x, y, sticking=False)
             self._marks.clear()
             self._append_breakpoint(now, self._x, self._y, sticking=False)
-        if event == _BELT_SPEED_REACHED:
+        if event == BELT_SPEED_REACHED:
             self._settle()
         elif event is not None:
             self.unbounded = True
@@ -347,7 +322,7 @@ class Motion:
         return 8.0 * ulp(abs(self._x) + abs(reaction) + abs(self._force) + self._static)
 
     def _propagate(
-        self, integrator: _Integrator, now: float, end: float
+        self, integrator: Integrator, now: float, end: float
     ) -> tuple[int | None, float]:
         """Integrate the state from `now` to `end`; return what event ended it, and when."""
         taylor, variables = integrator.taylor, integrator.variables
@@ -355,7 +330,7 @@ class Motion:
         if self._continuous_control:
             variables[2] = self._w
         taylor.time = now
-        if self._sudden_speed == inf:
+        if self._characteristic_speed == inf:
             reached = taylor.propagate_until(end, self._steps_left)
         else:
             reached = taylor.propagate_until(end, self._steps_left, self._longest_step())
@@ -365,7 +340,7 @@ class Motion:
             taylor.reset_cooldowns()
             self._sign = copysign(1.0, -self._reaction())
             self._y = self._sign * UNBOUNDED_SPEED
-            return _RUN_AWAY, now
+            return RUN_AWAY, now
         self._x, self._y = variables[0], variables[1]
         if self._continuous_control:
             self._w = variables[2]
@@ -383,13 +358,13 @@ class Motion:
         return -outcome - 1, float(taylor.time)
 
     def _longest_step(self) -> float:
-        """Return a time in which the slide's speed changes by the law's sudden speed at most.
+        """Return a time in which the slide's speed changes by the law's characteristic one at most.
 
         heyoka judges a step by what the series shows where it starts. An exponential that is next
         to nothing there, and rises before the step ends, would not be seen.
         """
         acceleration = abs(self._reaction()) + abs(self._x) + abs(self._y) + self._static
-        return self._sudden_speed / acceleration if acceleration > 0.0 else inf
+        return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
 
     def _append_breakpoint(self, now: float, x: float, y: float, *, sticking: bool) -> None:
         if self._recording:
@@ -399,62 +374,19 @@ class Motion:
             )  # not back by the rounding of a step
             self._recorded.append((self._breakpoint_time, x, y, sticking))
 
-    def _use_law(self, law: type[FrictionLaw]) -> None:
-        if law not in self._compiled:
-            equations = Equations(law, self._continuous_control)
-            curved = self._continuous_control or self._more_variables
-            self._compiled[law] = equations, self._compile_stick(equations) if curved else None
-        self._equations, self._sticking = self._compiled[law]
-        slip = law, self._recording
-        if slip not in self._compiled_slip:
-            self._compiled_slip[slip] = self._compile_slip(self._equations)
-        self._slipping = self._compiled_slip[slip]
-
-    def _compile_slip(self, equations: Equations) -> _Integrator:
-        falling = hy.event_direction.negative
-        # It runs away in the direction it slips in. Of the order of one, since heyoka's error is
-        # relative to the largest of states and events.
-        runs_away = 1.0 - equations.sign * equations.slip[0][1] / UNBOUNDED_SPEED
-        markers = []
-        if self._recording:
-            markers = [
-                hy.nt_event(equations.slip[0][1], callback=_marker(self._marks, turning=True)),
-                hy.nt_event(equations.acceleration, callback=_marker(self._marks)),
-            ]
-        taylor = hy.taylor_adaptive(
-            self._system(equations.slip),
-            [0.0] * len(equations.slip),
-            t_events=[
-                hy.t_event(equations.sign * equations.relative_speed, direction=falling),
-                hy.t_event(runs_away, direction=falling),
-            ],
-            nt_events=markers,
-            fast_math=True,  # a quarter faster; the error stays below 2e-12 over 190 periods
-        )
-        return _Integrator.of(taylor, equations)
-
-    def _compile_stick(self, equations: Equations) -> _Integrator:
-        falling = hy.event_direction.negative
-        taylor = hy.taylor_adaptive(
-            self._system(equations.stick),
-            [0.0] * len(equations.stick),
-            t_events=[
-                hy.t_event(equations.static - equations.reaction, direction=falling),
-                hy.t_event(equations.static + equations.reaction, direction=falling),
-            ],
-        )
-        return _Integrator.of(taylor, equations)
-
-    def _system(self, right_hand_side: Any) -> Any:
-        """Return what is integrated for a right-hand side: here, only that."""
-        return right_hand_side
+    def _use_law(self) -> None:
+        law = type(self._drive.friction)
+        self._equations, self._sticking = self._integrators.stick(law)
+        self._slipping = self._integrators.slip(law, recording=self._recording)
 
     def _set_parameters(self) -> None:
         values = self._equations.parameters(self._drive)
         self._belt_speed = values["belt_speed"]
         self._damping = values["damping"]
         self._static = values["static"]
-        self._sudden_speed = self._drive.friction.sudden_speed / self._drive.speed_scale
+        self._characteristic_speed = (
+            self._drive.friction.characteristic_speed / self._drive.speed_scale
+        )
         values |= vars(self._gains)
         indices = self._equations.index
         for integrator in (self._slipping, self._sticking):
@@ -466,18 +398,3 @@ class Motion:
                 index = indices[name]
                 if index < count:  # heyoka keeps those up to the last one an equation uses
                     parameters[index] = value
-
-
-def _marker(
-    marks: list[tuple[float, float, float]], *, turning: bool = False
-) -> Callable[[Any, float, int], None]:
-    """Return a callback that notes the state at an event; at a turning point Y is zero.
-
-    A plain function, not a method: heyoka copies its callbacks, and with a method its object.
-    """
-
-    def mark(integrator: Any, now: float, _: int) -> None:
-        x, y = integrator.update_d_output(now)[:2].tolist()
-        marks.append((now, x, 0.0 if turning else y))
-
-    return mark

@@ -29,7 +29,7 @@ class CubicLoop:
     """v0, above zero."""
 
     @classmethod
-    def of(cls, drive: Drive) -> Self | None:
+    def from_drive(cls, drive: Drive) -> Self | None:
         """Return the coefficients of `drive`; None if its law is another or its belt rests."""
         law = drive.friction.scaled(drive.speed_scale)
         if not isinstance(law, Stribeck) or drive.belt_speed == 0.0:

@@ -8,14 +8,8 @@ import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
-from stickslip_ros.physics.theory.linear import (
-    SPEED,
-    Expansion,
-    expand,
-    hurwitz_determinants,
-    jacobians,
-)
+from stickslip_ros.physics.model.equations import SPEED, WashoutGains
+from stickslip_ros.physics.theory.linear import Expansion, expand, hurwitz_determinants, jacobians
 from stickslip_ros.physics.theory.roots import zero_between
 
 _BELT_SPEEDS = np.geomspace(1e-6, 1e3, 4001)
@@ -55,7 +49,7 @@ class ComplexPair:
     """p with A^T p = (growth - i frequency) p, and p* q = 1."""
 
     @classmethod
-    def of(cls, expansion: Expansion) -> Self | None:
+    def from_expansion(cls, expansion: Expansion) -> Self | None:
         """Return the pair of the Jacobian; None if its eigenvalues are real."""
         decomposed: Any = np.linalg.eig(expansion.jacobian)
         values, right = decomposed
@@ -108,7 +102,7 @@ def first_lyapunov_coefficient(expansion: Expansion) -> float | None:
     amplitude along the eigenvector and is divided by the frequency.
     """
     jacobian, quadratic, cubic = expansion.jacobian, expansion.quadratic, expansion.cubic
-    pair = ComplexPair.of(expansion)
+    pair = ComplexPair.from_expansion(expansion)
     if pair is None:
         return None
     frequency, q, p = pair.frequency, pair.right, pair.left
@@ -127,7 +121,7 @@ def first_lyapunov_coefficient(expansion: Expansion) -> float | None:
 
 def crossing_speed(expansion: Expansion) -> float | None:
     """Return d Re(l)/d v0 of the complex pair l, eq. 11 and 22, dimensionless; None without one."""
-    pair = ComplexPair.of(expansion)
+    pair = ComplexPair.from_expansion(expansion)
     if pair is None:
         return None
     return float((pair.left.conj() @ expansion.jacobian_by_belt_speed @ pair.right).real)

@@ -7,11 +7,11 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.equations import SPEED, WashoutGains
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.physics.theory.hopf import ComplexPair
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, shoot
-from stickslip_ros.physics.theory.linear import SPEED, expand
+from stickslip_ros.physics.theory.linear import expand
 
 _STEPS = 16
 """Gains between the critical one and the one that is wanted, closest where the cycle is small."""
@@ -53,7 +53,7 @@ def limit_cycle_from_hopf(drive: Drive, gains: WashoutGains) -> LimitCycle | Non
 def _by_normal_form(drive: Drive, gains: WashoutGains, sigma: float) -> FloatArray | None:
     """Return displacement (m) and filter state (m) at the upward turning point, and period (s)."""
     expansion = expand(drive, gains)
-    pair = None if expansion is None else ComplexPair.of(expansion)
+    pair = None if expansion is None else ComplexPair.from_expansion(expansion)
     if pair is None or sigma * pair.growth >= 0.0:
         return None
     # Y = r cos(theta) is zero and rises at -pi/2.

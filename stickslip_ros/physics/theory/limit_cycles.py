@@ -17,10 +17,10 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.measures.cycles import EQUILIBRIUM_SPEED, CycleMeter, Measures
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
-from stickslip_ros.physics.motion.motion import UNBOUNDED_SPEED
+from stickslip_ros.physics.model.equations import SPEED, WashoutGains
+from stickslip_ros.physics.motion.integrator import UNBOUNDED_SPEED
+from stickslip_ros.physics.motion.variational import SensitiveMotion, TooStiffError
 from stickslip_ros.physics.theory.averaging import averaged_growth
-from stickslip_ros.physics.theory.linear import SPEED
 from stickslip_ros.physics.theory.returns import (
     follow,
     largest_cycle,
@@ -29,38 +29,18 @@ from stickslip_ros.physics.theory.returns import (
     release_position,
 )
 from stickslip_ros.physics.theory.roots import zero_between
-from stickslip_ros.physics.theory.sensitivity import SensitiveMotion, TooStiffError
 
 _ROUNDING = 1e-13
 """Share of the displacement below which a difference is rounding."""
 
-_TOLERANCE = 1e-12
-"""Share of the displacement by which a cycle may miss its start."""
-
-_ISOLATED = 1e-10
-"""Distance of a multiplier from 1 within which the orbit is one of a family, no limit cycle."""
-
 _NEAR = 1e-6
 """Share within which a turn of a run, or a measured period, is to agree with the one before it."""
-
-_NEWTON_STEPS, _HALVINGS = 40, 10
-
-_SMALLEST_CYCLE = 1e-6
-"""Distance from the equilibrium, in belt speeds, below which a cycle is taken for it."""
-
-_INNERMOST = 1e-4
-"""Least distance from the equilibrium to look at, in the smallest speed that matters."""
 
 _CORNER = 1e-6
 """Share of its distance within which the cycle that sticks is looked for."""
 
 _RATIO = 1.1
 """Of one distance to the next."""
-
-_FRICTION_SCALES = 10.0
-"""Static forces and belt speeds beyond which averaging says whether there can be a cycle."""
-
-_BISECTIONS = 60
 
 
 @dataclass(frozen=True)
@@ -175,8 +155,8 @@ class _ReturnMap:
     def __init__(self, drive: Drive) -> None:
         self._motion = SensitiveMotion(drive)
         self._equilibrium = float(self._motion.rate[SPEED])
-        speed = min(abs(drive.belt_speed), drive.friction.sudden_speed) / drive.speed_scale
-        self._innermost = max(_INNERMOST * min(speed, 1.0), least_cycle(drive) or 0.0)
+        speed = min(abs(drive.belt_speed), drive.friction.characteristic_speed) / drive.speed_scale
+        self._innermost = max(1e-4 * min(speed, 1.0), least_cycle(drive) or 0.0)
         self._outermost = _outermost(drive)
 
     def growth(self, distance: float) -> float:
@@ -258,7 +238,7 @@ class _ReturnMap:
 
         From either end it comes nearer to zero, and is nearest where its slope changes sign.
         """
-        for _ in range(_BISECTIONS):
+        for _ in range(60):
             middle = (inner + outer) / 2.0
             if self.growth(middle) * growth < 0.0:
                 return middle
@@ -291,7 +271,7 @@ def _outermost(drive: Drive) -> float:
     belt_speed = abs(drive.belt_speed) / drive.speed_scale
     amplitudes = np.geomspace(belt_speed, UNBOUNDED_SPEED, 200)
     growing = amplitudes[averaged_growth(drive, belt_speed, amplitudes) > 0.0]
-    by_friction = _FRICTION_SCALES * (belt_speed + drive.friction.static)
+    by_friction = 10.0 * (belt_speed + drive.friction.static)
     return max(by_friction, 2.0 * float(growing.max(initial=0.0)))
 
 
@@ -344,7 +324,8 @@ class _Shot:
         start[SPEED] = 0.0
         motion.start(start)
         distance = float(motion.rate[SPEED])
-        smallest = _SMALLEST_CYCLE * abs(drive.belt_speed) / drive.speed_scale
+        # Closer than this it is taken for the equilibrium.
+        smallest = 1e-6 * abs(drive.belt_speed) / drive.speed_scale
         if distance < smallest or not 0.0 < period < longest_return(drive):
             return None
         motion.advance(period)
@@ -375,26 +356,27 @@ class _Shot:
 def _solve(motion: SensitiveMotion, state: FloatArray, period: float) -> LimitCycle | None:
     """Solve for the cycle by Newton's method, each step halved until it comes nearer.
 
-    It ends where rounding lets no step come nearer. None where it misses still.
+    It ends where rounding lets no step come nearer. None where it misses still, or a multiplier of
+    one tells that it is one of a family.
     """
     guess = state.copy()
     guess[SPEED] = period * motion.drive.angular_frequency
     shot = _Shot.fire(motion, guess)
     if shot is None:
         return None
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(40):
         nearer = _nearer(motion, shot)
         if nearer is None:
             break
         shot = nearer
-    if shot.miss > _TOLERANCE or any(abs(m - 1.0) < _ISOLATED for m in shot.multipliers()):
+    if shot.miss > 1e-12 or any(abs(m - 1.0) < 1e-10 for m in shot.multipliers()):
         return None
     return _cycle(motion, shot)
 
 
 def _nearer(motion: SensitiveMotion, shot: _Shot) -> _Shot | None:
     step = shot.newton_step()
-    for halvings in range(_HALVINGS):
+    for halvings in range(10):
         trial = _Shot.fire(motion, shot.unknowns + 2.0**-halvings * step)
         if trial is not None and trial.miss < shot.miss:
             return trial

@@ -23,9 +23,6 @@ from stickslip_ros.physics.model.friction import FrictionLaw
 
 _HIGHEST_ORDER = 3
 
-SPEED = 1
-"""Where the slide's speed Y stands in the state."""
-
 
 @dataclass(frozen=True)
 class Expansion:

@@ -15,10 +15,8 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
-from stickslip_ros.physics.motion.motion import UNBOUNDED_SPEED, Motion
-
-_LEAST_SPEED, _SPEEDS = 1e-6, 2048
-"""Least speed at which g is looked at, in the smallest that matters, and how many there are."""
+from stickslip_ros.physics.motion.integrator import UNBOUNDED_SPEED
+from stickslip_ros.physics.motion.motion import Motion
 
 _ROUNDING = 16.0 * float(np.finfo(float).eps)
 """Share of its terms below which g is rounding."""
@@ -108,8 +106,8 @@ def _net_force(drive: Drive) -> tuple[FloatArray, FloatArray]:
     """Return speeds y on either side of rest and of the belt's speed, and g there."""
     law = drive.friction.scaled(drive.speed_scale)
     belt_speed = abs(drive.belt_speed) / drive.speed_scale
-    least = _LEAST_SPEED * min(belt_speed, drive.friction.sudden_speed / drive.speed_scale)
-    distances = np.geomspace(least, UNBOUNDED_SPEED, _SPEEDS)
+    least = 1e-6 * min(belt_speed, drive.friction.characteristic_speed / drive.speed_scale)
+    distances = np.geomspace(least, UNBOUNDED_SPEED, 2048)
     relative_speed = np.concatenate(
         [-belt_speed - distances, [-belt_speed], -distances, distances,
         (distances - belt_speed)[distances < belt_speed]]

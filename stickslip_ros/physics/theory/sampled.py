@@ -25,16 +25,8 @@ LONGEST_DELAY = 300
 SETTLED = 0.01
 """Share of its first size to which a deviation has fallen after the settling time."""
 
-_LARGE_ORDER = 24
-"""Order of the loop's matrix above which to look at many gains takes long."""
-
-_BISECTIONS = 60
-
 _ROUNDING = 1e-14
 """Share by which a multiplier is not known better."""
-
-_TERMS = 16
-"""Of the exponential series of a matrix of norm one half, in which rounding hides what is left."""
 
 _SLIDE, _FILTER = slice(0, 2), 2
 """Where X, Y and the filter's z = d w stand in the state; forces under way follow."""
@@ -82,7 +74,7 @@ class LinearSampledLoop:
     """Of the open loop, dimensionless (see `theory.linear`); shape (2, 2)."""
 
     @classmethod
-    def of(cls, drive: Drive, rate: float, force_delay: float = 0.0) -> Self | None:
+    def from_drive(cls, drive: Drive, rate: float, force_delay: float = 0.0) -> Self | None:
         """Return the loop at `rate` (Hz) with `force_delay` (s); None as `why_no_linear_loop`."""
         expansion = expand(drive)
         if expansion is None or why_no_linear_loop(drive, rate, force_delay):
@@ -171,7 +163,7 @@ class LinearSampledLoop:
 
         For searches. To hold the force delays it too, by half a period on average; the sum stays.
         """
-        if self.order <= _LARGE_ORDER:
+        if self.order <= 24:  # to look at many gains takes no long time
             return self
         rate = min(self.rate, max(20.0 / self.force_delay, 5.0 * self.drive.angular_frequency))
         mean_delay = self.force_delay + 0.5 / self.rate
@@ -288,7 +280,7 @@ class _Boundary:
         theta, imaginary = theta[imaginary != 0.0], imaginary[imaginary != 0.0]
         rows = np.flatnonzero(np.sign(imaginary[:-1]) * np.sign(imaginary[1:]) < 0.0)
         low, high, rising = theta[rows], theta[rows + 1], np.sign(imaginary[rows + 1])
-        for _ in range(_BISECTIONS):
+        for _ in range(60):
             middle = (low + high) / 2.0
             above = self.gain(middle).imag * rising > 0.0
             low, high = np.where(above, low, middle), np.where(above, middle, high)
@@ -338,7 +330,8 @@ def _exponential(matrix: FloatArray) -> FloatArray:
     squarings = max(frexp(float(np.abs(matrix).sum(axis=0).max()))[1] + 1, 0)
     part, one = matrix * 0.5**squarings, np.eye(len(matrix))
     found = one
-    for order in range(_TERMS, 0, -1):
+    # Of a norm of one half: rounding hides what is left of the series.
+    for order in range(16, 0, -1):
         found = one + part @ found / order
     for _ in range(squarings):
         found = found @ found

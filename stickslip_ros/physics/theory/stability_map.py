@@ -76,7 +76,7 @@ class CriticalGainCurves:
         gains = np.full((len(rates), len(force_delays)), np.nan)
         for row, rate in enumerate(rates.tolist()):
             for column, force_delay in enumerate(force_delays.tolist()):
-                loop = LinearSampledLoop.of(drive, rate, force_delay)
+                loop = LinearSampledLoop.from_drive(drive, rate, force_delay)
                 critical = loop.critical_linear_gain(corner_frequency) if loop else None
                 if critical is not None:
                     gains[row, column] = critical

@@ -20,9 +20,6 @@ _AVERAGED = np.geomspace(1e-4, 1e4, 200)
 _FOLLOWED = np.geomspace(4.0, 0.02, 100)
 """Belt speeds between which the motion is followed, in averaged onsets, or else in the drive's."""
 
-_JUST_BELOW = 1e-9
-"""Share by which a belt speed is below the onset where the slide is taken to stick."""
-
 _ROUNDING = 1e-12
 """Share of the belt speed below which a difference of speeds is rounding."""
 
@@ -141,7 +138,7 @@ def _ranges(
 
     tried = [(speed, margin(speed)) for speed in speeds if onset is None or speed < onset]
     if onset is not None:  # below it there is a range, be it ever so narrow
-        tried.insert(0, (onset * (1.0 - _JUST_BELOW), 1.0))
+        tried.insert(0, (onset * (1.0 - 1e-9), 1.0))
     tried.reverse()
     low = tried[0][0] if tried[0][1] > 0.0 else None
     for (speed, before), (next_speed, now) in pairwise(tried):

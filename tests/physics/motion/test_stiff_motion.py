@@ -7,7 +7,7 @@ import pytest
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model.friction import Coulomb
 from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.physics.theory.sensitivity import SensitiveMotion, TooStiffError
+from stickslip_ros.physics.motion.variational import SensitiveMotion, TooStiffError
 from tests.physics.drives import PAPER
 
 STIFF = replace(PAPER, damping=1e9)

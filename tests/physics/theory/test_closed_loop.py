@@ -35,7 +35,7 @@ def test_the_general_theory_agrees_with_the_closed_forms(
 ) -> None:
     force, speed = drive.normal_force, drive.speed_scale
     gains = WashoutGains(corner_frequency * drive.angular_frequency, 0.0, cubic * force / speed**3)
-    forms = CubicLoop.of(drive)
+    forms = CubicLoop.from_drive(drive)
     assert forms is not None
     expected = forms.critical_linear_gain(corner_frequency)
     critical = critical_gains(drive, gains)
@@ -58,7 +58,7 @@ def test_the_general_theory_agrees_with_the_closed_forms(
 
 
 def test_closed_forms_to_twelve_digits_at_the_papers_drive() -> None:
-    forms = CubicLoop.of(PAPER)
+    forms = CubicLoop.from_drive(PAPER)
     assert forms is not None
     for corner_frequency in (0.1, 0.2, 0.5, 1.0, 2.0):
         critical = critical_gains(PAPER, WashoutGains(corner_frequency, 0.0, -1.0))

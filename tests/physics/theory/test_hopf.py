@@ -61,7 +61,7 @@ def test_hopf_point_in_si_units() -> None:
 
 @given(cubic_drives)
 def test_the_general_theory_agrees_with_the_closed_forms(drive: Drive) -> None:
-    cubic = CubicLoop.of(drive)
+    cubic = CubicLoop.from_drive(drive)
     assert cubic is not None
     expansion = expand(drive)
     assert expansion is not None

@@ -7,10 +7,10 @@ import pytest
 
 from stickslip_ros.physics.measures.cycles import CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.motion.variational import SensitiveMotion
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run
-from stickslip_ros.physics.theory.sensitivity import SensitiveMotion
 from tests.physics.drives import FEED_DRIVE, PAPER
 
 SUBCRITICAL = WashoutGains(0.2, -0.16, 2.0)

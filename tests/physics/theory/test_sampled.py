@@ -26,7 +26,7 @@ from tests.physics.drives import FEED_DRIVE, PAPER
 
 
 def loop_of(drive: Drive, rate: float, force_delay: float = 0.0) -> LinearSampledLoop:
-    loop = LinearSampledLoop.of(drive, rate, force_delay)
+    loop = LinearSampledLoop.from_drive(drive, rate, force_delay)
     assert loop is not None
     return loop
 
@@ -206,7 +206,7 @@ def test_the_critical_gain_tends_to_that_of_the_continuous_loop(
     belt_speed: float, corner_frequency: float
 ) -> None:
     drive = replace(PAPER, belt_speed=belt_speed)
-    cubic = CubicLoop.of(drive)
+    cubic = CubicLoop.from_drive(drive)
     assert cubic is not None
     assume(abs(cubic.trace * corner_frequency - 1.0) > 0.05)
     expected = cubic.critical_linear_gain(corner_frequency)
@@ -259,7 +259,7 @@ def test_settling_time() -> None:
 
 def test_a_slow_washout_at_the_hopf_point_has_a_triple_root() -> None:
     """At p = 0, (l + r)^3 = l^3 + (d - k1) l^2 + l + d for r = 1/sqrt(3), d = r^3, k1 = d - 3 r."""
-    cubic = CubicLoop.of(PAPER)
+    cubic = CubicLoop.from_drive(PAPER)
     assert cubic is not None
     assert cubic.hopf_speed is not None
     loop = loop_of(replace(PAPER, belt_speed=cubic.hopf_speed), 1e6)
@@ -296,9 +296,9 @@ def test_a_coarser_loop_decays_nearly_alike(force_delay: float) -> None:
 
 
 def test_what_it_does_not_go_into_it_says() -> None:
-    assert LinearSampledLoop.of(replace(PAPER, belt_speed=0.0), 100.0) is None
+    assert LinearSampledLoop.from_drive(replace(PAPER, belt_speed=0.0), 100.0) is None
     assert "belt rests" in (why_no_linear_loop(replace(PAPER, belt_speed=0.0), 100.0, 0.0) or "")
-    assert LinearSampledLoop.of(PAPER, 100.0, 1e4) is None
+    assert LinearSampledLoop.from_drive(PAPER, 100.0, 1e4) is None
     reason = why_no_linear_loop(PAPER, 100.0, 1e4)
     assert reason is not None
     assert str(LONGEST_DELAY) in reason
@@ -308,6 +308,6 @@ def test_what_it_does_not_go_into_it_says() -> None:
 def test_the_longest_delay_and_the_highest_rate() -> None:
     assert loop_of(PAPER, 100.0, LONGEST_DELAY / 100.0).critical_linear_gain(0.1) is not None
     critical = loop_of(PAPER, 1e9).critical_linear_gain(2.0)
-    cubic = CubicLoop.of(PAPER)
+    cubic = CubicLoop.from_drive(PAPER)
     assert cubic is not None
     assert critical == pytest.approx(cubic.critical_linear_gain(2.0), rel=1e-6)

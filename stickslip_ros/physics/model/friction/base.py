@@ -36,7 +36,7 @@ class FrictionLaw(ABC):
         return self.coefficient(-belt_speed, -np.sign(belt_speed))
 
     @property
-    def sudden_speed(self) -> float:
+    def characteristic_speed(self) -> float:
         """Speed within which the coefficient may change by a factor; infinite for polynomials."""
         return inf
 

@@ -28,7 +28,7 @@ class Exponential(FrictionLaw):
     """Viscous rise mu_v of the coefficient with speed, s/m."""
 
     @property
-    def sudden_speed(self) -> float:
+    def characteristic_speed(self) -> float:
         """The decay speed."""
         return float(self.decay_speed)
 

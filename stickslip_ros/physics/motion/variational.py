@@ -1,22 +1,16 @@
 """The exact motion and its derivatives by the state it started from."""
 
-from typing import Any
-
-import heyoka as hy
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.equations import SPEED, WashoutGains
+from stickslip_ros.physics.motion.integrator import Integrator
 from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.physics.theory.linear import SPEED
 
 _GREATEST_EFFORT = 8e6
 """Time of slipping times how stiff it is, dimensionless, to spend on a motion: some seconds."""
-
-_STRETCH = 30.0
-"""Dimensionless time after which the effort is looked at."""
 
 
 class TooStiffError(Exception):
@@ -33,7 +27,7 @@ class SensitiveMotion(Motion):
     where the integration becomes too costly, starts counted together.
     """
 
-    _more_variables = True
+    _with_derivatives = True
 
     def __init__(self, drive: Drive, gains: WashoutGains | None = None) -> None:
         """Start at rest at X = 0: without force, or with `gains` (SI) under continuous control."""
@@ -71,10 +65,9 @@ class SensitiveMotion(Motion):
         self.landed = False
         """Whether the slide came to stick since the start."""
 
-    def _system(self, right_hand_side: Any) -> Any:
-        return hy.var_ode_sys(right_hand_side, hy.var_args.vars, order=1)
-
-    def _propagate(self, integrator: Any, now: float, end: float) -> tuple[int | None, float]:
+    def _propagate(
+        self, integrator: Integrator, now: float, end: float
+    ) -> tuple[int | None, float]:
         # From the identity each time: heyoka's error is relative to the largest of the variables.
         derivatives = integrator.state[self.order :].reshape(self.order, self.order)
         derivatives[:] = np.eye(self.order)
@@ -87,7 +80,7 @@ class SensitiveMotion(Motion):
 
     def _slip(self, now: float, end: float) -> float:
         sign, start = self._sign, now
-        now = super()._slip(now, min(end, now + _STRETCH))
+        now = super()._slip(now, min(end, now + 30.0))
         self._effort += (now - start) * (1.0 + self._stiffness(sign))
         if self._effort > _GREATEST_EFFORT:
             raise TooStiffError

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from stickslip_ros.paper.figures import BifurcationFigure, bifurcation_drive
 from stickslip_ros.physics.theory.sticking import Release
-from stickslip_ros.studies.settled import Case
+from stickslip_ros.studies.settled import ControlledDrive
 from stickslip_ros.studies.transitions import (
     HOPF_POINT,
     STICKING_LIMIT,
@@ -14,18 +14,18 @@ from stickslip_ros.studies.transitions import (
 )
 
 
-def marks(figure: BifurcationFigure) -> dict[str, float]:
+def transition_marks(figure: BifurcationFigure) -> dict[str, float]:
     """Return the values of the parameter at the transitions that the diagram shows, by name."""
     release = Release()
-    margins: dict[str, Callable[[Case], float]] = {
+    margins: dict[str, Callable[[ControlledDrive], float]] = {
         HOPF_POINT: hopf_margin,
         STICKING_LIMIT: lambda case: stick_margin(case, release),
     }
     found: dict[str, float] = {}
     for name, margin in margins.items():
 
-        def at(value: float, margin: Callable[[Case], float] = margin) -> float:
-            return margin(Case(bifurcation_drive(figure.number, value)))
+        def at(value: float, margin: Callable[[ControlledDrive], float] = margin) -> float:
+            return margin(ControlledDrive(bifurcation_drive(figure.number, value)))
 
         if values := list(sign_changes(at, figure.values.tolist())):
             found[name] = values[-1]

@@ -1,0 +1,295 @@
+"""Section 4.1: the washout filter and the closed loop, eq. 16 to 22."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.paper.claims.claim import (
+    Computations,
+    Correction,
+    Evidence,
+    Formula,
+    Number,
+    Observation,
+)
+from stickslip_ros.paper.claims.reference import (
+    BELT_SPEEDS,
+    DAMPING,
+    FILTER,
+    PRINTED_GAIN,
+    PRINTED_HOPF_SPEED,
+    STATES,
+    STUDIED_SPEED,
+    TAKEN_DAMPING,
+    TAKEN_FOR_DAMPING,
+    critical,
+    expansion,
+    for_both,
+    formula_for_both,
+    number_for_both,
+    printed_trace,
+    rates,
+    trace,
+)
+from stickslip_ros.paper.claims.summaries import complex_number, falling, listed
+from stickslip_ros.paper.figures import unit_drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.theory.hopf import crossing_speed, hopf_points
+from stickslip_ros.physics.theory.linear import hurwitz_determinants
+from stickslip_ros.physics.theory.roots import zero_between
+
+computes = Computations()
+
+
+_PRINTED_TRACE = 0.0078
+
+_SOME_GAINS = replace(FILTER, linear=-0.3, cubic=-2.0)
+
+
+@computes("eq-16-linear")
+def _(_: Evidence) -> Observation:
+    found = expansion(STUDIED_SPEED)
+    square, cube = found.quadratic[1, 1, 1] / 2.0, found.cubic[1, 1, 1, 1] / 6.0
+    return Observation(
+        f"{square:.4g} y^2, {cube:.4g} y^3",
+        max(abs(square), abs(cube)) < 1e-9,
+        remark=f"The square and the cube of the Stribeck law are in F, at v0 = {STUDIED_SPEED:g}; "
+        "with a linear law there would be no limit cycle to speak of.",
+    )
+
+
+def _slow_states() -> FloatArray:
+    """Return deviations from the equilibrium in which the slide is slower than the belt, up to ten.
+
+    Near it too: half of them are of the size of one.
+    """
+    states = STATES * np.where(np.arange(STATES.shape[1]) % 2, 10.0, 1.0)
+    states[1] = STUDIED_SPEED - np.abs(states[1])
+    return states
+
+
+def _friction(speed: FloatArray, last: float) -> FloatArray:
+    """Return F of eq. 6 and 16 at the belt speed of section 4.1, with a factor in the last term."""
+    cubes = speed**3 + 3.0 * speed * STUDIED_SPEED**2 - last * speed**2
+    return -0.45 * speed + 0.6 * cubes
+
+
+def _loop_rates(gains: WashoutGains | None) -> FloatArray:
+    states = _slow_states()
+    states[0] += expansion(STUDIED_SPEED).equilibrium[0]
+    return rates(unit_drive(STUDIED_SPEED), states if gains else states[:2], gains)
+
+
+@computes("eq-16")
+def _(_: Evidence) -> Formula:
+    x, y, _w = _slow_states()
+    printed, corrected = (
+        -_friction(y, last) - DAMPING * y - x for last in (3.0, 3.0 * STUDIED_SPEED)
+    )
+    return Formula(
+        printed,
+        _loop_rates(None)[1],
+        [Correction("With the factor v0 in the last term of F", corrected)],
+        "C and K, which are not defined, are 2 beta and 1. F as in eq. 6: while the slide is "
+        "slower than the belt.",
+    )
+
+
+@computes("eq-17")
+def _(_: Evidence) -> Formula:
+    _x, y, w = _slow_states()
+    moved = expansion(STUDIED_SPEED, gains=_SOME_GAINS).equilibrium[0]
+    moved -= expansion(STUDIED_SPEED).equilibrium[0]
+    return Formula(
+        y - _SOME_GAINS.corner_frequency * w,
+        _loop_rates(_SOME_GAINS)[2],
+        remark=f"It moves the equilibrium by {abs(moved):.6f}.",
+    )
+
+
+@computes("eq-18")
+def _(_: Evidence) -> Formula:
+    _x, y, w = _slow_states()
+    v = y - _SOME_GAINS.corner_frequency * w
+    return Formula(
+        None,
+        _loop_rates(_SOME_GAINS)[1] - _loop_rates(None)[1],
+        [
+            Correction(
+                "With v, which is not defined, read as y - d w as in eq. 19",
+                _SOME_GAINS.linear * v + _SOME_GAINS.cubic * v**3,
+            )
+        ],
+    )
+
+
+@computes("eq-18-linear")
+def _(_: Evidence) -> Observation:
+    gains = (0.0, -0.1, -0.3)
+
+    def speeds(cubic: float) -> list[float]:
+        loops = [replace(FILTER, linear=linear, cubic=cubic) for linear in gains]
+        return [hopf_points(unit_drive(0.4), loop)[-1].belt_speed for loop in loops]
+
+    without, with_cubic = speeds(0.0), speeds(-5.0)
+    return Observation(
+        f"v_b1 = {listed(without)}",
+        falling(without) and bool(np.allclose(without, with_cubic, rtol=1e-12)),
+        remark=f"For k1 = {listed(gains)} with d = 2, whatever k2.",
+    )
+
+
+@computes("eq-19")
+def _(_: Evidence) -> Formula:
+    x, y, w = _slow_states()
+    v = y - _SOME_GAINS.corner_frequency * w
+    force = _SOME_GAINS.linear * v + _SOME_GAINS.cubic * v**3
+    friction = _friction(y, 3.0 * STUDIED_SPEED)
+    return Formula(
+        [y, -friction - DAMPING * y - x + force, v],
+        _loop_rates(_SOME_GAINS),
+        remark="With F corrected as in eq. 16, while the slide is slower than the belt. Eq. 18 "
+        "goes into eq. 17, not the reverse.",
+    )
+
+
+def _printed_jacobian(p: float, linear: float) -> FloatArray:
+    return np.array([[0.0, 1.0, 0.0], [-1.0, p + linear, -2.0 * linear], [0.0, 1.0, -2.0]])
+
+
+@computes("eq-20")
+def _(_: Evidence) -> Formula:
+    linear = _SOME_GAINS.linear
+    return Formula(
+        _printed_jacobian(trace(STUDIED_SPEED), linear),
+        expansion(STUDIED_SPEED, gains=_SOME_GAINS).jacobian,
+        remark="That d = 2 is to be read from it; the text does not say so.",
+    )
+
+
+@computes("eq-20-trace")
+def _(_: Evidence) -> Number:
+    return number_for_both(
+        lambda damping: trace(STUDIED_SPEED, damping),
+        "With the damping of eq. 5 there is nothing to control at v0 = 0.49: p is below zero.",
+    )
+
+
+_EQ_21: dict[int, Callable[[FloatArray, float], FloatArray]] = {
+    1: lambda p, k1: 2.0 - (p + k1),
+    2: lambda p, k1: 2.0 * k1 - (p + 1.0),
+    3: lambda p, _: np.full_like(p, 2.0),
+}
+"""The coefficients as printed, of p and k1."""
+
+
+@computes("eq-21-c1", 1)
+@computes("eq-21-c2", 2)
+@computes("eq-21-c3", 3)
+def _(_: Evidence, order: int) -> Formula:
+    """Compare a coefficient of eq. 21, over belt speeds, with that of the loop's Jacobian."""
+
+    def coefficients(damping: float) -> list[float]:
+        expansions = (expansion(speed, damping, _SOME_GAINS) for speed in BELT_SPEEDS.tolist())
+        return [np.poly(found.jacobian)[order] for found in expansions]
+
+    values = _EQ_21[order](printed_trace(BELT_SPEEDS), _SOME_GAINS.linear)
+    return formula_for_both(values, coefficients, _of_printed_c2() if order == 2 else "")
+
+
+def _of_printed_c2() -> str:
+    p = trace(STUDIED_SPEED, TAKEN_DAMPING)
+    # c1 c2 - c3 = 0 with c1 = 2 - p - k1, c2 = 2 k1 - p - 1, c3 = 2, a square in k1
+    discriminant = (5.0 - p) ** 2 - 8.0 * (2.0 + (2.0 - p) * (p + 1.0))
+    true = np.poly(_printed_jacobian(p, _SOME_GAINS.linear))[2]
+    return (
+        f"The matrix of eq. 20 has c2 = 1 - 2 p = {true:.4f} at v0 = {STUDIED_SPEED:g}, "
+        "without k1. With the printed c2 the condition c1 c2 = c3 has "
+        f"{'no' if discriminant < 0.0 else 'a'} real root (discriminant {discriminant:.3g})."
+    )
+
+
+@computes("eq-21-condition")
+def _(_: Evidence) -> Observation:
+    gain = critical(STUDIED_SPEED, TAKEN_DAMPING).linear
+    c1, c2, c3 = np.poly(_printed_jacobian(trace(STUDIED_SPEED, TAKEN_DAMPING), gain))[1:]
+    found = expansion(STUDIED_SPEED, TAKEN_DAMPING, replace(FILTER, linear=gain)).eigenvalues
+    return Observation(
+        f"c1 c2 - c3 = {abs(c1 * c2 - c3):.6f}",
+        abs(c1 * c2 - c3) < 1e-9 and abs(found[0].real) < 1e-9,
+        remark=f"With the coefficients of eq. 20 at the critical gain {gain:.6f}; the pair there "
+        f"has real part {abs(found[0].real):.6f} and the frequency {found[0].imag:.5f}.",
+    )
+
+
+@computes("eq-21-gain")
+def _(_: Evidence) -> Number:
+    rounded = zero_between(
+        lambda k1: float(hurwitz_determinants(_printed_jacobian(_PRINTED_TRACE, k1))[-1]), -0.5, 0.5
+    )
+    exact = critical(STUDIED_SPEED, TAKEN_DAMPING).linear
+    return Number(
+        critical(STUDIED_SPEED, DAMPING).linear,
+        [
+            Correction(TAKEN_FOR_DAMPING, exact),
+            Correction(f"{TAKEN_FOR_DAMPING}, and p rounded to {_PRINTED_TRACE:g}", rounded),
+        ],
+        f"Without that rounding it is {exact:.6f}. The printed c2 did not lead there.",
+    )
+
+
+@computes("eq-22-roots")
+def _(_: Evidence) -> Observation:
+    gains = replace(FILTER, linear=PRINTED_GAIN)
+    pair, _conjugate, real = expansion(STUDIED_SPEED, TAKEN_DAMPING, gains).eigenvalues
+    return Observation(
+        f"{complex_number(pair)} and its conjugate, {real.real:.4f}",
+        pair.imag > 0.0 and real.imag == 0.0,
+        remark="With the damping of eq. 8 and k1 = -0.0395.",
+    )
+
+
+@computes("eq-22-alpha")
+def _(_: Evidence) -> Formula:
+    gains = replace(FILTER, linear=PRINTED_GAIN)
+    found = [expansion(speed, TAKEN_DAMPING, gains).eigenvalues for speed in BELT_SPEEDS.tolist()]
+    printed = -(1.5995 + 1.8 * BELT_SPEEDS**2)
+    off = np.abs(printed - [values.sum().real for values in found]).max()
+    at_studied = expansion(STUDIED_SPEED, TAKEN_DAMPING, gains).eigenvalues[0].real
+    return Formula(
+        printed,
+        [values[0].real for values in found],
+        remark="It deviates from the sum of all three eigenvalues, the trace of eq. 20, by "
+        f"{off:.6f}. The pair's real part at v0 = {STUDIED_SPEED:g} is {at_studied:.6f}, as it "
+        "must be near zero for a Hopf point.",
+    )
+
+
+@computes("eq-22-value")
+def _(_: Evidence) -> Number:
+    return number_for_both(
+        _crossing,
+        "At the critical gain, by projection onto the eigenvectors; printed is the derivative of "
+        "the trace of eq. 20. With the damping of eq. 8 it is {taken:.5f}.",
+    )
+
+
+def _crossing(damping: float) -> float:
+    gains = replace(FILTER, linear=critical(STUDIED_SPEED, damping).linear)
+    found = crossing_speed(expansion(STUDIED_SPEED, damping, gains))
+    assert found is not None
+    return found
+
+
+@computes("eq-11-product", PRINTED_HOPF_SPEED)
+@computes("eq-22-product", STUDIED_SPEED)
+def _(_: Evidence, speed: float) -> Number:
+    return Number(-3.6 * speed, remark="Only the multiplication.")
+
+
+@computes("eq-22-sign")
+def _(_: Evidence) -> Observation:
+    found = for_both(_crossing)
+    return Observation(listed(found), max(found) < 0.0, remark="For both dampings.")

@@ -1,0 +1,70 @@
+"""How far stable loops are from instability."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.theory.roots import zero_between
+from stickslip_ros.physics.theory.sampled import LinearSampledLoop, why_no_linear_loop
+from stickslip_ros.studies.design_task import Task
+
+_LITTLE_GAIN, _LITTLE_DELAY = 1.1, 0.02
+"""What is next to no margin: a factor in the linear gain, and a delay in natural periods."""
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How far stable loops are from the instability of one of them: of all, the one next to it."""
+
+    gain_down: float | None
+    """Factor below one of the linear gain that makes one unstable; None: there is none."""
+    gain_up: float | None
+    """Factor above one that does; None: there is none."""
+    delay: float | None
+    """Further delay of the force that does, s; None: none within half a natural period, or as far
+    as theory goes."""
+
+
+def margins(loops: Sequence[LinearSampledLoop], gains: WashoutGains) -> Margins:
+    """Return how far loops that are stable with these gains (SI units) are from instability."""
+    factors = [
+        end / gains.linear
+        for loop in loops
+        for interval in loop.stable_linear_gains(gains.corner_frequency)
+        if interval.low < gains.linear < interval.high
+        for end in interval
+    ]
+    delays = [delay for loop in loops if (delay := _delay_margin(loop, gains)) is not None]
+    return Margins(
+        gain_down=max((factor for factor in factors if 0.0 < factor < 1.0), default=None),
+        gain_up=min((factor for factor in factors if factor > 1.0), default=None),
+        delay=min(delays, default=None),
+    )
+
+
+def _delay_margin(loop: LinearSampledLoop, gains: WashoutGains) -> float | None:
+    def decay_rate(further: float) -> float:
+        return replace(loop, force_delay=loop.force_delay + further).decay_rate(gains)
+
+    further = np.linspace(0.0, loop.drive.natural_period / 2.0, 33).tolist()
+    for shorter, longer in pairwise(further):
+        if why_no_linear_loop(loop.drive, loop.rate, loop.force_delay + longer) is not None:
+            return None
+        if decay_rate(longer) < 0.0:
+            return zero_between(decay_rate, shorter, longer)
+    return None
+
+
+def little_margin(task: Task, found: Margins) -> str | None:
+    """Return what is to be said of loops that are next to instability; None where none is."""
+    little: list[str] = []
+    if found.gain_down is not None and found.gain_down > 1.0 / _LITTLE_GAIN:
+        little.append(f"{found.gain_down:.3g} times the linear gain is unstable")
+    if found.gain_up is not None and found.gain_up < _LITTLE_GAIN:
+        little.append(f"{found.gain_up:.3g} times the linear gain is unstable")
+    if found.delay is not None and found.delay < _LITTLE_DELAY * task.drive.natural_period:
+        little.append(f"a further delay of {task.shown(found.delay, 's')} makes it unstable")
+    return f"there is next to no margin: {', '.join(little)}" if little else None

@@ -1,0 +1,203 @@
+"""Gains that damp a drive fastest within a force limit, by the linear sampled loop."""
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import replace
+from math import ceil, floor, inf, isinf, log10
+from typing import Self
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import SPEED, WashoutGains
+from stickslip_ros.physics.theory.sampled import LinearSampledLoop
+from stickslip_ros.studies.design_task import Task
+from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
+from stickslip_ros.studies.trial import Vibration
+
+_CORNER_FREQUENCIES = (0.02, 20.0)
+"""Between which the best is looked for, in natural angular frequencies."""
+
+CUBIC_SHARES = (0.0, 0.125, 0.25, 0.5)
+"""Cubic gains that are considered, in the friction law's own cubic coefficient.
+
+With all of it the loop would escape to infinity from high speeds. A positive one softens the
+control where the vibration is large, so that more linear gain fits under the force limit.
+"""
+
+RESERVE = 0.95
+"""Share of what is allowed that the first proposal uses."""
+
+_COARSE, _FINE, _GRIDS, _ZOOM = (25, 41), (9, 9), 5, 0.3
+"""Corner frequencies and gains of the first grid, and of the next ones that close in on the best;
+how many grids in all, and the extent of each in that before."""
+
+_LITTLE_SPEED = 1.05
+"""Factor from the Hopf speed that is next to no margin."""
+
+
+class Candidates:
+    """What theory says of gains: from the linear loops of the range, and the vibrations there."""
+
+    def __init__(self, task: Task, vibrations: Sequence[Vibration]) -> None:
+        self.vibrations = vibrations
+        self.loops = [
+            loop
+            for vibration in vibrations
+            if (loop := LinearSampledLoop.from_drive(vibration.drive, task.rate, task.force_delay))
+        ]
+        self.task = task
+        # The loops differ in one number, the slope of the friction: those at its ends tell all.
+        slopes = [float(loop.jacobian[SPEED, SPEED]) for loop in self.loops]
+        ends = sorted({int(np.argmin(slopes)), int(np.argmax(slopes))})
+        self._extremes = [self.loops[index].coarsened() for index in ends]
+        # Twice what brings the slide to rest without overshoot: beyond it nothing is won.
+        unit = task.drive.normal_force / task.drive.speed_scale
+        self._largest_gain = (4.0 + 2.0 * max(map(abs, slopes))) * unit
+        self._cubic_coefficient = _cubic_coefficient(task.drive)
+        self._peaks: dict[float, float] = {}
+
+    def limited(self, force_limit: float) -> Self:
+        """Return those for another force limit, N."""
+        other = copy(self)
+        other.task = replace(self.task, force_limit=force_limit)
+        return other
+
+    def free_peak_force(self) -> float:
+        """Return the largest force, N, of the fastest gains without limit; 0 if none is stable."""
+        gains = self.limited(inf).best(RESERVE, CUBIC_SHARES)
+        if gains is None:
+            return 0.0
+        return max(vibration.peak_force(gains) for vibration in self.vibrations)
+
+    def slowest(self, gains: WashoutGains) -> LinearSampledLoop:
+        """Return the loop in which a small deviation dies out most slowly."""
+        return min(self.loops, key=lambda loop: loop.decay_rate(gains))
+
+    def best(self, strength: float, cubic_shares: Sequence[float]) -> WashoutGains | None:
+        """Return the gains that damp fastest with the share `strength` of what is allowed.
+
+        They have three digits, and are zero if nothing vibrates. None if none is stable.
+        """
+        if not any(vibration.vibrates for vibration in self.vibrations):
+            none = WashoutGains(rounded(self.task.drive.angular_frequency), 0.0, 0.0)
+            if self.slowest(none).decay_rate(none) > 0.0:
+                return none
+        best, fastest = None, 0.0
+        for share in cubic_shares:
+            cubic = share * self._cubic_coefficient
+            if share > 0.0 and (cubic == 0.0 or isinf(self.task.force_limit)):
+                break
+            gains = self._fastest(strength, cubic)
+            decay_rate = self.slowest(gains).decay_rate(gains)
+            if decay_rate > fastest * 1.05:  # less is not worth a larger cubic gain
+                best, fastest = gains, decay_rate
+        return best
+
+    def why_zero(self) -> str:
+        """Return why zero gains may be proposed."""
+        if any(vibration.vibrates for vibration in self.vibrations):
+            return "no gains within the force limit damp faster than none"
+        distances = {
+            abs(log10(ratio)): hopf_distance(vibration.drive)
+            for vibration in self.vibrations
+            if (ratio := hopf_ratio(vibration.drive)) is not None
+        }
+        said = ["nothing vibrates without control at these belt speeds: the gains are zero"]
+        if distances:
+            nearest = min(distances)
+            little = ", with next to no margin" if nearest < log10(_LITTLE_SPEED) else ""
+            said.append(distances[nearest] + little)
+        return "; ".join(said)
+
+    def why_none(self) -> str:
+        """Return why no gains are stable at all speeds within the force limit."""
+        frequencies = self._corner_frequencies(17).tolist()
+        if not any(map(self._can_be_stable, frequencies)):
+            return (
+                "no linear gain makes the equilibrium stable at all these belt speeds, at this "
+                "rate and delay"
+            )
+        return (
+            f"the force limit of {self.task.shown(self.task.force_limit, 'N')} is too small for "
+            "gains that make the equilibrium stable at all these belt speeds and catch the "
+            "vibration"
+        )
+
+    def _can_be_stable(self, corner_frequency: float) -> bool:
+        """Return whether some linear gain is stable at all speeds."""
+        sets = [loop.stable_linear_gains(corner_frequency) for loop in self._extremes]
+        return any(
+            max(one.low, other.low) < min(one.high, other.high)
+            for one in sets[0]
+            for other in sets[-1]
+        )
+
+    def _fastest(self, strength: float, cubic: float) -> WashoutGains:
+        """Return the fastest gains: the best of a grid that closes in on them."""
+        # A softening cubic gain is one beside a negative linear gain.
+        limits = np.array(
+            [np.log(self._corner_frequencies(2)), [-1.0, 0.0 if cubic > 0.0 else 1.0]]
+        )
+        window, counts = limits, _COARSE
+        best = WashoutGains(0.0, 0.0, 0.0)
+        for _ in range(_GRIDS):
+            logarithms, shares = (
+                np.linspace(low, high, count)
+                for (low, high), count in zip(window, counts, strict=True)
+            )
+            corners = np.exp(logarithms)
+            largest = [self._largest(corner, strength, cubic) for corner in corners.tolist()]
+            gains = np.outer(largest, shares)
+            rates = np.min([loop.decay_rates(corners, gains) for loop in self._extremes], axis=0)
+            row, column = np.unravel_index(int(np.argmax(rates)), rates.shape)
+            best = WashoutGains(*map(rounded, (corners[row], gains[row, column], cubic)))
+            centre = np.array([[logarithms[row]], [shares[column]]])
+            reach = _ZOOM / 2.0 * (window[:, 1:] - window[:, :1])
+            window = np.clip(centre + reach * [-1.0, 1.0], limits[:, :1], limits[:, 1:])
+            counts = _FINE
+        return best
+
+    def _corner_frequencies(self, count: int) -> FloatArray:
+        """Return corner frequencies (rad/s), up to the rate: a faster filter passes nothing on."""
+        omega = self.task.drive.angular_frequency
+        low, high = (share * omega for share in _CORNER_FREQUENCIES)
+        return np.geomspace(low, max(min(high, self.task.rate), 2.0 * low), count)
+
+    def _peak(self, corner_frequency: float) -> float:
+        """Return the largest filtered speed, m/s, of all vibrations."""
+        if corner_frequency not in self._peaks:
+            self._peaks[corner_frequency] = max(
+                float(np.abs(vibration.filtered(corner_frequency)).max(initial=0.0))
+                for vibration in self.vibrations
+            )
+        return self._peaks[corner_frequency]
+
+    def _largest(self, corner_frequency: float, strength: float, cubic: float) -> float:
+        """Return the magnitude of the linear gain that is allowed.
+
+        With a softening cubic gain the force k v - k2 v^3 may be largest short of the peak.
+        """
+        peak, limit = self._peak(corner_frequency), strength * self.task.force_limit
+        gain = limit / peak + cubic * peak**2 if peak > 0.0 else inf
+        if gain < 3.0 * cubic * peak**2:
+            gain = (6.75 * cubic * limit**2) ** (1.0 / 3.0)
+        return min(gain, strength * self._largest_gain)
+
+
+def _cubic_coefficient(drive: Drive) -> float:
+    """Return by what the friction force falls with the cube of high speeds, N s^3/m^3, or zero."""
+    law, high = drive.friction.scaled(drive.speed_scale), 1e6
+    coefficient = -float(law.coefficient(high, 1.0)) / high**3
+    return coefficient * drive.normal_force / drive.speed_scale**3 if coefficient > 1e-6 else 0.0
+
+
+def rounded(value: float, digits: int = 3, *, up: bool = False) -> float:
+    """Return a value with so many significant digits, `up` or to the nearest."""
+    if value == 0.0:
+        return 0.0
+    if up:
+        unit = 10.0 ** (floor(log10(value)) + 1 - digits)
+        value = ceil(value / unit) * unit
+    return float(f"{value:.{digits}g}")
