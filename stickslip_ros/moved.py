@@ -47,6 +47,8 @@ MOVED: dict[str, dict[str, str]] = {
     "stickslip_ros.physics.simulation": {
         name: f"{_LOOP}.simulation.{name}" for name in ("simulate_sampled", "simulate_continuous")
     },
+    "stickslip_ros.studies.plan": {"Sample": "stickslip_ros.studies.plan.RandomSample"},
+    "stickslip_ros.studies.settled": {"Course": "stickslip_ros.studies.settled.SettlingCourse"},
 }
 
 
@@ -58,14 +60,30 @@ def moved_from(module: str) -> Callable[[str], Any]:
         if now is None:
             raise AttributeError(f"module {module!r} has no attribute {name!r}")
         home, _, new_name = now.rpartition(".")
-        warnings.warn(
-            f"{module}.{name} is now {now}; the old name goes in version 0.2",
-            DeprecationWarning,
-            stacklevel=2,
-        )
+        _warn(f"{module}.{name}", now)
         return getattr(import_module(home), new_name)
 
     return get
+
+
+class Renamed:
+    """What a member of a class was called in version 0.1."""
+
+    def __init__(self, new_name: str) -> None:
+        self._new_name = new_name
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: object, owner: type) -> Any:
+        _warn(f"{owner.__name__}.{self._name}", f"{owner.__name__}.{self._new_name}")
+        return getattr(owner if instance is None else instance, self._new_name)
+
+
+def _warn(old: str, new: str) -> None:
+    warnings.warn(
+        f"{old} is now {new}; the old name goes in version 0.2", DeprecationWarning, stacklevel=3
+    )
 
 
 class _MovedModules(MetaPathFinder, Loader):

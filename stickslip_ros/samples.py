@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, Table
+from stickslip_ros.moved import Renamed
 
 LARGEST = 1e100
 """Magnitude up to which positions (m) and speeds (m/s) are believed, and nothing overflows."""
@@ -31,6 +32,8 @@ class Sample(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class SampleColumns(Table):
     """Samples that follow each other: the fields of `Sample` as arrays of shape (samples,)."""
+
+    effort = Renamed("friction_force")
 
     stamp: IntArray
     position: FloatArray

@@ -3,9 +3,18 @@
 import warnings
 from importlib import import_module
 
+import numpy as np
 import pytest
 
 from stickslip_ros.moved import MOVED
+from stickslip_ros.physics.model.friction import Exponential, FrictionLaw, Linear
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.theory.closed_forms import CubicLoop
+from stickslip_ros.physics.theory.sampled import LinearSampledLoop
+from stickslip_ros.samples import SampleColumns
+from stickslip_ros.studies.basin import Attractor, Basins
+from stickslip_ros.studies.columns import Columns
+from stickslip_ros.studies.design import Task
 
 PUBLIC = {
     "stickslip_ros.testing": "ClosedLoop RunResult Diagnostics own_domain",
@@ -65,3 +74,40 @@ def test_what_was_public_is_importable_from_where_it_was(module: str, name: str)
 def test_what_was_not_public_is_no_attribute(module: str) -> None:
     with pytest.raises(AttributeError, match=f"'{module}' has no attribute 'nothing'"):
         _ = import_module(module).nothing
+
+
+@pytest.mark.parametrize(
+    ("owner", "old", "new"),
+    [
+        (CubicLoop, "of", "from_drive"),
+        (LinearSampledLoop, "of", "from_drive"),
+        (Task, "of", "from_scenario"),
+        (Attractor, "of", "from_point"),
+        (Basins, "of", "from_points"),
+        (Columns, "of", "from_journal"),
+        (Motion, "take_knots", "take_breakpoints"),
+    ],
+)
+def test_members_have_their_old_names_too(owner: type, old: str, new: str) -> None:
+    with pytest.warns(DeprecationWarning, match=f"{owner.__name__}.{old} is now .*{new}; the old"):
+        found = getattr(owner, old)
+    assert found == getattr(owner, new)
+
+
+def test_values_have_their_old_names_too() -> None:
+    law = Exponential(0.4, 0.2, 0.01, 0.0)
+    with pytest.warns(DeprecationWarning, match="is now Exponential.characteristic_speed"):
+        assert law.sudden_speed == law.characteristic_speed
+    columns = SampleColumns(*(np.array([float(number)]) for number in range(6)))
+    with pytest.warns(DeprecationWarning, match="is now SampleColumns.friction_force"):
+        assert columns.effort is columns.friction_force
+
+
+def test_a_law_that_was_written_for_the_old_name_is_heeded() -> None:
+    class OldLaw(Linear):
+        @property
+        def sudden_speed(self) -> float:
+            return 0.5
+
+    law: FrictionLaw = OldLaw(0.4, -1.0)
+    assert law.characteristic_speed == 0.5

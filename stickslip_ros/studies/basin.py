@@ -6,6 +6,7 @@ from math import sqrt
 from typing import Self
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.moved import Renamed
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.plan import Axis, Plan
@@ -37,6 +38,8 @@ class Attractor:
     """Basin stability: what share of the starts that is."""
     standard_error: float = 0.0
     """Of the share of a random sample of n, sqrt(S (1 - S) / n); a grid's is smaller, as a rule."""
+
+    of = Renamed("from_point")
 
     @classmethod
     def from_point(cls, point: Point) -> Self:
@@ -71,6 +74,8 @@ class Basins:
     """Place in `attractors` of each attractor in the order in which they were found."""
     found: tuple[Attractor, ...]
     """The attractors in that order."""
+
+    of = Renamed("from_points")
 
     @classmethod
     def from_points(cls, points: Iterable[Point]) -> Self:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.moved import Renamed
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Grid, Plan
 from stickslip_ros.studies.runner import IN_FLIGHT, CountPoints, run, run_here
@@ -56,6 +57,8 @@ class Columns:
     """Poincare section x' = 0 of each point, m."""
     reason: npt.NDArray[np.object_]
     """Why a point has no cycle to measure, in words, or None."""
+
+    of = Renamed("from_journal")
 
     @classmethod
     def from_journal(cls, journal: Journal) -> Self:

@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.moved import Renamed
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.scenarios.files import Scenario
 
@@ -32,6 +33,8 @@ class Task:
     """Lowest and highest, m/s, above zero; the other direction mirrors them."""
     scenario: Scenario | None = field(default=None, compare=False, repr=False)
     """What sets the task, if a scenario does."""
+
+    of = Renamed("from_scenario")
 
     @classmethod
     def from_scenario(

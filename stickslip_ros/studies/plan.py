@@ -11,6 +11,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.moved import moved_from
 from stickslip_ros.scenarios.parameter import Parameter, known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.text import did_you_mean
@@ -270,3 +271,6 @@ Plan = Grid | RandomSample
 def _check_different(parameters: Sequence[str]) -> None:
     if len(set(parameters)) < len(parameters):
         raise InvalidInputError(f"{', '.join(parameters)}: must be different parameters")
+
+
+__getattr__ = moved_from(__name__)

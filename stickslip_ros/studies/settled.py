@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.moved import moved_from
 from stickslip_ros.physics.loop.simulation import measure_block, simulate_sampled
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycles import LEAST_CYCLES, CycleMeter, Measures, Regime
@@ -275,3 +276,6 @@ class _Section:
         elif measures.regime is Regime.EQUILIBRIUM:
             section = np.array([measures.midpoint])
         return Settled(measures, section, end)
+
+
+__getattr__ = moved_from(__name__)

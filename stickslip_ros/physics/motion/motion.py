@@ -7,6 +7,7 @@ import heyoka as hy
 import numpy as np
 
 from stickslip_ros.errors import RunError
+from stickslip_ros.moved import Renamed
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
@@ -218,6 +219,8 @@ class Motion:
         while now < end and not self.unbounded:
             now = self._stick(now, end) if self._sign == 0.0 else self._slip(now, end)
         self._time += duration
+
+    take_knots = Renamed("take_breakpoints")
 
     def take_breakpoints(self) -> Breakpoints:
         """Return the breakpoints recorded since the last call."""

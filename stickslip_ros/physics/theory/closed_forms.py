@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import Self
 
+from stickslip_ros.moved import Renamed
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Stribeck
 
@@ -27,6 +28,8 @@ class CubicLoop:
     """2 beta."""
     belt_speed: float
     """v0, above zero."""
+
+    of = Renamed("from_drive")
 
     @classmethod
     def from_drive(cls, drive: Drive) -> Self | None:

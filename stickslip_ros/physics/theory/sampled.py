@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.moved import Renamed
 from stickslip_ros.physics.loop.sampled_loop import whole_and_rest
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
@@ -72,6 +73,8 @@ class LinearSampledLoop:
     """From a sample to the start of its force, s."""
     jacobian: FloatArray
     """Of the open loop, dimensionless (see `theory.linear`); shape (2, 2)."""
+
+    of = Renamed("from_drive")
 
     @classmethod
     def from_drive(cls, drive: Drive, rate: float, force_delay: float = 0.0) -> Self | None:

@@ -7,6 +7,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from stickslip_ros.moved import Renamed
+
 
 @dataclass(frozen=True)
 class FrictionLaw(ABC):
@@ -34,6 +36,12 @@ class FrictionLaw(ABC):
     def at_rest(self, belt_speed: Any) -> Any:
         """Return mu(-v_belt), eq. 6: what carries a slide at rest on a belt that is not."""
         return self.coefficient(-belt_speed, -np.sign(belt_speed))
+
+    sudden_speed = Renamed("characteristic_speed")
+
+    def __init_subclass__(cls) -> None:
+        if "sudden_speed" in vars(cls):  # a law written for version 0.1
+            type.__setattr__(cls, "characteristic_speed", vars(cls)["sudden_speed"])
 
     @property
     def characteristic_speed(self) -> float:
