@@ -32,6 +32,7 @@ from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed import find_executable
 from stickslip_ros.plots.units import Units
+from stickslip_ros.running.namespace_lock import NamespaceInUseError
 from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, Scenario
 from stickslip_ros.scenarios.parameters import Pace, WashoutControllerParameters
 from stickslip_ros.text import printable
@@ -163,6 +164,8 @@ def record(
                 on_simulated_time=progress,
                 notify=_tell,
             )
+        except NamespaceInUseError as error:
+            raise InvalidInputError(f"{error}: give this one another, by --namespace") from None
         except RunError as error:
             raise RunError(f"{error}; {_state_of(bag)}") from None
     try:

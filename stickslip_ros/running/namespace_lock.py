@@ -14,11 +14,15 @@ _CREDENTIALS = struct.Struct("3i")
 _TIMEOUT = 1.0
 
 
+class NamespaceInUseError(InvalidInputError):
+    """Another run is in the namespace."""
+
+
 @contextmanager
 def lock_namespace(namespace: str, domain: int) -> Generator[None]:
     """Hold a namespace of a ROS domain on this machine; it is free when this process ends.
 
-    Raises InvalidInputError if another process of any user holds it. Linux only; elsewhere, and
+    Raises NamespaceInUseError if another process of any user holds it. Linux only; elsewhere, and
     where a sandbox refuses such addresses, it does nothing.
     """
     if sys.platform != "linux":
@@ -32,9 +36,9 @@ def lock_namespace(namespace: str, domain: int) -> Generator[None]:
             held.listen()
         except OSError as error:
             if error.errno == EADDRINUSE:
-                raise InvalidInputError(
+                raise NamespaceInUseError(
                     f"the namespace {namespace} of the ROS domain {domain} is in use by another "
-                    f"run{_holder(address)}: give this one another, by --namespace"
+                    f"run{_holder(address)}"
                 ) from None
         yield
 
