@@ -103,8 +103,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         }
         self._listening = {topic: self.subscribe_polled(topic) for topic in RECORDED_TOPICS}
         self._periodic = [
-            self.keep(self.every(self._tick, self._take_in)),
-            self.keep(self.every(_MEASURE_PERIOD, self._measure)),
+            self.keep(self.every(self._tick, partial(self._if_active, self._take_in))),
+            self.keep(self.every(_MEASURE_PERIOD, partial(self._if_active, self._measure))),
         ]
 
     def stop(self) -> None:
@@ -149,6 +149,11 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if report["lost_samples"]:
             complaints.append("samples were lost")
         return diagnosis(complaints, figures)
+
+    def _if_active(self, callback: Callable[[], None]) -> None:
+        """Call back unless the node has stopped since the timer was due."""
+        if self.active:
+            callback()
 
     def _take_in(self) -> None:
         """Record what has come since the last time, and keep it to be measured."""
