@@ -20,7 +20,6 @@ from stickslip_ros.paper.claims import (
     Verdict,
 )
 from stickslip_ros.paper.claims.claim import (
-    Correction,
     Formula,
     Number,
     Observation,
@@ -193,7 +192,7 @@ def test_a_number_agrees_with_what_it_rounds_to(units: int, digits: int, rest: f
     [(0.4944, 0.1, HOLDS), (0.48876, 0.49441, CORRECTED), (0.48876, 0.4943, FAILS)],
 )
 def test_verdict_on_a_number(value: float, corrected: float, verdict: Verdict) -> None:
-    finding = Number(value, [Correction("With x", corrected)], "So it is.").finding(0.4944)
+    finding = Number(value, {"With x": corrected}, "So it is.").finding(0.4944)
     assert finding.verdict is verdict
     assert finding.computed == value
     assert finding.remark.startswith("With x: 0.49441.") == (verdict is CORRECTED)
@@ -216,7 +215,7 @@ def test_verdict_on_a_formula(
     verdict: Verdict,
     difference: float | None,
 ) -> None:
-    finding = Formula(printed, [1.0, 2.0], [Correction("With x", corrected)]).finding("a = b")
+    finding = Formula(printed, [1.0, 2.0], {"With x": corrected}).finding("a = b")
     assert (finding.verdict, finding.difference) == (verdict, difference)
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from stickslip_ros.paper.claims.claim import (
     Computations,
-    Correction,
     Evidence,
     Formula,
     Number,
@@ -94,12 +93,11 @@ def _(_: Evidence) -> Formula:
     return Formula(
         None,
         rates(drive, STATES[:2])[1],
-        [
-            Correction(
-                "With gamma X for X in eq. 5, the stiffness at fixed scales,",
-                friction - DAMPING * speed - gamma * position,
-            )
-        ],
+        {
+            "With gamma X for X in eq. 5, the stiffness at fixed scales,": friction
+            - DAMPING * speed
+            - gamma * position
+        },
         "Eq. 2 has made the stiffness one.",
     )
 
@@ -118,7 +116,7 @@ def _(evidence: Evidence) -> Number:
     quadratic = np.polyfit(np.square(amplitudes), figure.values[rows] ** 2, 2)
     return Number(
         sqrt(float(quadratic[-1])),
-        [Correction(TAKEN_FOR_DAMPING, hopf_point(TAKEN_DAMPING).belt_speed)],
+        {TAKEN_FOR_DAMPING: hopf_point(TAKEN_DAMPING).belt_speed},
         "From Fig. 2: where the speed amplitudes of pure slip extrapolate to zero. Theory with the "
         f"same damping has {hopf_point().belt_speed:.4f}.",
     )
@@ -138,9 +136,9 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@computes("fig-2-quasi-periodic")
-def _(evidence: Evidence) -> Observation:
-    return _periodicity(evidence.bifurcation(2), _CLEAR_OF_HOPF * hopf_point().belt_speed)
+computes["fig-2-quasi-periodic"] = lambda evidence: _periodicity(
+    evidence.bifurcation(2), _CLEAR_OF_HOPF * hopf_point().belt_speed
+)
 
 
 @computes("fig-2-single-valued")
@@ -192,11 +190,7 @@ def _(evidence: Evidence) -> Number:
     fitting = zero_between(lambda v: critical_beta(v) - 0.02, 0.1, 0.499)
     return Number(
         critical_beta(0.4),
-        [
-            Correction(
-                f"With the belt speed {belt_speed:g} in place of 0.4", critical_beta(belt_speed)
-            )
-        ],
+        {f"With the belt speed {belt_speed:g} in place of 0.4": critical_beta(belt_speed)},
         "The belt speed of the figure is not printed; computed is 0.4, which other figures have. "
         f"The printed beta belongs to v0 = {fitting:.4f}.",
     )

@@ -8,7 +8,6 @@ import numpy as np
 
 from stickslip_ros.paper.claims.claim import (
     Computations,
-    Correction,
     Evidence,
     Formula,
     Number,
@@ -65,39 +64,31 @@ def _(_: Evidence) -> Formula:
     return Formula(
         [printed(q, 1) for q in samples(2)],
         [q.g20 for q in samples(2)],
-        [
-            Correction(
-                "With Q2 in place of Q1 in the real part's last term",
-                [printed(q, 2) for q in samples(2)],
-            )
-        ],
+        {
+            "With Q2 in place of Q1 in the real part's last term": [
+                printed(q, 2) for q in samples(2)
+            ]
+        },
         "Tried on arbitrary nonlinearities; the derivative in question is zero for the drive.",
     )
 
 
-@computes("eq-13-formula")
-@computes("eq-24-formula")
-def _(_: Evidence) -> Formula:
-    return Formula(
-        [
-            (q.by(1, 1, 1) + q.by(1, 2, 2) + 1j * (q.by(2, 1, 1) + q.by(2, 2, 2))) / 4.0
-            for q in samples(2)
-        ],
-        [q.g11 for q in samples(2)],
-        remark="Tried on arbitrary nonlinearities.",
-    )
-
-
-@computes("eq-14-real")
-def _(_: Evidence) -> Formula:
-    return Formula(
-        [
-            (q.by(1, 1, 1, 1) + q.by(1, 1, 2, 2) + q.by(2, 1, 1, 2) + q.by(2, 2, 2, 2)) / 8.0
-            for q in samples(2)
-        ],
-        [q.cubic.real for q in samples(2)],
-        remark="Tried on arbitrary nonlinearities.",
-    )
+computes["eq-13-formula"] = computes["eq-24-formula"] = lambda _: Formula(
+    [
+        (q.by(1, 1, 1) + q.by(1, 2, 2) + 1j * (q.by(2, 1, 1) + q.by(2, 2, 2))) / 4.0
+        for q in samples(2)
+    ],
+    [q.g11 for q in samples(2)],
+    remark="Tried on arbitrary nonlinearities.",
+)
+computes["eq-14-real"] = lambda _: Formula(
+    [
+        (q.by(1, 1, 1, 1) + q.by(1, 1, 2, 2) + q.by(2, 1, 1, 2) + q.by(2, 2, 2, 2)) / 8.0
+        for q in samples(2)
+    ],
+    [q.cubic.real for q in samples(2)],
+    remark="Tried on arbitrary nonlinearities.",
+)
 
 
 @computes("eq-14-imaginary")
@@ -108,18 +99,14 @@ def _(_: Evidence) -> Formula:
     return Formula(
         [(q.by(2, 1, 1, 1) - q.by(2, 1, 2, 2) - 2.0 * q.by(1, 1, 1, 2)) / 8.0 for q in samples(2)],
         [q.cubic.imag for q in samples(2)],
-        [
-            Correction(
-                "With (Q2_111 + Q2_122 - Q1_112 - Q1_222) / 8", [corrected(q) for q in samples(2)]
-            )
-        ],
+        {"With (Q2_111 + Q2_122 - Q1_112 - Q1_222) / 8": [corrected(q) for q in samples(2)]},
         "Without consequence for sigma, which is made of the real part.",
     )
 
 
-@computes("eq-14-value")
-def _(_: Evidence) -> Number:
-    return Number(_at_hopf_point(DAMPING).cubic.real, remark="Whatever the damping.")
+computes["eq-14-value"] = lambda _: Number(
+    _at_hopf_point(DAMPING).cubic.real, remark="Whatever the damping."
+)
 
 
 @computes("eq-15-formula")
@@ -134,10 +121,10 @@ def _(_: Evidence) -> Formula:
     return Formula(
         printed,
         [q.sigma for q in samples(2)],
-        [
-            Correction("With a sum in place of the product", summed),
-            Correction("With i in front of g20 g11, and a sum in place of the product,", corrected),
-        ],
+        {
+            "With a sum in place of the product": summed,
+            "With i in front of g20 g11, and a sum in place of the product,": corrected,
+        },
         f"Compared with the projection method. Without i the sum would be {without:.4g} at v_b1.",
     )
 
@@ -190,7 +177,7 @@ def _(_: Evidence, true: Callable[[Nonlinearity], complex], sign: float) -> Form
     return Formula(
         _mixed(sign, 1),
         [true(q) for q in samples(3)],
-        [Correction("With Q2_23 in the real and Q1_23 in the imaginary part", _mixed(sign, 2))],
+        {"With Q2_23 in the real and Q1_23 in the imaginary part": _mixed(sign, 2)},
         "Tried on arbitrary nonlinearities.",
     )
 
@@ -220,12 +207,7 @@ def _(_: Evidence) -> Formula:
     return Formula(
         None,
         [q.w20 for q in samples(3)],
-        [
-            Correction(
-                "With 2 i omega(mu_0) - lambda_3(mu_0) in the denominator and Q3_12 for Q3_13",
-                corrected,
-            )
-        ],
+        {"With 2 i omega(mu_0) - lambda_3(mu_0) in the denominator and Q3_12 for Q3_13": corrected},
         "As printed a parameter value mu_0 is subtracted from an eigenvalue.",
     )
 
@@ -238,17 +220,15 @@ def _(_: Evidence) -> Formula:
     return Formula(
         printed,
         [q.w11 for q in samples(3)],
-        [Correction("With the opposite sign", -printed)],
+        {"With the opposite sign": -printed},
         "Tried on arbitrary nonlinearities.",
     )
 
 
-@computes("eq-29-constant")
-def _(_: Evidence) -> Number:
-    return number_for_both(
-        lambda damping: _at_critical_gain(damping).cubic.real,
-        "Real part, in Jordan coordinates; {taken:.5f} with the damping of eq. 8.",
-    )
+computes["eq-29-constant"] = lambda _: number_for_both(
+    lambda damping: _at_critical_gain(damping).cubic.real,
+    "Real part, in Jordan coordinates; {taken:.5f} with the damping of eq. 8.",
+)
 
 
 @computes("eq-29-gain")
@@ -281,22 +261,16 @@ def _(_: Evidence) -> Formula:
     return Formula(
         printed,
         [q.sigma for q in samples(3)],
-        [
-            Correction(
-                "With i in front of g20 g11, with 2 G110 w11 added and w20 for g20", corrected
-            )
-        ],
+        {"With i in front of g20 g11, with 2 G110 w11 added and w20 for g20": corrected},
         "Compared with the projection method, on arbitrary nonlinearities.",
     )
 
 
-@computes("eq-30-value")
-def _(_: Evidence) -> Number:
-    return number_for_both(
-        lambda damping: critical(STUDIED_SPEED, damping).first_lyapunov_coefficient,
-        "By the projection method; {taken:.5f} with the damping of eq. 8. Of G21 half belongs in "
-        "sigma, which eq. 15 has and eq. 30 has not.",
-    )
+computes["eq-30-value"] = lambda _: number_for_both(
+    lambda damping: critical(STUDIED_SPEED, damping).first_lyapunov_coefficient,
+    "By the projection method; {taken:.5f} with the damping of eq. 8. Of G21 half belongs in "
+    "sigma, which eq. 15 has and eq. 30 has not.",
+)
 
 
 @computes("eq-30-sign")

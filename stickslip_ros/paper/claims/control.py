@@ -4,7 +4,7 @@ from dataclasses import replace
 from functools import cache
 from math import log
 
-from stickslip_ros.paper.claims.claim import Computations, Correction, Evidence, Number, Observation
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Number, Observation
 from stickslip_ros.paper.claims.reference import (
     DAMPING,
     FASTER,
@@ -165,7 +165,7 @@ def _(_: Evidence) -> Number:
     )
     return Number(
         here,
-        [Correction(TAKEN_FOR_DAMPING, taken)],
+        {TAKEN_FOR_DAMPING: taken},
         f"{taken:.4g} with the damping of eq. 8: the filter passes little of the speed and shifts "
         f"its phase. At v0 = {listed(speeds)} it is {'; '.join(others)}: the printed bound is that "
         "of a filter with d near zero, which passes the speed unchanged. "

@@ -6,7 +6,6 @@ import numpy as np
 
 from stickslip_ros.paper.claims.claim import (
     Computations,
-    Correction,
     Evidence,
     Formula,
     Number,
@@ -60,14 +59,12 @@ def _smallest_kinetic() -> tuple[float, float]:
     return _kinetic(speed), speed
 
 
-@computes("normal-vibration")
-def _(_: Evidence) -> Observation:
-    return Observation(
-        "depends on time" if time_dependent() else "constant normal force",
-        time_dependent(),
-        remark="Nothing in eq. 1 to 5 but the state changes with time, and the state holds no "
-        "normal motion: N is a constant, and only sets the scales.",
-    )
+computes["normal-vibration"] = lambda _: Observation(
+    "depends on time" if time_dependent() else "constant normal force",
+    time_dependent(),
+    remark="Nothing in eq. 1 to 5 but the state changes with time, and the state holds no "
+    "normal motion: N is a constant, and only sets the scales.",
+)
 
 
 @computes("eq-1")
@@ -118,7 +115,7 @@ def _(_: Evidence) -> Formula:
     return Formula(
         None,
         _SLIDE.damping_coefficient,
-        [Correction("With omega, which is not defined, read as omega_0", read)],
+        {"With omega, which is not defined, read as omega_0": read},
         f"The coefficient of X' is c / sqrt(k m) = {_SLIDE.damping_coefficient:.4g} for the drive "
         "tried.",
     )
@@ -132,18 +129,16 @@ def _(_: Evidence) -> Formula:
     return Formula(
         None,
         parameters["belt_speed"],
-        [Correction("With L, which is not defined, read as N/k", read)],
+        {"With L, which is not defined, read as N/k": read},
         "One symbol stands for the speed in m/s and for the dimensionless one.",
     )
 
 
-@computes("excitation-frequency")
-def _(_: Evidence) -> Observation:
-    return Observation(
-        "time-dependent" if time_dependent() else "autonomous",
-        time_dependent(),
-        remark="Omega is scaled but used nowhere: the equations do not contain time.",
-    )
+computes["excitation-frequency"] = lambda _: Observation(
+    "time-dependent" if time_dependent() else "autonomous",
+    time_dependent(),
+    remark="Omega is scaled but used nowhere: the equations do not contain time.",
+)
 
 
 @computes("eq-3")
@@ -162,19 +157,15 @@ def _(_: Evidence) -> Formula:
     )
 
 
-@computes("static-coefficient")
-def _(_: Evidence) -> Number:
-    return Number(_kinetic(0.0), remark="The law's size as the relative speed goes to zero.")
-
-
-@computes("smallest-coefficient")
-def _(_: Evidence) -> Number:
-    return Number(_smallest_kinetic()[0], remark="Where heyoka's derivative of the law is zero.")
-
-
-@computes("smallest-at")
-def _(_: Evidence) -> Number:
-    return Number(_smallest_kinetic()[1], remark="Where heyoka's derivative of the law is zero.")
+computes["static-coefficient"] = lambda _: Number(
+    _kinetic(0.0), remark="The law's size as the relative speed goes to zero."
+)
+computes["smallest-coefficient"] = lambda _: Number(
+    _smallest_kinetic()[0], remark="Where heyoka's derivative of the law is zero."
+)
+computes["smallest-at"] = lambda _: Number(
+    _smallest_kinetic()[1], remark="Where heyoka's derivative of the law is zero."
+)
 
 
 @computes("names-of-coefficients")
@@ -207,9 +198,7 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@computes("eq-4")
-def _(_: Evidence) -> Formula:
-    return Formula(rates(unit_drive(0.4), STATES[:2])[0], STATES[1])
+computes["eq-4"] = lambda _: Formula(rates(unit_drive(0.4), STATES[:2])[0], STATES[1])
 
 
 @computes("eq-5")
@@ -227,11 +216,7 @@ def _(_: Evidence) -> Formula:
     return Formula(
         law,
         rates(unit_drive(0.4), STATES[:2])[1],
-        [
-            Correction(
-                "With eq. 2 for eq. 3, which goes into it,", law - DAMPING * STATES[1] - STATES[0]
-            )
-        ],
+        {"With eq. 2 for eq. 3, which goes into it,": law - DAMPING * STATES[1] - STATES[0]},
     )
 
 

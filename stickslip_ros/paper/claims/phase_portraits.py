@@ -7,7 +7,7 @@ from math import sqrt
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import Computations, Correction, Evidence, Number, Observation
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Number, Observation
 from stickslip_ros.paper.claims.reference import (
     FASTER,
     PRINTED_HOPF_SPEED,
@@ -147,14 +147,12 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@computes("vb0")
-def _(_: Evidence) -> Number:
-    return Number(
-        exact_onset(),
-        [Correction("By averaging, an approximation", approximate_onset())],
-        "The periodic orbit that touches the belt's speed has the computed one. The paper does not "
-        "say where its value comes from.",
-    )
+computes["vb0"] = lambda _: Number(
+    exact_onset(),
+    {"By averaging, an approximation": approximate_onset()},
+    "The periodic orbit that touches the belt's speed has the computed one. The paper does not "
+    "say where its value comes from.",
+)
 
 
 @computes("vb0-and-vb1")

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.claims.claim import Correction, Formula, Number
+from stickslip_ros.paper.claims.claim import Formula, Number
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import Equations, W, WashoutGains, X, Y
@@ -115,7 +115,7 @@ def number_for_both(compute: Callable[[float], float], remark: str = "") -> Numb
     In the remark "{taken}" stands for the latter.
     """
     here, taken = for_both(compute)
-    return Number(here, [Correction(TAKEN_FOR_DAMPING, taken)], remark.format(taken=taken))
+    return Number(here, {TAKEN_FOR_DAMPING: taken}, remark.format(taken=taken))
 
 
 def formula_for_both(
@@ -123,7 +123,7 @@ def formula_for_both(
 ) -> Formula:
     """Return the formula for the damping of eq. 5, corrected to that of eq. 8."""
     here, taken = for_both(lambda damping: printed - np.asarray(true(damping)))
-    return Formula(here, 0.0, [Correction(TAKEN_FOR_DAMPING, taken)], remark)
+    return Formula(here, 0.0, {TAKEN_FOR_DAMPING: taken}, remark)
 
 
 def overdamped_from() -> float:

@@ -7,7 +7,6 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.claims.claim import (
     Computations,
-    Correction,
     Evidence,
     Formula,
     Number,
@@ -61,19 +60,15 @@ def _jacobians(damping: float) -> FloatArray:
     return np.array([expansion(speed, damping).jacobian for speed in BELT_SPEEDS])
 
 
-@computes("linear-coefficient")
-def _(_: Evidence) -> Number:
-    return Number(_growth(0.0)[0], remark="From heyoka's derivatives of the equations.")
-
-
-@computes("cubic-coefficient")
-def _(_: Evidence) -> Number:
-    return Number(-_third_order(), remark="From heyoka's derivatives of the equations.")
-
-
-@computes("eq-6-speed")
-def _(_: Evidence) -> Formula:
-    return Formula(0.0, [expansion(speed).equilibrium[1] for speed in BELT_SPEEDS])
+computes["linear-coefficient"] = lambda _: Number(
+    _growth(0.0)[0], remark="From heyoka's derivatives of the equations."
+)
+computes["cubic-coefficient"] = lambda _: Number(
+    -_third_order(), remark="From heyoka's derivatives of the equations."
+)
+computes["eq-6-speed"] = lambda _: Formula(
+    0.0, [expansion(speed).equilibrium[1] for speed in BELT_SPEEDS]
+)
 
 
 @computes("eq-6-position")
@@ -102,7 +97,7 @@ def _(_: Evidence) -> Formula:
     return Formula(
         printed(3.0),
         at_rest - friction,
-        [Correction("With the factor v0 in the last term", printed(3.0 * belt_speed))],
+        {"With the factor v0 in the last term": printed(3.0 * belt_speed)},
         "F2 is minus the change of the friction, so that -F stands in eq. 16; v_r is its value "
         "-v0 at rest. All this while the slide is slower than the belt: beyond, friction changes "
         "sign.",
@@ -143,7 +138,7 @@ def _(_: Evidence) -> Formula:
     return Formula(
         np.zeros_like(jacobians),
         jacobians,
-        [Correction("Without the = 0, with first row (0, 1) as printed,", structure)],
+        {"Without the = 0, with first row (0, 1) as printed,": structure},
     )
 
 
@@ -165,16 +160,12 @@ def _(_: Evidence) -> Formula:
     )
 
 
-@computes("eq-8-constant")
-def _(_: Evidence) -> Number:
-    return number_for_both(
-        lambda damping: _growth(damping)[0], "Eq. 5 has 2 beta, eq. 8 takes beta once."
-    )
-
-
-@computes("eq-8-square")
-def _(_: Evidence) -> Number:
-    return Number(_growth()[1], remark="Three times the cubic coefficient of the law.")
+computes["eq-8-constant"] = lambda _: number_for_both(
+    lambda damping: _growth(damping)[0], "Eq. 5 has 2 beta, eq. 8 takes beta once."
+)
+computes["eq-8-square"] = lambda _: Number(
+    _growth()[1], remark="Three times the cubic coefficient of the law."
+)
 
 
 @computes("eq-8-matrix")
@@ -184,22 +175,16 @@ def _(_: Evidence) -> Formula:
     return Formula(
         [[eigenvalue, 1.0], [-1.0, eigenvalue - p]],
         eigenvalue * np.eye(2) - expansion(0.4).jacobian,
-        [
-            Correction(
-                "With the signs of 1 and -1 exchanged", [[eigenvalue, -1.0], [1.0, eigenvalue - p]]
-            )
-        ],
+        {"With the signs of 1 and -1 exchanged": [[eigenvalue, -1.0], [1.0, eigenvalue - p]]},
         "The determinant is the same either way.",
     )
 
 
-@computes("eq-8-polynomial")
-def _(_: Evidence) -> Formula:
-    return Formula(
-        [[1.0, -trace(speed), 1.0] for speed in BELT_SPEEDS],
-        [np.poly(expansion(speed).jacobian) for speed in BELT_SPEEDS],
-        remark="With whatever damping p has.",
-    )
+computes["eq-8-polynomial"] = lambda _: Formula(
+    [[1.0, -trace(speed), 1.0] for speed in BELT_SPEEDS],
+    [np.poly(expansion(speed).jacobian) for speed in BELT_SPEEDS],
+    remark="With whatever damping p has.",
+)
 
 
 @computes("hurwitz")
@@ -214,13 +199,11 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@computes("vb1")
-def _(_: Evidence) -> Number:
-    return number_for_both(
-        lambda damping: hopf_point(damping).belt_speed,
-        "The slip of eq. 8: with the damping of eq. 5 the loop is stable above "
-        f"{hopf_point().belt_speed:.5f} already.",
-    )
+computes["vb1"] = lambda _: number_for_both(
+    lambda damping: hopf_point(damping).belt_speed,
+    "The slip of eq. 8: with the damping of eq. 5 the loop is stable above "
+    f"{hopf_point().belt_speed:.5f} already.",
+)
 
 
 @computes("vb1-supercritical")
@@ -242,14 +225,10 @@ def _(_: Evidence) -> Formula:
     return formula_for_both(printed, _jacobians)
 
 
-@computes("eq-9-square")
-def _(_: Evidence) -> Number:
-    return Number(_second_order(), remark="Half the second derivative at v0 = 1.")
-
-
-@computes("eq-9-cube")
-def _(_: Evidence) -> Number:
-    return Number(_third_order(), remark="A sixth of the third derivative.")
+computes["eq-9-square"] = lambda _: Number(
+    _second_order(), remark="Half the second derivative at v0 = 1."
+)
+computes["eq-9-cube"] = lambda _: Number(_third_order(), remark="A sixth of the third derivative.")
 
 
 @computes("eq-9-jordan")
@@ -275,7 +254,7 @@ def _(_: Evidence) -> Formula:
     return Formula(
         printed,
         np.array([expansion(speed).equilibrium for speed in BELT_SPEEDS]).T,
-        [Correction("With the two exchanged", printed[::-1])],
+        {"With the two exchanged": printed[::-1]},
         "It is displaced and at rest; in the coordinates of eq. 9 it is the origin.",
     )
 
@@ -301,12 +280,12 @@ def _(_: Evidence) -> Formula:
     return Formula(
         None if np.any(radicands < 0.0) else np.sqrt(radicands) / 2.0,
         halves + 1j * frequencies,
-        [
-            Correction(
-                "With alpha +- i beta and beta = sqrt(4 - p^2) / 2 where p^2 < 4",
-                np.emath.sqrt(radicands) / 2.0,
+        {
+            "With alpha +- i beta and beta = sqrt(4 - p^2) / 2 where p^2 < 4": np.emath.sqrt(
+                radicands
             )
-        ],
+            / 2.0
+        },
         f"Up to v0 = {overdamped_from():.4f} p^2 - 4 is below zero, {radicands.min():.4g} at the "
         "least, so that the printed root is of a negative number; from there on it is not, and the "
         f"two eigenvalues are real, as printed (tried up to v0 = {max(speeds):g}).",
@@ -322,10 +301,10 @@ def _(_: Evidence) -> Number:
     )
     return Number(
         hopf_point().crossing_speed,
-        [
-            Correction(TAKEN_FOR_DAMPING, hopf_point(TAKEN_DAMPING).crossing_speed),
-            Correction("With p' in place of p'/2, at v0 = 0.4944", doubled),
-        ],
+        {
+            TAKEN_FOR_DAMPING: hopf_point(TAKEN_DAMPING).crossing_speed,
+            "With p' in place of p'/2, at v0 = 0.4944": doubled,
+        },
         "The factor 1/2 of alpha = p/2 got lost, and the 0 in alpha'(0) stands for v_b1: the "
         f"eigenvalues cross at {hopf_point(TAKEN_DAMPING).crossing_speed:.5f} there.",
     )

@@ -8,7 +8,6 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.claims.claim import (
     Computations,
-    Correction,
     Evidence,
     Formula,
     Number,
@@ -91,7 +90,7 @@ def _(_: Evidence) -> Formula:
     return Formula(
         printed,
         _loop_rates(None)[1],
-        [Correction("With the factor v0 in the last term of F", corrected)],
+        {"With the factor v0 in the last term of F": corrected},
         "C and K, which are not defined, are 2 beta and 1. F as in eq. 6: while the slide is "
         "slower than the belt.",
     )
@@ -116,12 +115,10 @@ def _(_: Evidence) -> Formula:
     return Formula(
         None,
         _loop_rates(_SOME_GAINS)[1] - _loop_rates(None)[1],
-        [
-            Correction(
-                "With v, which is not defined, read as y - d w as in eq. 19",
-                _SOME_GAINS.linear * v + _SOME_GAINS.cubic * v**3,
-            )
-        ],
+        {
+            "With v, which is not defined, read as y - d w as in eq. 19": _SOME_GAINS.linear * v
+            + _SOME_GAINS.cubic * v**3
+        },
     )
 
 
@@ -169,12 +166,10 @@ def _(_: Evidence) -> Formula:
     )
 
 
-@computes("eq-20-trace")
-def _(_: Evidence) -> Number:
-    return number_for_both(
-        lambda damping: trace(STUDIED_SPEED, damping),
-        "With the damping of eq. 5 there is nothing to control at v0 = 0.49: p is below zero.",
-    )
+computes["eq-20-trace"] = lambda _: number_for_both(
+    lambda damping: trace(STUDIED_SPEED, damping),
+    "With the damping of eq. 5 there is nothing to control at v0 = 0.49: p is below zero.",
+)
 
 
 _EQ_21: dict[int, Callable[[FloatArray, float], FloatArray]] = {
@@ -232,10 +227,10 @@ def _(_: Evidence) -> Number:
     exact = critical(STUDIED_SPEED, TAKEN_DAMPING).linear
     return Number(
         critical(STUDIED_SPEED, DAMPING).linear,
-        [
-            Correction(TAKEN_FOR_DAMPING, exact),
-            Correction(f"{TAKEN_FOR_DAMPING}, and p rounded to {_PRINTED_TRACE:g}", rounded),
-        ],
+        {
+            TAKEN_FOR_DAMPING: exact,
+            f"{TAKEN_FOR_DAMPING}, and p rounded to {_PRINTED_TRACE:g}": rounded,
+        },
         f"Without that rounding it is {exact:.6f}. The printed c2 did not lead there.",
     )
 
@@ -267,13 +262,11 @@ def _(_: Evidence) -> Formula:
     )
 
 
-@computes("eq-22-value")
-def _(_: Evidence) -> Number:
-    return number_for_both(
-        _crossing,
-        "At the critical gain, by projection onto the eigenvectors; printed is the derivative of "
-        "the trace of eq. 20. With the damping of eq. 8 it is {taken:.5f}.",
-    )
+computes["eq-22-value"] = lambda _: number_for_both(
+    _crossing,
+    "At the critical gain, by projection onto the eigenvectors; printed is the derivative of "
+    "the trace of eq. 20. With the damping of eq. 8 it is {taken:.5f}.",
+)
 
 
 def _crossing(damping: float) -> float:
