@@ -25,6 +25,7 @@ from stickslip_ros.paper.claims.reference import (
     expansion,
     hopf_point,
     rates,
+    slip_friction,
     trace_of,
 )
 from stickslip_ros.paper.claims.summaries import VIBRATING, listed
@@ -89,7 +90,7 @@ def _(_: Evidence) -> Formula:
     gamma, belt_speed = 2.0, 0.4
     drive = unit_drive(belt_speed, stiffness=gamma)
     position, speed = STATES[0] * drive.length_scale, STATES[1] * drive.speed_scale
-    friction = STRIBECK.coefficient(speed - belt_speed, np.sign(speed - belt_speed))
+    friction = slip_friction(STRIBECK, speed - belt_speed)
     return Formula(
         None,
         rates(drive, STATES[:2])[1],

@@ -24,6 +24,7 @@ from stickslip_ros.paper.claims.reference import (
     expansion,
     for_both,
     hopf_point,
+    known,
     number_for_both,
 )
 from stickslip_ros.paper.claims.summaries import complex_number, listed
@@ -129,11 +130,10 @@ def _(_: Evidence) -> Formula:
     )
 
 
-@computes("eq-15-value")
-def _(_: Evidence) -> Number:
-    sigma = first_lyapunov_coefficient(expansion(hopf_point().belt_speed))
-    assert sigma is not None
-    return Number(sigma, remark="By the projection method, from heyoka's derivatives.")
+computes["eq-15-value"] = lambda _: Number(
+    known(first_lyapunov_coefficient(expansion(hopf_point().belt_speed))),
+    remark="By the projection method, from heyoka's derivatives.",
+)
 
 
 @computes("eq-15-imaginary")
@@ -197,19 +197,18 @@ def _(_: Evidence, coefficient: Callable[[Nonlinearity], complex]) -> Observatio
     )
 
 
-@computes("eq-27-formula")
-def _(_: Evidence) -> Formula:
-    corrected = [
-        (q.by(3, 1, 1) - q.by(3, 2, 2) - 2j * q.by(3, 1, 2))
-        / (4.0 * (2j * q.frequency - q.third_eigenvalue))
-        for q in samples(3)
-    ]
-    return Formula(
-        None,
-        [q.w20 for q in samples(3)],
-        {"With 2 i omega(mu_0) - lambda_3(mu_0) in the denominator and Q3_12 for Q3_13": corrected},
-        "As printed a parameter value mu_0 is subtracted from an eigenvalue.",
-    )
+computes["eq-27-formula"] = lambda _: Formula(
+    None,
+    [q.w20 for q in samples(3)],
+    {
+        "With 2 i omega(mu_0) - lambda_3(mu_0) in the denominator and Q3_12 for Q3_13": [
+            (q.by(3, 1, 1) - q.by(3, 2, 2) - 2j * q.by(3, 1, 2))
+            / (4.0 * (2j * q.frequency - q.third_eigenvalue))
+            for q in samples(3)
+        ]
+    },
+    "As printed a parameter value mu_0 is subtracted from an eigenvalue.",
+)
 
 
 @computes("eq-28-formula")

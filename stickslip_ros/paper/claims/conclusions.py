@@ -22,7 +22,6 @@ from stickslip_ros.paper.figures import STRIBECK, unit_drive
 
 computes = Computations()
 
-
 _STILL_ON_ITS_WAY = 0.02
 """Trace so small that a motion is not settled when a bifurcation diagram looks at it."""
 

@@ -21,6 +21,7 @@ from stickslip_ros.paper.claims.reference import (
     expansion,
     for_both,
     hopf_point,
+    known,
     trace,
 )
 from stickslip_ros.paper.claims.summaries import VIBRATING, amplitude, border, falling, listed
@@ -58,7 +59,7 @@ def _(_: Evidence) -> Observation:
         lambda damping: [(amplitudes(v, damping) or [0.0])[0] for v in _FIG_12_SPEEDS]
     )
     return Observation(
-        f"{listed(here)}",
+        listed(here),
         exponent < 0.1,
         remark=f"Amplitudes of the limit cycles at v0 = {listed(_FIG_12_SPEEDS)}; with the damping "
         f"of eq. 8 {listed(taken)}. They go to zero without a jump: amplitude squared over the "
@@ -151,9 +152,7 @@ def _(evidence: Evidence) -> Observation:
 
 @computes("eq-30-criterion")
 def _(_: Evidence) -> Number:
-    here, taken = for_both(lambda damping: critical(STUDIED_SPEED, damping).cubic)
-    assert here is not None
-    assert taken is not None
+    here, taken = for_both(lambda damping: known(critical(STUDIED_SPEED, damping).cubic))
     speeds, corners = (0.2, 0.4, STUDIED_SPEED), (0.02, 0.2, 2.0)
     others = (
         f"{listed([critical(v, DAMPING, d).cubic or 0.0 for v in speeds])} at d = {d:g}"
@@ -288,8 +287,6 @@ def _(evidence: Evidence) -> Observation:
     ends = linear.portraits[-1].measures.regime
     strongest = cubic.portraits[-1]
     vibrates = sum(portrait.measures.regime in VIBRATING for portrait in cubic.portraits)
-    gains = strongest.case.gains
-    assert gains is not None
     starts = ((3.0, 0.0), (-3.0, 0.0), (0.0, 3.0), (0.0, -3.0))
     resting = [_comes_to_rest(k1, x, y) for k1 in (-1.0, -10.0) for x, y in starts]
     return Observation(
@@ -299,7 +296,7 @@ def _(evidence: Evidence) -> Observation:
         f"slide comes to rest from {sum(resting)} of {len(resting)} starts up to 3 away. k2 alone "
         "cannot, as it does "
         f"not change the eigenvalues: {vibrates} of {len(cubic.portraits)} motions vibrate, with "
-        f"k2 = {gains.cubic:g} at the amplitude {amplitude(strongest):.4f}.",
+        f"k2 = {known(strongest.case.gains).cubic:g} at the amplitude {amplitude(strongest):.4f}.",
     )
 
 

@@ -20,6 +20,7 @@ from stickslip_ros.paper.claims.reference import (
     hopf_point,
     only_rest_at,
     rates,
+    slip_friction,
     time_dependent,
     trace,
 )
@@ -32,7 +33,6 @@ from stickslip_ros.physics.model.friction import Stribeck
 from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
-
 
 _SLIDE = Drive(
     mass=3.0,
@@ -71,10 +71,7 @@ computes["normal-vibration"] = lambda _: Observation(
 def _(_: Evidence) -> Formula:
     drive = _SLIDE
     position, speed = STATES[0] * drive.length_scale, STATES[1] * drive.speed_scale
-    relative_speed = speed - drive.belt_speed
-    friction = drive.normal_force * drive.friction.coefficient(
-        relative_speed, np.sign(relative_speed)
-    )
+    friction = drive.normal_force * slip_friction(drive.friction, speed - drive.belt_speed)
     acceleration = (friction - drive.damping * speed - drive.stiffness * position) / drive.mass
     scale = drive.angular_frequency * drive.speed_scale
     return Formula(
@@ -87,8 +84,7 @@ def _(_: Evidence) -> Formula:
 @computes("eq-2")
 def _(_: Evidence) -> Formula:
     law = _SLIDE.friction.scaled(_SLIDE.speed_scale)
-    relative_speed = STATES[1] - _SLIDE.belt_speed / _SLIDE.speed_scale
-    coefficient = law.coefficient(relative_speed, np.sign(relative_speed))
+    coefficient = slip_friction(law, STATES[1] - _SLIDE.belt_speed / _SLIDE.speed_scale)
     return Formula(
         coefficient - _SLIDE.damping_coefficient * STATES[1] - STATES[0],
         rates(_SLIDE, STATES[:2])[1],
@@ -97,10 +93,8 @@ def _(_: Evidence) -> Formula:
 
 @computes("scales")
 def _(_: Evidence) -> Formula:
-    time, length = (
-        1.0 / sqrt(_SLIDE.stiffness / _SLIDE.mass),
-        _SLIDE.normal_force / _SLIDE.stiffness,
-    )
+    time = 1.0 / sqrt(_SLIDE.stiffness / _SLIDE.mass)
+    length = _SLIDE.normal_force / _SLIDE.stiffness
     inertia, spring = _SLIDE.mass * length / time**2, _SLIDE.stiffness * length
     return Formula(
         np.array([inertia, spring]) / _SLIDE.normal_force,
@@ -125,10 +119,9 @@ def _(_: Evidence) -> Formula:
 def _(_: Evidence) -> Formula:
     length = _SLIDE.normal_force / _SLIDE.stiffness
     read = _SLIDE.belt_speed / (sqrt(_SLIDE.stiffness / _SLIDE.mass) * length)
-    parameters = Equations(Stribeck, continuous_control=False).parameters(_SLIDE)
     return Formula(
         None,
-        parameters["belt_speed"],
+        Equations(Stribeck, continuous_control=False).parameters(_SLIDE)["belt_speed"],
         {"With L, which is not defined, read as N/k": read},
         "One symbol stands for the speed in m/s and for the dimensionless one.",
     )
@@ -203,16 +196,14 @@ computes["eq-4"] = lambda _: Formula(rates(unit_drive(0.4), STATES[:2])[0], STAT
 
 @computes("eq-5")
 def _(_: Evidence) -> Formula:
-    relative_speed = STATES[1] - 0.4
-    friction = STRIBECK.coefficient(relative_speed, np.sign(relative_speed))
+    friction = slip_friction(STRIBECK, STATES[1] - 0.4)
     printed = [STATES[1], -DAMPING * STATES[1] - STATES[0] + friction]
     return Formula(printed, rates(unit_drive(0.4), STATES[:2]))
 
 
 @computes("eq-5-origin")
 def _(_: Evidence) -> Formula:
-    relative_speed = STATES[1] - 0.4
-    law = STRIBECK.coefficient(relative_speed, np.sign(relative_speed))
+    law = slip_friction(STRIBECK, STATES[1] - 0.4)
     return Formula(
         law,
         rates(unit_drive(0.4), STATES[:2])[1],

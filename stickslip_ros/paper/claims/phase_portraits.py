@@ -46,7 +46,6 @@ from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
 
-
 _PRINTED_ONSET = 0.4372
 """v_b0."""
 

@@ -27,6 +27,7 @@ from stickslip_ros.paper.claims.reference import (
     expansion,
     for_both,
     formula_for_both,
+    known,
     number_for_both,
     printed_trace,
     rates,
@@ -40,7 +41,6 @@ from stickslip_ros.physics.theory.linear import hurwitz_determinants
 from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
-
 
 _PRINTED_TRACE = 0.0078
 
@@ -156,16 +156,11 @@ def _printed_jacobian(p: float, linear: float) -> FloatArray:
     return np.array([[0.0, 1.0, 0.0], [-1.0, p + linear, -2.0 * linear], [0.0, 1.0, -2.0]])
 
 
-@computes("eq-20")
-def _(_: Evidence) -> Formula:
-    linear = _SOME_GAINS.linear
-    return Formula(
-        _printed_jacobian(trace(STUDIED_SPEED), linear),
-        expansion(STUDIED_SPEED, gains=_SOME_GAINS).jacobian,
-        remark="That d = 2 is to be read from it; the text does not say so.",
-    )
-
-
+computes["eq-20"] = lambda _: Formula(
+    _printed_jacobian(trace(STUDIED_SPEED), _SOME_GAINS.linear),
+    expansion(STUDIED_SPEED, gains=_SOME_GAINS).jacobian,
+    remark="That d = 2 is to be read from it; the text does not say so.",
+)
 computes["eq-20-trace"] = lambda _: number_for_both(
     lambda damping: trace(STUDIED_SPEED, damping),
     "With the damping of eq. 5 there is nothing to control at v0 = 0.49: p is below zero.",
@@ -271,9 +266,7 @@ computes["eq-22-value"] = lambda _: number_for_both(
 
 def _crossing(damping: float) -> float:
     gains = replace(FILTER, linear=critical(STUDIED_SPEED, damping).linear)
-    found = crossing_speed(expansion(STUDIED_SPEED, damping, gains))
-    assert found is not None
-    return found
+    return known(crossing_speed(expansion(STUDIED_SPEED, damping, gains)))
 
 
 @computes("eq-11-product", PRINTED_HOPF_SPEED)
