@@ -19,12 +19,7 @@ from stickslip_ros.paper.claims import (
     Finding,
     Verdict,
 )
-from stickslip_ros.paper.claims.claim import (
-    Formula,
-    Number,
-    Observation,
-    agrees,
-)
+from stickslip_ros.paper.claims.claim import Formula, Number, Observation, agrees
 from stickslip_ros.paper.claims.normal_form import Nonlinearity, samples
 from stickslip_ros.paper.claims.reference import FILTER, arrivals, expansion, hopf_point
 from stickslip_ros.paper.figures import (

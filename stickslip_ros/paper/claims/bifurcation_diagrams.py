@@ -7,13 +7,7 @@ from math import sqrt
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import (
-    Computations,
-    Evidence,
-    Formula,
-    Number,
-    Observation,
-)
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.reference import (
     DAMPING,
     PRINTED_HOPF_SPEED,

@@ -6,13 +6,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import (
-    Computations,
-    Evidence,
-    Formula,
-    Number,
-    Observation,
-)
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.normal_form import Nonlinearity, samples
 from stickslip_ros.paper.claims.reference import (
     DAMPING,

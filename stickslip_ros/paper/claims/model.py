@@ -4,13 +4,7 @@ from math import isclose, sqrt
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import (
-    Computations,
-    Evidence,
-    Formula,
-    Number,
-    Observation,
-)
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.reference import (
     DAMPING,
     FASTER,

@@ -5,13 +5,7 @@ from math import log
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.claims.claim import (
-    Computations,
-    Evidence,
-    Formula,
-    Number,
-    Observation,
-)
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.reference import (
     BELT_SPEEDS,
     DAMPING,

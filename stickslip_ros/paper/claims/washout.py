@@ -6,13 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.claims.claim import (
-    Computations,
-    Evidence,
-    Formula,
-    Number,
-    Observation,
-)
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.reference import (
     BELT_SPEEDS,
     DAMPING,
