@@ -180,11 +180,7 @@ _SETTLED_ON = f"What the motion from rest is after {COURSE.transient:g} natural 
 
 _BIFURCATIONS = {
     2: _Bifurcation(
-        f"{_SETTLED_ON}, over the belt speed: β = 0.01",
-        "belt speed v0",
-        0.0,
-        1.0,
-        unit_drive,
+        f"{_SETTLED_ON}, over the belt speed: β = 0.01", "belt speed v0", 0.0, 1.0, unit_drive
     ),
     3: _Bifurcation(
         f"{_SETTLED_ON}, over the damping: v0 = 0.477",

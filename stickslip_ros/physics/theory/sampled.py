@@ -308,10 +308,7 @@ class _Boundary:
         circle.
         """
         steps = 16 * (self._whole + 2)
-        parts: list[Any] = [
-            np.arange(1, steps) * (pi / steps),
-            self._near(0.0, self._period),
-        ]
+        parts: list[Any] = [np.arange(1, steps) * (pi / steps), self._near(0.0, self._period)]
         for pole in self._poles:
             parts.append(self._near(abs(float(np.angle(np.exp(1j * pole.imag)))), abs(pole.real)))
         if self._ending > 0.0 and self._starting > 0.0:
