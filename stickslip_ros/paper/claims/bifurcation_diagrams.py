@@ -100,12 +100,8 @@ def _(_: Evidence) -> Formula:
 @computes("fig-2-end")
 def _(evidence: Evidence) -> Number:
     figure = evidence.bifurcation(2)
-    rows = _rows(
-        figure,
-        lambda value, regime: (
-            regime is Regime.PURE_SLIP and value < _CLEAR_OF_HOPF * hopf_point().belt_speed
-        ),
-    )
+    end = _CLEAR_OF_HOPF * hopf_point().belt_speed
+    rows = _rows(figure, lambda value, regime: regime is Regime.PURE_SLIP and value < end)
     amplitudes = [figure.diagram.measures[row].velocity_amplitude or 0.0 for row in rows]
     # By averaging r^2 = 4 (v_b1^2 - v0^2) near the Hopf point; higher orders bend the line.
     quadratic = np.polyfit(np.square(amplitudes), figure.values[rows] ** 2, 2)

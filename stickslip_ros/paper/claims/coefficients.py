@@ -133,8 +133,6 @@ computes["eq-15-value"] = lambda _: Number(
     known(first_lyapunov_coefficient(expansion(hopf_point().belt_speed))),
     remark="By the projection method, from heyoka's derivatives.",
 )
-
-
 computes["eq-15-imaginary"] = lambda _: number_for_both(
     lambda damping: ((q := _at_hopf_point(damping)).g20 * q.g11).real / 2.0,
     "Of i g20 g11 / 2; even with the damping of eq. 8 it is 3.6^2 v_b1^2 / 32 = {taken:.4f}. "

@@ -29,21 +29,17 @@ from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.hopf import hopf_points
-from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run
 
 computes = Computations()
 
 _FIG_12_SPEEDS = (0.48, 0.49, 0.492)
 
 
-@computes("fig-12-place")
-def _(_: Evidence) -> Number:
-    speed = hopf_point().belt_speed
-    return Number(
-        speed,
-        remark="The Hopf speed for beta = 0.01 in eq. 5: what is seen there is the supercritical "
-        f"Hopf point itself, which eq. 8 has put at {hopf_point(TAKEN_DAMPING).belt_speed:.4f}.",
-    )
+computes["fig-12-place"] = lambda _: Number(
+    hopf_point().belt_speed,
+    remark="The Hopf speed for beta = 0.01 in eq. 5: what is seen there is the supercritical "
+    f"Hopf point itself, which eq. 8 has put at {hopf_point(TAKEN_DAMPING).belt_speed:.4f}.",
+)
 
 
 @computes("fig-12-sudden")
@@ -211,14 +207,11 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@computes("before-control")
-def _(_: Evidence) -> Observation:
-    sigma = hopf_point().first_lyapunov_coefficient
-    return Observation(
-        f"sigma = {sigma:.6g}",
-        sigma < 0.0,
-        remark="As section 2 has it; the same section 4.2 goes on to call it subcritical.",
-    )
+computes["before-control"] = lambda _: Observation(
+    f"sigma = {hopf_point().first_lyapunov_coefficient:.6g}",
+    hopf_point().first_lyapunov_coefficient < 0.0,
+    remark="As section 2 has it; the same section 4.2 goes on to call it subcritical.",
+)
 
 
 @computes("after-control")
@@ -240,9 +233,7 @@ def _(_: Evidence) -> Observation:
 def _(_: Evidence) -> Observation:
     here, taken = for_both(lambda damping: amplitudes(STUDIED_SPEED, damping))
     gains = replace(FILTER, linear=PRINTED_GAIN / 2.0)
-    drive = unit_drive(STUDIED_SPEED, damping=TAKEN_DAMPING)
-    cycle = limit_cycle_of_run(drive, 0.0, gains=gains)
-    left = 0.0 if cycle is None else cycle.measures.amplitude or 0.0
+    left = controlled_amplitude(STUDIED_SPEED, gains, TAKEN_DAMPING)
     resting = expansion(STUDIED_SPEED, TAKEN_DAMPING, replace(FILTER, linear=-0.05)).stable
     return Observation(
         f"{listed(here)} without filter" if here else "no vibration without filter",
@@ -313,11 +304,9 @@ def _comes_to_rest(linear: float, position: float, speed: float) -> bool:
 @computes("fig-13-design")
 def _(_: Evidence) -> Observation:
     needed, slow = critical(0.4, DAMPING).linear, critical(0.4, DAMPING, 0.2).linear
-    taken = expansion(0.4, TAKEN_DAMPING, replace(FILTER, linear=PRINTED_GAIN)).stable
-    here = expansion(0.4, DAMPING, replace(FILTER, linear=PRINTED_GAIN)).stable
-    without, left = (
-        controlled_amplitude(0.4, replace(FILTER, linear=linear)) for linear in (0.0, PRINTED_GAIN)
-    )
+    gains = replace(FILTER, linear=PRINTED_GAIN)
+    here, taken = for_both(lambda damping: expansion(0.4, damping, gains).stable)
+    without, left = controlled_amplitude(0.4, FILTER), controlled_amplitude(0.4, gains)
     return Observation(
         f"k1 = {needed:.4f} is needed at v0 = 0.4",
         here,

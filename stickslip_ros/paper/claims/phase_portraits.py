@@ -213,10 +213,9 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@computes("fig-7-stick")
-def _(evidence: Evidence) -> Observation:
-    portraits = evidence.portraits(7).portraits
-    return _falling_stick_fractions(portraits, "of the motions that vibrate")
+computes["fig-7-stick"] = lambda evidence: _falling_stick_fractions(
+    evidence.portraits(7).portraits, "of the motions that vibrate"
+)
 
 
 @computes("fig-10-stick")
@@ -244,14 +243,11 @@ def _(evidence: Evidence, figure: int) -> Observation:
     return Observation("; ".join(labels), stages == expected)
 
 
-@computes("linear-slope")
-def _(_: Evidence) -> Number:
-    tangent = trace(1e-9, 0.0)
-    return Number(
-        tangent,
-        remark="Computed is the Stribeck law's slope at zero relative speed, "
-        f"{tangent / PRINTED_SLOPE:.4g} times what is printed.",
-    )
+computes["linear-slope"] = lambda _: Number(
+    trace(1e-9, 0.0),
+    remark="Computed is the Stribeck law's slope at zero relative speed, "
+    f"{trace(1e-9, 0.0) / PRINTED_SLOPE:.4g} times what is printed.",
+)
 
 
 @computes("fig-8")
@@ -261,14 +257,9 @@ def _(evidence: Evidence) -> Observation:
     undamped = [portrait for portrait in portraits if portrait.drive.damping == 0.0]
     ranges = [(p.measures.amplitude or 0.0) / p.drive.belt_speed for p in undamped]
     betas, speeds = (0.001, 1.0), (0.02, 0.2, 2.0)
-    found = [
-        cycle
-        for beta in betas
-        for speed in speeds
-        for cycle in limit_cycles(
-            unit_drive(speed, damping=2.0 * beta, friction=Coulomb(STRIBECK.static))
-        )
-    ]
+    law = Coulomb(STRIBECK.static)
+    drives = [unit_drive(v, damping=2.0 * beta, friction=law) for beta in betas for v in speeds]
+    found = [cycle for drive in drives for cycle in limit_cycles(drive)]
     return Observation(
         f"{regimes(damped).count(Regime.EQUILIBRIUM)} of {len(damped)} dampings come to rest",
         set(regimes(damped)) == {Regime.EQUILIBRIUM} and not found,
@@ -284,13 +275,9 @@ def _(evidence: Evidence) -> Observation:
     tangent, printed, slow = evidence.portraits(9).panels
     least = [panel.portraits[0] for panel in (tangent, printed, slow)]
     vibrates = [portrait.measures.regime in VIBRATING for portrait in least]
+    laws = [Linear(STRIBECK.static, slope) for slope in (PRINTED_SLOPE, TANGENT_SLOPE)]
     fastest = [
-        border(
-            lambda v, slope=slope: stays(unit_drive(v, friction=Linear(STRIBECK.static, slope))),
-            0.01,
-            2.0,
-        )
-        for slope in (PRINTED_SLOPE, TANGENT_SLOPE)
+        border(lambda v, law=law: stays(unit_drive(v, friction=law)), 0.01, 2.0) for law in laws
     ]
     passes = least[1].time_beyond(10.0)
     return Observation(

@@ -33,11 +33,6 @@ from stickslip_ros.physics.motion.motion import Motion
 computes = Computations()
 
 
-def _second_order() -> float:
-    """Return the coefficient of v0 X2^2 in X2'."""
-    return float(expansion(1.0).quadratic[1, 1, 1]) / 2.0
-
-
 def _third_order() -> float:
     """Return the coefficient of X2^3 in X2'."""
     return float(expansion(1.0).cubic[1, 1, 1, 1]) / 6.0
@@ -98,10 +93,9 @@ def _(_: Evidence) -> Formula:
     )
 
 
-@computes("eq-6-first")
-def _(_: Evidence) -> Formula:
-    at_rest = expansion(0.4)
-    return Formula(0.0, np.concatenate([at_rest.quadratic[0].ravel(), at_rest.cubic[0].ravel()]))
+computes["eq-6-first"] = lambda _: Formula(
+    0.0, np.concatenate([expansion(0.4).quadratic[0].ravel(), expansion(0.4).cubic[0].ravel()])
+)
 
 
 @computes("first-approximation")
@@ -164,8 +158,7 @@ computes["eq-8-square"] = lambda _: Number(
 
 @computes("eq-8-matrix")
 def _(_: Evidence) -> Formula:
-    p = trace(0.4)
-    eigenvalue = 0.3
+    p, eigenvalue = trace(0.4), 0.3
     return Formula(
         [[eigenvalue, 1.0], [-1.0, eigenvalue - p]],
         eigenvalue * np.eye(2) - expansion(0.4).jacobian,
@@ -204,23 +197,21 @@ computes["vb1"] = lambda _: number_for_both(
 def _(_: Evidence) -> Observation:
     sigma = hopf_point().first_lyapunov_coefficient
     just_below = cycles(hopf_point().belt_speed - 2e-3)
-    stable = [cycle.stable for cycle in just_below]
     return Observation(
         f"sigma = {sigma:.6g}",
-        sigma < 0.0 and stable == [True] and not cycles(hopf_point().belt_speed + 2e-3),
+        sigma < 0.0
+        and [cycle.stable for cycle in just_below] == [True]
+        and not cycles(hopf_point().belt_speed + 2e-3),
         remark=f"0.002 below v_b1 shooting finds {len(just_below)} limit cycle, of multiplier "
         f"{abs(just_below[0].multipliers[0]):.5f}; 0.002 above none.",
     )
 
 
-@computes("eq-9-matrix")
-def _(_: Evidence) -> Formula:
-    printed = np.array([[[0.0, 1.0], [-1.0, p]] for p in printed_trace(BELT_SPEEDS)])
-    return formula_for_both(printed, _jacobians)
-
-
+computes["eq-9-matrix"] = lambda _: formula_for_both(
+    np.array([[[0.0, 1.0], [-1.0, p]] for p in printed_trace(BELT_SPEEDS)]), _jacobians
+)
 computes["eq-9-square"] = lambda _: Number(
-    _second_order(), remark="Half the second derivative at v0 = 1."
+    float(expansion(1.0).quadratic[1, 1, 1]) / 2.0, remark="Half the second derivative at v0 = 1."
 )
 computes["eq-9-cube"] = lambda _: Number(_third_order(), remark="A sixth of the third derivative.")
 
@@ -253,16 +244,11 @@ def _(_: Evidence) -> Formula:
     )
 
 
-@computes("eq-10-real")
-def _(_: Evidence) -> Formula:
-    def real_parts(damping: float) -> list[float]:
-        return [expansion(v, damping).eigenvalues.real.mean() for v in BELT_SPEEDS]
-
-    return formula_for_both(
-        printed_trace(BELT_SPEEDS) / 2.0,
-        real_parts,
-        f"From v0 = {overdamped_from():.4f} on, where both eigenvalues are real, it is their mean.",
-    )
+computes["eq-10-real"] = lambda _: formula_for_both(
+    printed_trace(BELT_SPEEDS) / 2.0,
+    lambda damping: [expansion(v, damping).eigenvalues.real.mean() for v in BELT_SPEEDS],
+    f"From v0 = {overdamped_from():.4f} on, where both eigenvalues are real, it is their mean.",
+)
 
 
 @computes("eq-10-imaginary")
@@ -288,11 +274,9 @@ def _(_: Evidence) -> Formula:
 
 @computes("eq-11-value")
 def _(_: Evidence) -> Number:
-    step = 1e-5
-    speed = PRINTED_HOPF_SPEED
-    doubled = (trace(speed + step, TAKEN_DAMPING) - trace(speed - step, TAKEN_DAMPING)) / (
-        2.0 * step
-    )
+    step, speed = 1e-5, PRINTED_HOPF_SPEED
+    change = trace(speed + step, TAKEN_DAMPING) - trace(speed - step, TAKEN_DAMPING)
+    doubled = change / (2.0 * step)
     return Number(
         hopf_point().crossing_speed,
         {
@@ -304,10 +288,9 @@ def _(_: Evidence) -> Number:
     )
 
 
-@computes("eq-11-sign")
-def _(_: Evidence) -> Observation:
-    crossing = hopf_point().crossing_speed
-    return Observation(f"{crossing:.5f}", crossing < 0.0)
+computes["eq-11-sign"] = lambda _: Observation(
+    f"{hopf_point().crossing_speed:.5f}", hopf_point().crossing_speed < 0.0
+)
 
 
 @computes("stable-below")
@@ -318,10 +301,9 @@ def _(_: Evidence) -> Observation:
         len(here) == 1 and here[0].stable and not expansion(speed).stable
         for speed, here in zip(speeds, found, strict=True)
     )
-    stable_between = expansion(STUDIED_SPEED).stable
     return Observation(
         f"one stable cycle at each of {len(speeds)} belt speeds" if below else "other cycles",
-        below and not stable_between,
+        below and not expansion(STUDIED_SPEED).stable,
         below,
         "With v_b1 computed with beta = 0.01 in eq. 5: at "
         f"v0 = {STUDIED_SPEED:g} < {PRINTED_HOPF_SPEED:g} the equilibrium is stable and there are "
