@@ -30,14 +30,8 @@ from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
 
-_SAME_POINT = 1e-6
-"""Distance of turning points that are one."""
-
 _CLEAR_OF_HOPF = 0.98
 """Share of the Hopf speed beyond which a diagram looks at motions that are still on their way."""
-
-_SOFTEST, _STIFFEST = 1e-3, 1e5
-"""Stiffnesses beyond those of Fig. 4."""
 
 
 def _rows(figure: BifurcationFigure, chosen: Callable[[float, Regime | None], bool]) -> list[int]:
@@ -52,7 +46,7 @@ def _rows(figure: BifurcationFigure, chosen: Callable[[float, Regime | None], bo
 def _turning_points(figure: BifurcationFigure, row: int) -> int:
     """Return how many different turning points a row of the diagram has."""
     found = np.sort(figure.diagram.position[figure.diagram.row == row])
-    return 1 + int(np.sum(np.diff(found) > _SAME_POINT))
+    return 1 + int(np.sum(np.diff(found) > 1e-6))  # those closer to each other are one
 
 
 def _periodicity(figure: BifurcationFigure, end: float) -> Observation:
@@ -201,9 +195,9 @@ def _(evidence: Evidence) -> Observation:
         for name in ("amplitude", "velocity_amplitude", "stick_fraction")
     )
     ratios = [max(values) / min(values) for values in (displacement, speed, stuck)]
+    far = (1e-3, 1e5)  # beyond the stiffnesses of the figure
     softest, stiffest = (
-        cycles(0.2, stiffness=stiffness)[0].measures.velocity_amplitude or 0.0
-        for stiffness in (_SOFTEST, _STIFFEST)
+        cycles(0.2, stiffness=stiffness)[0].measures.velocity_amplitude or 0.0 for stiffness in far
     )
     return Observation(
         f"amplitude changes by a factor of {ratios[0]:.3g}",
@@ -211,7 +205,7 @@ def _(evidence: Evidence) -> Observation:
         softest / stiffest < 2.5,
         f"On the speed amplitude: over a stiffness of {figure.values[0]:g} to "
         f"{figure.values[-1]:g} it changes by a factor of {ratios[1]:.3g}, and over one of "
-        f"{_SOFTEST:g} to {_STIFFEST:g} by {softest / stiffest:.3g}. The stick fraction changes by "
+        f"{far[0]:g} to {far[1]:g} by {softest / stiffest:.3g}. The stick fraction changes by "
         f"{ratios[2]:.3g}, and goes to zero (see Fig. 10).",
     )
 

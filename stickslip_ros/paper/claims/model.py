@@ -231,10 +231,7 @@ def _(evidence: Evidence) -> Observation:
         if drive.belt_speed > 1.05 * hopf_point().belt_speed
     ]
     resting = [measures.regime is Regime.EQUILIBRIUM for measures, _ in fast]
-    off = max(
-        abs((measures.midpoint or 0.0) / drive.equilibrium_position - 1.0)
-        for measures, drive in fast
-    )
+    off = max(abs((m.midpoint or 0.0) / drive.equilibrium_position - 1.0) for m, drive in fast)
     return Observation(
         f"at {sum(resting)} of {len(fast)} belt speeds",
         all(resting) and off < 1e-4 and only_rest_at(FASTER),

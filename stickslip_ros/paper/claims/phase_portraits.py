@@ -62,10 +62,7 @@ def _of_speed(evidence: Evidence, low: float, high: float) -> list[Portrait]:
 @computes("fig-6-rest")
 def _(evidence: Evidence) -> Observation:
     above = _of_speed(evidence, hopf_point().belt_speed, 9.0)
-    off = max(
-        abs((portrait.least_relative_speed or 0.0) / portrait.drive.belt_speed - 1.0)
-        for portrait in above
-    )
+    off = max(abs((p.least_relative_speed or 0.0) / p.drive.belt_speed - 1.0) for p in above)
     return Observation(
         f"v0 = {belt_speeds(above)}: at rest",
         set(regimes(above)) == {Regime.EQUILIBRIUM} and off < 1e-3 and only_rest_at(FASTER),
@@ -79,21 +76,19 @@ def _(evidence: Evidence) -> Observation:
     above = _of_speed(evidence, hopf_point().belt_speed, 9.0)
     times = [portrait.settling_time or 0.0 for portrait in above]
     overdamped = overdamped_from()
-    near, rates = (
-        [-float(expansion(speed).eigenvalues[0].real) for speed in speeds.tolist()]
-        for speeds in (
-            np.linspace(hopf_point().belt_speed, overdamped, 20),
-            np.array([overdamped, 1.5, 2.0]),
-        )
+    speeds = np.linspace(hopf_point().belt_speed, overdamped, 20).tolist()
+    near, beyond = (
+        [float(expansion(v).eigenvalues[0].real) for v in tried]
+        for tried in (speeds, (overdamped, 1.5, 2.0))
     )
-    rises = falling(times) and falling([-rate for rate in near])
+    rises = falling(times) and falling(near)
     return Observation(
         f"after {listed(times)}",
-        rises and falling([-rate for rate in rates]),
+        rises and falling(beyond),
         rises,
         f"Only up to v0 = {overdamped:.4f}, where the drive becomes overdamped. The decay rate is "
-        f"{rates[0]:.3f} there, {rates[1]:.3f} at 1.5 and {rates[2]:.3f} at 2. Settling times of "
-        f"Fig. 6 for v0 = {belt_speeds(above)}.",
+        f"{-beyond[0]:.3f} there, {-beyond[1]:.3f} at 1.5 and {-beyond[2]:.3f} at 2. "
+        f"Settling times of Fig. 6 for v0 = {belt_speeds(above)}.",
     )
 
 
@@ -112,7 +107,7 @@ def _(evidence: Evidence) -> Observation:
     between = _of_speed(evidence, exact_onset(), hopf_point().belt_speed)
     least = [portrait.least_relative_speed or 0.0 for portrait in between]
     return Observation(
-        f"{listed(least)}",
+        listed(least),
         set(regimes(between)) == {Regime.PURE_SLIP} and min(least) > 0.0,
         remark=f"At v0 = {belt_speeds(between)}.",
     )
@@ -205,7 +200,7 @@ def _(_: Evidence) -> Observation:
     true = [hopf_point(2.0 * beta).belt_speed for beta in betas]
     once, twice = ([sqrt((0.45 - n * beta) / 1.8) for beta in betas] for n in (1.0, 2.0))
     return Observation(
-        f"{listed(true)}",
+        listed(true),
         bool(np.allclose(once, true, rtol=1e-9)),
         bool(np.allclose(twice, true, rtol=1e-9)),
         f"With 2 beta in place of beta in eq. 8, which gives {listed(once)} for beta = "

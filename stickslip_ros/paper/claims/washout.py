@@ -36,8 +36,6 @@ from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
 
-_PRINTED_TRACE = 0.0078
-
 _SOME_GAINS = replace(FILTER, linear=-0.3, cubic=-2.0)
 
 
@@ -210,15 +208,16 @@ def _(_: Evidence) -> Observation:
 
 @computes("eq-21-gain")
 def _(_: Evidence) -> Number:
+    p = 0.0078  # as printed
     rounded = zero_between(
-        lambda k1: float(hurwitz_determinants(_printed_jacobian(_PRINTED_TRACE, k1))[-1]), -0.5, 0.5
+        lambda k1: float(hurwitz_determinants(_printed_jacobian(p, k1))[-1]), -0.5, 0.5
     )
     exact = critical(STUDIED_SPEED, TAKEN_DAMPING).linear
     return Number(
         critical(STUDIED_SPEED, DAMPING).linear,
         {
             TAKEN_FOR_DAMPING: exact,
-            f"{TAKEN_FOR_DAMPING}, and p rounded to {_PRINTED_TRACE:g}": rounded,
+            f"{TAKEN_FOR_DAMPING}, and p rounded to {p:g}": rounded,
         },
         f"Without that rounding it is {exact:.6f}. The printed c2 did not lead there.",
     )
