@@ -6,6 +6,7 @@ the paper. Where the paper does not print its parameter values, these show what 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -135,35 +136,25 @@ def _portrait_figure(number: int, plan: _Portraits, progress: Progress) -> Portr
     return PortraitFigure(number, plan.title, tuple(panels))
 
 
-def _belt_speeds(
-    speeds: Sequence[float], *, damping: float = 0.02, duration: float | None = None
+def _cases(
+    parameter: str,
+    values: Sequence[float],
+    drive: Callable[[float], Drive],
+    duration: float | None = None,
 ) -> list[PortraitCase]:
-    return [
-        PortraitCase(f"v0 = {v0:g}", unit_drive(v0, damping=damping), duration=duration)
-        for v0 in speeds
-    ]
+    return [PortraitCase(f"{parameter} {v:g}", drive(v), duration=duration) for v in values]
 
 
 def _dampings(
     betas: Sequence[float], belt_speed: float, friction: FrictionLaw = STRIBECK
 ) -> list[PortraitCase]:
-    return [
-        PortraitCase(f"β = {beta:g}", unit_drive(belt_speed, damping=2.0 * beta, friction=friction))
-        for beta in betas
-    ]
+    return _cases(
+        "β =", betas, lambda beta: unit_drive(belt_speed, damping=2.0 * beta, friction=friction)
+    )
 
 
 def _stiffnesses(stiffnesses: Sequence[float], belt_speed: float) -> list[PortraitCase]:
-    return [
-        PortraitCase(f"stiffness {k:g}", unit_drive(belt_speed, stiffness=k)) for k in stiffnesses
-    ]
-
-
-def _minima(minima: Sequence[float], belt_speed: float) -> list[PortraitCase]:
-    return [
-        PortraitCase(f"μm = {minimum:g}", unit_drive(belt_speed, friction=_stribeck(minimum)))
-        for minimum in minima
-    ]
+    return _cases("stiffness", stiffnesses, lambda k: unit_drive(belt_speed, stiffness=k))
 
 
 def _stribeck(minimum: float) -> Stribeck:
@@ -189,11 +180,7 @@ _SETTLED_ON = f"What the motion from rest is after {COURSE.transient:g} natural 
 
 _BIFURCATIONS = {
     2: _Bifurcation(
-        f"{_SETTLED_ON}, over the belt speed: β = 0.01",
-        "belt speed v0",
-        0.0,
-        1.0,
-        unit_drive,
+        f"{_SETTLED_ON}, over the belt speed: β = 0.01", "belt speed v0", 0.0, 1.0, unit_drive
     ),
     3: _Bifurcation(
         f"{_SETTLED_ON}, over the damping: v0 = 0.477",
@@ -221,7 +208,7 @@ _BIFURCATIONS = {
 _PORTRAITS = {
     6: _Portraits(
         "Motion from rest at several belt speeds",
-        {"β = 0.01": _belt_speeds((0.2, 0.3, 0.42, 0.45, 0.48, 0.495, 0.6))},
+        {"β = 0.01": _cases("v0 =", (0.2, 0.3, 0.42, 0.45, 0.48, 0.495, 0.6), unit_drive)},
     ),
     7: _Portraits(
         "Motion from rest with several dampings, Stribeck friction",
@@ -255,13 +242,19 @@ _PORTRAITS = {
     ),
     11: _Portraits(
         "Motion from rest with several smallest kinetic friction coefficients",
-        {"v0 = 0.4, β = 0.01, μs = 0.4": _minima((0.10, 0.25, 0.35, 0.37, 0.39), 0.4)},
+        {
+            "v0 = 0.4, β = 0.01, μs = 0.4": _cases(
+                "μm =",
+                (0.10, 0.25, 0.35, 0.37, 0.39),
+                lambda minimum: unit_drive(0.4, friction=_stribeck(minimum)),
+            )
+        },
     ),
     12: _Portraits(
         "Motion from rest near the Hopf speed, sooner and later",
         {
             f"2β = {damping:g}, up to τ = {duration:g}": (
-                _belt_speeds((0.48, 0.49, 0.492), damping=damping, duration=duration)
+                _cases("v0 =", (0.48, 0.49, 0.492), partial(unit_drive, damping=damping), duration)
             )
             for damping in (0.01, 0.02)
             for duration in (300.0, _LONG)

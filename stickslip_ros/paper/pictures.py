@@ -18,9 +18,6 @@ from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.style import BLUE, DASHES, GREEN, ORANGE, save, styled
 
-_MOST_COLUMNS, _COLUMNS = 5, 4
-"""Portraits in a row at most, and where a panel has more of them."""
-
 _FIRST, _LATER, _BELT = "#888888", "#DDDDDD", "black"
 
 _FIRST_PERIODS = 20
@@ -78,7 +75,7 @@ def _bifurcation(figure: BifurcationFigure, marks: Mapping[str, float]) -> Figur
 @styled
 def _portraits(figure: PortraitFigure) -> Figure:
     largest = max(len(panel.portraits) for panel in figure.panels)
-    columns = largest if largest <= _MOST_COLUMNS else _COLUMNS
+    columns = largest if largest <= 5 else 4
     rows = [ceil(len(panel.portraits) / columns) for panel in figure.panels]
     heights = [*(2.5 * count + 0.3 for count in rows), 0.3]
     drawn = Figure(figsize=(2.5 * columns, sum(heights) + 0.3))

@@ -1,7 +1,7 @@
 """Phase portraits: motions from rest as finely sampled trajectories, and what they settle on."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -114,20 +114,15 @@ def _portrait(case: PortraitCase, motion: Motion) -> Portrait:
         if motion.unbounded:
             break
     breakpoints = motion.take_breakpoints()
-    trajectory = Breakpoints(
-        breakpoints.time - breakpoints.time[0],
-        breakpoints.position,
-        breakpoints.velocity,
-        breakpoints.sticking,
-    )
+    trajectory = replace(breakpoints, time=breakpoints.time - breakpoints.time[0])
     meter = CycleMeter(LAST_CYCLES)
     cycles = meter.feed(trajectory, drive.belt_speed)
     if motion.unbounded:
         meter.report_run_away()
     measures = meter.measures()
-    settling_time = None
-    if not motion.unbounded:
-        settling_time = _settling_time(trajectory, cycles, measures, drive)
+    settling_time = (
+        None if motion.unbounded else _settling_time(trajectory, cycles, measures, drive)
+    )
     return Portrait(case, trajectory, measures, settling_time)
 
 

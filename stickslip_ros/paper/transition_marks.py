@@ -17,16 +17,16 @@ from stickslip_ros.studies.transitions import (
 def transition_marks(figure: BifurcationFigure) -> dict[str, float]:
     """Return the values of the parameter at the transitions that the diagram shows, by name."""
     release = Release()
-    margins: dict[str, Callable[[ControlledDrive], float]] = {
-        HOPF_POINT: hopf_margin,
-        STICKING_LIMIT: lambda case: stick_margin(case, release),
+
+    def case(value: float) -> ControlledDrive:
+        return ControlledDrive(bifurcation_drive(figure.number, value))
+
+    margins: dict[str, Callable[[float], float]] = {
+        HOPF_POINT: lambda value: hopf_margin(case(value)),
+        STICKING_LIMIT: lambda value: stick_margin(case(value), release),
     }
     found: dict[str, float] = {}
     for name, margin in margins.items():
-
-        def at(value: float, margin: Callable[[ControlledDrive], float] = margin) -> float:
-            return margin(ControlledDrive(bifurcation_drive(figure.number, value)))
-
-        if values := list(sign_changes(at, figure.values.tolist())):
+        if values := list(sign_changes(margin, figure.values.tolist())):
             found[name] = values[-1]
     return found

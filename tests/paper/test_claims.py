@@ -19,13 +19,7 @@ from stickslip_ros.paper.claims import (
     Finding,
     Verdict,
 )
-from stickslip_ros.paper.claims.claim import (
-    Correction,
-    Formula,
-    Number,
-    Observation,
-    agrees,
-)
+from stickslip_ros.paper.claims.claim import Formula, Number, Observation, agrees
 from stickslip_ros.paper.claims.normal_form import Nonlinearity, samples
 from stickslip_ros.paper.claims.reference import FILTER, arrivals, expansion, hopf_point
 from stickslip_ros.paper.figures import (
@@ -193,7 +187,7 @@ def test_a_number_agrees_with_what_it_rounds_to(units: int, digits: int, rest: f
     [(0.4944, 0.1, HOLDS), (0.48876, 0.49441, CORRECTED), (0.48876, 0.4943, FAILS)],
 )
 def test_verdict_on_a_number(value: float, corrected: float, verdict: Verdict) -> None:
-    finding = Number(value, [Correction("With x", corrected)], "So it is.").finding(0.4944)
+    finding = Number(value, {"With x": corrected}, "So it is.").finding(0.4944)
     assert finding.verdict is verdict
     assert finding.computed == value
     assert finding.remark.startswith("With x: 0.49441.") == (verdict is CORRECTED)
@@ -216,7 +210,7 @@ def test_verdict_on_a_formula(
     verdict: Verdict,
     difference: float | None,
 ) -> None:
-    finding = Formula(printed, [1.0, 2.0], [Correction("With x", corrected)]).finding("a = b")
+    finding = Formula(printed, [1.0, 2.0], {"With x": corrected}).finding("a = b")
     assert (finding.verdict, finding.difference) == (verdict, difference)
 
 

@@ -7,14 +7,7 @@ from math import sqrt
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import (
-    Computations,
-    Correction,
-    Evidence,
-    Formula,
-    Number,
-    Observation,
-)
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.reference import (
     DAMPING,
     PRINTED_HOPF_SPEED,
@@ -26,6 +19,7 @@ from stickslip_ros.paper.claims.reference import (
     expansion,
     hopf_point,
     rates,
+    slip_friction,
     trace_of,
 )
 from stickslip_ros.paper.claims.summaries import VIBRATING, listed
@@ -36,14 +30,8 @@ from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
 
-_SAME_POINT = 1e-6
-"""Distance of turning points that are one."""
-
 _CLEAR_OF_HOPF = 0.98
 """Share of the Hopf speed beyond which a diagram looks at motions that are still on their way."""
-
-_SOFTEST, _STIFFEST = 1e-3, 1e5
-"""Stiffnesses beyond those of Fig. 4."""
 
 
 def _rows(figure: BifurcationFigure, chosen: Callable[[float, Regime | None], bool]) -> list[int]:
@@ -58,7 +46,7 @@ def _rows(figure: BifurcationFigure, chosen: Callable[[float, Regime | None], bo
 def _turning_points(figure: BifurcationFigure, row: int) -> int:
     """Return how many different turning points a row of the diagram has."""
     found = np.sort(figure.diagram.position[figure.diagram.row == row])
-    return 1 + int(np.sum(np.diff(found) > _SAME_POINT))
+    return 1 + int(np.sum(np.diff(found) > 1e-6))  # those closer to each other are one
 
 
 def _periodicity(figure: BifurcationFigure, end: float) -> Observation:
@@ -90,16 +78,15 @@ def _(_: Evidence) -> Formula:
     gamma, belt_speed = 2.0, 0.4
     drive = unit_drive(belt_speed, stiffness=gamma)
     position, speed = STATES[0] * drive.length_scale, STATES[1] * drive.speed_scale
-    friction = STRIBECK.coefficient(speed - belt_speed, np.sign(speed - belt_speed))
+    friction = slip_friction(STRIBECK, speed - belt_speed)
     return Formula(
         None,
         rates(drive, STATES[:2])[1],
-        [
-            Correction(
-                "With gamma X for X in eq. 5, the stiffness at fixed scales,",
-                friction - DAMPING * speed - gamma * position,
-            )
-        ],
+        {
+            "With gamma X for X in eq. 5, the stiffness at fixed scales,": friction
+            - DAMPING * speed
+            - gamma * position
+        },
         "Eq. 2 has made the stiffness one.",
     )
 
@@ -107,18 +94,14 @@ def _(_: Evidence) -> Formula:
 @computes("fig-2-end")
 def _(evidence: Evidence) -> Number:
     figure = evidence.bifurcation(2)
-    rows = _rows(
-        figure,
-        lambda value, regime: (
-            regime is Regime.PURE_SLIP and value < _CLEAR_OF_HOPF * hopf_point().belt_speed
-        ),
-    )
+    end = _CLEAR_OF_HOPF * hopf_point().belt_speed
+    rows = _rows(figure, lambda value, regime: regime is Regime.PURE_SLIP and value < end)
     amplitudes = [figure.diagram.measures[row].velocity_amplitude or 0.0 for row in rows]
     # By averaging r^2 = 4 (v_b1^2 - v0^2) near the Hopf point; higher orders bend the line.
     quadratic = np.polyfit(np.square(amplitudes), figure.values[rows] ** 2, 2)
     return Number(
         sqrt(float(quadratic[-1])),
-        [Correction(TAKEN_FOR_DAMPING, hopf_point(TAKEN_DAMPING).belt_speed)],
+        {TAKEN_FOR_DAMPING: hopf_point(TAKEN_DAMPING).belt_speed},
         "From Fig. 2: where the speed amplitudes of pure slip extrapolate to zero. Theory with the "
         f"same damping has {hopf_point().belt_speed:.4f}.",
     )
@@ -138,9 +121,9 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@computes("fig-2-quasi-periodic")
-def _(evidence: Evidence) -> Observation:
-    return _periodicity(evidence.bifurcation(2), _CLEAR_OF_HOPF * hopf_point().belt_speed)
+computes["fig-2-quasi-periodic"] = lambda evidence: _periodicity(
+    evidence.bifurcation(2), _CLEAR_OF_HOPF * hopf_point().belt_speed
+)
 
 
 @computes("fig-2-single-valued")
@@ -192,11 +175,7 @@ def _(evidence: Evidence) -> Number:
     fitting = zero_between(lambda v: critical_beta(v) - 0.02, 0.1, 0.499)
     return Number(
         critical_beta(0.4),
-        [
-            Correction(
-                f"With the belt speed {belt_speed:g} in place of 0.4", critical_beta(belt_speed)
-            )
-        ],
+        {f"With the belt speed {belt_speed:g} in place of 0.4": critical_beta(belt_speed)},
         "The belt speed of the figure is not printed; computed is 0.4, which other figures have. "
         f"The printed beta belongs to v0 = {fitting:.4f}.",
     )
@@ -216,9 +195,9 @@ def _(evidence: Evidence) -> Observation:
         for name in ("amplitude", "velocity_amplitude", "stick_fraction")
     )
     ratios = [max(values) / min(values) for values in (displacement, speed, stuck)]
+    far = (1e-3, 1e5)  # beyond the stiffnesses of the figure
     softest, stiffest = (
-        cycles(0.2, stiffness=stiffness)[0].measures.velocity_amplitude or 0.0
-        for stiffness in (_SOFTEST, _STIFFEST)
+        cycles(0.2, stiffness=stiffness)[0].measures.velocity_amplitude or 0.0 for stiffness in far
     )
     return Observation(
         f"amplitude changes by a factor of {ratios[0]:.3g}",
@@ -226,7 +205,7 @@ def _(evidence: Evidence) -> Observation:
         softest / stiffest < 2.5,
         f"On the speed amplitude: over a stiffness of {figure.values[0]:g} to "
         f"{figure.values[-1]:g} it changes by a factor of {ratios[1]:.3g}, and over one of "
-        f"{_SOFTEST:g} to {_STIFFEST:g} by {softest / stiffest:.3g}. The stick fraction changes by "
+        f"{far[0]:g} to {far[1]:g} by {softest / stiffest:.3g}. The stick fraction changes by "
         f"{ratios[2]:.3g}, and goes to zero (see Fig. 10).",
     )
 

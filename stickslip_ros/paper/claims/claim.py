@@ -1,7 +1,7 @@
 """What a claim of the paper is, and how a computation judges it."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from decimal import Decimal
 from enum import StrEnum
 from functools import cache
@@ -102,6 +102,7 @@ class Computations(dict[str, Callable[[Evidence], Computed]]):
     def __call__(self, claim: str, *arguments: Any) -> Callable[[_Computation], _Computation]:
         """Return a decorator for the function that computes what a claim is about.
 
+        One expression needs none: `computes[claim] = lambda evidence: ...`.
         It takes the evidence and the further `arguments`; with others it may compute other claims.
         """
 
@@ -113,16 +114,6 @@ class Computations(dict[str, Callable[[Evidence], Computed]]):
 
 
 @dataclass(frozen=True)
-class Correction:
-    """Another calculation, which may be the one that gives what is printed."""
-
-    description: str
-    """What is different in it, such as "With i in front"."""
-    value: Any
-    """A number, or the values of a formula."""
-
-
-@dataclass(frozen=True)
 class Number:
     """What the equations give for a printed number.
 
@@ -130,8 +121,11 @@ class Number:
     """
 
     value: float
-    corrections: Sequence[Correction] = ()
-    """The first one that gives what is printed counts."""
+    corrections: Mapping[str, float] = field(default_factory=dict[str, float])
+    """What other calculations give, by what is different in them, such as "With i in front".
+
+    The first one that gives what is printed counts.
+    """
     remark: str = ""
 
     def finding(self, printed: float) -> Finding:
@@ -140,10 +134,10 @@ class Number:
         if agrees(printed, self.value):
             verdict = Verdict.HOLDS
         else:
-            for correction in self.corrections:
-                if agrees(printed, correction.value):
+            for correction, value in self.corrections.items():
+                if agrees(printed, value):
                     verdict = Verdict.CORRECTED
-                    remark = f"{correction.description}: {correction.value:.6g}. {remark}"
+                    remark = f"{correction}: {value:.6g}. {remark}"
                     break
         difference = self.value - printed
         if abs(difference) <= _ROUNDING * max(1.0, abs(printed)):
@@ -162,7 +156,7 @@ class Formula:
     """None if it cannot be evaluated as it stands."""
     true: npt.ArrayLike
     """From the equations or a definition, by another way."""
-    corrections: Sequence[Correction] = ()
+    corrections: Mapping[str, npt.ArrayLike] = field(default_factory=dict[str, npt.ArrayLike])
     """Values of corrected formulas; the first one that agrees with the true ones counts."""
     remark: str = ""
 
@@ -176,10 +170,10 @@ class Formula:
             verdict, found, difference = Verdict.HOLDS, "the same", 0.0
         else:
             found = "cannot be evaluated" if difference is None else "something else"
-            for correction in self.corrections:
-                if _distance(correction.value, true) <= rounding:
+            for correction, values in self.corrections.items():
+                if _distance(values, true) <= rounding:
                     verdict = Verdict.CORRECTED
-                    remark = f"{correction.description} it agrees. {remark}"
+                    remark = f"{correction} it agrees. {remark}"
                     break
         return Finding(found, difference, verdict, remark.strip())
 

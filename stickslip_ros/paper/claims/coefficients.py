@@ -1,19 +1,12 @@
 """The coefficients of the normal form, eq. 12 to 15 and, with the filter, eq. 23 to 30."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import (
-    Computations,
-    Correction,
-    Evidence,
-    Formula,
-    Number,
-    Observation,
-)
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.normal_form import Nonlinearity, samples
 from stickslip_ros.paper.claims.reference import (
     DAMPING,
@@ -25,6 +18,7 @@ from stickslip_ros.paper.claims.reference import (
     expansion,
     for_both,
     hopf_point,
+    known,
     number_for_both,
 )
 from stickslip_ros.paper.claims.summaries import complex_number, listed
@@ -44,6 +38,28 @@ def _at_critical_gain(damping: float, cubic: float = 0.0) -> Nonlinearity:
     return Nonlinearity.at(expansion(STUDIED_SPEED, damping, gains))
 
 
+def _on_samples(
+    order: int,
+    printed: Callable[[Nonlinearity], complex] | None,
+    true: Callable[[Nonlinearity], complex],
+    corrections: Mapping[str, Callable[[Nonlinearity], complex]],
+    remark: str = "Tried on arbitrary nonlinearities.",
+) -> Formula:
+    """Return a formula of a coefficient, by its values for arbitrary nonlinearities."""
+    tried = samples(order)
+    return Formula(
+        None if printed is None else [printed(q) for q in tried],
+        [true(q) for q in tried],
+        {what: [corrected(q) for q in tried] for what, corrected in corrections.items()},
+        remark,
+    )
+
+
+def _beat(q: Nonlinearity) -> complex:
+    """Return the term of the second derivatives in eq. 15 and 30, without the i in front."""
+    return q.g20 * q.g11 / (2.0 * q.frequency)
+
+
 @computes("eq-12-value", attrgetter("g20"))
 @computes("eq-13-value", attrgetter("g11"))
 def _(_: Evidence, coefficient: Callable[[Nonlinearity], complex]) -> Number:
@@ -55,111 +71,73 @@ def _(_: Evidence, coefficient: Callable[[Nonlinearity], complex]) -> Number:
     )
 
 
-@computes("eq-12-formula")
-@computes("eq-23-formula")
-def _(_: Evidence) -> Formula:
-    def printed(q: Nonlinearity, mixed: int) -> complex:
-        real = q.by(1, 1, 1) - q.by(1, 2, 2) + 2.0 * q.by(mixed, 1, 2)
-        return (real + 1j * (q.by(2, 1, 1) - q.by(2, 2, 2) - 2.0 * q.by(1, 1, 2))) / 4.0
-
-    return Formula(
-        [printed(q, 1) for q in samples(2)],
-        [q.g20 for q in samples(2)],
-        [
-            Correction(
-                "With Q2 in place of Q1 in the real part's last term",
-                [printed(q, 2) for q in samples(2)],
-            )
-        ],
-        "Tried on arbitrary nonlinearities; the derivative in question is zero for the drive.",
-    )
+def _printed_g20(q: Nonlinearity, mixed: int) -> complex:
+    real = q.by(1, 1, 1) - q.by(1, 2, 2) + 2.0 * q.by(mixed, 1, 2)
+    return (real + 1j * (q.by(2, 1, 1) - q.by(2, 2, 2) - 2.0 * q.by(1, 1, 2))) / 4.0
 
 
-@computes("eq-13-formula")
-@computes("eq-24-formula")
-def _(_: Evidence) -> Formula:
-    return Formula(
-        [
-            (q.by(1, 1, 1) + q.by(1, 2, 2) + 1j * (q.by(2, 1, 1) + q.by(2, 2, 2))) / 4.0
-            for q in samples(2)
-        ],
-        [q.g11 for q in samples(2)],
-        remark="Tried on arbitrary nonlinearities.",
-    )
-
-
-@computes("eq-14-real")
-def _(_: Evidence) -> Formula:
-    return Formula(
-        [
-            (q.by(1, 1, 1, 1) + q.by(1, 1, 2, 2) + q.by(2, 1, 1, 2) + q.by(2, 2, 2, 2)) / 8.0
-            for q in samples(2)
-        ],
-        [q.cubic.real for q in samples(2)],
-        remark="Tried on arbitrary nonlinearities.",
-    )
-
-
-@computes("eq-14-imaginary")
-def _(_: Evidence) -> Formula:
-    def corrected(q: Nonlinearity) -> float:
-        return (q.by(2, 1, 1, 1) + q.by(2, 1, 2, 2) - q.by(1, 1, 1, 2) - q.by(1, 2, 2, 2)) / 8.0
-
-    return Formula(
-        [(q.by(2, 1, 1, 1) - q.by(2, 1, 2, 2) - 2.0 * q.by(1, 1, 1, 2)) / 8.0 for q in samples(2)],
-        [q.cubic.imag for q in samples(2)],
-        [
-            Correction(
-                "With (Q2_111 + Q2_122 - Q1_112 - Q1_222) / 8", [corrected(q) for q in samples(2)]
-            )
-        ],
-        "Without consequence for sigma, which is made of the real part.",
-    )
-
-
-@computes("eq-14-value")
-def _(_: Evidence) -> Number:
-    return Number(_at_hopf_point(DAMPING).cubic.real, remark="Whatever the damping.")
+computes["eq-12-formula"] = computes["eq-23-formula"] = lambda _: _on_samples(
+    2,
+    lambda q: _printed_g20(q, 1),
+    lambda q: q.g20,
+    {"With Q2 in place of Q1 in the real part's last term": lambda q: _printed_g20(q, 2)},
+    "Tried on arbitrary nonlinearities; the derivative in question is zero for the drive.",
+)
+computes["eq-13-formula"] = computes["eq-24-formula"] = lambda _: _on_samples(
+    2,
+    lambda q: (q.by(1, 1, 1) + q.by(1, 2, 2) + 1j * (q.by(2, 1, 1) + q.by(2, 2, 2))) / 4.0,
+    lambda q: q.g11,
+    {},
+)
+computes["eq-14-real"] = lambda _: _on_samples(
+    2,
+    lambda q: (q.by(1, 1, 1, 1) + q.by(1, 1, 2, 2) + q.by(2, 1, 1, 2) + q.by(2, 2, 2, 2)) / 8.0,
+    lambda q: q.cubic.real,
+    {},
+)
+computes["eq-14-imaginary"] = lambda _: _on_samples(
+    2,
+    lambda q: (q.by(2, 1, 1, 1) - q.by(2, 1, 2, 2) - 2.0 * q.by(1, 1, 1, 2)) / 8.0,
+    lambda q: q.cubic.imag,
+    {
+        "With (Q2_111 + Q2_122 - Q1_112 - Q1_222) / 8": lambda q: (
+            (q.by(2, 1, 1, 1) + q.by(2, 1, 2, 2) - q.by(1, 1, 1, 2) - q.by(1, 2, 2, 2)) / 8.0
+        )
+    },
+    "Without consequence for sigma, which is made of the real part.",
+)
+computes["eq-14-value"] = lambda _: Number(
+    _at_hopf_point(DAMPING).cubic.real, remark="Whatever the damping."
+)
 
 
 @computes("eq-15-formula")
 def _(_: Evidence) -> Formula:
-    printed = [(q.g20 * q.g11 / (2.0 * q.frequency)).real * q.cubic.real / 2.0 for q in samples(2)]
-    summed = [(q.g20 * q.g11 / (2.0 * q.frequency) + q.cubic / 2.0).real for q in samples(2)]
-    corrected = [
-        (1j * q.g20 * q.g11 / (2.0 * q.frequency) + q.cubic / 2.0).real for q in samples(2)
-    ]
     at_hopf = _at_hopf_point(DAMPING)
     without = (at_hopf.g20 * at_hopf.g11 / 2.0 + at_hopf.cubic / 2.0).real
-    return Formula(
-        printed,
-        [q.sigma for q in samples(2)],
-        [
-            Correction("With a sum in place of the product", summed),
-            Correction("With i in front of g20 g11, and a sum in place of the product,", corrected),
-        ],
+    return _on_samples(
+        2,
+        lambda q: _beat(q).real * q.cubic.real / 2.0,
+        lambda q: q.sigma,
+        {
+            "With a sum in place of the product": lambda q: (_beat(q) + q.cubic / 2.0).real,
+            "With i in front of g20 g11, and a sum in place of the product,": lambda q: (
+                (1j * _beat(q) + q.cubic / 2.0).real
+            ),
+        },
         f"Compared with the projection method. Without i the sum would be {without:.4g} at v_b1.",
     )
 
 
-@computes("eq-15-value")
-def _(_: Evidence) -> Number:
-    sigma = first_lyapunov_coefficient(expansion(hopf_point().belt_speed))
-    assert sigma is not None
-    return Number(sigma, remark="By the projection method, from heyoka's derivatives.")
-
-
-@computes("eq-15-imaginary")
-def _(_: Evidence) -> Number:
-    def imaginary(damping: float) -> float:
-        q = _at_hopf_point(damping)
-        return (q.g20 * q.g11 * 0.5j).imag
-
-    return number_for_both(
-        imaginary,
-        "Of i g20 g11 / 2; even with the damping of eq. 8 it is 3.6^2 v_b1^2 / 32 = {taken:.4f}. "
-        "Without consequence for sigma.",
-    )
+computes["eq-15-value"] = lambda _: Number(
+    known(first_lyapunov_coefficient(expansion(hopf_point().belt_speed))),
+    remark="By the projection method, from heyoka's derivatives.",
+)
+computes["eq-15-imaginary"] = lambda _: number_for_both(
+    lambda damping: ((q := _at_hopf_point(damping)).g20 * q.g11).real / 2.0,
+    "Of i g20 g11 / 2; even with the damping of eq. 8 it is 3.6^2 v_b1^2 / 32 = {taken:.4f}. "
+    "Without consequence for sigma.",
+)
 
 
 @computes("eq-23-value", attrgetter("g20"))
@@ -175,23 +153,18 @@ def _(_: Evidence, coefficient: Callable[[Nonlinearity], complex]) -> Number:
     )
 
 
-def _mixed(sign: float, plane: int) -> list[complex]:
-    """Return G110 (sign +1) or G101 (-1) of the samples, Q2 derived by y1 or y2, and Q1 too."""
-    return [
-        (q.by(1, 1, 3) + sign * q.by(2, plane, 3) + 1j * (q.by(2, 1, 3) - sign * q.by(1, plane, 3)))
-        / 2.0
-        for q in samples(3)
-    ]
+def _mixed(q: Nonlinearity, sign: float, plane: int) -> complex:
+    """Return G110 (sign +1) or G101 (-1), Q2 derived by y1 or y2, and Q1 too."""
+    real = q.by(1, 1, 3) + sign * q.by(2, plane, 3)
+    return (real + 1j * (q.by(2, 1, 3) - sign * q.by(1, plane, 3))) / 2.0
 
 
 @computes("eq-25-formula", attrgetter("g110"), 1.0)
 @computes("eq-26-formula", attrgetter("g101"), -1.0)
 def _(_: Evidence, true: Callable[[Nonlinearity], complex], sign: float) -> Formula:
-    return Formula(
-        _mixed(sign, 1),
-        [true(q) for q in samples(3)],
-        [Correction("With Q2_23 in the real and Q1_23 in the imaginary part", _mixed(sign, 2))],
-        "Tried on arbitrary nonlinearities.",
+    corrected = "With Q2_23 in the real and Q1_23 in the imaginary part"
+    return _on_samples(
+        3, lambda q: _mixed(q, sign, 1), true, {corrected: lambda q: _mixed(q, sign, 2)}
     )
 
 
@@ -210,45 +183,31 @@ def _(_: Evidence, coefficient: Callable[[Nonlinearity], complex]) -> Observatio
     )
 
 
-@computes("eq-27-formula")
-def _(_: Evidence) -> Formula:
-    corrected = [
-        (q.by(3, 1, 1) - q.by(3, 2, 2) - 2j * q.by(3, 1, 2))
-        / (4.0 * (2j * q.frequency - q.third_eigenvalue))
-        for q in samples(3)
-    ]
-    return Formula(
-        None,
-        [q.w20 for q in samples(3)],
-        [
-            Correction(
-                "With 2 i omega(mu_0) - lambda_3(mu_0) in the denominator and Q3_12 for Q3_13",
-                corrected,
-            )
-        ],
-        "As printed a parameter value mu_0 is subtracted from an eigenvalue.",
-    )
+computes["eq-27-formula"] = lambda _: _on_samples(
+    3,
+    None,
+    lambda q: q.w20,
+    {
+        "With 2 i omega(mu_0) - lambda_3(mu_0) in the denominator and Q3_12 for Q3_13": lambda q: (
+            (q.by(3, 1, 1) - q.by(3, 2, 2) - 2j * q.by(3, 1, 2))
+            / (4.0 * (2j * q.frequency - q.third_eigenvalue))
+        )
+    },
+    "As printed a parameter value mu_0 is subtracted from an eigenvalue.",
+)
 
 
-@computes("eq-28-formula")
-def _(_: Evidence) -> Formula:
-    printed = np.array(
-        [(q.by(3, 1, 1) + q.by(3, 2, 2)) / (4.0 * q.third_eigenvalue) for q in samples(3)]
-    )
-    return Formula(
-        printed,
-        [q.w11 for q in samples(3)],
-        [Correction("With the opposite sign", -printed)],
-        "Tried on arbitrary nonlinearities.",
-    )
+def _printed_w11(q: Nonlinearity) -> float:
+    return (q.by(3, 1, 1) + q.by(3, 2, 2)) / (4.0 * q.third_eigenvalue)
 
 
-@computes("eq-29-constant")
-def _(_: Evidence) -> Number:
-    return number_for_both(
-        lambda damping: _at_critical_gain(damping).cubic.real,
-        "Real part, in Jordan coordinates; {taken:.5f} with the damping of eq. 8.",
-    )
+computes["eq-28-formula"] = lambda _: _on_samples(
+    3, _printed_w11, lambda q: q.w11, {"With the opposite sign": lambda q: -_printed_w11(q)}
+)
+computes["eq-29-constant"] = lambda _: number_for_both(
+    lambda damping: _at_critical_gain(damping).cubic.real,
+    "Real part, in Jordan coordinates; {taken:.5f} with the damping of eq. 8.",
+)
 
 
 @computes("eq-29-gain")
@@ -265,38 +224,22 @@ def _(_: Evidence) -> Number:
     )
 
 
-@computes("eq-30-formula")
-def _(_: Evidence) -> Formula:
-    printed = [
-        (q.g20 * q.g11 / (2.0 * q.frequency) + (q.cubic + q.g101 * q.g20) / 2.0).real
-        for q in samples(3)
-    ]
-    corrected = [
-        (
-            1j * q.g20 * q.g11 / (2.0 * q.frequency)
-            + (q.cubic + 2.0 * q.g110 * q.w11 + q.g101 * q.w20) / 2.0
-        ).real
-        for q in samples(3)
-    ]
-    return Formula(
-        printed,
-        [q.sigma for q in samples(3)],
-        [
-            Correction(
-                "With i in front of g20 g11, with 2 G110 w11 added and w20 for g20", corrected
-            )
-        ],
-        "Compared with the projection method, on arbitrary nonlinearities.",
-    )
-
-
-@computes("eq-30-value")
-def _(_: Evidence) -> Number:
-    return number_for_both(
-        lambda damping: critical(STUDIED_SPEED, damping).first_lyapunov_coefficient,
-        "By the projection method; {taken:.5f} with the damping of eq. 8. Of G21 half belongs in "
-        "sigma, which eq. 15 has and eq. 30 has not.",
-    )
+computes["eq-30-formula"] = lambda _: _on_samples(
+    3,
+    lambda q: (_beat(q) + (q.cubic + q.g101 * q.g20) / 2.0).real,
+    lambda q: q.sigma,
+    {
+        "With i in front of g20 g11, with 2 G110 w11 added and w20 for g20": lambda q: (
+            (1j * _beat(q) + (q.cubic + 2.0 * q.g110 * q.w11 + q.g101 * q.w20) / 2.0).real
+        )
+    },
+    "Compared with the projection method, on arbitrary nonlinearities.",
+)
+computes["eq-30-value"] = lambda _: number_for_both(
+    lambda damping: critical(STUDIED_SPEED, damping).first_lyapunov_coefficient,
+    "By the projection method; {taken:.5f} with the damping of eq. 8. Of G21 half belongs in "
+    "sigma, which eq. 15 has and eq. 30 has not.",
+)
 
 
 @computes("eq-30-sign")
@@ -305,14 +248,8 @@ def _(_: Evidence) -> Observation:
     return Observation(listed(found), max(found) < 0.0, remark="For both dampings.")
 
 
-@computes("eq-30-imaginary")
-def _(_: Evidence) -> Number:
-    def imaginary(damping: float) -> float:
-        q = _at_critical_gain(damping)
-        return (1j * q.g20 * q.g11 / (2.0 * q.frequency)).imag
-
-    return number_for_both(
-        imaginary,
-        "Of i g20 g11 / (2 omega_0); {taken:.4f} with the damping of eq. 8. The factor v0^2 is "
-        "missing, and 16 should be 32. Without consequence for sigma.",
-    )
+computes["eq-30-imaginary"] = lambda _: number_for_both(
+    lambda damping: _beat(_at_critical_gain(damping)).real,
+    "Of i g20 g11 / (2 omega_0); {taken:.4f} with the damping of eq. 8. The factor v0^2 is "
+    "missing, and 16 should be 32. Without consequence for sigma.",
+)

@@ -22,7 +22,6 @@ from stickslip_ros.paper.figures import STRIBECK, unit_drive
 
 computes = Computations()
 
-
 _STILL_ON_ITS_WAY = 0.02
 """Trace so small that a motion is not settled when a bifurcation diagram looks at it."""
 
@@ -113,10 +112,7 @@ def _(evidence: Evidence) -> Observation:
 
 @computes("amplitude-reduced")
 def _(evidence: Evidence) -> Observation:
-    linear, cubic, slow = evidence.portraits(13).panels
-    sizes = [
-        [amplitude(portrait) for portrait in panel.portraits] for panel in (linear, cubic, slow)
-    ]
+    sizes = [[amplitude(p) for p in panel.portraits] for panel in evidence.portraits(13).panels]
     without = sizes[0][0]
     largest = max(sizes[0][1:])
     slower, high = (

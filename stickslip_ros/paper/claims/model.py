@@ -4,14 +4,7 @@ from math import isclose, sqrt
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import (
-    Computations,
-    Correction,
-    Evidence,
-    Formula,
-    Number,
-    Observation,
-)
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.reference import (
     DAMPING,
     FASTER,
@@ -21,6 +14,7 @@ from stickslip_ros.paper.claims.reference import (
     hopf_point,
     only_rest_at,
     rates,
+    slip_friction,
     time_dependent,
     trace,
 )
@@ -33,7 +27,6 @@ from stickslip_ros.physics.model.friction import Stribeck
 from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
-
 
 _SLIDE = Drive(
     mass=3.0,
@@ -60,24 +53,19 @@ def _smallest_kinetic() -> tuple[float, float]:
     return _kinetic(speed), speed
 
 
-@computes("normal-vibration")
-def _(_: Evidence) -> Observation:
-    return Observation(
-        "depends on time" if time_dependent() else "constant normal force",
-        time_dependent(),
-        remark="Nothing in eq. 1 to 5 but the state changes with time, and the state holds no "
-        "normal motion: N is a constant, and only sets the scales.",
-    )
+computes["normal-vibration"] = lambda _: Observation(
+    "depends on time" if time_dependent() else "constant normal force",
+    time_dependent(),
+    remark="Nothing in eq. 1 to 5 but the state changes with time, and the state holds no "
+    "normal motion: N is a constant, and only sets the scales.",
+)
 
 
 @computes("eq-1")
 def _(_: Evidence) -> Formula:
     drive = _SLIDE
     position, speed = STATES[0] * drive.length_scale, STATES[1] * drive.speed_scale
-    relative_speed = speed - drive.belt_speed
-    friction = drive.normal_force * drive.friction.coefficient(
-        relative_speed, np.sign(relative_speed)
-    )
+    friction = drive.normal_force * slip_friction(drive.friction, speed - drive.belt_speed)
     acceleration = (friction - drive.damping * speed - drive.stiffness * position) / drive.mass
     scale = drive.angular_frequency * drive.speed_scale
     return Formula(
@@ -90,8 +78,7 @@ def _(_: Evidence) -> Formula:
 @computes("eq-2")
 def _(_: Evidence) -> Formula:
     law = _SLIDE.friction.scaled(_SLIDE.speed_scale)
-    relative_speed = STATES[1] - _SLIDE.belt_speed / _SLIDE.speed_scale
-    coefficient = law.coefficient(relative_speed, np.sign(relative_speed))
+    coefficient = slip_friction(law, STATES[1] - _SLIDE.belt_speed / _SLIDE.speed_scale)
     return Formula(
         coefficient - _SLIDE.damping_coefficient * STATES[1] - STATES[0],
         rates(_SLIDE, STATES[:2])[1],
@@ -100,10 +87,8 @@ def _(_: Evidence) -> Formula:
 
 @computes("scales")
 def _(_: Evidence) -> Formula:
-    time, length = (
-        1.0 / sqrt(_SLIDE.stiffness / _SLIDE.mass),
-        _SLIDE.normal_force / _SLIDE.stiffness,
-    )
+    time = 1.0 / sqrt(_SLIDE.stiffness / _SLIDE.mass)
+    length = _SLIDE.normal_force / _SLIDE.stiffness
     inertia, spring = _SLIDE.mass * length / time**2, _SLIDE.stiffness * length
     return Formula(
         np.array([inertia, spring]) / _SLIDE.normal_force,
@@ -118,7 +103,7 @@ def _(_: Evidence) -> Formula:
     return Formula(
         None,
         _SLIDE.damping_coefficient,
-        [Correction("With omega, which is not defined, read as omega_0", read)],
+        {"With omega, which is not defined, read as omega_0": read},
         f"The coefficient of X' is c / sqrt(k m) = {_SLIDE.damping_coefficient:.4g} for the drive "
         "tried.",
     )
@@ -128,22 +113,19 @@ def _(_: Evidence) -> Formula:
 def _(_: Evidence) -> Formula:
     length = _SLIDE.normal_force / _SLIDE.stiffness
     read = _SLIDE.belt_speed / (sqrt(_SLIDE.stiffness / _SLIDE.mass) * length)
-    parameters = Equations(Stribeck, continuous_control=False).parameters(_SLIDE)
     return Formula(
         None,
-        parameters["belt_speed"],
-        [Correction("With L, which is not defined, read as N/k", read)],
+        Equations(Stribeck, continuous_control=False).parameters(_SLIDE)["belt_speed"],
+        {"With L, which is not defined, read as N/k": read},
         "One symbol stands for the speed in m/s and for the dimensionless one.",
     )
 
 
-@computes("excitation-frequency")
-def _(_: Evidence) -> Observation:
-    return Observation(
-        "time-dependent" if time_dependent() else "autonomous",
-        time_dependent(),
-        remark="Omega is scaled but used nowhere: the equations do not contain time.",
-    )
+computes["excitation-frequency"] = lambda _: Observation(
+    "time-dependent" if time_dependent() else "autonomous",
+    time_dependent(),
+    remark="Omega is scaled but used nowhere: the equations do not contain time.",
+)
 
 
 @computes("eq-3")
@@ -162,19 +144,15 @@ def _(_: Evidence) -> Formula:
     )
 
 
-@computes("static-coefficient")
-def _(_: Evidence) -> Number:
-    return Number(_kinetic(0.0), remark="The law's size as the relative speed goes to zero.")
-
-
-@computes("smallest-coefficient")
-def _(_: Evidence) -> Number:
-    return Number(_smallest_kinetic()[0], remark="Where heyoka's derivative of the law is zero.")
-
-
-@computes("smallest-at")
-def _(_: Evidence) -> Number:
-    return Number(_smallest_kinetic()[1], remark="Where heyoka's derivative of the law is zero.")
+computes["static-coefficient"] = lambda _: Number(
+    _kinetic(0.0), remark="The law's size as the relative speed goes to zero."
+)
+computes["smallest-coefficient"] = lambda _: Number(
+    _smallest_kinetic()[0], remark="Where heyoka's derivative of the law is zero."
+)
+computes["smallest-at"] = lambda _: Number(
+    _smallest_kinetic()[1], remark="Where heyoka's derivative of the law is zero."
+)
 
 
 @computes("names-of-coefficients")
@@ -207,31 +185,23 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@computes("eq-4")
-def _(_: Evidence) -> Formula:
-    return Formula(rates(unit_drive(0.4), STATES[:2])[0], STATES[1])
+computes["eq-4"] = lambda _: Formula(rates(unit_drive(0.4), STATES[:2])[0], STATES[1])
 
 
 @computes("eq-5")
 def _(_: Evidence) -> Formula:
-    relative_speed = STATES[1] - 0.4
-    friction = STRIBECK.coefficient(relative_speed, np.sign(relative_speed))
+    friction = slip_friction(STRIBECK, STATES[1] - 0.4)
     printed = [STATES[1], -DAMPING * STATES[1] - STATES[0] + friction]
     return Formula(printed, rates(unit_drive(0.4), STATES[:2]))
 
 
 @computes("eq-5-origin")
 def _(_: Evidence) -> Formula:
-    relative_speed = STATES[1] - 0.4
-    law = STRIBECK.coefficient(relative_speed, np.sign(relative_speed))
+    law = slip_friction(STRIBECK, STATES[1] - 0.4)
     return Formula(
         law,
         rates(unit_drive(0.4), STATES[:2])[1],
-        [
-            Correction(
-                "With eq. 2 for eq. 3, which goes into it,", law - DAMPING * STATES[1] - STATES[0]
-            )
-        ],
+        {"With eq. 2 for eq. 3, which goes into it,": law - DAMPING * STATES[1] - STATES[0]},
     )
 
 
@@ -261,10 +231,7 @@ def _(evidence: Evidence) -> Observation:
         if drive.belt_speed > 1.05 * hopf_point().belt_speed
     ]
     resting = [measures.regime is Regime.EQUILIBRIUM for measures, _ in fast]
-    off = max(
-        abs((measures.midpoint or 0.0) / drive.equilibrium_position - 1.0)
-        for measures, drive in fast
-    )
+    off = max(abs((m.midpoint or 0.0) / drive.equilibrium_position - 1.0) for m, drive in fast)
     return Observation(
         f"at {sum(resting)} of {len(fast)} belt speeds",
         all(resting) and off < 1e-4 and only_rest_at(FASTER),

@@ -85,12 +85,13 @@ class Nonlinearity:
     @property
     def w20(self) -> complex:
         """Coefficient of z^2/2 in y3 on the centre manifold: (2 i w - lambda3) w20 = Q3_zz."""
-        return self._filter(self._z, self._z) / (2j * self.frequency - self.third_eigenvalue)
+        along = complex(self._along(self._z, self._z)[2])
+        return along / (2j * self.frequency - self.third_eigenvalue)
 
     @property
     def w11(self) -> complex:
         """Coefficient of z times its conjugate: -lambda3 w11 = Q3_z conj(z)."""
-        return self._filter(self._z, self._z.conj()) / -self.third_eigenvalue
+        return complex(self._along(self._z, self._z.conj())[2]) / -self.third_eigenvalue
 
     @property
     def sigma(self) -> float:
@@ -114,9 +115,6 @@ class Nonlinearity:
     def _plane(self, *directions: npt.NDArray[np.complex128]) -> complex:
         along = self._along(*directions)
         return complex(along[0] + 1j * along[1])
-
-    def _filter(self, *directions: npt.NDArray[np.complex128]) -> complex:
-        return complex(self._along(*directions)[2])
 
     def _along(self, *directions: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
         along = (self.second if len(directions) == 2 else self.third).astype(np.complex128)

@@ -7,7 +7,7 @@ from math import sqrt
 
 import numpy as np
 
-from stickslip_ros.paper.claims.claim import Computations, Correction, Evidence, Number, Observation
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Number, Observation
 from stickslip_ros.paper.claims.reference import (
     FASTER,
     PRINTED_HOPF_SPEED,
@@ -46,7 +46,6 @@ from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
 
-
 _PRINTED_ONSET = 0.4372
 """v_b0."""
 
@@ -63,10 +62,7 @@ def _of_speed(evidence: Evidence, low: float, high: float) -> list[Portrait]:
 @computes("fig-6-rest")
 def _(evidence: Evidence) -> Observation:
     above = _of_speed(evidence, hopf_point().belt_speed, 9.0)
-    off = max(
-        abs((portrait.least_relative_speed or 0.0) / portrait.drive.belt_speed - 1.0)
-        for portrait in above
-    )
+    off = max(abs((p.least_relative_speed or 0.0) / p.drive.belt_speed - 1.0) for p in above)
     return Observation(
         f"v0 = {belt_speeds(above)}: at rest",
         set(regimes(above)) == {Regime.EQUILIBRIUM} and off < 1e-3 and only_rest_at(FASTER),
@@ -80,21 +76,19 @@ def _(evidence: Evidence) -> Observation:
     above = _of_speed(evidence, hopf_point().belt_speed, 9.0)
     times = [portrait.settling_time or 0.0 for portrait in above]
     overdamped = overdamped_from()
-    near, rates = (
-        [-float(expansion(speed).eigenvalues[0].real) for speed in speeds.tolist()]
-        for speeds in (
-            np.linspace(hopf_point().belt_speed, overdamped, 20),
-            np.array([overdamped, 1.5, 2.0]),
-        )
+    speeds = np.linspace(hopf_point().belt_speed, overdamped, 20).tolist()
+    near, beyond = (
+        [float(expansion(v).eigenvalues[0].real) for v in tried]
+        for tried in (speeds, (overdamped, 1.5, 2.0))
     )
-    rises = falling(times) and falling([-rate for rate in near])
+    rises = falling(times) and falling(near)
     return Observation(
         f"after {listed(times)}",
-        rises and falling([-rate for rate in rates]),
+        rises and falling(beyond),
         rises,
         f"Only up to v0 = {overdamped:.4f}, where the drive becomes overdamped. The decay rate is "
-        f"{rates[0]:.3f} there, {rates[1]:.3f} at 1.5 and {rates[2]:.3f} at 2. Settling times of "
-        f"Fig. 6 for v0 = {belt_speeds(above)}.",
+        f"{-beyond[0]:.3f} there, {-beyond[1]:.3f} at 1.5 and {-beyond[2]:.3f} at 2. "
+        f"Settling times of Fig. 6 for v0 = {belt_speeds(above)}.",
     )
 
 
@@ -113,7 +107,7 @@ def _(evidence: Evidence) -> Observation:
     between = _of_speed(evidence, exact_onset(), hopf_point().belt_speed)
     least = [portrait.least_relative_speed or 0.0 for portrait in between]
     return Observation(
-        f"{listed(least)}",
+        listed(least),
         set(regimes(between)) == {Regime.PURE_SLIP} and min(least) > 0.0,
         remark=f"At v0 = {belt_speeds(between)}.",
     )
@@ -147,14 +141,12 @@ def _(evidence: Evidence) -> Observation:
     )
 
 
-@computes("vb0")
-def _(_: Evidence) -> Number:
-    return Number(
-        exact_onset(),
-        [Correction("By averaging, an approximation", approximate_onset())],
-        "The periodic orbit that touches the belt's speed has the computed one. The paper does not "
-        "say where its value comes from.",
-    )
+computes["vb0"] = lambda _: Number(
+    exact_onset(),
+    {"By averaging, an approximation": approximate_onset()},
+    "The periodic orbit that touches the belt's speed has the computed one. The paper does not "
+    "say where its value comes from.",
+)
 
 
 @computes("vb0-and-vb1")
@@ -208,7 +200,7 @@ def _(_: Evidence) -> Observation:
     true = [hopf_point(2.0 * beta).belt_speed for beta in betas]
     once, twice = ([sqrt((0.45 - n * beta) / 1.8) for beta in betas] for n in (1.0, 2.0))
     return Observation(
-        f"{listed(true)}",
+        listed(true),
         bool(np.allclose(once, true, rtol=1e-9)),
         bool(np.allclose(twice, true, rtol=1e-9)),
         f"With 2 beta in place of beta in eq. 8, which gives {listed(once)} for beta = "
@@ -216,10 +208,9 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@computes("fig-7-stick")
-def _(evidence: Evidence) -> Observation:
-    portraits = evidence.portraits(7).portraits
-    return _falling_stick_fractions(portraits, "of the motions that vibrate")
+computes["fig-7-stick"] = lambda evidence: _falling_stick_fractions(
+    evidence.portraits(7).portraits, "of the motions that vibrate"
+)
 
 
 @computes("fig-10-stick")
@@ -247,14 +238,11 @@ def _(evidence: Evidence, figure: int) -> Observation:
     return Observation("; ".join(labels), stages == expected)
 
 
-@computes("linear-slope")
-def _(_: Evidence) -> Number:
-    tangent = trace(1e-9, 0.0)
-    return Number(
-        tangent,
-        remark="Computed is the Stribeck law's slope at zero relative speed, "
-        f"{tangent / PRINTED_SLOPE:.4g} times what is printed.",
-    )
+computes["linear-slope"] = lambda _: Number(
+    trace(1e-9, 0.0),
+    remark="Computed is the Stribeck law's slope at zero relative speed, "
+    f"{trace(1e-9, 0.0) / PRINTED_SLOPE:.4g} times what is printed.",
+)
 
 
 @computes("fig-8")
@@ -264,14 +252,9 @@ def _(evidence: Evidence) -> Observation:
     undamped = [portrait for portrait in portraits if portrait.drive.damping == 0.0]
     ranges = [(p.measures.amplitude or 0.0) / p.drive.belt_speed for p in undamped]
     betas, speeds = (0.001, 1.0), (0.02, 0.2, 2.0)
-    found = [
-        cycle
-        for beta in betas
-        for speed in speeds
-        for cycle in limit_cycles(
-            unit_drive(speed, damping=2.0 * beta, friction=Coulomb(STRIBECK.static))
-        )
-    ]
+    law = Coulomb(STRIBECK.static)
+    drives = [unit_drive(v, damping=2.0 * beta, friction=law) for beta in betas for v in speeds]
+    found = [cycle for drive in drives for cycle in limit_cycles(drive)]
     return Observation(
         f"{regimes(damped).count(Regime.EQUILIBRIUM)} of {len(damped)} dampings come to rest",
         set(regimes(damped)) == {Regime.EQUILIBRIUM} and not found,
@@ -287,13 +270,9 @@ def _(evidence: Evidence) -> Observation:
     tangent, printed, slow = evidence.portraits(9).panels
     least = [panel.portraits[0] for panel in (tangent, printed, slow)]
     vibrates = [portrait.measures.regime in VIBRATING for portrait in least]
+    laws = [Linear(STRIBECK.static, slope) for slope in (PRINTED_SLOPE, TANGENT_SLOPE)]
     fastest = [
-        border(
-            lambda v, slope=slope: stays(unit_drive(v, friction=Linear(STRIBECK.static, slope))),
-            0.01,
-            2.0,
-        )
-        for slope in (PRINTED_SLOPE, TANGENT_SLOPE)
+        border(lambda v, law=law: stays(unit_drive(v, friction=law)), 0.01, 2.0) for law in laws
     ]
     passes = least[1].time_beyond(10.0)
     return Observation(

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.claims.claim import Correction, Formula, Number
+from stickslip_ros.paper.claims.claim import Formula, Number
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import Equations, W, WashoutGains, X, Y
@@ -66,13 +66,17 @@ STATES: FloatArray = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 40))
 """Where formulas in the state X, Y, W are evaluated."""
 
 
+def known(value: _T | None) -> _T:
+    """Return what there is for every drive that the claims are about."""
+    assert value is not None
+    return value
+
+
 def expansion(
     belt_speed: float, damping: float = DAMPING, gains: WashoutGains | None = None
 ) -> Expansion:
     """Return the derivatives of the right-hand side at the equilibrium."""
-    found = expand(unit_drive(belt_speed, damping=damping), gains)
-    assert found is not None
-    return found
+    return known(expand(unit_drive(belt_speed, damping=damping), gains))
 
 
 def trace(belt_speed: float, damping: float = DAMPING) -> float:
@@ -82,9 +86,7 @@ def trace(belt_speed: float, damping: float = DAMPING) -> float:
 
 def trace_of(drive: Drive) -> float:
     """Return p of any drive; where it is above zero the equilibrium is unstable."""
-    found = expand(drive)
-    assert found is not None
-    return float(np.trace(found.jacobian))
+    return float(np.trace(known(expand(drive)).jacobian))
 
 
 @cache
@@ -115,7 +117,7 @@ def number_for_both(compute: Callable[[float], float], remark: str = "") -> Numb
     In the remark "{taken}" stands for the latter.
     """
     here, taken = for_both(compute)
-    return Number(here, [Correction(TAKEN_FOR_DAMPING, taken)], remark.format(taken=taken))
+    return Number(here, {TAKEN_FOR_DAMPING: taken}, remark.format(taken=taken))
 
 
 def formula_for_both(
@@ -123,7 +125,7 @@ def formula_for_both(
 ) -> Formula:
     """Return the formula for the damping of eq. 5, corrected to that of eq. 8."""
     here, taken = for_both(lambda damping: printed - np.asarray(true(damping)))
-    return Formula(here, 0.0, [Correction(TAKEN_FOR_DAMPING, taken)], remark)
+    return Formula(here, 0.0, {TAKEN_FOR_DAMPING: taken}, remark)
 
 
 def overdamped_from() -> float:
@@ -139,16 +141,12 @@ def onset(damping: float = DAMPING, stiffness: float = 1.0) -> StickingOnset:
 
 def exact_onset(damping: float = DAMPING, stiffness: float = 1.0) -> float:
     """Return that of the motion itself."""
-    speed = onset(damping, stiffness).exact
-    assert speed is not None
-    return speed
+    return known(onset(damping, stiffness).exact)
 
 
 def approximate_onset(damping: float = DAMPING) -> float:
     """Return that by averaging."""
-    speed = onset(damping).approximate
-    assert speed is not None
-    return speed
+    return known(onset(damping).approximate)
 
 
 @cache
@@ -168,14 +166,12 @@ def only_rest_at(belt_speeds: Sequence[float]) -> bool:
 def critical(belt_speed: float, damping: float, corner_frequency: float = 2.0) -> CriticalGains:
     """Return the critical gains of the loop without a cubic gain."""
     gains = replace(FILTER, corner_frequency=corner_frequency)
-    found = critical_gains(unit_drive(belt_speed, damping=damping), gains)
-    assert found is not None
-    return found
+    return known(critical_gains(unit_drive(belt_speed, damping=damping), gains))
 
 
-def controlled_amplitude(belt_speed: float, gains: WashoutGains) -> float:
+def controlled_amplitude(belt_speed: float, gains: WashoutGains, damping: float = DAMPING) -> float:
     """Return the amplitude of the limit cycle that the motion from rest at X = 0 leads to."""
-    cycle = limit_cycle_of_run(unit_drive(belt_speed), 0.0, gains=gains)
+    cycle = limit_cycle_of_run(unit_drive(belt_speed, damping=damping), 0.0, gains=gains)
     return 0.0 if cycle is None else cycle.measures.amplitude or 0.0
 
 
@@ -207,6 +203,11 @@ def amplitudes(belt_speed: float, damping: float = DAMPING) -> list[float]:
     """Return the displacement amplitudes of the limit cycles."""
     found = [cycle.measures.amplitude for cycle in cycles(belt_speed, damping)]
     return [amplitude for amplitude in found if amplitude is not None]
+
+
+def slip_friction(law: FrictionLaw, relative_speed: FloatArray) -> FloatArray:
+    """Return the friction coefficients at relative speeds of either sign."""
+    return law.coefficient(relative_speed, np.sign(relative_speed))
 
 
 def rates(drive: Drive, states: FloatArray, gains: WashoutGains | None = None) -> FloatArray:

@@ -5,14 +5,7 @@ from math import log
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.claims.claim import (
-    Computations,
-    Correction,
-    Evidence,
-    Formula,
-    Number,
-    Observation,
-)
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.reference import (
     BELT_SPEEDS,
     DAMPING,
@@ -40,11 +33,6 @@ from stickslip_ros.physics.motion.motion import Motion
 computes = Computations()
 
 
-def _second_order() -> float:
-    """Return the coefficient of v0 X2^2 in X2'."""
-    return float(expansion(1.0).quadratic[1, 1, 1]) / 2.0
-
-
 def _third_order() -> float:
     """Return the coefficient of X2^3 in X2'."""
     return float(expansion(1.0).cubic[1, 1, 1, 1]) / 6.0
@@ -61,19 +49,15 @@ def _jacobians(damping: float) -> FloatArray:
     return np.array([expansion(speed, damping).jacobian for speed in BELT_SPEEDS])
 
 
-@computes("linear-coefficient")
-def _(_: Evidence) -> Number:
-    return Number(_growth(0.0)[0], remark="From heyoka's derivatives of the equations.")
-
-
-@computes("cubic-coefficient")
-def _(_: Evidence) -> Number:
-    return Number(-_third_order(), remark="From heyoka's derivatives of the equations.")
-
-
-@computes("eq-6-speed")
-def _(_: Evidence) -> Formula:
-    return Formula(0.0, [expansion(speed).equilibrium[1] for speed in BELT_SPEEDS])
+computes["linear-coefficient"] = lambda _: Number(
+    _growth(0.0)[0], remark="From heyoka's derivatives of the equations."
+)
+computes["cubic-coefficient"] = lambda _: Number(
+    -_third_order(), remark="From heyoka's derivatives of the equations."
+)
+computes["eq-6-speed"] = lambda _: Formula(
+    0.0, [expansion(speed).equilibrium[1] for speed in BELT_SPEEDS]
+)
 
 
 @computes("eq-6-position")
@@ -102,17 +86,16 @@ def _(_: Evidence) -> Formula:
     return Formula(
         printed(3.0),
         at_rest - friction,
-        [Correction("With the factor v0 in the last term", printed(3.0 * belt_speed))],
+        {"With the factor v0 in the last term": printed(3.0 * belt_speed)},
         "F2 is minus the change of the friction, so that -F stands in eq. 16; v_r is its value "
         "-v0 at rest. All this while the slide is slower than the belt: beyond, friction changes "
         "sign.",
     )
 
 
-@computes("eq-6-first")
-def _(_: Evidence) -> Formula:
-    at_rest = expansion(0.4)
-    return Formula(0.0, np.concatenate([at_rest.quadratic[0].ravel(), at_rest.cubic[0].ravel()]))
+computes["eq-6-first"] = lambda _: Formula(
+    0.0, np.concatenate([expansion(0.4).quadratic[0].ravel(), expansion(0.4).cubic[0].ravel()])
+)
 
 
 @computes("first-approximation")
@@ -143,7 +126,7 @@ def _(_: Evidence) -> Formula:
     return Formula(
         np.zeros_like(jacobians),
         jacobians,
-        [Correction("Without the = 0, with first row (0, 1) as printed,", structure)],
+        {"Without the = 0, with first row (0, 1) as printed,": structure},
     )
 
 
@@ -165,41 +148,30 @@ def _(_: Evidence) -> Formula:
     )
 
 
-@computes("eq-8-constant")
-def _(_: Evidence) -> Number:
-    return number_for_both(
-        lambda damping: _growth(damping)[0], "Eq. 5 has 2 beta, eq. 8 takes beta once."
-    )
-
-
-@computes("eq-8-square")
-def _(_: Evidence) -> Number:
-    return Number(_growth()[1], remark="Three times the cubic coefficient of the law.")
+computes["eq-8-constant"] = lambda _: number_for_both(
+    lambda damping: _growth(damping)[0], "Eq. 5 has 2 beta, eq. 8 takes beta once."
+)
+computes["eq-8-square"] = lambda _: Number(
+    _growth()[1], remark="Three times the cubic coefficient of the law."
+)
 
 
 @computes("eq-8-matrix")
 def _(_: Evidence) -> Formula:
-    p = trace(0.4)
-    eigenvalue = 0.3
+    p, eigenvalue = trace(0.4), 0.3
     return Formula(
         [[eigenvalue, 1.0], [-1.0, eigenvalue - p]],
         eigenvalue * np.eye(2) - expansion(0.4).jacobian,
-        [
-            Correction(
-                "With the signs of 1 and -1 exchanged", [[eigenvalue, -1.0], [1.0, eigenvalue - p]]
-            )
-        ],
+        {"With the signs of 1 and -1 exchanged": [[eigenvalue, -1.0], [1.0, eigenvalue - p]]},
         "The determinant is the same either way.",
     )
 
 
-@computes("eq-8-polynomial")
-def _(_: Evidence) -> Formula:
-    return Formula(
-        [[1.0, -trace(speed), 1.0] for speed in BELT_SPEEDS],
-        [np.poly(expansion(speed).jacobian) for speed in BELT_SPEEDS],
-        remark="With whatever damping p has.",
-    )
+computes["eq-8-polynomial"] = lambda _: Formula(
+    [[1.0, -trace(speed), 1.0] for speed in BELT_SPEEDS],
+    [np.poly(expansion(speed).jacobian) for speed in BELT_SPEEDS],
+    remark="With whatever damping p has.",
+)
 
 
 @computes("hurwitz")
@@ -214,42 +186,34 @@ def _(_: Evidence) -> Observation:
     )
 
 
-@computes("vb1")
-def _(_: Evidence) -> Number:
-    return number_for_both(
-        lambda damping: hopf_point(damping).belt_speed,
-        "The slip of eq. 8: with the damping of eq. 5 the loop is stable above "
-        f"{hopf_point().belt_speed:.5f} already.",
-    )
+computes["vb1"] = lambda _: number_for_both(
+    lambda damping: hopf_point(damping).belt_speed,
+    "The slip of eq. 8: with the damping of eq. 5 the loop is stable above "
+    f"{hopf_point().belt_speed:.5f} already.",
+)
 
 
 @computes("vb1-supercritical")
 def _(_: Evidence) -> Observation:
     sigma = hopf_point().first_lyapunov_coefficient
     just_below = cycles(hopf_point().belt_speed - 2e-3)
-    stable = [cycle.stable for cycle in just_below]
     return Observation(
         f"sigma = {sigma:.6g}",
-        sigma < 0.0 and stable == [True] and not cycles(hopf_point().belt_speed + 2e-3),
+        sigma < 0.0
+        and [cycle.stable for cycle in just_below] == [True]
+        and not cycles(hopf_point().belt_speed + 2e-3),
         remark=f"0.002 below v_b1 shooting finds {len(just_below)} limit cycle, of multiplier "
         f"{abs(just_below[0].multipliers[0]):.5f}; 0.002 above none.",
     )
 
 
-@computes("eq-9-matrix")
-def _(_: Evidence) -> Formula:
-    printed = np.array([[[0.0, 1.0], [-1.0, p]] for p in printed_trace(BELT_SPEEDS)])
-    return formula_for_both(printed, _jacobians)
-
-
-@computes("eq-9-square")
-def _(_: Evidence) -> Number:
-    return Number(_second_order(), remark="Half the second derivative at v0 = 1.")
-
-
-@computes("eq-9-cube")
-def _(_: Evidence) -> Number:
-    return Number(_third_order(), remark="A sixth of the third derivative.")
+computes["eq-9-matrix"] = lambda _: formula_for_both(
+    np.array([[[0.0, 1.0], [-1.0, p]] for p in printed_trace(BELT_SPEEDS)]), _jacobians
+)
+computes["eq-9-square"] = lambda _: Number(
+    float(expansion(1.0).quadratic[1, 1, 1]) / 2.0, remark="Half the second derivative at v0 = 1."
+)
+computes["eq-9-cube"] = lambda _: Number(_third_order(), remark="A sixth of the third derivative.")
 
 
 @computes("eq-9-jordan")
@@ -275,21 +239,16 @@ def _(_: Evidence) -> Formula:
     return Formula(
         printed,
         np.array([expansion(speed).equilibrium for speed in BELT_SPEEDS]).T,
-        [Correction("With the two exchanged", printed[::-1])],
+        {"With the two exchanged": printed[::-1]},
         "It is displaced and at rest; in the coordinates of eq. 9 it is the origin.",
     )
 
 
-@computes("eq-10-real")
-def _(_: Evidence) -> Formula:
-    def real_parts(damping: float) -> list[float]:
-        return [expansion(v, damping).eigenvalues.real.mean() for v in BELT_SPEEDS]
-
-    return formula_for_both(
-        printed_trace(BELT_SPEEDS) / 2.0,
-        real_parts,
-        f"From v0 = {overdamped_from():.4f} on, where both eigenvalues are real, it is their mean.",
-    )
+computes["eq-10-real"] = lambda _: formula_for_both(
+    printed_trace(BELT_SPEEDS) / 2.0,
+    lambda damping: [expansion(v, damping).eigenvalues.real.mean() for v in BELT_SPEEDS],
+    f"From v0 = {overdamped_from():.4f} on, where both eigenvalues are real, it is their mean.",
+)
 
 
 @computes("eq-10-imaginary")
@@ -301,12 +260,12 @@ def _(_: Evidence) -> Formula:
     return Formula(
         None if np.any(radicands < 0.0) else np.sqrt(radicands) / 2.0,
         halves + 1j * frequencies,
-        [
-            Correction(
-                "With alpha +- i beta and beta = sqrt(4 - p^2) / 2 where p^2 < 4",
-                np.emath.sqrt(radicands) / 2.0,
+        {
+            "With alpha +- i beta and beta = sqrt(4 - p^2) / 2 where p^2 < 4": np.emath.sqrt(
+                radicands
             )
-        ],
+            / 2.0
+        },
         f"Up to v0 = {overdamped_from():.4f} p^2 - 4 is below zero, {radicands.min():.4g} at the "
         "least, so that the printed root is of a negative number; from there on it is not, and the "
         f"two eigenvalues are real, as printed (tried up to v0 = {max(speeds):g}).",
@@ -315,26 +274,23 @@ def _(_: Evidence) -> Formula:
 
 @computes("eq-11-value")
 def _(_: Evidence) -> Number:
-    step = 1e-5
-    speed = PRINTED_HOPF_SPEED
-    doubled = (trace(speed + step, TAKEN_DAMPING) - trace(speed - step, TAKEN_DAMPING)) / (
-        2.0 * step
-    )
+    step, speed = 1e-5, PRINTED_HOPF_SPEED
+    change = trace(speed + step, TAKEN_DAMPING) - trace(speed - step, TAKEN_DAMPING)
+    doubled = change / (2.0 * step)
     return Number(
         hopf_point().crossing_speed,
-        [
-            Correction(TAKEN_FOR_DAMPING, hopf_point(TAKEN_DAMPING).crossing_speed),
-            Correction("With p' in place of p'/2, at v0 = 0.4944", doubled),
-        ],
+        {
+            TAKEN_FOR_DAMPING: hopf_point(TAKEN_DAMPING).crossing_speed,
+            "With p' in place of p'/2, at v0 = 0.4944": doubled,
+        },
         "The factor 1/2 of alpha = p/2 got lost, and the 0 in alpha'(0) stands for v_b1: the "
         f"eigenvalues cross at {hopf_point(TAKEN_DAMPING).crossing_speed:.5f} there.",
     )
 
 
-@computes("eq-11-sign")
-def _(_: Evidence) -> Observation:
-    crossing = hopf_point().crossing_speed
-    return Observation(f"{crossing:.5f}", crossing < 0.0)
+computes["eq-11-sign"] = lambda _: Observation(
+    f"{hopf_point().crossing_speed:.5f}", hopf_point().crossing_speed < 0.0
+)
 
 
 @computes("stable-below")
@@ -345,10 +301,9 @@ def _(_: Evidence) -> Observation:
         len(here) == 1 and here[0].stable and not expansion(speed).stable
         for speed, here in zip(speeds, found, strict=True)
     )
-    stable_between = expansion(STUDIED_SPEED).stable
     return Observation(
         f"one stable cycle at each of {len(speeds)} belt speeds" if below else "other cycles",
-        below and not stable_between,
+        below and not expansion(STUDIED_SPEED).stable,
         below,
         "With v_b1 computed with beta = 0.01 in eq. 5: at "
         f"v0 = {STUDIED_SPEED:g} < {PRINTED_HOPF_SPEED:g} the equilibrium is stable and there are "

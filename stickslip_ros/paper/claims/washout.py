@@ -6,14 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.paper.claims.claim import (
-    Computations,
-    Correction,
-    Evidence,
-    Formula,
-    Number,
-    Observation,
-)
+from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.reference import (
     BELT_SPEEDS,
     DAMPING,
@@ -28,6 +21,7 @@ from stickslip_ros.paper.claims.reference import (
     expansion,
     for_both,
     formula_for_both,
+    known,
     number_for_both,
     printed_trace,
     rates,
@@ -41,9 +35,6 @@ from stickslip_ros.physics.theory.linear import hurwitz_determinants
 from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
-
-
-_PRINTED_TRACE = 0.0078
 
 _SOME_GAINS = replace(FILTER, linear=-0.3, cubic=-2.0)
 
@@ -91,7 +82,7 @@ def _(_: Evidence) -> Formula:
     return Formula(
         printed,
         _loop_rates(None)[1],
-        [Correction("With the factor v0 in the last term of F", corrected)],
+        {"With the factor v0 in the last term of F": corrected},
         "C and K, which are not defined, are 2 beta and 1. F as in eq. 6: while the slide is "
         "slower than the belt.",
     )
@@ -116,12 +107,10 @@ def _(_: Evidence) -> Formula:
     return Formula(
         None,
         _loop_rates(_SOME_GAINS)[1] - _loop_rates(None)[1],
-        [
-            Correction(
-                "With v, which is not defined, read as y - d w as in eq. 19",
-                _SOME_GAINS.linear * v + _SOME_GAINS.cubic * v**3,
-            )
-        ],
+        {
+            "With v, which is not defined, read as y - d w as in eq. 19": _SOME_GAINS.linear * v
+            + _SOME_GAINS.cubic * v**3
+        },
     )
 
 
@@ -159,22 +148,15 @@ def _printed_jacobian(p: float, linear: float) -> FloatArray:
     return np.array([[0.0, 1.0, 0.0], [-1.0, p + linear, -2.0 * linear], [0.0, 1.0, -2.0]])
 
 
-@computes("eq-20")
-def _(_: Evidence) -> Formula:
-    linear = _SOME_GAINS.linear
-    return Formula(
-        _printed_jacobian(trace(STUDIED_SPEED), linear),
-        expansion(STUDIED_SPEED, gains=_SOME_GAINS).jacobian,
-        remark="That d = 2 is to be read from it; the text does not say so.",
-    )
-
-
-@computes("eq-20-trace")
-def _(_: Evidence) -> Number:
-    return number_for_both(
-        lambda damping: trace(STUDIED_SPEED, damping),
-        "With the damping of eq. 5 there is nothing to control at v0 = 0.49: p is below zero.",
-    )
+computes["eq-20"] = lambda _: Formula(
+    _printed_jacobian(trace(STUDIED_SPEED), _SOME_GAINS.linear),
+    expansion(STUDIED_SPEED, gains=_SOME_GAINS).jacobian,
+    remark="That d = 2 is to be read from it; the text does not say so.",
+)
+computes["eq-20-trace"] = lambda _: number_for_both(
+    lambda damping: trace(STUDIED_SPEED, damping),
+    "With the damping of eq. 5 there is nothing to control at v0 = 0.49: p is below zero.",
+)
 
 
 _EQ_21: dict[int, Callable[[FloatArray, float], FloatArray]] = {
@@ -226,16 +208,17 @@ def _(_: Evidence) -> Observation:
 
 @computes("eq-21-gain")
 def _(_: Evidence) -> Number:
+    p = 0.0078  # as printed
     rounded = zero_between(
-        lambda k1: float(hurwitz_determinants(_printed_jacobian(_PRINTED_TRACE, k1))[-1]), -0.5, 0.5
+        lambda k1: float(hurwitz_determinants(_printed_jacobian(p, k1))[-1]), -0.5, 0.5
     )
     exact = critical(STUDIED_SPEED, TAKEN_DAMPING).linear
     return Number(
         critical(STUDIED_SPEED, DAMPING).linear,
-        [
-            Correction(TAKEN_FOR_DAMPING, exact),
-            Correction(f"{TAKEN_FOR_DAMPING}, and p rounded to {_PRINTED_TRACE:g}", rounded),
-        ],
+        {
+            TAKEN_FOR_DAMPING: exact,
+            f"{TAKEN_FOR_DAMPING}, and p rounded to {p:g}": rounded,
+        },
         f"Without that rounding it is {exact:.6f}. The printed c2 did not lead there.",
     )
 
@@ -267,20 +250,16 @@ def _(_: Evidence) -> Formula:
     )
 
 
-@computes("eq-22-value")
-def _(_: Evidence) -> Number:
-    return number_for_both(
-        _crossing,
-        "At the critical gain, by projection onto the eigenvectors; printed is the derivative of "
-        "the trace of eq. 20. With the damping of eq. 8 it is {taken:.5f}.",
-    )
+computes["eq-22-value"] = lambda _: number_for_both(
+    _crossing,
+    "At the critical gain, by projection onto the eigenvectors; printed is the derivative of "
+    "the trace of eq. 20. With the damping of eq. 8 it is {taken:.5f}.",
+)
 
 
 def _crossing(damping: float) -> float:
     gains = replace(FILTER, linear=critical(STUDIED_SPEED, damping).linear)
-    found = crossing_speed(expansion(STUDIED_SPEED, damping, gains))
-    assert found is not None
-    return found
+    return known(crossing_speed(expansion(STUDIED_SPEED, damping, gains)))
 
 
 @computes("eq-11-product", PRINTED_HOPF_SPEED)

@@ -67,15 +67,11 @@ def simulate_continuous(
     """
     tracer = None if observer is None else MotionTracer(motion, observer)
     advance = motion.advance if tracer is None else tracer.advance
-    parts = [(duration, False)]
-    if washout is not None:
-        free = min(washout.start_after, duration)
-        parts = [(free, False), (duration - free, True)]
+    free = duration if washout is None else min(washout.start_after, duration)
     block = 10.0 * motion.drive.natural_period
     done = 0.0
-    for length, controlled in parts:
+    for length, share in ((free, 0.0), (duration - free, 1.0)):
         if washout is not None:
-            share = 1.0 if controlled else 0.0
             motion.set_gains(
                 washout.corner_frequency, share * washout.linear_gain, share * washout.cubic_gain
             )

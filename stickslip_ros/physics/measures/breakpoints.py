@@ -5,7 +5,7 @@ measures then only compare and subtract.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -60,18 +60,14 @@ def breakpoints_from_samples(
     )
     breakpoints = _with_stick_edges(breakpoints, stuck, belt_velocity)
     breakpoints = _with_interior_points(breakpoints, _Cubics.turning_points, velocity=0.0)
-    return (
-        _with_interior_points(breakpoints, _Cubics.velocity_peaks) if exact_times else breakpoints
-    )
+    if exact_times:
+        breakpoints = _with_interior_points(breakpoints, _Cubics.velocity_peaks)
+    return breakpoints
 
 
 def _insert(breakpoints: Breakpoints, at: npt.NDArray[np.intp], new: Breakpoints) -> Breakpoints:
-    return Breakpoints(
-        np.insert(breakpoints.time, at, new.time),
-        np.insert(breakpoints.position, at, new.position),
-        np.insert(breakpoints.velocity, at, new.velocity),
-        np.insert(breakpoints.sticking, at, new.sticking),
-    )
+    columns = zip(vars(breakpoints).values(), vars(new).values(), strict=True)
+    return Breakpoints(*(np.insert(column, at, inserted) for column, inserted in columns))
 
 
 def _with_stick_edges(
@@ -110,9 +106,7 @@ def _with_stick_edges(
     )
     sticking = breakpoints.sticking.copy()
     sticking[edges + 1] = landing
-    breakpoints = Breakpoints(
-        breakpoints.time, breakpoints.position, breakpoints.velocity, sticking
-    )
+    breakpoints = replace(breakpoints, sticking=sticking)
     return _insert(breakpoints, edges + 1, edge_breakpoints)
 
 

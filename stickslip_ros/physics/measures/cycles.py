@@ -147,10 +147,8 @@ class _Stretch:
             return
         rows = slice(first, last + 1)
         # Stretches are short: lists take a fraction of the time that arrays would.
-        position, velocity = (
-            breakpoints.position[rows].tolist(),
-            breakpoints.velocity[rows].tolist(),
-        )
+        position = breakpoints.position[rows].tolist()
+        velocity = breakpoints.velocity[rows].tolist()
         self.end = float(breakpoints.time[last])
         self.lowest = min(self.lowest, *position)
         self.highest = max(self.highest, *position)
@@ -249,9 +247,11 @@ class CycleMeter:
         since_turn = self._open.duration if self._open else 0.0
         if not self._cycles or since_turn > _STALE_PERIODS * period:
             recent = self._recent_motion()
-            if recent is None or recent.velocity_amplitude >= self._equilibrium_speed:
-                return _without_cycles(None, None)
-            if recent.stick_fraction > 0.0:  # it rides a slow belt
+            if (
+                recent is None
+                or recent.velocity_amplitude >= self._equilibrium_speed
+                or recent.stick_fraction > 0.0  # it rides a slow belt
+            ):
                 return _without_cycles(None, None)
             steady = True if self._lasts(since_turn) else None
             return _without_cycles(recent, Regime.EQUILIBRIUM, steady=steady)
@@ -361,17 +361,6 @@ def _without_cycles(
     trend: Trend | None = None,
 ) -> Measures:
     """Return the measures of a motion that has no period."""
-    if motion is None:
-        return Measures(None, None, None, None, None, None, cycles, regime, steady)
-    return Measures(
-        amplitude=motion.amplitude,
-        velocity_amplitude=motion.velocity_amplitude,
-        midpoint=motion.midpoint,
-        period=None,
-        frequency=None,
-        stick_fraction=motion.stick_fraction,
-        cycles=cycles,
-        regime=regime,
-        steady=steady,
-        trend=trend,
-    )
+    means = dict.fromkeys(Cycle._fields) if motion is None else motion._asdict()
+    means |= {"period": None, "frequency": None}
+    return Measures(**means, cycles=cycles, regime=regime, steady=steady, trend=trend)

@@ -372,9 +372,8 @@ class Motion:
     def _append_breakpoint(self, now: float, x: float, y: float, *, sticking: bool) -> None:
         if self._recording:
             time = self._time + now / self._drive.angular_frequency
-            self._breakpoint_time = max(
-                self._breakpoint_time, time
-            )  # not back by the rounding of a step
+            # Not back by the rounding of a step.
+            self._breakpoint_time = max(self._breakpoint_time, time)
             self._recorded.append((self._breakpoint_time, x, y, sticking))
 
     def _use_law(self) -> None:
@@ -387,9 +386,8 @@ class Motion:
         self._belt_speed = values["belt_speed"]
         self._damping = values["damping"]
         self._static = values["static"]
-        self._characteristic_speed = (
-            self._drive.friction.characteristic_speed / self._drive.speed_scale
-        )
+        speed = self._drive.friction.characteristic_speed
+        self._characteristic_speed = speed / self._drive.speed_scale
         values |= vars(self._gains)
         indices = self._equations.index
         for integrator in (self._slipping, self._sticking):

@@ -290,12 +290,8 @@ def _next_turn(motion: SensitiveMotion, state: FloatArray) -> tuple[FloatArray, 
 
 
 def _first_turn(breakpoints: Breakpoints) -> float | None:
-    before, at, after = (
-        breakpoints.velocity[:-2],
-        breakpoints.velocity[1:-1],
-        breakpoints.velocity[2:],
-    )
-    upward = np.flatnonzero((before < 0.0) & (at == 0.0) & (after > 0.0))
+    velocity = breakpoints.velocity
+    upward = np.flatnonzero((velocity[:-2] < 0.0) & (velocity[1:-1] == 0.0) & (velocity[2:] > 0.0))
     return float(breakpoints.time[upward[0] + 1]) if len(upward) > 0 else None
 
 

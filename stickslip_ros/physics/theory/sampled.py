@@ -210,9 +210,8 @@ class LinearSampledLoop:
 
     def _radii(self, corner_frequency: float, linear_gains: FloatArray) -> FloatArray:
         scaled = WashoutGains(corner_frequency, linear_gains, 0.0).scaled(self.drive)
-        return _spectral_radius(
-            self._transitions(np.full(len(linear_gains), scaled.corner_frequency), scaled.linear)
-        )
+        corners = np.full(len(linear_gains), scaled.corner_frequency)
+        return _spectral_radius(self._transitions(corners, scaled.linear))
 
     def _transitions(self, corner_frequency: Any, linear_gain: Any) -> FloatArray:
         """Return the transition matrices for dimensionless arrays of one shape, (..., n, n)."""
@@ -308,10 +307,7 @@ class _Boundary:
         circle.
         """
         steps = 16 * (self._whole + 2)
-        parts: list[Any] = [
-            np.arange(1, steps) * (pi / steps),
-            self._near(0.0, self._period),
-        ]
+        parts: list[Any] = [np.arange(1, steps) * (pi / steps), self._near(0.0, self._period)]
         for pole in self._poles:
             parts.append(self._near(abs(float(np.angle(np.exp(1j * pole.imag)))), abs(pole.real)))
         if self._ending > 0.0 and self._starting > 0.0:

@@ -11,9 +11,6 @@ from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.closed_loop import critical_gains
 from stickslip_ros.physics.theory.sampled import LinearSampledLoop
 
-_DECADES = 1.0
-"""How far the corner frequencies of a map go, either way."""
-
 
 @dataclass(frozen=True)
 class StabilityMap:
@@ -34,11 +31,7 @@ class StabilityMap:
     @classmethod
     def around(cls, loop: LinearSampledLoop, gains: WashoutGains, points: int = 81) -> Self:
         """Return the map around `gains` (SI units) with so many points along each axis."""
-        corners = np.geomspace(
-            gains.corner_frequency * 10.0**-_DECADES,
-            gains.corner_frequency * 10.0**_DECADES,
-            points,
-        )
+        corners = np.geomspace(0.1 * gains.corner_frequency, 10.0 * gains.corner_frequency, points)
         continuous = np.full(points, np.nan)
         for row, corner_frequency in enumerate(corners):
             critical = critical_gains(loop.drive, WashoutGains(float(corner_frequency), 0.0, 0.0))
@@ -46,15 +39,9 @@ class StabilityMap:
                 continuous[row] = critical.linear
         needed = loop.critical_linear_gain(gains.corner_frequency) or 0.0
         far = 2.0 * (gains.linear or needed or -loop.drive.normal_force / loop.drive.speed_scale)
-        linear = np.linspace(far, -0.25 * far, points)
-        return cls(
-            loop,
-            gains,
-            corners,
-            np.sort(linear),
-            loop.coarsened().decay_rates(corners, np.sort(linear)),
-            continuous,
-        )
+        linear = np.sort(np.linspace(far, -0.25 * far, points))
+        decay_rates = loop.coarsened().decay_rates(corners, linear)
+        return cls(loop, gains, corners, linear, decay_rates, continuous)
 
 
 @dataclass(frozen=True)
