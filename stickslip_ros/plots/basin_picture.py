@@ -12,16 +12,7 @@ from matplotlib.lines import Line2D
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
-from stickslip_ros.plots.style import (
-    AMBER,
-    MANY,
-    PURPLE,
-    SKY_BLUE,
-    YELLOW,
-    drawing,
-    set_title,
-    styled,
-)
+from stickslip_ros.plots.style import AMBER, MANY, PURPLE, SKY_BLUE, YELLOW, set_title, styled
 from stickslip_ros.plots.units import SI, Units
 
 _MORE_COLOURS = (SKY_BLUE, YELLOW, PURPLE, AMBER)
@@ -56,10 +47,8 @@ def basin_figure(
     set_title(figure, f"{what}: {title}" if title else what)
     axes = figure.subplots()
     axes.grid(visible=False)
-    (length, x_label), (speed, y_label) = (
-        units.axis("displacement at the start", "m", position),
-        units.axis("velocity at the start", "m/s", velocity, belt_speed),
-    )
+    length, x_label = units.axis("displacement at the start", "m", position)
+    speed, y_label = units.axis("velocity at the start", "m/s", velocity, belt_speed)
     x, y = position / length, velocity / speed
     handles: list[Any] = []
     rasterized = len(attractor) > MANY
@@ -86,10 +75,6 @@ def basin_figure(
     axes.set_ylabel(y_label)
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
-
-
-draw_basin = drawing(basin_figure)
-"""Write the picture of basins to a path."""
 
 
 def _looks(regimes: Sequence[Regime | None]) -> Iterator[Look]:

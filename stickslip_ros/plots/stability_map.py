@@ -9,10 +9,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
-from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE, drawing, styled
+from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE, styled
 from stickslip_ros.plots.units import Units
 
-_LEVELS = 9
 _UNSTABLE = "#eeeeee"
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": BLUE, "ls": "-"},
@@ -36,17 +35,13 @@ def stability_figure(found: StabilityMap, critical: CriticalGainCurves | None) -
     return figure
 
 
-draw_stability_map = drawing(stability_figure)
-"""Write the map to a path."""
-
-
 def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> None:
     corners, gains, rates = found.corner_frequencies, found.linear_gains, found.decay_rates.T
     units = Units.for_drive(found.loop.drive)
     axes.grid(visible=False)
     fastest = float(rates.max())
     if fastest > 0.0:
-        levels = np.linspace(0.0, fastest, _LEVELS)
+        levels = np.linspace(0.0, fastest, 9)
         filled = axes.contourf(corners, gains, rates, levels=levels, cmap="viridis")
         figure.colorbar(filled, ax=axes, label=units.label("decay rate", "1/s"), format="%.3g")
         axes.contour(corners, gains, rates, levels=[0.0], colors=[ORANGE], linewidths=2.0)

@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
-from stickslip_ros.plots.style import DASHES, GREY, LIGHT_GREY, MANY, drawing, set_title, styled
+from stickslip_ros.plots.style import DASHES, GREY, LIGHT_GREY, MANY, set_title, styled
 from stickslip_ros.plots.units import Units
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Axis, Carry, Grid
@@ -30,9 +30,6 @@ _HOLLOW: Any = {"mfc": "white", "mew": 0.8}
 
 _MOST_SHOWN = 4
 """Values of one transition in the legend."""
-
-_DIFFERENT = 0.02
-"""Share of the largest amplitude by which up and down differ where there is hysteresis."""
 
 _HYSTERESIS = "#FBF6C9"
 
@@ -164,10 +161,6 @@ def map_figure(
     return figure
 
 
-draw_diagram, draw_map = drawing(diagram_figure), drawing(map_figure)
-"""Write the picture of a sweep over one parameter, or over two, to a path."""
-
-
 def _units(study: Study) -> Units:
     return Units.for_drive(study.scenario.plant.as_drive(), _grid(study).parameters)
 
@@ -185,7 +178,6 @@ def _passes(grid: Grid) -> Iterator[tuple[slice, Carry | None]]:
 
 
 def _present(columns: Columns) -> Iterator[tuple[Regime | None, Look]]:
-    """Yield the regimes that there are, with their looks."""
     for regime, look in REGIMES.items():
         if _are(columns.regime, regime).any():
             yield regime, look if regime is not None else look._replace(label="no result")
@@ -203,7 +195,8 @@ def _draw_section(
     rasterized = len(positions) > MANY
     for regime, (colour, _, marker, _) in REGIMES.items():
         shown = _are(regimes, regime)
-        look: Any = {"color": _pale(colour) if wide else colour, "ls": "", "rasterized": rasterized}
+        pale = tuple(1.0 - 0.4 * (1.0 - part) for part in to_rgb(colour))
+        look: Any = {"color": pale if wide else colour, "ls": "", "rasterized": rasterized}
         for steady, filled in ((True, _FULL), (False, _HOLLOW)):
             some = shown & (columns.steady[rows] == steady)
             places = np.repeat(values[some], counts[some])
@@ -218,7 +211,7 @@ def _shade_hysteresis(panels: Sequence[Axes], columns: Columns, axis: Axis) -> l
     """Shade where up and down differ; return what the legend has of it."""
     up, down = columns.amplitude.reshape(2, -1)
     largest = float(np.nanmax(columns.amplitude, initial=0.0))
-    differs = np.abs(up - down) > _DIFFERENT * largest
+    differs = np.abs(up - down) > 0.02 * largest  # less is not hysteresis
     differs |= np.isnan(up) != np.isnan(down)
     if not differs.any():
         return []
@@ -249,7 +242,6 @@ def _mark_transitions(
 
 
 def _draw_regimes(axes: Axes, columns: Columns, grid: Grid, rows: slice) -> None:
-    """Draw the cells of a map by regime."""
     x, y = (_edges(axis) for axis in grid.axes)
     for regime, look in _present(columns):
         if regime is not None:
@@ -307,7 +299,3 @@ def _title(study: Study) -> str:
     scenario = study.scenario
     changed = f", {' '.join(scenario.overrides)}" if scenario.overrides else ""
     return f"What {scenario.name} settles on{changed}"
-
-
-def _pale(colour: str) -> tuple[float, ...]:
-    return tuple(1.0 - 0.4 * (1.0 - part) for part in to_rgb(colour))

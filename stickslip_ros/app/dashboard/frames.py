@@ -21,8 +21,6 @@ PERIODS = (10, 50, 200)
 """Natural periods that the traces may show."""
 
 _QUANTITIES = (("displacement", "m"), ("velocity", "m/s"), ("control force", "N"))
-_ORBIT_PERIODS = 5.0
-_BUCKETS = 400
 _UNKNOWN_PERIOD = 1.0
 
 
@@ -67,7 +65,7 @@ class Frames:
         each has stands in the JSON.
         """
         period, drive = self.period, self.drive
-        frame = self._trace.frame(periods * period, _ORBIT_PERIODS * period, _BUCKETS)
+        frame = self._trace.frame(periods * period, 5.0 * period, buckets=400)
         body: dict[str, Any] = {"motion": None, "cycles": self._cycles(drive)}
         lines: dict[str, list[FloatArray]] = {}
         if frame is not None:
