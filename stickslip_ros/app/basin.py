@@ -158,7 +158,6 @@ def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> No
 
 
 def _label(attractor: Attractor, units: Units) -> str:
-    """Return what a legend says of an attractor."""
     amplitude = ""
     if attractor.amplitude is not None:
         amplitude = f", amplitude {units.text(attractor.amplitude, 'm')}"

@@ -60,7 +60,6 @@ def _name(number: int) -> str:
 
 
 def _draw_figures(folder: Path) -> dict[int, PaperFigure]:
-    """Compute and draw the figures, several at a time."""
     figures: dict[int, PaperFigure] = {}
     # Not forked: heyoka's compiler has threads, which a fork would lose.
     with (

@@ -95,8 +95,8 @@ def run(arguments: argparse.Namespace) -> int:
         made = {"transitions": {name.lower().replace(" ", "_"): theory[name] for name in theory}}
         write_results(arguments, journal, further, made)
         if not arguments.json:
-            _print(journal, plan)
-            units = _units(journal, plan)
+            units = Units.for_drive(study.scenario.plant.as_drive(), plan.parameters)
+            _print(journal, plan, units)
             for name, values in theory.items():
                 print(f"{name}: {', '.join(units.texts(values, plan.axes[0].unit))}")
     return 0
@@ -121,11 +121,11 @@ def _direction_and_regime(point: Point, plan: Grid) -> str:
     return f"{plan.direction(point.number) or ''} {regime}".lstrip()
 
 
-def _print(journal: Journal, plan: Grid) -> None:
+def _print(journal: Journal, plan: Grid, units: Units) -> None:
     """Print in which ranges of the parameter there is which regime; of a map, how often."""
     title = f"{journal.study.scenario.name}, {journal.count} points"
     if len(plan.axes) == 1:
-        rows = list(islice(_ranges(journal, plan), _MOST_RANGES + 1))
+        rows = list(islice(_ranges(journal, plan, units), _MOST_RANGES + 1))
         if len(rows) <= _MOST_RANGES:
             headings = ["regime", plan.parameters[0], "points", "amplitude", "stick fraction"]
             print_table(title, headings, rows)
@@ -135,8 +135,7 @@ def _print(journal: Journal, plan: Grid) -> None:
     print_table(title, ["regime", "points"], rows)
 
 
-def _ranges(journal: Journal, plan: Grid) -> Iterator[list[str]]:
-    unit, units = plan.axes[0].unit, _units(journal, plan)
+def _ranges(journal: Journal, plan: Grid, units: Units) -> Iterator[list[str]]:
     largest = max((point.measures.amplitude or 0.0 for point in journal.points()), default=0.0)
     for kind, points in groupby(journal.points(), lambda point: _direction_and_regime(point, plan)):
         measured = [
@@ -146,15 +145,11 @@ def _ranges(journal: Journal, plan: Grid) -> Iterator[list[str]]:
         amplitudes, stick_fractions, numbers = zip(*measured, strict=True)
         yield [
             kind,
-            _range([plan.values(number)[0] for number in numbers], unit, units),
+            _range([plan.values(number)[0] for number in numbers], plan.axes[0].unit, units),
             str(len(numbers)),
             _range(amplitudes, "m", units, largest),
             _range(stick_fractions, "", units),
         ]
-
-
-def _units(journal: Journal, plan: Grid) -> Units:
-    return Units.for_drive(journal.study.scenario.plant.as_drive(), plan.parameters)
 
 
 def _range(values: Iterable[float | None], unit: str, units: Units, largest: float = 0.0) -> str:

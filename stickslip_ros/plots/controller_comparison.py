@@ -29,9 +29,8 @@ def comparison_figure(runs: Sequence[ControlledRun], shown: float = 0.6) -> Figu
 
     Three controllers can be told apart.
     """
-    units = SI
-    length, length_label = units.axis("displacement", "m", *(run.states.position for run in runs))
-    newton, force_label = units.axis("control force", "N", *(run.forces.force for run in runs))
+    length, length_label = SI.axis("displacement", "m", *(run.states.position for run in runs))
+    newton, force_label = SI.axis("control force", "N", *(run.forces.force for run in runs))
     speeds = sorted({run.belt_speed for run in runs})
     controllers = dict.fromkeys(run.controller for run in runs)
     thin, dashed, thick = (GREY, "-", 0.8), (ORANGE, "--", 1.2), (BLUE, "-", 1.6)
@@ -48,7 +47,7 @@ def comparison_figure(runs: Sequence[ControlledRun], shown: float = 0.6) -> Figu
         time, force_time = ((each.stamp - start) / NANOSECONDS for each in (states, forces))
         column[0].plot(time, states.position / length, **look)
         column[1].step(force_time, forces.force / newton, where="post", **look)
-        column[0].set_title(f"belt speed {units.text(run.belt_speed, 'm/s')}")
+        column[0].set_title(f"belt speed {SI.text(run.belt_speed, 'm/s')}")
         column[1].set_xlabel("time (s)")
     axes[0, 0].set_ylabel(length_label)
     axes[1, 0].set_ylabel(force_label)

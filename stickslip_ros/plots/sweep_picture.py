@@ -54,7 +54,7 @@ def diagram_figure(columns: Columns, study: Study) -> Figure:
     grid = _grid(study)
     (axis,) = grid.axes
     both = grid.carry is Carry.BOTH
-    units = _units(study)
+    units = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
     figure = Figure(figsize=(8.5, 8.0))
     set_title(figure, _title(study))
     panels: list[Axes] = list(figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.0, 1.0)))
@@ -79,15 +79,13 @@ def diagram_figure(columns: Columns, study: Study) -> Figure:
         Line2D([], [], color=look.colour, marker=look.marker, ms=5.0, ls="", label=look.label)
         for _, look in _present(columns)
     ]
+    black: Any = {"color": "black", "marker": "o"}
     if np.any(~columns.steady & ~_are(columns.regime, None)):
-        handles.append(
-            Line2D(
-                [], [], color="black", marker="o", ms=5.0, ls="", label="not steady yet", **_HOLLOW
-            )
-        )
+        look = {**black, **_HOLLOW, "ms": 5.0, "ls": ""}
+        handles.append(Line2D([], [], **look, label="not steady yet"))
     if both:
         handles += [
-            Line2D([], [], color="black", marker="o", ms=2.5, label="carried up"),
+            Line2D([], [], **black, ms=2.5, label="carried up"),
             Line2D([], [], color=LIGHT_GREY, marker="o", ms=7.0, lw=5.0, label="carried down"),
             *_shade_hysteresis(panels, columns, axis),
         ]
@@ -115,7 +113,7 @@ def map_figure(
     grid = _grid(study)
     first, second = grid.axes
     count = len(grid.directions)
-    units = _units(study)
+    units = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
     figure = Figure(figsize=(1.0 + 6.0 * count, 6.2))
     set_title(figure, _title(study))
     panels: list[Axes] = list(figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0])
@@ -159,10 +157,6 @@ def map_figure(
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
-
-
-def _units(study: Study) -> Units:
-    return Units.for_drive(study.scenario.plant.as_drive(), _grid(study).parameters)
 
 
 def _grid(study: Study) -> Grid:

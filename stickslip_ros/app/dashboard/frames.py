@@ -66,11 +66,19 @@ class Frames:
         """
         period, drive = self.period, self.drive
         frame = self._trace.frame(periods * period, 5.0 * period, buckets=400)
-        body: dict[str, Any] = {"motion": None, "cycles": self._cycles(drive)}
+        axes = _axes(drive)
+        length, speed, force = (scale for scale, _ in axes)
+        cycles = {
+            "count": self._listener.cycle_count,
+            "amplitude": [
+                amplitude / length for amplitude in list(self._listener.cycles[AMPLITUDE])
+            ],
+            "stick_fraction": list(self._listener.cycles[STICK_FRACTION]),
+            "label": axes[0][1].replace("displacement", "amplitude"),
+        }
+        body: dict[str, Any] = {"motion": None, "cycles": cycles}
         lines: dict[str, list[FloatArray]] = {}
         if frame is not None:
-            axes = _axes(drive)
-            length, speed, force = (scale for scale, _ in axes)
             lines = {
                 "position": _scaled(frame.position, 1.0, length),
                 "velocity": _scaled(frame.velocity, 1.0, speed),
@@ -95,16 +103,6 @@ class Frames:
         with np.errstate(over="ignore"):  # what is too large for the page is off it
             floats = [column.astype("<f4").tobytes() for column in columns]
         return b"".join([struct.pack("<I", len(text)), text, *floats])
-
-    def _cycles(self, drive: Drive | None) -> dict[str, Any]:
-        amplitudes = list(self._listener.cycles[AMPLITUDE])
-        scale, label = _axes(drive)[0]
-        return {
-            "count": self._listener.cycle_count,
-            "amplitude": [amplitude / scale for amplitude in amplitudes],
-            "stick_fraction": list(self._listener.cycles[STICK_FRACTION]),
-            "label": label.replace("displacement", "amplitude"),
-        }
 
 
 def _axes(drive: Drive | None) -> list[tuple[float, str]]:

@@ -192,7 +192,6 @@ class _Page:
             self._newest_event = when
 
     def _missing(self) -> list[str]:
-        """Say which nodes of the loop are not heard."""
         return [
             f"{node} {health.state}"
             for node, health in self._listener.health.items()
@@ -307,7 +306,6 @@ def _card(title: str) -> ui.card:
 
 
 def _refusal() -> ui.label:
-    """Return a line for what was refused, and why."""
     label = ui.label().classes("text-sm text-red-700")
     return label.bind_visibility_from(label, "text")
 
