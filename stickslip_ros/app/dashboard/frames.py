@@ -70,9 +70,7 @@ class Frames:
         length, speed, force = (scale for scale, _ in axes)
         cycles = {
             "count": self._listener.cycle_count,
-            "amplitude": [
-                amplitude / length for amplitude in list(self._listener.cycles[AMPLITUDE])
-            ],
+            "amplitude": [a / length for a in list(self._listener.cycles[AMPLITUDE])],
             "stick_fraction": list(self._listener.cycles[STICK_FRACTION]),
             "label": axes[0][1].replace("displacement", "amplitude"),
         }
