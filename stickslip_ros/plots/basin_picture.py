@@ -15,11 +15,6 @@ from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
 from stickslip_ros.plots.style import AMBER, MANY, PURPLE, SKY_BLUE, YELLOW, set_title, styled
 from stickslip_ros.plots.units import SI, Units
 
-_MORE_COLOURS = (SKY_BLUE, YELLOW, PURPLE, AMBER)
-_MORE_HATCHES = ("+++", "", "ooo", "|||", "---")
-_MORE_MARKERS = ("v", "*", "P", "<", ">")
-"""Of attractors whose regime another one has too; together they repeat after twenty."""
-
 
 @styled
 def basin_figure(
@@ -79,7 +74,9 @@ def basin_figure(
 
 def _looks(regimes: Sequence[Regime | None]) -> Iterator[Look]:
     """Yield the look of each attractor: that of its regime, or another if that is taken."""
-    more = zip(cycle(_MORE_COLOURS), cycle(_MORE_MARKERS), cycle(_MORE_HATCHES), strict=False)
+    colours = cycle((SKY_BLUE, YELLOW, PURPLE, AMBER))
+    # Together they repeat after twenty.
+    more = zip(colours, cycle("v*P<>"), cycle(("+++", "", "ooo", "|||", "---")), strict=False)
     for number, regime in enumerate(regimes):
         look = REGIMES[regime]
         if regime in regimes[:number]:
