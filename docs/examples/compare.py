@@ -10,7 +10,8 @@ from pathlib import Path
 from velocity_feedback import VelocityFeedback
 
 from stickslip_ros.physics.measures.cycles import Regime
-from stickslip_ros.plots.controller_comparison import ControlledRun, draw_comparison
+from stickslip_ros.plots.controller_comparison import ControlledRun, comparison_figure
+from stickslip_ros.plots.style import save
 from stickslip_ros.testing import ClosedLoop, RunResult
 
 HERE = Path(__file__).parent
@@ -73,10 +74,8 @@ def main() -> None:
     }
     rows = [figures(*case, result) for case, result in results.items()]
     (HERE / "comparison.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    draw_comparison(
-        HERE / "comparison.png",
-        [ControlledRun(*case, r.states, r.forces) for case, r in results.items()],
-    )
+    runs = [ControlledRun(*case, r.states, r.forces) for case, r in results.items()]
+    save(comparison_figure(runs), HERE / "comparison.png")
     page = PAGE.read_text(encoding="utf-8")
     new = BEGIN + table(rows) + END
     PAGE.write_text(re.sub(f"{BEGIN}.*{END}", lambda _: new, page, flags=re.S), encoding="utf-8")

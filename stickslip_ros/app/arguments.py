@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import (
@@ -20,6 +20,9 @@ from stickslip_ros.scenarios.parameter import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.text import printable, shown
 from stickslip_ros.versions import versions
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _PICTURES = (".png", ".svg", ".pdf")
 
@@ -90,6 +93,14 @@ def check_picture(path: Path | None) -> None:
         _check_writable("--plot", path)
 
 
+def write_picture(path: Path, figure: "Figure") -> None:
+    """Write a figure to the `path` that --plot names."""
+    from stickslip_ros.plots.style import save  # half as long again to import as everything else
+
+    with writing("--plot", path):
+        save(figure, path)
+
+
 def check_new(option: str, path: Path) -> None:
     """Refuse `path`, given with `option`, where there is a file, or none can be written."""
     if path.exists():
@@ -142,24 +153,20 @@ def scenario_of(
     scenario = load_scenario(
         arguments.scenario, asked, namespace, base=arguments.base, other_nodes=other_nodes
     )
-    _tell_defaults(scenario, unused)
-    return scenario
-
-
-def _tell_defaults(scenario: Scenario, unused: Collection[str]) -> None:
     values = scenario.as_dict()
-    shown: list[str] = []
+    defaults: list[str] = []
     for full_name in scenario.left_to_defaults:
         if full_name not in unused:
             node, _, name = full_name.partition(".")
             unit = known_parameters(NODE_PARAMETERS[node])[name].unit or ""
-            shown.append(f"{full_name} = {values[node][name]} {unit}".rstrip())
-    if shown:
+            defaults.append(f"{full_name} = {values[node][name]} {unit}".rstrip())
+    if defaults:
         sentence = (
-            f"{scenario.path} does not give {', '.join(shown)}: these are the defaults; "
+            f"{scenario.path} does not give {', '.join(defaults)}: these are the defaults; "
             "--base SCENARIO takes what is left out from another scenario"
         )
         print(printable(sentence), file=sys.stderr)
+    return scenario
 
 
 def made_of(scenario: Scenario) -> dict[str, Any]:

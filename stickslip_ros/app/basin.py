@@ -11,7 +11,7 @@ from stickslip_ros.app.arguments import (
     add_scenario,
     check_picture,
     scenario_of,
-    writing,
+    write_picture,
 )
 from stickslip_ros.app.output import print_table
 from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
@@ -28,7 +28,7 @@ from stickslip_ros.studies.basin import (
     basin_study,
     default_axes,
 )
-from stickslip_ros.studies.columns import Columns, ExtraColumns
+from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Grid, Plan, RandomSample
 
@@ -81,11 +81,10 @@ def run(arguments: argparse.Namespace) -> int:
     label = f"basins of {scenario.name}, {study.plan.size} starts"
     with computed(arguments, study, label) as journal:
         basins = Basins.from_points(journal.points())
-        further: ExtraColumns = {"attractor": basins.place}
         made = {"attractors": [asdict(attractor) for attractor in basins.attractors]}
         if arguments.plot is not None:
             _draw(arguments, journal, basins)
-        write_results(arguments, journal, further, made)
+        write_results(arguments, journal, {"attractor": basins.place}, made)
         if not arguments.json:
             title = f"{scenario.name}, {study.plan.size} starts"
             _print(title, basins, Units.for_drive(scenario.plant.as_drive()))
@@ -118,8 +117,8 @@ def _print(title: str, basins: Basins, units: Units) -> None:
     rows = [
         [
             _name(attractor),
-            *units.texts([attractor.amplitude], "m"),
-            *units.texts([attractor.midpoint], "m"),
+            units.text(attractor.amplitude, "m"),
+            units.text(attractor.midpoint, "m"),
             str(attractor.count),
             f"{attractor.share:.4f}",
             f"{attractor.standard_error:.4f}",
@@ -137,30 +136,28 @@ def _name(attractor: Attractor) -> str:
 
 def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> None:
     # Half as long again to import as everything else.
-    from stickslip_ros.plots.basin_picture import draw_basin
+    from stickslip_ros.plots.basin_picture import basin_figure
 
     plan, scenario = journal.study.plan, journal.study.scenario
     drive = scenario.plant.as_drive()
     units = Units.for_drive(drive)
     columns = Columns.from_journal(journal)
-    with writing("--plot", arguments.plot):
-        draw_basin(
-            arguments.plot,
-            position=columns.values[POSITION],
-            velocity=columns.values[VELOCITY],
-            attractor=np.array([basins.place(point) for point in journal.points()]),
-            regimes=[attractor.regime for attractor in basins.attractors],
-            labels=[_label(attractor, units) for attractor in basins.attractors],
-            grid_shape=plan.shape if isinstance(plan, Grid) else None,
-            belt_speed=drive.belt_speed,
-            equilibrium_position=drive.equilibrium_position,
-            units=units,
-            title=" ".join([scenario.name, *scenario.overrides]),
-        )
+    figure = basin_figure(
+        position=columns.values[POSITION],
+        velocity=columns.values[VELOCITY],
+        attractor=np.array([basins.place(point) for point in journal.points()]),
+        regimes=[attractor.regime for attractor in basins.attractors],
+        labels=[_label(attractor, units) for attractor in basins.attractors],
+        grid_shape=plan.shape if isinstance(plan, Grid) else None,
+        belt_speed=drive.belt_speed,
+        equilibrium_position=drive.equilibrium_position,
+        units=units,
+        title=" ".join([scenario.name, *scenario.overrides]),
+    )
+    write_picture(arguments.plot, figure)
 
 
 def _label(attractor: Attractor, units: Units) -> str:
-    """Return what a legend says of an attractor."""
     amplitude = ""
     if attractor.amplitude is not None:
         amplitude = f", amplitude {units.text(attractor.amplitude, 'm')}"

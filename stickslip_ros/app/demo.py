@@ -8,12 +8,12 @@ from stickslip_ros.app.run import default_bag, record
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.plots.control_coming_on import draw_control_coming_on
+from stickslip_ros.plots.control_coming_on import control_coming_on_figure
+from stickslip_ros.plots.style import save
 from stickslip_ros.scenarios.files import load_scenario
 
 _SCENARIO = "feed_drive"
 _DURATION = 10.0
-_SHOWN_AROUND = (0.5, 1.0)
 _FIGURES = (
     "amplitude",
     "midpoint",
@@ -62,7 +62,7 @@ def _demonstrate() -> None:
     picture = bag.with_suffix(".png")
     with Recording(bag) as recording:
         states, forces = recording.joint_states, recording.control_forces
-    draw_control_coming_on(picture, states, forces, switched_on, _SHOWN_AROUND)
+    save(control_coming_on_figure(states, forces, switched_on, around=(0.5, 1.0)), picture)
     print(f"bag:     {bag}\npicture: {picture}")
 
 

@@ -16,6 +16,7 @@ from stickslip_ros.app.arguments import (
     check_picture,
     made_of,
     scenario_of,
+    write_picture,
     writing,
 )
 from stickslip_ros.app.output import finite, print_json, print_table, progress_bar
@@ -31,8 +32,6 @@ HELP = "propose corner frequency and gains that damp the vibration within a forc
 _DESCRIPTION = f"""{HELP}. The drive, rate and force_delay are the scenario's, the force limit is
 washout_controller.force_limit (-p washout_controller.force_limit=200). Its gains do not matter.
 What is proposed was simulated: the vibration is caught at several belt speeds and phases."""
-
-_NO_JITTER = "force_jitter is left out: the delay of the force is constant here"
 
 _CONTROLLER = {
     "corner_frequency": ("corner frequency", "rad/s"),
@@ -93,11 +92,16 @@ def run(arguments: argparse.Namespace) -> int:
     with progress_bar(f"designing for {scenario.name}", 1.0) as progress:
         found = design(task, progress)
     if scenario.plant.force_jitter > 0.0:
-        found = replace(found, remark="; ".join(filter(None, (found.remark, _NO_JITTER))))
+        no_jitter = "force_jitter is left out: the delay of the force is constant here"
+        found = replace(found, remark="; ".join(filter(None, (found.remark, no_jitter))))
     if arguments.json:
         print_json({**_as_dict(found), **made_of(scenario)})
     else:
-        _print(scenario.name, found, written=arguments.out is not None)
+        _print(scenario.name, found)
+        if found.parameter_file is not None and arguments.out is None:
+            print(
+                "--out FILE writes the scenario with these gains, --json has it as parameter_file"
+            )
     if arguments.out is not None:
         _write(arguments.out, found)
     if arguments.plot is not None:
@@ -129,13 +133,13 @@ def _write(path: Path, found: Design) -> None:
 
 def _draw(path: Path, found: Design) -> None:
     # Half as long again to import as everything else.
-    from stickslip_ros.plots.stability_map import draw_stability_map
+    from stickslip_ros.plots.stability_map import stability_figure
 
     if found.slowest is None or found.controller is None:
         _leave_out(f"--plot {path}: not drawn")
         return
-    with writing("--plot", path):
-        draw_stability_map(path, StabilityMap.around(found.slowest, found.controller.gains), None)
+    map_around = StabilityMap.around(found.slowest, found.controller.gains)
+    write_picture(path, stability_figure(map_around, None))
 
 
 def _leave_out(what: str) -> None:
@@ -170,11 +174,13 @@ def _rows(
     return [[label, units.text(figures[key], unit)] for key, (label, unit) in labels.items()]
 
 
-def _print(name: str, found: Design, *, written: bool) -> None:
+def _print(name: str, found: Design) -> None:
     units = Units.for_drive(found.task.drive)
     speeds = units.texts(sorted({*found.task.belt_speeds}), "m/s")
     task = f"{name}, belt speed {' to '.join(speeds)}"
-    if found.controller is not None:
+    if found.controller is None:
+        print(f"{task}: nothing to propose")
+    else:
         proposed = _rows(finite(asdict(found.controller)), _CONTROLLER, units)
         print_table(task, ["proposal", ""], proposed)
         if found.margins is not None:
@@ -187,9 +193,5 @@ def _print(name: str, found: Design, *, written: bool) -> None:
         ]
         headings = [label for label, _ in _CHECKS.values()]
         print_table("while it catches the vibration", headings, zip(*columns, strict=True))
-    else:
-        print(f"{task}: nothing to propose")
     if found.remark is not None:
         print(found.remark)
-    if found.parameter_file is not None and not written:
-        print("--out FILE writes the scenario with these gains, --json has it as parameter_file")

@@ -30,9 +30,6 @@ _COMMANDS = (
     "paper",
 )
 
-_NEGATIVE = re.compile(r"-(\.?\d|inf)")
-_LONG_OPTION = re.compile(r"--[\w-]+")
-
 
 def _load(name: str) -> ModuleType:
     """Import a command, which some do for seconds, when it is asked for."""
@@ -89,12 +86,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             chosen.parser.error(_unrecognized(unknown, chosen.parser.format_usage()))
         status: int = chosen.run(chosen)
         sys.stdout.flush()
-    except InvalidInputError as error:
-        print(f"stickslip {command}: {error}", file=sys.stderr)
-        status = 2
     except StickslipError as error:
         print(f"stickslip {command}: {error}", file=sys.stderr)
-        status = 1
+        status = 2 if isinstance(error, InvalidInputError) else 1
     except KeyboardInterrupt as error:
         print(": ".join([f"stickslip {command}: interrupted", *error.args]), file=sys.stderr)
         status = INTERRUPTED
@@ -119,7 +113,8 @@ def _with_negative_values(given: Sequence[str]) -> list[str]:
     """Join what begins with a negative number to its option: argparse takes it for another."""
     joined: list[str] = []
     for word in given:
-        if _NEGATIVE.match(word) and joined and _LONG_OPTION.fullmatch(joined[-1]):
+        negative = re.match(r"-(\.?\d|inf)", word)
+        if negative and joined and re.fullmatch(r"--[\w-]+", joined[-1]):
             joined[-1] += f"={word}"
         else:
             joined.append(word)

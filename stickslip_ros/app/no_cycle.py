@@ -4,7 +4,6 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.units import Units
 from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
 
-_FEW_PERIODS = 3.0
 _FAR = 10.0
 """Ratio of belt speed and Hopf speed from which on another unit may have been meant."""
 
@@ -18,7 +17,7 @@ def why_no_cycle(regime: str | None, duration: float, drive: Drive | None) -> st
     if drive is None:
         return said
     period = drive.natural_period
-    if duration < _FEW_PERIODS * period:
+    if duration < 3.0 * period:
         return f"{said}: the natural period is {units.text(period, 's')}, so it takes longer"
     ratio = hopf_ratio(drive)
     if ratio is not None and not 1.0 / _FAR < ratio < _FAR:

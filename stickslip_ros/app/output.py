@@ -134,15 +134,10 @@ def _shown(name: str, figures: Mapping[str, Any]) -> Any:
     value = figures.get(name)
     if name == "regime":
         return with_trend(Regime.label(value), figures.get("trend"))
-    if name == "velocity_amplitude" and value is not None and _at_rest(figures):
-        return 0.0
+    if name == "velocity_amplitude" and value is not None:
+        amplitude, midpoint = figures.get("amplitude") or 0.0, figures.get("midpoint") or 0.0
+        return 0.0 if amplitude <= NOISE * abs(midpoint) else value  # what is left is rounding
     return value
-
-
-def _at_rest(figures: Mapping[str, Any]) -> bool:
-    """Return whether all that is left of the motion is rounding."""
-    amplitude, midpoint = (figures.get(name) or 0.0 for name in ("amplitude", "midpoint"))
-    return amplitude <= NOISE * abs(midpoint)
 
 
 def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
@@ -153,8 +148,14 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
     shown = [[printable(cell) for cell in row] for row in (headings, *rows)]
     if sys.stdout.isatty():
         _print_framed(Console(), printable(title), shown[0], shown[1:])
-    else:
-        _print_plain(printable(title), shown[0], shown[1:])
+        return
+    if title:
+        print(printable(title))
+    lines = shown if any(headings) else shown[1:]
+    widths = [max(map(cell_len, column)) for column in zip(*lines, strict=True)]
+    for line in lines:
+        padded = map(set_cell_size, line[:-1], widths)
+        print("  ".join([*padded, line[-1]]).rstrip())
 
 
 @contextmanager
@@ -169,16 +170,6 @@ def progress_bar(label: str, total: float | None) -> Generator[Callable[[float],
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(printable(label), total=total)
         yield lambda done: bar.update(task, completed=done)
-
-
-def _print_plain(title: str, headings: list[str], rows: list[list[str]]) -> None:
-    lines = [headings, *rows] if any(headings) else rows
-    widths = [max(map(cell_len, column)) for column in zip(*lines, strict=True)]
-    if title:
-        print(title)
-    for line in lines:
-        padded = map(set_cell_size, line[:-1], widths)
-        print("  ".join([*padded, line[-1]]).rstrip())
 
 
 def _print_framed(console: Console, title: str, headings: list[str], rows: list[list[str]]) -> None:

@@ -9,12 +9,7 @@ from pathlib import Path
 from stickslip_ros.app.arguments import add_json, writing
 from stickslip_ros.app.output import print_json, print_table, progress_bar
 from stickslip_ros.paper.claims import CLAIMS, Evidence, Finding
-from stickslip_ros.paper.figures import (
-    NUMBERS,
-    BifurcationFigure,
-    PaperFigure,
-    compute_figure,
-)
+from stickslip_ros.paper.figures import NUMBERS, BifurcationFigure, PaperFigure, compute_figure
 from stickslip_ros.paper.pictures import draw_paper_figure
 from stickslip_ros.paper.report import as_markdown, report, verdict_counts
 from stickslip_ros.paper.transition_marks import transition_marks
@@ -65,7 +60,6 @@ def _name(number: int) -> str:
 
 
 def _draw_figures(folder: Path) -> dict[int, PaperFigure]:
-    """Compute and draw the figures, several at a time."""
     figures: dict[int, PaperFigure] = {}
     # Not forked: heyoka's compiler has threads, which a fork would lose.
     with (

@@ -2,12 +2,11 @@
 
 import argparse
 import json
-from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from stickslip_ros.app.arguments import add_json, add_plot, check_picture, seconds, writing
+from stickslip_ros.app.arguments import add_json, add_plot, check_picture, seconds, write_picture
 from stickslip_ros.app.no_cycle import why_no_cycle
 from stickslip_ros.app.output import print_figures, print_json
 from stickslip_ros.bags.reader import Recording
@@ -15,14 +14,12 @@ from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycles import Measures
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.parameter import known_parameters
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.text import printable
 from stickslip_ros.versions import versions
-
-if TYPE_CHECKING:
-    from stickslip_ros.plots.run_history import RunHistory
 
 HELP = "measure a recorded run, or set several side by side"
 
@@ -54,9 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="leave out what is after, s from the first sample of each bag (default: the end)",
     )
     parser.add_argument(
-        "--namespace",
-        metavar="NS",
-        help="ROS namespace of the drive, where a bag holds several",
+        "--namespace", metavar="NS", help="ROS namespace of the drive, where a bag holds several"
     )
     add_plot(parser, "motion, force, cycles and friction law of the one bag")
     add_json(parser)
@@ -65,7 +60,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     plot: Path | None = arguments.plot
-    history = None if plot is None else _history_to_draw(plot, arguments.bags)
+    bags: list[Path] = arguments.bags
+    check_picture(plot)
+    if plot is not None and len(bags) > 1:
+        raise InvalidInputError(f"--plot {plot}: draws one bag, and {len(bags)} were given")
+    history = None if plot is None else RunHistory()
     reports = {
         str(bag): report_of_bag(
             bag,
@@ -74,19 +73,20 @@ def run(arguments: argparse.Namespace) -> int:
             namespace=arguments.namespace,
             observer=history,
         )
-        for bag in arguments.bags
+        for bag in bags
     }
     if plot is not None and history is not None:
-        _draw(plot, arguments, history, reports[str(arguments.bags[0])])
+        drive = _drive_of(bags[0], arguments.namespace)
+        _draw(plot, bags[0], drive, history, reports[str(bags[0])])
     if arguments.json:
         results = [{**report, "bag": bag} for bag, report in reports.items()]
         result = results[0] if len(results) == 1 else {"reports": results}
         print_json({**result, "versions": versions()})
         return 0
     several = len(reports) > 1
-    drives = {str(bag): _drive_of(bag, arguments.namespace) for bag in arguments.bags}
+    drives = {str(bag): _drive_of(bag, arguments.namespace) for bag in bags}
     print_figures(
-        "" if several else str(arguments.bags[0]),
+        "" if several else str(bags[0]),
         {bag if several else "": report for bag, report in reports.items()},
         {bag if several else "": Units.for_drive(drive) for bag, drive in drives.items()},
     )
@@ -100,30 +100,17 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _history_to_draw(path: Path, bags: Sequence[Path]) -> "RunHistory":
-    # Half as long again to import as everything else.
-    from stickslip_ros.plots.run_history import RunHistory
-
-    check_picture(path)
-    if len(bags) > 1:
-        raise InvalidInputError(f"--plot {path}: draws one bag, and {len(bags)} were given")
-    return RunHistory()
-
-
 def _draw(
-    path: Path, arguments: argparse.Namespace, history: "RunHistory", report: dict[str, Any]
+    path: Path, bag: Path, drive: Drive | None, history: RunHistory, report: dict[str, Any]
 ) -> None:
+    # Half as long again to import as everything else.
     from stickslip_ros.plots.run_figure import run_figure
-    from stickslip_ros.plots.style import save
 
-    (bag,) = arguments.bags
-    drive = _drive_of(bag, arguments.namespace)
     notes = [*report["missing"], *report["notes"]]
     if drive is None:
         notes.append("the bag does not say what drive it was: no equilibrium, no friction law")
     measures = Measures(**{field.name: report[field.name] for field in fields(Measures)})
-    with writing("--plot", path):
-        save(run_figure(history, measures, drive, title=str(bag), notes=notes), path)
+    write_picture(path, run_figure(history, measures, drive, title=str(bag), notes=notes))
 
 
 def _drive_of(bag: Path, namespace: str | None) -> Drive | None:

@@ -121,10 +121,9 @@ def run(arguments: argparse.Namespace) -> int:
         command = shlex.join([arguments.controller, *arguments.further]) if controller else None
         print_json({**figures, "controller_command": command, **made_of(scenario)})
     else:
-        units = Units.for_drive(scenario.plant.as_drive())
-        print_figures(scenario.name, {"": {**figures["report"], **figures}}, {"": units})
-        report = figures["report"]
-        reason = why_no_cycle(report["regime"], report["duration"], scenario.plant.as_drive())
+        report, drive = figures["report"], scenario.plant.as_drive()
+        print_figures(scenario.name, {"": {**report, **figures}}, {"": Units.for_drive(drive)})
+        reason = why_no_cycle(report["regime"], report["duration"], drive)
         if reason is not None:
             print(reason)
     if not figures["report"]["complete"]:

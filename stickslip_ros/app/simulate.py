@@ -13,7 +13,7 @@ from stickslip_ros.app.arguments import (
     naming,
     scenario_of,
     seconds,
-    writing,
+    write_picture,
 )
 from stickslip_ros.app.no_cycle import why_no_cycle
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
@@ -88,11 +88,9 @@ def run(arguments: argparse.Namespace) -> int:
 def _draw(path: Path, scenario: Scenario, history: RunHistory, measures: Measures) -> None:
     # Half as long again to import as everything else.
     from stickslip_ros.plots.run_figure import run_figure
-    from stickslip_ros.plots.style import save
 
     disturbed = scenario.plant.disturbance.kind is not DisturbanceKind.NONE
     title = " ".join([scenario.name, *scenario.overrides])
     force = "control force and disturbance" if disturbed else "control force"
-    with writing("--plot", path):
-        figure = run_figure(history, measures, scenario.plant.as_drive(), title=title, force=force)
-        save(figure, path)
+    drive = scenario.plant.as_drive()
+    write_picture(path, run_figure(history, measures, drive, title=title, force=force))

@@ -1,7 +1,6 @@
 """`stickslip stability`: what theory says of a scenario, without running it."""
 
 import argparse
-from pathlib import Path
 from typing import Any, cast
 
 from stickslip_ros.app.arguments import (
@@ -11,14 +10,9 @@ from stickslip_ros.app.arguments import (
     check_picture,
     made_of,
     scenario_of,
-    writing,
+    write_picture,
 )
-from stickslip_ros.app.output import (
-    print_figures,
-    print_json,
-    print_table,
-    progress_bar,
-)
+from stickslip_ros.app.output import print_figures, print_json, print_table, progress_bar
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import Scenario
@@ -92,21 +86,15 @@ def run(arguments: argparse.Namespace) -> int:
         found, notes = stability(scenario)
     if arguments.plot is not None:
         with progress_bar("drawing", None):
-            _draw(arguments.plot, scenario)
+            # Half as long again to import as everything else.
+            from stickslip_ros.plots.stability_map import stability_figure
+
+            write_picture(arguments.plot, stability_figure(*stability_map(scenario)))
     if arguments.json:
         print_json({**found, "notes": notes, **made_of(scenario)})
     else:
         _print(scenario, found, notes)
     return 0
-
-
-def _draw(path: Path, scenario: Scenario) -> None:
-    # Half as long again to import as everything else.
-    from stickslip_ros.plots.stability_map import draw_stability_map
-
-    found = stability_map(scenario)
-    with writing("--plot", path):
-        draw_stability_map(path, *found)
 
 
 def _print(scenario: Scenario, found: Section, notes: Notes) -> None:
@@ -136,7 +124,6 @@ def _print(scenario: Scenario, found: Section, notes: Notes) -> None:
 
 
 def _shown(name: str, value: Any, unit: str, units: Units) -> str:
-    """Return a figure, or a list of them, to be read."""
     if value is None or not isinstance(value, list):
         return units.texts([value], unit, digits=8 if name == "spectral_radius" else 4)[0]
     items = cast(list[Any], value)

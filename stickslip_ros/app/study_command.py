@@ -91,10 +91,7 @@ def computed(arguments: argparse.Namespace, study: Study, label: str) -> Generat
                 if arguments.dask is None:
                     run_here(journal, arguments.workers, progress)
                 else:
-                    with (
-                        naming("--dask"),
-                        dask_executor(arguments.dask) as (executor, in_flight),
-                    ):
+                    with naming("--dask"), dask_executor(arguments.dask) as (executor, in_flight):
                         run(journal, executor, in_flight=in_flight, progress=progress)
         except KeyboardInterrupt:
             print(

@@ -2,7 +2,7 @@
 
 import argparse
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import groupby, islice
 
 from stickslip_ros.app.arguments import (
@@ -12,7 +12,7 @@ from stickslip_ros.app.arguments import (
     check_picture,
     naming,
     scenario_of,
-    writing,
+    write_picture,
 )
 from stickslip_ros.app.output import print_table
 from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
@@ -95,8 +95,8 @@ def run(arguments: argparse.Namespace) -> int:
         made = {"transitions": {name.lower().replace(" ", "_"): theory[name] for name in theory}}
         write_results(arguments, journal, further, made)
         if not arguments.json:
-            _print(journal, plan)
-            units = _units(journal, plan)
+            units = Units.for_drive(study.scenario.plant.as_drive(), plan.parameters)
+            _print(journal, plan, units)
             for name, values in theory.items():
                 print(f"{name}: {', '.join(units.texts(values, plan.axes[0].unit))}")
     return 0
@@ -104,14 +104,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _draw(arguments: argparse.Namespace, journal: Journal) -> None:
     # Half as long again to import as everything else.
-    from stickslip_ros.plots.sweep_picture import draw_diagram, draw_map
+    from stickslip_ros.plots.sweep_picture import diagram_figure, map_figure
 
-    columns = Columns.from_journal(journal)
-    with writing("--plot", arguments.plot):
-        if len(arguments.over) == 1:
-            draw_diagram(arguments.plot, columns, journal.study)
-        else:
-            draw_map(arguments.plot, columns, journal.study, arguments.colour)
+    columns, study = Columns.from_journal(journal), journal.study
+    if len(arguments.over) == 1:
+        write_picture(arguments.plot, diagram_figure(columns, study))
+    else:
+        write_picture(arguments.plot, map_figure(columns, study, arguments.colour))
 
 
 def _direction_and_regime(point: Point, plan: Grid) -> str:
@@ -122,11 +121,11 @@ def _direction_and_regime(point: Point, plan: Grid) -> str:
     return f"{plan.direction(point.number) or ''} {regime}".lstrip()
 
 
-def _print(journal: Journal, plan: Grid) -> None:
+def _print(journal: Journal, plan: Grid, units: Units) -> None:
     """Print in which ranges of the parameter there is which regime; of a map, how often."""
     title = f"{journal.study.scenario.name}, {journal.count} points"
     if len(plan.axes) == 1:
-        rows = list(islice(_ranges(journal, plan), _MOST_RANGES + 1))
+        rows = list(islice(_ranges(journal, plan, units), _MOST_RANGES + 1))
         if len(rows) <= _MOST_RANGES:
             headings = ["regime", plan.parameters[0], "points", "amplitude", "stick fraction"]
             print_table(title, headings, rows)
@@ -136,43 +135,26 @@ def _print(journal: Journal, plan: Grid) -> None:
     print_table(title, ["regime", "points"], rows)
 
 
-def _ranges(journal: Journal, plan: Grid) -> Iterator[list[str]]:
-    unit, units = plan.axes[0].unit, _units(journal, plan)
+def _ranges(journal: Journal, plan: Grid, units: Units) -> Iterator[list[str]]:
     largest = max((point.measures.amplitude or 0.0 for point in journal.points()), default=0.0)
     for kind, points in groupby(journal.points(), lambda point: _direction_and_regime(point, plan)):
-        values, amplitudes, stick_fractions = _Extremes(), _Extremes(), _Extremes()
-        count = 0
-        for point in points:
-            count += 1
-            values.add(plan.values(point.number)[0])
-            amplitudes.add(point.measures.amplitude)
-            stick_fractions.add(point.measures.stick_fraction)
+        measured = [
+            (point.measures.amplitude, point.measures.stick_fraction, point.number)
+            for point in points
+        ]
+        amplitudes, stick_fractions, numbers = zip(*measured, strict=True)
         yield [
             kind,
-            values.shown(unit, units),
-            str(count),
-            amplitudes.shown("m", units, largest),
-            stick_fractions.shown("", units),
+            _range([plan.values(number)[0] for number in numbers], plan.axes[0].unit, units),
+            str(len(numbers)),
+            _range(amplitudes, "m", units, largest),
+            _range(stick_fractions, "", units),
         ]
 
 
-def _units(journal: Journal, plan: Grid) -> Units:
-    return Units.for_drive(journal.study.scenario.plant.as_drive(), plan.parameters)
-
-
-class _Extremes:
-    """The least and the largest of some values."""
-
-    def __init__(self) -> None:
-        self._ends: tuple[float, float] | None = None
-
-    def add(self, value: float | None) -> None:
-        if value is not None:
-            low, high = self._ends or (value, value)
-            self._ends = min(low, value), max(high, value)
-
-    def shown(self, unit: str, units: Units, largest: float = 0.0) -> str:
-        if self._ends is None:
-            return "-"
-        low, high = units.texts(self._ends, unit, largest=largest)
-        return low if low == high else f"{low.split()[0]} to {high}"
+def _range(values: Iterable[float | None], unit: str, units: Units, largest: float = 0.0) -> str:
+    known = [value for value in values if value is not None]
+    if not known:
+        return "-"
+    low, high = units.texts([min(known), max(known)], unit, largest=largest)
+    return low if low == high else f"{low.split()[0]} to {high}"

@@ -12,22 +12,8 @@ from matplotlib.lines import Line2D
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
-from stickslip_ros.plots.style import (
-    AMBER,
-    MANY,
-    PURPLE,
-    SKY_BLUE,
-    YELLOW,
-    drawing,
-    set_title,
-    styled,
-)
+from stickslip_ros.plots.style import AMBER, MANY, PURPLE, SKY_BLUE, YELLOW, set_title, styled
 from stickslip_ros.plots.units import SI, Units
-
-_MORE_COLOURS = (SKY_BLUE, YELLOW, PURPLE, AMBER)
-_MORE_HATCHES = ("+++", "", "ooo", "|||", "---")
-_MORE_MARKERS = ("v", "*", "P", "<", ">")
-"""Of attractors whose regime another one has too; together they repeat after twenty."""
 
 
 @styled
@@ -56,10 +42,8 @@ def basin_figure(
     set_title(figure, f"{what}: {title}" if title else what)
     axes = figure.subplots()
     axes.grid(visible=False)
-    (length, x_label), (speed, y_label) = (
-        units.axis("displacement at the start", "m", position),
-        units.axis("velocity at the start", "m/s", velocity, belt_speed),
-    )
+    length, x_label = units.axis("displacement at the start", "m", position)
+    speed, y_label = units.axis("velocity at the start", "m/s", velocity, belt_speed)
     x, y = position / length, velocity / speed
     handles: list[Any] = []
     rasterized = len(attractor) > MANY
@@ -88,13 +72,11 @@ def basin_figure(
     return figure
 
 
-draw_basin = drawing(basin_figure)
-"""Write the picture of basins to a path."""
-
-
 def _looks(regimes: Sequence[Regime | None]) -> Iterator[Look]:
     """Yield the look of each attractor: that of its regime, or another if that is taken."""
-    more = zip(cycle(_MORE_COLOURS), cycle(_MORE_MARKERS), cycle(_MORE_HATCHES), strict=False)
+    colours = cycle((SKY_BLUE, YELLOW, PURPLE, AMBER))
+    # Together they repeat after twenty.
+    more = zip(colours, cycle("v*P<>"), cycle(("+++", "", "ooo", "|||", "---")), strict=False)
     for number, regime in enumerate(regimes):
         look = REGIMES[regime]
         if regime in regimes[:number]:

@@ -1,11 +1,9 @@
 """The picture of a run in which the control comes on: what it was like before, and after."""
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import breakpoints_from_samples
-from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, drawing, styled
+from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, styled
 from stickslip_ros.plots.units import SI
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
@@ -27,12 +25,20 @@ def control_coming_on_figure(
     before = figure.add_subplot(grid[2, 0])
     after = figure.add_subplot(grid[2, 1], sharex=before, sharey=before)
 
-    units = SI
-    length, length_label = units.axis("displacement", "m", states.position)
-    speed, speed_label = units.axis("velocity", "m/s", states.velocity)
-    newton, force_label = units.axis("control force", "N", forces.force)
+    length, length_label = SI.axis("displacement", "m", states.position)
+    speed, speed_label = SI.axis("velocity", "m/s", states.velocity)
+    newton, force_label = SI.axis("control force", "N", forces.force)
     start, end = switched_on - around[0], switched_on + around[1]
-    _draw_displacement(displacement, time, states, length, (start, end))
+    shown = (time >= start) & (time <= end)
+    x, v, belt = (each[shown] for each in (states.position, states.velocity, states.belt_velocity))
+    breakpoints = breakpoints_from_samples(time[shown], x, v, belt)
+    displacement.fill_between(
+        breakpoints.time, 0.0, 1.0, where=breakpoints.stuck,
+        transform=displacement.get_xaxis_transform(),
+        color=GREY, alpha=0.4, lw=0.0, label="slide sticks to the belt",
+    )  # fmt: skip
+    displacement.plot(time[shown], x / length, color=BLUE, lw=1.0)
+    displacement.legend(loc="upper right")
     displacement.set_ylabel(length_label)
     displacement.tick_params(labelbottom=False)
     shown = (force_time >= start) & (force_time <= end)
@@ -43,51 +49,18 @@ def control_coming_on_figure(
     for axes in (displacement, force):
         axes.axvline(switched_on, color="black", lw=1.0, ls=":")
 
-    belt = float(states.belt_velocity[-1])
+    x, v, belt_speed = states.position / length, states.velocity / speed, states.belt_velocity[-1]
     late = time >= switched_on
     settled = ~late & (time >= switched_on / 2.0)
     for axes, rows, colour, title in (
         (before, settled, BLUE, f"before: {switched_on / 2.0:g} s to {switched_on:g} s"),
         (after, late, GREEN, f"after: {switched_on:g} s to {time[-1]:g} s"),
     ):
-        axes.axhline(belt / speed, color="black", ls="--", lw=1.0, label="belt speed")
-        axes.plot(
-            states.position[rows] / length, states.velocity[rows] / speed, color=colour, lw=0.9
-        )
+        axes.axhline(belt_speed / speed, color="black", ls="--", lw=1.0, label="belt speed")
+        axes.plot(x[rows], v[rows], color=colour, lw=0.9)
         axes.set_title(title)
         axes.set_xlabel(length_label)
-    after.plot(
-        states.position[-1] / length,
-        states.velocity[-1] / speed,
-        "o",
-        color="black",
-        ms=5,
-        label="end",
-    )
+    after.plot(x[-1], v[-1], "o", color="black", ms=5, label="end")
     after.legend(loc="lower left")
     before.set_ylabel(speed_label)
     return figure
-
-
-draw_control_coming_on = drawing(control_coming_on_figure)
-"""Write the picture to a path."""
-
-
-def _draw_displacement(
-    axes: Axes,
-    time: FloatArray,
-    states: SampleColumns,
-    length: float,
-    span: tuple[float, float],
-) -> None:
-    shown = (time >= span[0]) & (time <= span[1])
-    time, states = time[shown], states[shown]
-    breakpoints = breakpoints_from_samples(
-        time, states.position, states.velocity, states.belt_velocity
-    )
-    axes.fill_between(
-        breakpoints.time, 0.0, 1.0, where=breakpoints.stuck, transform=axes.get_xaxis_transform(),
-        color=GREY, alpha=0.4, lw=0.0, label="slide sticks to the belt",
-    )  # fmt: skip
-    axes.plot(time, states.position / length, color=BLUE, lw=1.0)
-    axes.legend(loc="upper right")

@@ -14,7 +14,6 @@ from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
 _NONE = ForceColumns(np.empty(0, np.int64), np.empty(0))
-_ORBIT_BUCKETS = 1_000
 
 
 class Line(NamedTuple):
@@ -105,7 +104,7 @@ class LiveTrace:
             lost_stamp = force_stamp[~np.isnan(lost)]
             turning = round(orbit * NANOSECONDS)
             orbit_stamp, x, v, _ = _since(self._states, end - turning)
-            rows = peaks(orbit_stamp // max(turning // _ORBIT_BUCKETS, 1), x, v)
+            rows = peaks(orbit_stamp // max(turning // 1_000, 1), x, v)
             position, velocity, belt = (
                 _line(stamp, column, end, width, self._states.interval) for column in columns
             )

@@ -40,9 +40,6 @@ _PIXELS = 1000
 _LEAST_SPAN = 1e-6
 """Of an axis, in the largest magnitude that is drawn on it: less is rounding."""
 
-_PART = 0.05
-"""Of the run, that is enlarged where nothing is known of a period."""
-
 _MOTION: Any = {"color": BLUE, "lw": 1.0}
 _BELT: Any = {"color": "black", "lw": 1.0, "ls": "--", "zorder": 2.5}
 _REST: Any = {"color": GREEN, "lw": 1.2, "ls": ":", "zorder": 2.5}
@@ -163,11 +160,11 @@ class _Picture:
             position, velocity, force = column
             position.set_title(pane.title)
             self._draw_motion(position, velocity, pane)
-            _draw_line(force, pane, friction[0], friction[1], newton, history.gap, **_FRICTION)
+            _draw_line(force, pane, friction, newton, history.gap, **_FRICTION)
             gap = history.control_gap
-            _draw_line(force, pane, control[0], control[1], newton, gap, **_CONTROL)
-            self.holds |= _draw_held(force, pane, control[0], control[1], newton, gap, dropped[0])
-            _draw_line(force, pane, dropped[0], dropped[1], newton, gap, **_DROPPED)
+            _draw_line(force, pane, control, newton, gap, **_CONTROL)
+            self.holds |= _draw_held(force, pane, control, newton, gap, dropped[0])
+            _draw_line(force, pane, dropped, newton, gap, **_DROPPED)
             self._label_time(force, pane)
         labels = self._length[1], self._speed[1], label
         for row, of_row in zip(panels, labels, strict=True):
@@ -184,14 +181,15 @@ class _Picture:
 
     def _draw_motion(self, position: Axes, velocity: Axes, pane: _Pane) -> None:
         rows, gap = pane.rows, self._history.gap
+        length, speed = self._length[0], self._speed[0]
         if self._drive is not None:
             # On a belt at rest any place within the static friction is one.
             belt = np.where(rows.belt_velocity == 0.0, np.nan, rows.belt_velocity)
             rest = self._drive.friction.at_rest(belt) * self._drive.length_scale
-            _draw_line(position, pane, rows.time, rest, self._length[0], gap, **_REST)
-        _draw_line(position, pane, rows.time, rows.position, self._length[0], gap, **_MOTION)
-        _draw_line(velocity, pane, rows.time, rows.belt_velocity, self._speed[0], gap, **_BELT)
-        _draw_line(velocity, pane, rows.time, rows.velocity, self._speed[0], gap, **_MOTION)
+            _draw_line(position, pane, (rows.time, rest), length, gap, **_REST)
+        _draw_line(position, pane, (rows.time, rows.position), length, gap, **_MOTION)
+        _draw_line(velocity, pane, (rows.time, rows.belt_velocity), speed, gap, **_BELT)
+        _draw_line(velocity, pane, (rows.time, rows.velocity), speed, gap, **_MOTION)
 
     def portrait(self, axes: Axes) -> None:
         """Draw the phase portrait of the last cycles, above that of the beginning."""
@@ -226,7 +224,8 @@ class _Picture:
         scale, label = self.units.axis("amplitude", "m", columns[0])
         if not len(time):
             _say(amplitude, "no cycle was completed")
-        rows = peaks(intervals(time, _pixel(time)), *columns)
+        span = float(time[-1] - time[0]) if len(time) else 0.0
+        rows = peaks(intervals(time, span / _PIXELS or 1.0), *columns)
         farthest = float(np.abs(self._history.motion.position).max(initial=0.0)) / scale
         for axes, values, least in (
             (amplitude, columns[0] / scale, _LEAST_SPAN * farthest),
@@ -293,7 +292,6 @@ class _Picture:
 
 
 def _found(measures: Measures, units: Units) -> str:
-    """Return what the measures say, in a few words."""
     found = [with_trend(REGIMES[measures.regime].label, measures.trend)]
     for name, value, unit in (
         ("amplitude", measures.amplitude, "m"),
@@ -306,27 +304,17 @@ def _found(measures: Measures, units: Units) -> str:
 
 
 def _shown(motion: DrawnMotion, measures: Measures, drive: Drive | None) -> float:
-    """Return how much of the end is enlarged, s."""
+    """Return how much of the end is enlarged, s: a part where nothing is known of a period."""
     span = float(motion.time[-1] - motion.time[0]) if len(motion.time) else 0.0
     period = measures.period or (drive.natural_period if drive is not None else 0.0)
-    return min(LAST_CYCLES * period, span) or _PART * span
-
-
-def _pixel(time: FloatArray) -> float:
-    """Return the time in the width of a pixel of a panel."""
-    return float(time[-1] - time[0]) / _PIXELS or 1.0 if len(time) else 1.0
+    return min(LAST_CYCLES * period, span) or 0.05 * span
 
 
 def _draw_line(
-    axes: Axes,
-    pane: _Pane,
-    time: FloatArray,
-    values: FloatArray,
-    scale: float,
-    gap: float,
-    **look: Any,
+    axes: Axes, pane: _Pane, trace: Sequence[FloatArray], scale: float, gap: float, **look: Any
 ) -> None:
-    """Draw values over time, within a pane and a little beyond, with every peak."""
+    """Draw a trace, of time and values, within a pane and a little beyond, with every peak."""
+    time, values = trace
     first, end = np.searchsorted(time, (pane.start, pane.end), "right")
     rows = slice(max(int(first) - 1, 0), int(end) + 1)
     time, values = time[rows], values[rows]
@@ -340,8 +328,7 @@ def _draw_line(
 def _draw_held(
     axes: Axes,
     pane: _Pane,
-    time: FloatArray,
-    force: FloatArray,
+    control: Sequence[FloatArray],
     scale: float,
     gap: float,
     dropped: FloatArray,
@@ -350,6 +337,7 @@ def _draw_held(
 
     Where some came and were `dropped` (s), it is not known what acted.
     """
+    time, force = control
     behind = np.flatnonzero(np.diff(time) > max(gap, 2.0 * (pane.end - pane.start) / _PIXELS))
     came = np.diff(np.searchsorted(dropped, time)) > 0
     behind = behind[~came[behind]]
@@ -392,5 +380,4 @@ def _shade(axes: Axes, pane: _Pane) -> None:
 
 
 def _say(axes: Axes, why: str) -> None:
-    """Say in a panel why there is nothing in it."""
     axes.text(0.5, 0.5, why, ha="center", va="center", transform=axes.transAxes)

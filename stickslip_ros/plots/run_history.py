@@ -101,10 +101,8 @@ class RunHistory:
             self._first_rows += len(time)
         relative = breakpoints.velocity - belt_velocity
         least, largest = self.relative_speeds or (np.inf, -np.inf)
-        self.relative_speeds = (
-            min(least, float(relative.min())),
-            max(largest, float(relative.max())),
-        )
+        low, high = float(relative.min()), float(relative.max())
+        self.relative_speeds = min(least, low), max(largest, high)
 
     def _take_cycles(self, motion: MeasuredMotion) -> None:
         time = np.array(motion.cycle_ends)

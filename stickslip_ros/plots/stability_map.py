@@ -9,11 +9,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
-from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE, drawing, styled
+from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE, styled
 from stickslip_ros.plots.units import Units
 
-_LEVELS = 9
 _UNSTABLE = "#eeeeee"
+_GAINS: Any = {"color": "white", "mec": "black", "marker": "*", "ls": ""}
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": BLUE, "ls": "-"},
     {"color": ORANGE, "ls": "--"},
@@ -27,17 +27,12 @@ _LOOKS: tuple[dict[str, Any], ...] = (
 @styled
 def stability_figure(found: StabilityMap, critical: CriticalGainCurves | None) -> Figure:
     """Return the map, and beside it the critical gain over the delay if given."""
-    width = 6.4 if critical is None else 12.0
-    figure = Figure(figsize=(width, 5.2))
+    figure = Figure(figsize=(6.4 if critical is None else 12.0, 5.2))
     axes = figure.subplots(1, 1 if critical is None else 2, squeeze=False)[0]
     _draw_map(figure, axes[0], found)
     if critical is not None:
         _draw_critical_gains(axes[1], critical, found)
     return figure
-
-
-draw_stability_map = drawing(stability_figure)
-"""Write the map to a path."""
 
 
 def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> None:
@@ -46,14 +41,12 @@ def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> None:
     axes.grid(visible=False)
     fastest = float(rates.max())
     if fastest > 0.0:
-        levels = np.linspace(0.0, fastest, _LEVELS)
+        levels = np.linspace(0.0, fastest, 9)
         filled = axes.contourf(corners, gains, rates, levels=levels, cmap="viridis")
         figure.colorbar(filled, ax=axes, label=units.label("decay rate", "1/s"), format="%.3g")
         axes.contour(corners, gains, rates, levels=[0.0], colors=[ORANGE], linewidths=2.0)
     axes.plot(corners, found.continuous, color="black", ls="--", lw=1.2)
-    axes.plot(
-        found.gains.corner_frequency, found.gains.linear, "*", color="white", mec="black", ms=14
-    )
+    axes.plot(found.gains.corner_frequency, found.gains.linear, **_GAINS, ms=14)
     axes.set_facecolor(_UNSTABLE)
     axes.axhline(0.0, color=GREY, lw=0.8)
     axes.set_xscale("log")
@@ -70,7 +63,7 @@ def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> None:
         handles=[
             Line2D([], [], color=ORANGE, lw=2.0, label="limit of stability, sampled"),
             Line2D([], [], color="black", ls="--", lw=1.2, label="the same, continuous"),
-            Line2D([], [], color="white", mec="black", marker="*", ls="", ms=12, label="gains"),
+            Line2D([], [], **_GAINS, ms=12, label="gains"),
             Patch(facecolor=_UNSTABLE, edgecolor=GREY, label="unstable"),
         ],
         loc="lower left",
@@ -89,9 +82,7 @@ def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, found: Stabil
         label = units.text(float(rate), "Hz")
         axes.plot(delays / late, np.insert(gains, jumps, np.nan), **look, lw=1.6, label=label)
     axes.axhline(0.0, color=GREY, lw=0.8)
-    axes.plot(
-        found.loop.force_delay / late, found.gains.linear, "*", color="white", mec="black", ms=14
-    )
+    axes.plot(found.loop.force_delay / late, found.gains.linear, **_GAINS, ms=14)
     axes.set_ylabel(units.label("critical linear gain k1", "N s/m"))
     corner = found.gains.corner_frequency
     axes.set_title(f"corner frequency {corner:.3g}{'' if units.dimensionless else ' rad/s'}")

@@ -5,7 +5,7 @@ from functools import wraps
 from io import BytesIO
 from pathlib import Path
 from textwrap import fill
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 from matplotlib import rc_context
@@ -29,11 +29,6 @@ DASHES = ("--", ":", "-.")
 MANY = 5000
 """Points or cells from which on a drawing of lines and curves has them as an image within."""
 
-_DPI, _SMALL_DPI = 130, 110
-
-_LETTERS_PER_INCH = 10.0
-"""Of a title, on average."""
-
 _LOOK: dict[str, Any] = {
     "font.size": 9.0,
     "axes.labelsize": 9.0,
@@ -54,10 +49,7 @@ _LOOK: dict[str, Any] = {
     "pdf.fonttype": 42,
 }
 
-_REPRODUCIBLE: dict[str, dict[str, None]] = {
-    ".svg": {"Date": None},
-    ".pdf": {"CreationDate": None},
-}
+_REPRODUCIBLE = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 """What a file of each kind leaves out, so that the same picture is the same file."""
 
 _P = ParamSpec("_P")
@@ -78,7 +70,7 @@ def styled(draw: Callable[_P, _R]) -> Callable[_P, _R]:
 
 def set_title(figure: Figure, *lines: str) -> None:
     """Put lines above a figure as they are, each broken where it is too long and cut if need be."""
-    letters = round(_LETTERS_PER_INCH * float(figure.get_figwidth()))
+    letters = round(10.0 * float(figure.get_figwidth()))  # ten per inch, on average
     broken = (fill(printable(line), letters, max_lines=3, placeholder=" ...") for line in lines)
     figure.suptitle("\n".join(broken), parse_math=False)
 
@@ -94,25 +86,13 @@ def save(figure: Figure, path: Path, *, colours: int | None = None) -> None:
         _use_style()
         if ending == ".png" and colours is not None:
             buffer = BytesIO()
-            figure.savefig(buffer, format="png", dpi=_SMALL_DPI)
+            figure.savefig(buffer, format="png", dpi=110)
             with Image.open(buffer) as image:
                 # This method, unlike the usual one, keeps colours that few points have.
                 few = image.convert("RGB").quantize(colours, Image.Quantize.MAXCOVERAGE)
             few.save(path, optimize=True)
         else:
-            figure.savefig(path, dpi=_DPI, metadata=_REPRODUCIBLE.get(ending))
-
-
-def drawing(figure: Callable[_P, Figure]) -> Callable[Concatenate[Path, _P], None]:
-    """Return what writes the figure to a path, its first argument; the format follows the ending.
-
-    The other arguments are those of `figure`. Raises OSError if the file cannot be written.
-    """
-
-    def draw(path: Path, *arguments: _P.args, **options: _P.kwargs) -> None:
-        save(figure(*arguments, **options), path)
-
-    return draw
+            figure.savefig(path, dpi=130, metadata=_REPRODUCIBLE.get(ending))
 
 
 def _use_style() -> None:

@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycles import Regime
 from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
-from stickslip_ros.plots.style import DASHES, GREY, LIGHT_GREY, MANY, drawing, set_title, styled
+from stickslip_ros.plots.style import DASHES, GREY, LIGHT_GREY, MANY, set_title, styled
 from stickslip_ros.plots.units import Units
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Axis, Carry, Grid
@@ -30,9 +30,6 @@ _HOLLOW: Any = {"mfc": "white", "mew": 0.8}
 
 _MOST_SHOWN = 4
 """Values of one transition in the legend."""
-
-_DIFFERENT = 0.02
-"""Share of the largest amplitude by which up and down differ where there is hysteresis."""
 
 _HYSTERESIS = "#FBF6C9"
 
@@ -57,7 +54,7 @@ def diagram_figure(columns: Columns, study: Study) -> Figure:
     grid = _grid(study)
     (axis,) = grid.axes
     both = grid.carry is Carry.BOTH
-    units = _units(study)
+    units = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
     figure = Figure(figsize=(8.5, 8.0))
     set_title(figure, _title(study))
     panels: list[Axes] = list(figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.0, 1.0)))
@@ -82,15 +79,13 @@ def diagram_figure(columns: Columns, study: Study) -> Figure:
         Line2D([], [], color=look.colour, marker=look.marker, ms=5.0, ls="", label=look.label)
         for _, look in _present(columns)
     ]
+    black: Any = {"color": "black", "marker": "o"}
     if np.any(~columns.steady & ~_are(columns.regime, None)):
-        handles.append(
-            Line2D(
-                [], [], color="black", marker="o", ms=5.0, ls="", label="not steady yet", **_HOLLOW
-            )
-        )
+        look = {**black, **_HOLLOW, "ms": 5.0, "ls": ""}
+        handles.append(Line2D([], [], **look, label="not steady yet"))
     if both:
         handles += [
-            Line2D([], [], color="black", marker="o", ms=2.5, label="carried up"),
+            Line2D([], [], **black, ms=2.5, label="carried up"),
             Line2D([], [], color=LIGHT_GREY, marker="o", ms=7.0, lw=5.0, label="carried down"),
             *_shade_hysteresis(panels, columns, axis),
         ]
@@ -118,7 +113,7 @@ def map_figure(
     grid = _grid(study)
     first, second = grid.axes
     count = len(grid.directions)
-    units = _units(study)
+    units = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
     figure = Figure(figsize=(1.0 + 6.0 * count, 6.2))
     set_title(figure, _title(study))
     panels: list[Axes] = list(figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0])
@@ -164,14 +159,6 @@ def map_figure(
     return figure
 
 
-draw_diagram, draw_map = drawing(diagram_figure), drawing(map_figure)
-"""Write the picture of a sweep over one parameter, or over two, to a path."""
-
-
-def _units(study: Study) -> Units:
-    return Units.for_drive(study.scenario.plant.as_drive(), _grid(study).parameters)
-
-
 def _grid(study: Study) -> Grid:
     assert isinstance(study.plan, Grid)
     return study.plan
@@ -185,7 +172,6 @@ def _passes(grid: Grid) -> Iterator[tuple[slice, Carry | None]]:
 
 
 def _present(columns: Columns) -> Iterator[tuple[Regime | None, Look]]:
-    """Yield the regimes that there are, with their looks."""
     for regime, look in REGIMES.items():
         if _are(columns.regime, regime).any():
             yield regime, look if regime is not None else look._replace(label="no result")
@@ -203,7 +189,8 @@ def _draw_section(
     rasterized = len(positions) > MANY
     for regime, (colour, _, marker, _) in REGIMES.items():
         shown = _are(regimes, regime)
-        look: Any = {"color": _pale(colour) if wide else colour, "ls": "", "rasterized": rasterized}
+        pale = tuple(1.0 - 0.4 * (1.0 - part) for part in to_rgb(colour))
+        look: Any = {"color": pale if wide else colour, "ls": "", "rasterized": rasterized}
         for steady, filled in ((True, _FULL), (False, _HOLLOW)):
             some = shown & (columns.steady[rows] == steady)
             places = np.repeat(values[some], counts[some])
@@ -218,7 +205,7 @@ def _shade_hysteresis(panels: Sequence[Axes], columns: Columns, axis: Axis) -> l
     """Shade where up and down differ; return what the legend has of it."""
     up, down = columns.amplitude.reshape(2, -1)
     largest = float(np.nanmax(columns.amplitude, initial=0.0))
-    differs = np.abs(up - down) > _DIFFERENT * largest
+    differs = np.abs(up - down) > 0.02 * largest  # less is not hysteresis
     differs |= np.isnan(up) != np.isnan(down)
     if not differs.any():
         return []
@@ -249,7 +236,6 @@ def _mark_transitions(
 
 
 def _draw_regimes(axes: Axes, columns: Columns, grid: Grid, rows: slice) -> None:
-    """Draw the cells of a map by regime."""
     x, y = (_edges(axis) for axis in grid.axes)
     for regime, look in _present(columns):
         if regime is not None:
@@ -307,7 +293,3 @@ def _title(study: Study) -> str:
     scenario = study.scenario
     changed = f", {' '.join(scenario.overrides)}" if scenario.overrides else ""
     return f"What {scenario.name} settles on{changed}"
-
-
-def _pale(colour: str) -> tuple[float, ...]:
-    return tuple(1.0 - 0.4 * (1.0 - part) for part in to_rgb(colour))

@@ -39,7 +39,8 @@ class Units:
 
         Times have no prefix beyond the second, and numbers none at all.
         """
-        largest = _largest(*values)
+        arrays = [np.asarray(value, dtype=float) for value in values]
+        largest = max((float(np.nanmax(np.abs(a), initial=0.0)) for a in arrays), default=0.0)
         if self.dimensionless or not unit or (unit == "s" and largest >= 1.0):
             return 1.0, self.label(name, unit)
         scale, prefix = prefix_for(largest)
@@ -77,11 +78,6 @@ def _text(value: Any, scale: float, unit: str, digits: int) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value / scale:.{digits}g}{unit}" if isinstance(value, float) else str(value)
-
-
-def _largest(*values: npt.ArrayLike) -> float:
-    arrays = [np.asarray(value, dtype=float) for value in values]
-    return max((float(np.nanmax(np.abs(array), initial=0.0)) for array in arrays), default=0.0)
 
 
 SI = Units()

@@ -9,9 +9,9 @@ import pytest
 from PIL import Image
 
 from stickslip_ros.physics.measures.cycles import Regime
-from stickslip_ros.plots.basin_picture import basin_figure, draw_basin
+from stickslip_ros.plots.basin_picture import basin_figure
 from stickslip_ros.plots.regimes import REGIMES as LOOKS
-from stickslip_ros.plots.style import GREEN, ORANGE, SKY_BLUE
+from stickslip_ros.plots.style import GREEN, ORANGE, SKY_BLUE, save
 from stickslip_ros.plots.units import Units
 
 LABELS = ["stick-slip, amplitude 0.318 m: 68.8 % +- 0.7 %", "equilibrium: 31.2 %"]
@@ -37,7 +37,7 @@ def starts(**changes: Any) -> dict[str, Any]:
 
 
 def drawn(path: Path, **changes: Any) -> Path:
-    draw_basin(path, **starts(**changes))
+    save(basin_figure(**starts(**changes)), path)
     return path
 
 

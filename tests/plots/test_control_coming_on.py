@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stickslip_ros.plots.control_coming_on import draw_control_coming_on
+from stickslip_ros.plots.control_coming_on import control_coming_on_figure
+from stickslip_ros.plots.style import save
 from stickslip_ros.samples import ForceColumns, SampleColumns
 
 
@@ -22,13 +23,13 @@ def decaying_run() -> tuple[SampleColumns, ForceColumns]:
 @pytest.mark.parametrize(("ending", "start"), [(".png", b"\x89PNG"), (".svg", b"<?xml")])
 def test_the_format_follows_the_ending(tmp_path: Path, ending: str, start: bytes) -> None:
     path = tmp_path / f"run{ending}"
-    draw_control_coming_on(path, *decaying_run(), 1.0, (0.3, 0.5))
+    save(control_coming_on_figure(*decaying_run(), 1.0, (0.3, 0.5)), path)
     assert path.read_bytes().startswith(start)
 
 
 def test_axes_have_units_with_sensible_prefixes(tmp_path: Path) -> None:
     path = tmp_path / "run.svg"
-    draw_control_coming_on(path, *decaying_run(), 1.0, (0.3, 0.5))
+    save(control_coming_on_figure(*decaying_run(), 1.0, (0.3, 0.5)), path)
     picture = path.read_text(encoding="utf-8")
     for label in ("displacement (µm)", "velocity (mm/s)", "control force (N)", "slide sticks"):
         assert label in picture

@@ -11,7 +11,8 @@ from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.sampled import LinearSampledLoop
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
-from stickslip_ros.plots.stability_map import draw_stability_map, stability_figure
+from stickslip_ros.plots.stability_map import stability_figure
+from stickslip_ros.plots.style import save
 from tests.physics.drives import FEED_DRIVE, PAPER
 
 GAINS = WashoutGains(20.0, -3000.0, 0.0)
@@ -80,13 +81,13 @@ def test_the_format_follows_the_ending(
     if with_critical_gains:
         delays = np.linspace(0.0, 0.06, 7)
         critical = CriticalGainCurves.over(FEED_DRIVE, 20.0, np.array([100.0, 1000.0]), delays)
-    draw_stability_map(path, map_of(), critical)
+    save(stability_figure(map_of(), critical), path)
     assert path.read_bytes().startswith(start)
 
 
 def test_axes_have_units(tmp_path: Path) -> None:
     path = tmp_path / "map.svg"
-    draw_stability_map(path, map_of(), None)
+    save(stability_figure(map_of(), None), path)
     picture = path.read_text(encoding="utf-8")
     for label in ("corner frequency d (rad/s)", "linear gain k1 (N s/m)", "decay rate (1/s)"):
         assert label in picture
@@ -119,4 +120,4 @@ def test_where_nothing_is_stable_there_is_a_picture_all_the_same(tmp_path: Path)
     assert loop is not None
     found = StabilityMap.around(loop, replace(GAINS, linear=0.0), points=11)
     assert -inf < found.decay_rates.max() < 0.0
-    draw_stability_map(tmp_path / "map.png", found, None)
+    save(stability_figure(found, None), tmp_path / "map.png")

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from stickslip_ros.plots.style import drawing, save, set_title, styled
+from stickslip_ros.plots.style import save, set_title, styled
 
 ENDINGS = (".png", ".svg", ".pdf", ".PNG")
 
@@ -25,7 +25,7 @@ def small_figure(label: str = "displacement (µm)") -> Figure:
 @pytest.mark.parametrize("ending", ENDINGS)
 def test_the_ending_says_what_it_is(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"picture{ending}"
-    drawing(small_figure)(path)
+    save(small_figure(), path)
     match ending.lower():
         case ".png":
             with Image.open(path) as image:

@@ -7,8 +7,8 @@ import numpy.typing as npt
 import pytest
 from PIL import Image
 
-from stickslip_ros.plots.style import BLUE, GREEN, LIGHT_GREY, ORANGE
-from stickslip_ros.plots.sweep_picture import diagram_figure, draw_diagram, draw_map, map_figure
+from stickslip_ros.plots.style import BLUE, GREEN, LIGHT_GREY, ORANGE, save
+from stickslip_ros.plots.sweep_picture import diagram_figure, map_figure
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.journal import Journal
@@ -58,7 +58,7 @@ def over_two() -> Swept:
 
 
 def diagram(path: Path, found: Swept) -> str:
-    draw_diagram(path, *found)
+    save(diagram_figure(*found), path)
     return path.read_text(encoding="utf-8")
 
 
@@ -78,10 +78,10 @@ def test_the_format_follows_the_ending(
     tmp_path: Path, over_speed: Swept, over_two: Swept, ending: str, start: bytes
 ) -> None:
     path = tmp_path / f"picture{ending}"
-    draw_diagram(path, *over_speed)
+    save(diagram_figure(*over_speed), path)
     assert path.read_bytes().startswith(start)
     path.unlink()
-    draw_map(path, *over_two)
+    save(map_figure(*over_two), path)
     assert path.read_bytes().startswith(start)
 
 
@@ -116,7 +116,7 @@ def test_where_up_and_down_differ_a_diagram_is_shaded(tmp_path: Path, both_ways:
     for text in ("carried up", "carried down", "hysteresis", "Hopf point 1.1513"):
         assert text in picture
     path = tmp_path / "diagram.png"
-    draw_diagram(path, *both_ways)
+    save(diagram_figure(*both_ways), path)
     shaded = (pixels(path) == [0xFB, 0xF6, 0xC9]).all(axis=-1).any(axis=0)
     columns = np.flatnonzero(shaded)
     assert 0.4 < np.ptp(columns) / len(shaded) < 0.6  # of 0.8 to 2.2 m/s, 1.1 to 1.8
@@ -158,7 +158,7 @@ def test_a_map_says_what_its_colours_are(
     tmp_path: Path, over_two: Swept, colour: str, label: str
 ) -> None:
     path = tmp_path / "map.svg"
-    draw_map(path, *over_two, colour)
+    save(map_figure(*over_two, colour), path)
     picture = path.read_text(encoding="utf-8")
     for text in (label, "no result", "Hopf point", "limit of sticking", "plant.friction.static"):
         assert text in picture
@@ -167,7 +167,7 @@ def test_a_map_says_what_its_colours_are(
 def test_a_map_has_each_point_where_it_is(tmp_path: Path, over_two: Swept) -> None:
     """Static coefficients from left to right, belt speeds upward."""
     path = tmp_path / "map.png"
-    draw_map(path, *over_two)
+    save(map_figure(*over_two), path)
     found = pixels(path)
     inside = found[100:-150, 150:-100]
     assert [0x00, 0x9E, 0x73] in inside[:20, -1].tolist()
@@ -202,12 +202,12 @@ def test_a_map_carried_both_ways_has_two_panels(tmp_path: Path) -> None:
         carry=Carry.BOTH,
     )
     path = tmp_path / "map.svg"
-    draw_map(path, *found)
+    save(map_figure(*found), path)
     picture = path.read_text(encoding="utf-8")
     for text in ("carried up along plant.belt_speed", "carried down along plant.belt_speed"):
         assert text in picture
     path = tmp_path / "map.png"
-    draw_map(path, *found)
+    save(map_figure(*found), path)
     green = (pixels(path) == [0x00, 0x9E, 0x73]).all(axis=-1)
     left, right = np.array_split(green, 2, axis=1)
     assert right.sum() > 1.5 * left.sum()
@@ -217,7 +217,7 @@ def test_beside_a_colour_bar_what_runs_away_is_grey(tmp_path: Path) -> None:
     overrides = (FREE, LINEAR, "plant.belt_speed=0.2")
     found = swept("plant.friction.slope=0.7:0.9:2", "plant.damping=0.0:0.1:2", overrides=overrides)
     path = tmp_path / "map.png"
-    draw_map(path, *found, "amplitude")
+    save(map_figure(*found, "amplitude"), path)
     assert share(path, LIGHT_GREY) > 0.2
 
 

@@ -14,9 +14,6 @@ HELP = "show a running loop on a web page, live, and act on it"
 DEFAULT_PORT = 8642
 """The first that is tried where none is asked for."""
 
-_NICENESS = 10
-"""The simulation goes first."""
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
@@ -39,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     reach = keep_on_this_machine(arguments.network)
     die_with_parent()
     with suppress(OSError):
-        os.nice(_NICENESS)
+        os.nice(10)  # the simulation goes first
     from stickslip_ros.app.dashboard.server import serve  # it needs NiceGUI, and takes seconds
 
     serve(namespace, arguments.port, reach)

@@ -4,7 +4,6 @@ from typing import Any
 
 from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE
 
-_LINE: dict[str, Any] = {"type": "line", "showSymbol": False, "silent": True}
 _AXIS: dict[str, Any] = {
     "type": "value",
     "scale": True,
@@ -20,7 +19,8 @@ _CENTRED: dict[str, Any] = {
 
 
 def _line(colour: str, style: str = "solid", **more: Any) -> dict[str, Any]:
-    return _LINE | {"lineStyle": {"color": colour, "width": 1.3, "type": style}} | more
+    line: dict[str, Any] = {"type": "line", "showSymbol": False, "silent": True}
+    return line | {"lineStyle": {"color": colour, "width": 1.3, "type": style}} | more
 
 
 TRACE: dict[str, Any] = {

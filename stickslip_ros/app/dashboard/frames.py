@@ -21,8 +21,6 @@ PERIODS = (10, 50, 200)
 """Natural periods that the traces may show."""
 
 _QUANTITIES = (("displacement", "m"), ("velocity", "m/s"), ("control force", "N"))
-_ORBIT_PERIODS = 5.0
-_BUCKETS = 400
 _UNKNOWN_PERIOD = 1.0
 
 
@@ -67,12 +65,18 @@ class Frames:
         each has stands in the JSON.
         """
         period, drive = self.period, self.drive
-        frame = self._trace.frame(periods * period, _ORBIT_PERIODS * period, _BUCKETS)
-        body: dict[str, Any] = {"motion": None, "cycles": self._cycles(drive)}
+        frame = self._trace.frame(periods * period, 5.0 * period, buckets=400)
+        axes = _axes(drive)
+        length, speed, force = (scale for scale, _ in axes)
+        cycles = {
+            "count": self._listener.cycle_count,
+            "amplitude": [a / length for a in list(self._listener.cycles[AMPLITUDE])],
+            "stick_fraction": list(self._listener.cycles[STICK_FRACTION]),
+            "label": axes[0][1].replace("displacement", "amplitude"),
+        }
+        body: dict[str, Any] = {"motion": None, "cycles": cycles}
         lines: dict[str, list[FloatArray]] = {}
         if frame is not None:
-            axes = _axes(drive)
-            length, speed, force = (scale for scale, _ in axes)
             lines = {
                 "position": _scaled(frame.position, 1.0, length),
                 "velocity": _scaled(frame.velocity, 1.0, speed),
@@ -97,16 +101,6 @@ class Frames:
         with np.errstate(over="ignore"):  # what is too large for the page is off it
             floats = [column.astype("<f4").tobytes() for column in columns]
         return b"".join([struct.pack("<I", len(text)), text, *floats])
-
-    def _cycles(self, drive: Drive | None) -> dict[str, Any]:
-        amplitudes = list(self._listener.cycles[AMPLITUDE])
-        scale, label = _axes(drive)[0]
-        return {
-            "count": self._listener.cycle_count,
-            "amplitude": [amplitude / scale for amplitude in amplitudes],
-            "stick_fraction": list(self._listener.cycles[STICK_FRACTION]),
-            "label": label.replace("displacement", "amplitude"),
-        }
 
 
 def _axes(drive: Drive | None) -> list[tuple[float, str]]:

@@ -58,16 +58,8 @@ ABSENT = "not there"
 LONGEST_TAP = 1e6
 """Simulated time, s, that a push may last."""
 
-_TAKE_PERIOD = 0.02
-_TAP_PERIOD = 0.002
-_WATCH_PERIOD = 0.1
 _ANSWER_TIMEOUT = 10.0
-_TRANSITION_TIME = 8.0
-"""Time, s, that a transition may take before it is asked for again."""
 _CYCLES_KEPT = 200
-_EVENTS_KEPT = 200
-_MOST_NODES = 50
-"""That health is kept of: anybody may publish diagnostics of any name."""
 
 Answer = Future[str]
 """What a request comes to: nothing where it was done, else why not, in a sentence."""
@@ -112,7 +104,7 @@ class ListenerNode(PollingNode):
         """The measures of the last cycles, each by its topic."""
         self.cycle_count = 0
         """How many cycles were heard of in all."""
-        self.events: deque[tuple[float, str]] = deque(maxlen=_EVENTS_KEPT)
+        self.events: deque[tuple[float, str]] = deque(maxlen=200)
         """When, in s since the epoch, and what happened to the nodes, the newest last."""
         self._steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._calls: list[tuple[ServiceCall, float, Callable[[], None]]] = []
@@ -129,12 +121,8 @@ class ListenerNode(PollingNode):
         )
         for topic in (AMPLITUDE, STICK_FRACTION, FREQUENCY):
             self.cycles[topic] = deque(maxlen=_CYCLES_KEPT)
-            self.create_subscription(
-                Float64,
-                topic.name,
-                partial(self._on_cycle, topic),
-                qos_profile(topic, _CYCLES_KEPT),
-            )
+            callback, qos = partial(self._on_cycle, topic), qos_profile(topic, _CYCLES_KEPT)
+            self.create_subscription(Float64, topic.name, callback, qos)
         self.create_subscription(
             DiagnosticArray, DIAGNOSTICS.name, self._on_diagnostics, qos_profile(DIAGNOSTICS)
         )
@@ -144,8 +132,8 @@ class ListenerNode(PollingNode):
             self._on_parameter_event,
             qos_profile_parameter_events,
         )
-        self._every(_TAKE_PERIOD, self._take)
-        self._every(_WATCH_PERIOD, self._watch)
+        self._every(0.02, self._take)
+        self._every(0.1, self._watch)
 
     def set_parameter(self, node: str, name: str, value: Any) -> Answer:
         """Set a parameter of a node while it runs."""
@@ -169,7 +157,7 @@ class ListenerNode(PollingNode):
             "change_state",
             ChangeState.Request(transition=Transition(id=transition)),
             lambda response: "" if response.success else f"{node} could not be {done}",
-            _TRANSITION_TIME,
+            answer_time=8.0,  # a transition may take that long
         )
 
     def reset(self) -> Answer:
@@ -200,7 +188,7 @@ class ListenerNode(PollingNode):
             self._tap_end = self._newest + round(duration * NANOSECONDS)
             self.events.append((time.time(), f"pushed with {force:g} N for {duration:g} s"))
             if self._tap_timer is None:
-                self._tap_timer = self._every(_TAP_PERIOD, self._take)
+                self._tap_timer = self._every(0.002, self._take)
             _settle(answer, "")
 
         self._call_soon(push)
@@ -307,7 +295,7 @@ class ListenerNode(PollingNode):
         state = figures.pop(STATE, "")
         message = status.message if status.message != state else ""
         before = self.health.get(node)
-        if before is None and len(self.health) >= _MOST_NODES:
+        if before is None and len(self.health) >= 50:  # anybody may publish any name
             return
         before = before or Health()
         restarted = state == before.state and _has_restarted(before.figures, figures)

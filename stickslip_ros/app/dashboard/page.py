@@ -32,10 +32,6 @@ _FIRST = (
 )
 """Parameters with a field of their own; the others are chosen from a list."""
 _REFRESH = 0.25
-_TAP_PART = 0.25
-"""Of the normal force, and of the natural period: what a tap is at first."""
-_LEVELS = ("well", "warning", "error", "stale")
-_STATE_TIMEOUT = 3.0
 
 
 def add_page(app: FastAPI, listener: ListenerNode, frames: Frames) -> None:
@@ -179,11 +175,14 @@ class _Page:
                 (self._tap_force, scales[0], units.label("force", "N")),
                 (self._tap_time, scales[1], units.label("for", "s")),
             ):
-                field.value = float(f"{_TAP_PART * scale:.2g}")
+                field.value = float(f"{scale / 4.0:.2g}")
                 field.props["label"] = label
         for field in self._fields:
             field.refresh(units)
-        self._show_control(listener.health[_CONTROLLER])
+        there = listener.health[_CONTROLLER].state not in (ABSENT, SILENT)
+        self._switch.set_enabled(there and not self._busy)
+        if not self._busy:
+            self._switch.set_value(self._is_active())
         rows = [_row(node, health) for node, health in sorted(listener.health.items())]
         if rows != self._health.rows:
             self._health.rows = rows
@@ -193,7 +192,6 @@ class _Page:
             self._newest_event = when
 
     def _missing(self) -> list[str]:
-        """Say which nodes of the loop are not heard."""
         return [
             f"{node} {health.state}"
             for node, health in self._listener.health.items()
@@ -212,29 +210,23 @@ class _Page:
         colour = GREY if trend else look.colour
         self._regime.style(f"background-color: {colour} !important")
 
-    def _show_control(self, health: Health) -> None:
-        there = health.state not in (ABSENT, SILENT)
-        self._switch.set_enabled(there and not self._busy)
-        if not self._busy:
-            self._switch.set_value(health.state == "active")
+    def _is_active(self) -> bool:
+        return self._listener.health[_CONTROLLER].state == "active"
 
     def _switch_control(self, event: GenericEventArguments) -> Awaitable[None] | None:
         """Take what the person asked for from the event: a refresh may set the switch back."""
         active = bool(event.args)
-        if self._busy or active == (self._listener.health[_CONTROLLER].state == "active"):
+        if self._busy or active == self._is_active():
             return None
         self._busy = True
         self._switch.set_value(active)
         return self._pursue_control(active)
 
     async def _pursue_control(self, active: bool) -> None:
-        listener = self._listener
         try:
-            await _report(listener.set_active(_CONTROLLER, active), self._switch_refusal)
-            deadline = time.monotonic() + _STATE_TIMEOUT
-            while time.monotonic() < deadline:
-                if active == (listener.health[_CONTROLLER].state == "active"):
-                    break
+            await _report(self._listener.set_active(_CONTROLLER, active), self._switch_refusal)
+            deadline = time.monotonic() + 3.0
+            while active != self._is_active() and time.monotonic() < deadline:
                 await asyncio.sleep(_REFRESH)
         finally:
             self._busy = False
@@ -314,13 +306,13 @@ def _card(title: str) -> ui.card:
 
 
 def _refusal() -> ui.label:
-    """Return a line for what was refused, and why."""
     label = ui.label().classes("text-sm text-red-700")
     return label.bind_visibility_from(label, "text")
 
 
 def _row(node: str, health: Health) -> dict[str, str]:
-    level = _LEVELS[min(health.level, 3)] if health.heard_at else ""
+    levels = "well", "warning", "error", "stale"
+    level = levels[min(health.level, 3)] if health.heard_at else ""
     return {
         "node": node,
         "state": health.state,

@@ -92,7 +92,6 @@ def _listen(port: int | None) -> socket.socket:
 
 @contextmanager
 def _running(node: ListenerNode) -> Generator[None]:
-    """Run a node in a thread of its own."""
     executor = EventsExecutor()
     executor.add_node(node)
     stop = Future()
