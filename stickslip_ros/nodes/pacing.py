@@ -19,14 +19,8 @@ from stickslip_ros.scenarios.parameters import PlantParameters
 
 Publish = Callable[[Sample], None]
 
-_BATCH = 100
-"""Samples that lockstep publishes in one go where nothing holds it up."""
-_SWITCH_INTERVAL = 1e-4
-"""Time, s, after which a thread in Python code lets another one have its turn."""
-_PR_SET_TIMERSLACK = 29
 _LONG_WAIT = 0.05
 """Wait, s, from which on it must be possible to be interrupted."""
-
 
 NO_FORCE = "no control force comes: going on without"
 
@@ -182,6 +176,10 @@ class LockstepPacer(Pacer):
         super().stop()
         self._node.destroy_timer(self._watchdog)
 
+    def _finish(self) -> None:
+        self.stop()
+        super()._finish()
+
     def force_came(self) -> None:
         """Go on if the force was the one waited for."""
         if self._loop.answered:
@@ -195,12 +193,11 @@ class LockstepPacer(Pacer):
 
     def _proceed(self) -> None:
         loop = self._loop
-        for _ in range(_BATCH):
+        for _ in range(100):  # further ones behind the callbacks that have come meanwhile
             if not self._running:
                 return
             held_up = self._awaits_force or self._flow.full
             if loop.unbounded or (loop.sample_number >= self._last and not held_up):
-                self.stop()
                 self._finish()
                 return
             if held_up:
@@ -209,7 +206,6 @@ class LockstepPacer(Pacer):
                 sample = loop.advance()
             except StickslipError as error:
                 self.failure = str(error)
-                self.stop()
                 self._finish()
                 return
             self._publish(sample)
@@ -315,6 +311,6 @@ class RealtimePacer(Pacer):
 def _be_prompt() -> None:
     """Let this thread go on soon after it could; the defaults favour throughput."""
     if sys.platform == "linux":  # otherwise it sleeps up to 50 us longer than asked
-        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1)
-    sys.setswitchinterval(_SWITCH_INTERVAL)
+        ctypes.CDLL(None).prctl(29, 1)  # PR_SET_TIMERSLACK
+    sys.setswitchinterval(1e-4)
     gc.freeze()  # what the imports have made takes tens of ms to go through

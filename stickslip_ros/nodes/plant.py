@@ -113,8 +113,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         self.elapsed = 0.0 if self._pacer.finished else self.elapsed + done
         self._next_start = self._loop.stamp(self._loop.sample_number + 1)
         self._answerable = self._loop.sample.stamp
-        for publisher in (self._state, self._applied, self._dropped_force):
-            self.wait_for_delivery(publisher)
+        super().stop()
 
     def apply_parameters(self) -> None:
         """Go on with the new drive and disturbance from the next sample on."""

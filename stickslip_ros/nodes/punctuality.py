@@ -2,14 +2,8 @@
 
 from collections import deque
 
-_MOST_LATE = 0.01
-"""Share of forces or samples from which on lateness is a complaint."""
-
 _WINDOW = 10
 """Looks over which shares are taken."""
-
-_LEAST_SAMPLES = 100
-"""Fewer say nothing of a share."""
 
 
 class Punctuality:
@@ -39,7 +33,7 @@ class Punctuality:
         before = self._counts[0]
         self._counts.append(counts)
         number, late, missed = (now - then for now, then in zip(counts, before, strict=True))
-        if number < _LEAST_SAMPLES:
+        if number < 100:  # too few for a share of them to say anything
             return ""
         found = [
             f"{100.0 * count / number:.2g} % of the latest {what}"
@@ -47,7 +41,7 @@ class Punctuality:
                 (late, "forces came late (the last one was held)"),
                 (missed, "samples missed their deadlines"),
             )
-            if count > _MOST_LATE * number
+            if count > 0.01 * number
         ]
         if not found:
             return ""

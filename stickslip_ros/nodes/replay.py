@@ -76,7 +76,9 @@ class ReplayNode(ManagedNode[ReplayParameters]):
             rate=self.parameters.rate,
             loop=self.parameters.loop,
             windows={
-                topic: FlowWindow(_FLOW_WINDOW, partial(self._has_publisher, recorded))
+                topic: FlowWindow(
+                    _FLOW_WINDOW, lambda recorded=recorded: self.count_publishers(recorded) > 0
+                )
                 for topic, recorded in self._recorders.items()
             },
         )
@@ -86,8 +88,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         """Fall silent, once the messages sent have arrived."""
         if self._player is not None:
             self._player.stop()
-        for writer in self._writers.values():
-            self.wait_for_delivery(writer)
+        super().stop()
 
     def diagnose(self) -> Diagnosis:
         """Return how far the replay has come and how late it was, or what it waits for."""
@@ -163,9 +164,6 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         name = f"{writer.topic_name.rpartition('/')[0]}/{RECORDED.name}"
         self.subscribe(replace(RECORDED, name=name), partial(self._on_recorded, topic))
         return name
-
-    def _has_publisher(self, topic: str) -> bool:
-        return self.count_publishers(topic) > 0
 
     def _on_recorded(self, topic: str, stamp: int) -> None:
         if self._player is not None:

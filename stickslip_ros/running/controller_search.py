@@ -8,8 +8,7 @@ from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, Topic
-from stickslip_ros.nodes.base.matching import mismatch
-from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.nodes.base.qos import mismatch, qos_profile
 
 DASHBOARD = "dashboard"
 """Name of a node that reads joint_states and yet is meant to be no controller."""

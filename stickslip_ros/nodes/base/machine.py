@@ -22,12 +22,8 @@ from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 _DOMAIN = "ROS_DOMAIN_ID"
 _LARGEST_DOMAIN = 232
 _DECIMAL = re.compile(r"0|[1-9][0-9]{0,20}")
-_DISCOVERY_ADDRESSES = ("127.0.0.1", "239.255.0.1")
-"""On which Fast DDS listens where it is kept on this machine."""
-_WITHOUT_SHARED_MEMORY = ("", "NONE", "UDPv4", "UDPv6")
 _LEAST_SHARED_MEMORY = 1 << 20
 """Bytes that a process of Fast DDS takes at most, rounded up."""
-_ECHO_TIMEOUT = 1.0
 
 
 def check_machine(domain: int) -> None:
@@ -54,7 +50,8 @@ def check_machine(domain: int) -> None:
 
 def _check_ports(domain: int) -> None:
     shared = port(domain, DISCOVERY)
-    for address in _DISCOVERY_ADDRESSES if is_kept_on_loopback() else ("",):
+    # On these two Fast DDS listens where it is kept on this machine.
+    for address in ("127.0.0.1", "239.255.0.1") if is_kept_on_loopback() else ("",):
         if not is_free(shared, address, shared=True):
             raise InvalidInputError(
                 f"UDP port {shared}, by which the nodes of {_DOMAIN} = {domain} find each other, "
@@ -70,7 +67,7 @@ def _check_ports(domain: int) -> None:
 
 def _check_shared_memory() -> None:
     transports = os.environ.get(TRANSPORTS, "")
-    if transports in _WITHOUT_SHARED_MEMORY or not SHARED_MEMORY.is_dir():
+    if transports in ("", "NONE", "UDPv4", "UDPv6") or not SHARED_MEMORY.is_dir():
         return
     free = free_shared_memory()
     if free < _LEAST_SHARED_MEMORY:
@@ -100,7 +97,7 @@ def _reaches_itself() -> bool:
     kind = socket.AF_INET, socket.SOCK_DGRAM
     with socket.socket(*kind) as reader, socket.socket(*kind) as writer:
         reader.bind(("127.0.0.1", 0))
-        reader.settimeout(_ECHO_TIMEOUT)
+        reader.settimeout(1.0)
         try:
             writer.sendto(b"", reader.getsockname())
             reader.recv(1)
