@@ -49,8 +49,8 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         for sentence in self._selection.left_out:
             self.get_logger().warning(sentence)
         self._writers = {
-            name: self.keep(self.create_publisher(topic.message_class, name, topic.qos))
-            for name, topic in self._selection.topics.items()
+            name: self.keep(self.create_publisher(kind, name, qos))
+            for name, (kind, qos) in self._selection.topics.items()
         }
         self._clock_writer = self.advertise(CLOCK) if self.parameters.clock else None
         joint_state = message_class(JOINT_STATES.type_name)

@@ -1,13 +1,11 @@
 """Controllers in the ROS graph: which nodes close the loop, and which ones nearly do."""
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any
 
 from rclpy.node import Node, NodeNameNonExistentError
-from rclpy.qos import QoSProfile
-from rclpy.topic_endpoint_info import TopicEndpointInfo
+from rclpy.topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum
 
-from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, Topic
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.base.qos import mismatch, qos_profile
 
 DASHBOARD = "dashboard"
@@ -42,7 +40,7 @@ class ControllerSearch:
         """
         readers = self._observer.get_subscriptions_info_by_topic(JOINT_STATES.name)
         writers = self._observer.get_publishers_info_by_topic(CONTROL_FORCE.name)
-        return sorted(_named(readers, _misfit_as_reader) & _named(writers, _misfit_as_writer))
+        return sorted(_named(readers, _misfit) & _named(writers, _misfit))
 
     def managed(self) -> list[str]:
         """Return the full names of all managed (lifecycle) nodes but ours."""
@@ -62,10 +60,10 @@ class ControllerSearch:
         for node in sorted(writes - reads - self._ours):
             yield f"{node} publishes {control_force} but does not read {joint_states}"
         for info in readers:
-            if misfit := _misfit_as_reader(info):
+            if misfit := _misfit(info):
                 yield f"{_full_name(info)} cannot read {joint_states}: {misfit}"
         for info in writers:
-            if misfit := _misfit_as_writer(info):
+            if misfit := _misfit(info):
                 yield f"nobody can read {control_force} of {_full_name(info)}: {misfit}"
         yield from self._near_misses_elsewhere()
 
@@ -110,18 +108,11 @@ def _full_name(info: TopicEndpointInfo) -> str:
     return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
 
 
-def _misfit_as_reader(info: TopicEndpointInfo) -> str:
-    return _misfit(info, JOINT_STATES, qos_profile(JOINT_STATES), info.qos_profile)
-
-
-def _misfit_as_writer(info: TopicEndpointInfo) -> str:
-    return _misfit(info, CONTROL_FORCE, info.qos_profile, qos_profile(CONTROL_FORCE))
-
-
-def _misfit(
-    info: TopicEndpointInfo, topic: Topic[Any], writer: QoSProfile, reader: QoSProfile
-) -> str:
+def _misfit(info: TopicEndpointInfo) -> str:
     """Return why an endpoint and the plant's do not match, or nothing."""
+    reads = info.endpoint_type == TopicEndpointTypeEnum.SUBSCRIPTION
+    topic = JOINT_STATES if reads else CONTROL_FORCE
     if info.topic_type != topic.type_name:
         return f"its type is {info.topic_type}, not {topic.type_name}"
-    return mismatch(writer, reader)
+    ours, theirs = qos_profile(topic), info.qos_profile
+    return mismatch(ours, theirs) if reads else mismatch(theirs, ours)

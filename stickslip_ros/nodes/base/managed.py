@@ -11,7 +11,6 @@ from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
-from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.timer import Timer
@@ -120,17 +119,15 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         """Destroy what is kept before the node is cleaned up."""
         self._kept.remove(thing)
         # The node has to let go of it, too: what is only destroyed by itself goes on to be heard.
-        match thing:
-            case Publisher():
-                self.destroy_publisher(thing)
-            case Subscription():
-                self.destroy_subscription(thing)
-            case Service():
-                self.destroy_service(thing)
-            case Timer():
-                self.destroy_timer(thing)
-            case _:
-                thing.destroy()
+        for destroy in (
+            self.destroy_publisher,
+            self.destroy_subscription,
+            self.destroy_service,
+            self.destroy_timer,
+        ):
+            if destroy(thing):
+                return
+        thing.destroy()
 
     def advertise(self, topic: Topic[Any]) -> Publisher:
         """Publish a topic until the node is cleaned up."""
