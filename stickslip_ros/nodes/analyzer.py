@@ -153,8 +153,12 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def _take_in(self) -> None:
         """Record what has come since the last time, and keep it to be measured."""
         taken = {topic: self._take(topic) for topic in RECORDED_TOPICS}
-        if not self._meter.dropped_known:
-            self._look_for_dropped_forces(bool(taken[DROPPED_FORCE]))
+        # Only where a plant tells of them the bag has their topic: without it, they are not known.
+        if not self._meter.dropped_known and (
+            taken[DROPPED_FORCE] or self._listening[DROPPED_FORCE].get_publisher_count() > 0
+        ):
+            self._meter.dropped_known = True
+            self._record(lambda recorder: self._add_topic(recorder, DROPPED_FORCE))
         states = taken[JOINT_STATES]
         if states and states[-1].stamp != self._newest_recorded:
             self._newest_recorded = states[-1].stamp
@@ -183,14 +187,6 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         if topic in self._to_measure:
             self._to_measure[topic] += [message.data for message in taken]
         return taken
-
-    def _look_for_dropped_forces(self, taken: bool) -> None:
-        """Let the bag have their topic where a plant tells of them: without it, it is not known."""
-        self._meter.dropped_known = (
-            taken or self._listening[DROPPED_FORCE].get_publisher_count() > 0
-        )
-        if self._meter.dropped_known:
-            self._record(lambda recorder: self._add_topic(recorder, DROPPED_FORCE))
 
     def _measure(self) -> None:
         """Decode and measure what was taken in since the last time."""

@@ -28,7 +28,6 @@ from stickslip_ros.stamps import NANOSECONDS
 
 _FLOW_WINDOW = PlantParameters().flow_window
 """Joint states that may be on their way to a recorder."""
-_LOOK_PERIOD = 0.05
 _SETTLED = 0.5
 """Time, s, without a new reader after which those that are there count as all."""
 _SILENCE = 3.0
@@ -63,7 +62,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
             self.keep(self.create_service(Trigger, f"~/{name}", partial(self._steer, act)))
         self._readers: list[int] = []
         self._connected_at = self._readers_changed_at = time.monotonic()
-        self.keep(self.every(_LOOK_PERIOD, self._look_for_readers))
+        self.keep(self.every(0.05, self._look_for_readers))
 
     def start(self) -> None:
         """Publish the first message now, further ones when they are due."""

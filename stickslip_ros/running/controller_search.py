@@ -1,6 +1,7 @@
 """Controllers in the ROS graph: which nodes close the loop, and which ones nearly do."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
+from itertools import filterfalse
 
 from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum
@@ -40,7 +41,7 @@ class ControllerSearch:
         """
         readers = self._observer.get_subscriptions_info_by_topic(JOINT_STATES.name)
         writers = self._observer.get_publishers_info_by_topic(CONTROL_FORCE.name)
-        return sorted(_named(readers, _misfit) & _named(writers, _misfit))
+        return sorted(_named(filterfalse(_misfit, readers)) & _named(filterfalse(_misfit, writers)))
 
     def managed(self) -> list[str]:
         """Return the full names of all managed (lifecycle) nodes but ours."""
@@ -92,16 +93,9 @@ def _is_managed(observer: Node, name: str, namespace: str) -> bool:
     return any(_CHANGE_STATE in types for _, types in services)
 
 
-def _named(
-    endpoints: Iterable[TopicEndpointInfo],
-    misfit: Callable[[TopicEndpointInfo], str] = lambda _: "",
-) -> set[str]:
-    """Return the names of the nodes of endpoints that fit, as far as they are known already."""
-    return {
-        _full_name(info)
-        for info in endpoints
-        if not info.node_name.startswith("_") and not misfit(info)
-    }
+def _named(endpoints: Iterable[TopicEndpointInfo]) -> set[str]:
+    """Return the names of the nodes of endpoints, as far as they are known already."""
+    return {_full_name(info) for info in endpoints if not info.node_name.startswith("_")}
 
 
 def _full_name(info: TopicEndpointInfo) -> str:

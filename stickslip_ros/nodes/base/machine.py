@@ -1,5 +1,6 @@
 """What ROS needs of this machine: a domain with free ports, the clock, the loopback, memory."""
 
+import errno
 import os
 import re
 import socket
@@ -7,17 +8,12 @@ import time
 from datetime import UTC, datetime
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.nodes.base.domain_ports import (
-    DISCOVERY,
-    FIRST_PROCESS,
-    LARGEST_PORT,
-    MOST_PROCESSES,
-    is_free,
-    port,
-)
 from stickslip_ros.nodes.base.network import TRANSPORTS, is_fast_dds, is_kept_on_loopback
 from stickslip_ros.nodes.base.shared_memory import SHARED_MEMORY, free_shared_memory
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
+
+FIRST_PROCESS = 10
+"""Number of the port in its domain that is the first process's own; each has two."""
 
 _DOMAIN = "ROS_DOMAIN_ID"
 _LARGEST_DOMAIN = 232
@@ -48,8 +44,24 @@ def check_machine(domain: int) -> None:
         _check_shared_memory()
 
 
+def port(domain: int, number: int) -> int:
+    """Return the UDP port of a domain with this number, from 0 to 249 (RTPS 2.5, 9.6.2.4)."""
+    return 7400 + 250 * domain + number
+
+
+def is_free(taken: int, address: str = "", *, shared: bool = False) -> bool:
+    """Return whether a UDP port can be listened on, or be `shared` with those who share it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, shared)
+        try:
+            probe.bind((address, taken))
+        except OSError as error:
+            return error.errno != errno.EADDRINUSE
+    return True
+
+
 def _check_ports(domain: int) -> None:
-    shared = port(domain, DISCOVERY)
+    shared = port(domain, 0)
     # On these two Fast DDS listens where it is kept on this machine.
     for address in ("127.0.0.1", "239.255.0.1") if is_kept_on_loopback() else ("",):
         if not is_free(shared, address, shared=True):
@@ -57,7 +69,8 @@ def _check_ports(domain: int) -> None:
                 f"UDP port {shared}, by which the nodes of {_DOMAIN} = {domain} find each other, "
                 "is taken by another program: end that, or choose another domain"
             )
-    own = range(port(domain, FIRST_PROCESS), LARGEST_PORT, 2)[:MOST_PROCESSES]
+    # Fast DDS looks for ports for no more than 100 processes.
+    own = range(port(domain, FIRST_PROCESS), 65_535, 2)[:100]
     if not any(is_free(first) and is_free(first + 1) for first in own):
         raise InvalidInputError(
             f"{_DOMAIN} = {domain} is refused: of its UDP ports, {own[0]} to {own[-1] + 1}, a node "

@@ -13,8 +13,6 @@ _DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _DISCOVERY_SERVER = "ROS_DISCOVERY_SERVER"
 _LOCALHOST_ONLY = "ROS_LOCALHOST_ONLY"
 """The range's predecessor, which overrules it."""
-_NO_PROFILES_FROM_HERE = "SKIP_DEFAULT_XML_FILE"
-"""Set, it keeps Fast DDS from reading profiles of the working directory, which overrule others."""
 
 
 def keep_on_this_machine(network: bool) -> str:
@@ -47,7 +45,8 @@ def this_machine_only() -> dict[str, str]:
         _DISCOVERY_RANGE: "SYSTEM_DEFAULT",
         _LOCALHOST_ONLY: "",
         _PROFILES: _profile("loopback"),
-        _NO_PROFILES_FROM_HERE: "1",
+        # Profiles of the working directory would overrule this one.
+        "SKIP_DEFAULT_XML_FILE": "1",
     }
 
 

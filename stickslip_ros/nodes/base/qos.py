@@ -64,8 +64,9 @@ def matching_writers(node: Node, reader: Subscription) -> list[TopicEndpointInfo
 
 
 def _same_type(other: TopicEndpointInfo, ours: Publisher | Subscription) -> bool:
-    package = ours.msg_type.__module__.partition(".")[0]
-    return other.topic_type == f"{package}/msg/{ours.msg_type.__name__}"
+    kind: Any = ours.msg_type
+    package = kind.__module__.partition(".")[0]
+    return other.topic_type == f"{package}/msg/{kind.__name__}"
 
 
 def _explicit(profile: QoSProfile) -> QoSProfile:
