@@ -39,6 +39,7 @@ from stickslip_ros.nodes.base.duplicate_publishers import duplicate_publishers
 from stickslip_ros.nodes.base.managed import ERROR, OK, Diagnosis, ManagedNode, diagnosis
 from stickslip_ros.nodes.base.polling import waiting_messages
 from stickslip_ros.nodes.base.process import run_node
+from stickslip_ros.nodes.base.qos import qos_profile
 from stickslip_ros.nodes.base.service_call import parameters_call
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.scenarios.parameter import known_parameters
@@ -100,7 +101,10 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             CONTROL_FORCE: [],
             DROPPED_FORCE: [],
         }
-        self._listening = {topic: self.subscribe_polled(topic) for topic in RECORDED_TOPICS}
+        self._listening = {
+            topic: self.keep(self.create_polled_subscription(topic, qos_profile(topic)))
+            for topic in RECORDED_TOPICS
+        }
         self._periodic = [
             self.keep(self.every(self._tick, self._take_in)),
             self.keep(self.every(0.1, self._measure)),

@@ -6,7 +6,6 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable
-from math import inf
 from threading import TIMEOUT_MAX, Event, Lock, Thread
 from typing import Any
 
@@ -106,13 +105,13 @@ class Pacer:
         self._loop = loop
         self._publish = publish
         self._end = end
-        self._last: float = inf
+        self._last = 0
         self._running = False
         self._started = self._stopped = time.monotonic()
 
-    def start(self, last: int | None) -> None:
-        """Publish sample 0 and go on, up to sample `last` if there is one."""
-        self._last = inf if last is None else last
+    def start(self, last: int) -> None:
+        """Publish sample 0 and go on, up to sample `last`."""
+        self._last = last
         self._running = True
         self._started = time.monotonic()
         self._publish(self._loop.sample)
@@ -165,7 +164,7 @@ class LockstepPacer(Pacer):
         self._seen_at = 0.0
         self._watchdog = node.every(min(0.1, self._reply_timeout / 10.0), self._watch)
 
-    def start(self, last: int | None) -> None:
+    def start(self, last: int) -> None:
         """Publish sample 0 and go on, once the node is active, when it is answered."""
         super().start(last)
         self._flow.sent(self._loop.sample.stamp)
@@ -265,7 +264,7 @@ class RealtimePacer(Pacer):
         self._sleeper = Sleeper()
         self._thread = Thread(target=self._run, name="pacer", daemon=True)
 
-    def start(self, last: int | None) -> None:
+    def start(self, last: int) -> None:
         """Publish sample 0 now; every further one is due an interval after the one before."""
         super().start(last)
         self._thread.start()

@@ -7,16 +7,10 @@ _WINDOW = 10
 
 
 class Punctuality:
-    """Looks at the counts of a plant every now and then, and says what is wrong with them."""
+    """Looks at the counts of a segment every now and then, and says what is wrong with them."""
 
     def __init__(self) -> None:
-        self._counts: deque[tuple[int, int, int]] = deque(maxlen=_WINDOW + 1)
-        self.clear()
-
-    def clear(self) -> None:
-        """Begin a segment."""
-        self._counts.clear()
-        self._counts.append((0, 0, 0))
+        self._counts = deque([(0, 0, 0)], maxlen=_WINDOW + 1)
 
     def look(
         self, samples: int, late_forces: int, missed_deadlines: int, *, controlled: bool

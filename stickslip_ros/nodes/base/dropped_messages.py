@@ -13,10 +13,6 @@ class DroppedMessages:
     def __init__(self, logger: RcutilsLogger) -> None:
         """Count from now on; what is dropped after a quiet time is logged."""
         self._logger = logger
-        self.clear()
-
-    def clear(self) -> None:
-        """Count from 0."""
         self._number = 0
         self._last = ""
         self._complaint_ends = -inf

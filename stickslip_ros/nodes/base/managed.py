@@ -168,10 +168,6 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         kind, qos = message_class(topic.type_name), qos_profile(topic, depth)
         return self.keep(self.create_subscription(kind, topic.name, callback, qos, raw=True))
 
-    def subscribe_polled(self, topic: Topic[Any]) -> Subscription:
-        """Let the messages of a topic wait to be taken, until the node is cleaned up."""
-        return self.keep(self.create_polled_subscription(topic, qos_profile(topic)))
-
     def publish_diagnostics(self) -> None:
         """Publish the node's health."""
         level, message, figures = self.diagnose()
@@ -203,7 +199,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         if self._is_waiting():
             return TransitionCallbackReturn.FAILURE
         self._waiting = False
-        self.dropped.clear()
+        self.dropped = DroppedMessages(self.get_logger())
         result = self._transition(self.start, "active")
         self.active = result is TransitionCallbackReturn.SUCCESS
         return result
