@@ -50,8 +50,6 @@ from stickslip_ros.versions import versions
 
 ColumnsT = TypeVar("ColumnsT")
 
-_TAKE_PERIOD = 0.02
-"""Time, s, for which messages gather: one by one each would wake a thread and find cold caches."""
 VERDICT_TIME = 0.05
 """Time, s, in which a plant that has dropped forces says so of the last ones, too."""
 
@@ -77,7 +75,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             check_new_bag(self._next_bag())
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
         self._channels: dict[str, int] = {}
-        self._tick = min(_TAKE_PERIOD, self.parameters.flush_period / 2.0)
+        # Messages gather that long: one by one each would wake a thread and find cold caches.
+        self._tick = min(0.02, self.parameters.flush_period / 2.0)
 
     def start(self) -> None:
         """Open a bag, start to measure, and then listen: who is heard is not lost."""
@@ -193,7 +192,6 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         return taken
 
     def _measure(self) -> None:
-        """Decode and measure what was taken in since the last time."""
         states = self._columns(JOINT_STATES, joint_state_columns)
         windows = self._cycles // self.parameters.window
         for cycle in self._meter.motion.feed(states):

@@ -1,6 +1,7 @@
 """Controllers in the ROS graph: which nodes close the loop, and which ones nearly do."""
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from itertools import filterfalse
 
 from rclpy.node import Node, NodeNameNonExistentError
@@ -11,8 +12,6 @@ from stickslip_ros.nodes.base.qos import mismatch, qos_profile
 
 DASHBOARD = "dashboard"
 """Name of a node that reads joint_states and yet is meant to be no controller."""
-
-_CHANGE_STATE = "lifecycle_msgs/srv/ChangeState"
 
 
 class ControllerSearch:
@@ -45,9 +44,12 @@ class ControllerSearch:
 
     def managed(self) -> list[str]:
         """Return the full names of all managed (lifecycle) nodes but ours."""
-        nodes = self._observer.get_node_names_and_namespaces()
-        managed = [node for node in nodes if _is_managed(self._observer, *node)]
-        names = [f"{namespace.rstrip('/')}/{name}" for name, namespace in managed]
+        names: list[str] = []
+        for name, namespace in self._observer.get_node_names_and_namespaces():
+            with suppress(NodeNameNonExistentError):  # it has gone meanwhile
+                services = self._observer.get_service_names_and_types_by_node(name, namespace)
+                if any("lifecycle_msgs/srv/ChangeState" in types for _, types in services):
+                    names.append(f"{namespace.rstrip('/')}/{name}")
         return [name for name in names if name not in self._ours]
 
     def near_misses(self) -> Iterator[str]:
@@ -83,14 +85,6 @@ class ControllerSearch:
             elif name == CONTROL_FORCE.name:
                 for node in sorted(_named(self._observer.get_publishers_info_by_topic(topic))):
                     yield f"{node} publishes {topic}, the plant reads {self._control_force}"
-
-
-def _is_managed(observer: Node, name: str, namespace: str) -> bool:
-    try:
-        services = observer.get_service_names_and_types_by_node(name, namespace)
-    except NodeNameNonExistentError:  # it has gone meanwhile
-        return False
-    return any(_CHANGE_STATE in types for _, types in services)
 
 
 def _named(endpoints: Iterable[TopicEndpointInfo]) -> set[str]:

@@ -42,7 +42,6 @@ STATE = "state"
 """Key under which a node's diagnostics say in which state of its life cycle it is."""
 
 _DIAGNOSTICS_PERIOD = 1.0
-_DELIVERY_TIMEOUT = 1.0
 
 
 def diagnosis(complaints: Iterable[str], figures: dict[str, Any]) -> Diagnosis:
@@ -89,7 +88,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         """Stop working (deactivate), once the messages sent have arrived."""
         for publisher in self._kept:
             if isinstance(publisher, Publisher):
-                publisher.wait_for_all_acked(Duration(seconds=_DELIVERY_TIMEOUT))
+                publisher.wait_for_all_acked(Duration(seconds=1))
 
     def diagnose(self) -> Diagnosis:
         """Return the node's health; by default what it tells of dropped messages."""

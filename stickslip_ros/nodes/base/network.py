@@ -10,7 +10,6 @@ TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 
 _PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-_DISCOVERY_SERVER = "ROS_DISCOVERY_SERVER"
 _LOCALHOST_ONLY = "ROS_LOCALHOST_ONLY"
 """The range's predecessor, which overrules it."""
 
@@ -22,7 +21,7 @@ def keep_on_this_machine(network: bool) -> str:
     for more.
     """
     _heed_predecessor()
-    names = [_DISCOVERY_RANGE, *([_DISCOVERY_SERVER, _PROFILES] if is_fast_dds() else [])]
+    names = [_DISCOVERY_RANGE, *(["ROS_DISCOVERY_SERVER", _PROFILES] if is_fast_dds() else [])]
     said = [f"{name}={os.environ[name]}" for name in names if os.environ.get(name)]
     if network:
         os.environ[_DISCOVERY_RANGE] = "SUBNET"
