@@ -9,10 +9,10 @@ MANIFEST = ElementTree.parse("package.xml").getroot()
 NAME = MANIFEST.findtext("name")
 
 EXECUTABLES = {
-    "plant_node": "stickslip_ros.nodes.executables:plant",
-    "washout_controller_node": "stickslip_ros.nodes.executables:washout_controller",
-    "analyzer_node": "stickslip_ros.nodes.executables:analyzer",
-    "replay_node": "stickslip_ros.nodes.executables:replay",
+    "plant_node": "stickslip_ros.nodes.plant:main",
+    "washout_controller_node": "stickslip_ros.nodes.washout_controller:main",
+    "analyzer_node": "stickslip_ros.nodes.analyzer:main",
+    "replay_node": "stickslip_ros.nodes.replay:main",
     "stickslip": "stickslip_ros.app.main:main",
 }
 

@@ -4,6 +4,9 @@ import os
 import signal
 import sys
 
+NODE_SCRIPTS = ("plant_node", "washout_controller_node", "analyzer_node", "replay_node")
+"""Installed scripts that run a node."""
+
 
 def is_run(package: str, *scripts: str) -> bool:
     """Return whether this process runs a module of `package`, or one of the installed scripts."""

@@ -2,9 +2,9 @@
 
 from importlib import metadata
 
-import stickslip_ros
+from stickslip_ros.interrupts import NODE_SCRIPTS
 
 
 def test_every_installed_script_is_known() -> None:
     scripts = metadata.distribution("stickslip_ros").entry_points.select(group="console_scripts")
-    assert set(stickslip_ros._SCRIPTS) == set(scripts.names)
+    assert {"stickslip", *NODE_SCRIPTS} == set(scripts.names)

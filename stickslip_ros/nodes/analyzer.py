@@ -5,8 +5,7 @@ import json
 import shutil
 import sys
 import time
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import islice
 from operator import attrgetter
@@ -40,6 +39,7 @@ from stickslip_ros.nodes.base.duplicate_publishers import duplicate_publishers
 from stickslip_ros.nodes.base.managed import ERROR, OK, Diagnosis, ManagedNode, diagnosis
 from stickslip_ros.nodes.base.polling import waiting_messages
 from stickslip_ros.nodes.base.process import run_node
+from stickslip_ros.nodes.base.qos import qos_profile
 from stickslip_ros.nodes.base.service_call import parameters_call
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.scenarios.parameter import known_parameters
@@ -50,9 +50,6 @@ from stickslip_ros.versions import versions
 
 ColumnsT = TypeVar("ColumnsT")
 
-_TAKE_PERIOD = 0.02
-"""Time, s, for which messages gather: one by one each would wake a thread and find cold caches."""
-_MEASURE_PERIOD = 0.1
 VERDICT_TIME = 0.05
 """Time, s, in which a plant that has dropped forces says so of the last ones, too."""
 
@@ -78,7 +75,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             check_new_bag(self._next_bag())
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
         self._channels: dict[str, int] = {}
-        self._tick = min(_TAKE_PERIOD, self.parameters.flush_period / 2.0)
+        # Messages gather that long: one by one each would wake a thread and find cold caches.
+        self._tick = min(0.02, self.parameters.flush_period / 2.0)
 
     def start(self) -> None:
         """Open a bag, start to measure, and then listen: who is heard is not lost."""
@@ -87,6 +85,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._logged = ""
         self._bag_failure = ""
         self._recorder: Recorder | None = None
+        self._flushed_at = time.monotonic()
         if self.parameters.bag:
             self._open_bag()
         # It exists while there is a recorder to wait for, and the plant sees by it that there is.
@@ -101,10 +100,13 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             CONTROL_FORCE: [],
             DROPPED_FORCE: [],
         }
-        self._listening = {topic: self.subscribe_polled(topic) for topic in RECORDED_TOPICS}
+        self._listening = {
+            topic: self.keep(self.create_polled_subscription(topic, qos_profile(topic)))
+            for topic in RECORDED_TOPICS
+        }
         self._periodic = [
             self.keep(self.every(self._tick, partial(self._if_active, self._take_in))),
-            self.keep(self.every(_MEASURE_PERIOD, partial(self._if_active, self._measure))),
+            self.keep(self.every(0.1, partial(self._if_active, self._measure))),
         ]
 
     def stop(self) -> None:
@@ -121,7 +123,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         for call in self._parameter_calls:
             call.close()
         self._keep("report", report)
-        self._close_bag()
+        self._record(Recorder.close)
+        self._recorder = None
         if self._bag_failure:  # then it is nowhere else
             self.get_logger().warning(f"report: {json.dumps(report)}")
         else:
@@ -157,15 +160,23 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def _take_in(self) -> None:
         """Record what has come since the last time, and keep it to be measured."""
-        taken = [self._take(topic) for topic in RECORDED_TOPICS]
-        if not self._meter.dropped_known:
-            self._look_for_dropped_forces(bool(taken[RECORDED_TOPICS.index(DROPPED_FORCE)]))
-        states = taken[RECORDED_TOPICS.index(JOINT_STATES)]
+        taken = {topic: self._take(topic) for topic in RECORDED_TOPICS}
+        # Only where a plant tells of them the bag has their topic: without it, they are not known.
+        if not self._meter.dropped_known and (
+            taken[DROPPED_FORCE] or self._listening[DROPPED_FORCE].get_publisher_count() > 0
+        ):
+            self._meter.dropped_known = True
+            self._record(lambda recorder: self._add_topic(recorder, DROPPED_FORCE))
+        states = taken[JOINT_STATES]
         if states and states[-1].stamp != self._newest_recorded:
             self._newest_recorded = states[-1].stamp
             self._recorded.publish(pack_header(self._newest_recorded))
-        self._write(heapq.merge(*taken, key=attrgetter("stamp")))
-        self._flush_if_due()
+        self._write(heapq.merge(*taken.values(), key=attrgetter("stamp")))
+        # Flush if that would be too late at the next tick.
+        now = time.monotonic()
+        if now + self._tick >= self._flushed_at + self.parameters.flush_period:
+            self._flushed_at = now
+            self._record(Recorder.flush)
 
     def _take(self, topic: Topic[Any]) -> list[_Message]:
         """Take the messages of a topic that wait; one without a proper stamp is dropped."""
@@ -185,17 +196,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._to_measure[topic] += [message.data for message in taken]
         return taken
 
-    def _look_for_dropped_forces(self, taken: bool) -> None:
-        """Let the bag have their topic where a plant tells of them: without it, it is not known."""
-        self._meter.dropped_known = (
-            taken or self._listening[DROPPED_FORCE].get_publisher_count() > 0
-        )
-        if self._meter.dropped_known and self._recorder is not None:
-            with self._recording():
-                self._add_topic(self._recorder, DROPPED_FORCE)
-
     def _measure(self) -> None:
-        """Decode and measure what was taken in since the last time."""
         states = self._columns(JOINT_STATES, joint_state_columns)
         windows = self._cycles // self.parameters.window
         for cycle in self._meter.motion.feed(states):
@@ -256,7 +257,6 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             raise
         self._bags_opened += 1
         self._recorder = recorder
-        self._flushed_at = time.monotonic()
         self._keep("versions", versions())
         self._keep("analyzer", self.parameters.flat())
 
@@ -267,41 +267,22 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def _keep(self, name: str, values: Mapping[str, Any]) -> None:
         """Put a table into the bag that says how the recording came about, or what it gave."""
-        if self._recorder is None:
-            return
         texts = {key: json.dumps(value) for key, value in values.items()}
-        with self._recording():
-            self._recorder.add_metadata(f"stickslip_ros/{name}", texts)
+        self._record(lambda recorder: recorder.add_metadata(f"stickslip_ros/{name}", texts))
 
     def _write(self, messages: Iterable[_Message]) -> None:
-        if self._recorder is None:
-            return
-        with self._recording():
+        def write(recorder: Recorder) -> None:
             for topic, stamp, data in messages:
-                self._recorder.write(self._channels[topic.name], data, stamp)
+                recorder.write(self._channels[topic.name], data, stamp)
 
-    def _flush_if_due(self) -> None:
-        """Flush if that would be too late at the next tick."""
+        self._record(write)
+
+    def _record(self, act: Callable[[Recorder], None]) -> None:
+        """Do it with the bag, if there is one; go on without one that cannot be written."""
         if self._recorder is None:
             return
-        now = time.monotonic()
-        if now + self._tick < self._flushed_at + self.parameters.flush_period:
-            return
-        self._flushed_at = now
-        with self._recording():
-            self._recorder.flush()
-
-    def _close_bag(self) -> None:
-        if self._recorder is not None:
-            with self._recording():
-                self._recorder.close()
-            self._recorder = None
-
-    @contextmanager
-    def _recording(self) -> Generator[None]:
-        """Go on measuring without a bag where that cannot be written."""
         try:
-            yield
+            act(self._recorder)
         except BagError as error:
             self._recorder = None
             self._bag_failure = str(error)

@@ -6,7 +6,6 @@ import sys
 import time
 from collections import deque
 from collections.abc import Callable
-from math import inf
 from threading import TIMEOUT_MAX, Event, Lock, Thread
 from typing import Any
 
@@ -19,14 +18,8 @@ from stickslip_ros.scenarios.parameters import PlantParameters
 
 Publish = Callable[[Sample], None]
 
-_BATCH = 100
-"""Samples that lockstep publishes in one go where nothing holds it up."""
-_SWITCH_INTERVAL = 1e-4
-"""Time, s, after which a thread in Python code lets another one have its turn."""
-_PR_SET_TIMERSLACK = 29
 _LONG_WAIT = 0.05
 """Wait, s, from which on it must be possible to be interrupted."""
-
 
 NO_FORCE = "no control force comes: going on without"
 
@@ -112,13 +105,13 @@ class Pacer:
         self._loop = loop
         self._publish = publish
         self._end = end
-        self._last: float = inf
+        self._last = 0
         self._running = False
         self._started = self._stopped = time.monotonic()
 
-    def start(self, last: int | None) -> None:
-        """Publish sample 0 and go on, up to sample `last` if there is one."""
-        self._last = inf if last is None else last
+    def start(self, last: int) -> None:
+        """Publish sample 0 and go on, up to sample `last`."""
+        self._last = last
         self._running = True
         self._started = time.monotonic()
         self._publish(self._loop.sample)
@@ -171,7 +164,7 @@ class LockstepPacer(Pacer):
         self._seen_at = 0.0
         self._watchdog = node.every(min(0.1, self._reply_timeout / 10.0), self._watch)
 
-    def start(self, last: int | None) -> None:
+    def start(self, last: int) -> None:
         """Publish sample 0 and go on, once the node is active, when it is answered."""
         super().start(last)
         self._flow.sent(self._loop.sample.stamp)
@@ -181,6 +174,10 @@ class LockstepPacer(Pacer):
         """Publish no further sample."""
         super().stop()
         self._node.destroy_timer(self._watchdog)
+
+    def _finish(self) -> None:
+        self.stop()
+        super()._finish()
 
     def force_came(self) -> None:
         """Go on if the force was the one waited for."""
@@ -195,12 +192,11 @@ class LockstepPacer(Pacer):
 
     def _proceed(self) -> None:
         loop = self._loop
-        for _ in range(_BATCH):
+        for _ in range(100):  # further ones behind the callbacks that have come meanwhile
             if not self._running:
                 return
             held_up = self._awaits_force or self._flow.full
             if loop.unbounded or (loop.sample_number >= self._last and not held_up):
-                self.stop()
                 self._finish()
                 return
             if held_up:
@@ -209,7 +205,6 @@ class LockstepPacer(Pacer):
                 sample = loop.advance()
             except StickslipError as error:
                 self.failure = str(error)
-                self.stop()
                 self._finish()
                 return
             self._publish(sample)
@@ -269,7 +264,7 @@ class RealtimePacer(Pacer):
         self._sleeper = Sleeper()
         self._thread = Thread(target=self._run, name="pacer", daemon=True)
 
-    def start(self, last: int | None) -> None:
+    def start(self, last: int) -> None:
         """Publish sample 0 now; every further one is due an interval after the one before."""
         super().start(last)
         self._thread.start()
@@ -315,6 +310,6 @@ class RealtimePacer(Pacer):
 def _be_prompt() -> None:
     """Let this thread go on soon after it could; the defaults favour throughput."""
     if sys.platform == "linux":  # otherwise it sleeps up to 50 us longer than asked
-        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1)
-    sys.setswitchinterval(_SWITCH_INTERVAL)
+        ctypes.CDLL(None).prctl(29, 1)  # PR_SET_TIMERSLACK
+    sys.setswitchinterval(1e-4)
     gc.freeze()  # what the imports have made takes tens of ms to go through

@@ -57,7 +57,6 @@ class PlantNode(ManagedNode[PlantParameters]):
         self.elapsed = 0.0
         self._disturbance = 0.0
         self._lock = threading.Lock()
-        self._punctuality = Punctuality()
         self._state = self.advertise(JOINT_STATES)
         self._applied = self.advertise(APPLIED_DISTURBANCE)
         self._dropped_force = self.advertise(DROPPED_FORCE)
@@ -71,7 +70,7 @@ class PlantNode(ManagedNode[PlantParameters]):
 
     def start(self) -> None:
         """Begin a segment: sample 0 now, further ones as the pacer lets them come."""
-        self._punctuality.clear()
+        self._punctuality = Punctuality()
         if self._disturbance:  # whoever records the new segment has not heard of it
             self._disturbance = nan
         parameters = self.parameters
@@ -99,11 +98,12 @@ class PlantNode(ManagedNode[PlantParameters]):
             )
         else:
             self._pacer = LockstepPacer(self._loop, self._publish, self._end, self)
-        last = parameters.last_sample
-        if last is not None:
-            last = max(last - round(self.elapsed * parameters.rate), 0)
+        last = stampable
+        if parameters.last_sample is not None:
+            due = parameters.last_sample - round(self.elapsed * parameters.rate)
+            last = min(max(due, 0), stampable)
         self._has_started = True
-        self._pacer.start(stampable if last is None else min(last, stampable))
+        self._pacer.start(last)
 
     def stop(self) -> None:
         """Pause the motion, once the states sent have arrived."""
@@ -113,8 +113,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         self.elapsed = 0.0 if self._pacer.finished else self.elapsed + done
         self._next_start = self._loop.stamp(self._loop.sample_number + 1)
         self._answerable = self._loop.sample.stamp
-        for publisher in (self._state, self._applied, self._dropped_force):
-            self.wait_for_delivery(publisher)
+        super().stop()
 
     def apply_parameters(self) -> None:
         """Go on with the new drive and disturbance from the next sample on."""

@@ -2,27 +2,15 @@
 
 from collections import deque
 
-_MOST_LATE = 0.01
-"""Share of forces or samples from which on lateness is a complaint."""
-
 _WINDOW = 10
 """Looks over which shares are taken."""
 
-_LEAST_SAMPLES = 100
-"""Fewer say nothing of a share."""
-
 
 class Punctuality:
-    """Looks at the counts of a plant every now and then, and says what is wrong with them."""
+    """Looks at the counts of a segment every now and then, and says what is wrong with them."""
 
     def __init__(self) -> None:
-        self._counts: deque[tuple[int, int, int]] = deque(maxlen=_WINDOW + 1)
-        self.clear()
-
-    def clear(self) -> None:
-        """Begin a segment."""
-        self._counts.clear()
-        self._counts.append((0, 0, 0))
+        self._counts = deque([(0, 0, 0)], maxlen=_WINDOW + 1)
 
     def look(
         self, samples: int, late_forces: int, missed_deadlines: int, *, controlled: bool
@@ -39,7 +27,7 @@ class Punctuality:
         before = self._counts[0]
         self._counts.append(counts)
         number, late, missed = (now - then for now, then in zip(counts, before, strict=True))
-        if number < _LEAST_SAMPLES:
+        if number < 100:  # too few for a share of them to say anything
             return ""
         found = [
             f"{100.0 * count / number:.2g} % of the latest {what}"
@@ -47,7 +35,7 @@ class Punctuality:
                 (late, "forces came late (the last one was held)"),
                 (missed, "samples missed their deadlines"),
             )
-            if count > _MOST_LATE * number
+            if count > 0.01 * number
         ]
         if not found:
             return ""

@@ -28,7 +28,6 @@ from stickslip_ros.stamps import NANOSECONDS
 
 _FLOW_WINDOW = PlantParameters().flow_window
 """Joint states that may be on their way to a recorder."""
-_LOOK_PERIOD = 0.05
 _SETTLED = 0.5
 """Time, s, without a new reader after which those that are there count as all."""
 _SILENCE = 3.0
@@ -49,8 +48,8 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         for sentence in self._selection.left_out:
             self.get_logger().warning(sentence)
         self._writers = {
-            name: self.keep(self.create_publisher(topic.message_class, name, topic.qos))
-            for name, topic in self._selection.topics.items()
+            name: self.keep(self.create_publisher(kind, name, qos))
+            for name, (kind, qos) in self._selection.topics.items()
         }
         self._clock_writer = self.advertise(CLOCK) if self.parameters.clock else None
         joint_state = message_class(JOINT_STATES.type_name)
@@ -63,7 +62,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
             self.keep(self.create_service(Trigger, f"~/{name}", partial(self._steer, act)))
         self._readers: list[int] = []
         self._connected_at = self._readers_changed_at = time.monotonic()
-        self.keep(self.every(_LOOK_PERIOD, self._look_for_readers))
+        self.keep(self.every(0.05, self._look_for_readers))
 
     def start(self) -> None:
         """Publish the first message now, further ones when they are due."""
@@ -76,7 +75,9 @@ class ReplayNode(ManagedNode[ReplayParameters]):
             rate=self.parameters.rate,
             loop=self.parameters.loop,
             windows={
-                topic: FlowWindow(_FLOW_WINDOW, partial(self._has_publisher, recorded))
+                topic: FlowWindow(
+                    _FLOW_WINDOW, lambda recorded=recorded: self.count_publishers(recorded) > 0
+                )
                 for topic, recorded in self._recorders.items()
             },
         )
@@ -86,8 +87,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         """Fall silent, once the messages sent have arrived."""
         if self._player is not None:
             self._player.stop()
-        for writer in self._writers.values():
-            self.wait_for_delivery(writer)
+        super().stop()
 
     def diagnose(self) -> Diagnosis:
         """Return how far the replay has come and how late it was, or what it waits for."""
@@ -163,9 +163,6 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         name = f"{writer.topic_name.rpartition('/')[0]}/{RECORDED.name}"
         self.subscribe(replace(RECORDED, name=name), partial(self._on_recorded, topic))
         return name
-
-    def _has_publisher(self, topic: str) -> bool:
-        return self.count_publishers(topic) > 0
 
     def _on_recorded(self, topic: str, stamp: int) -> None:
         if self._player is not None:

@@ -10,8 +10,6 @@ from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.process import initialise, run_until_stopped
 from stickslip_ros.nodes.replay import ReplayNode
 
-_PROGRESS_PERIOD = 0.1
-
 
 def replay_bag(
     parameters: Mapping[str, Any],
@@ -27,7 +25,8 @@ def replay_bag(
     initialise()
     try:
         node = _OneReplay(offering, progress, overrides=parameters)
-        return node.run()
+        run_until_stopped(node)
+        return not node.ended
     finally:
         rclpy.try_shutdown()
 
@@ -44,15 +43,9 @@ class _OneReplay(ReplayNode):
         super().__init__(**options)
         self._offering = offering
         self._progress = progress
-        self._ended = False
-        self.every(_PROGRESS_PERIOD, self._tell_progress)
-
-    def run(self) -> bool:
-        """Return whether a signal ended it."""
-        run_until_stopped(self)
-        if self._player is not None and self._player.failure is not None:
-            raise self._player.failure
-        return not self._ended
+        self.ended = False
+        """Whether the bag has ended it."""
+        self.every(0.1, self._tell_progress)
 
     def connect(self) -> None:
         super().connect()
@@ -64,8 +57,8 @@ class _OneReplay(ReplayNode):
 
     def _end(self) -> None:
         super()._end()
-        self._ended = True
-        self.end_process(None)
+        self.ended = True
+        self.end_process(self._player.failure if self._player is not None else None)
 
     def _tell_progress(self) -> None:
         if self._position > 0.0:

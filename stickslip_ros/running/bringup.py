@@ -31,9 +31,6 @@ from stickslip_ros.scenarios.files import Scenario, parameter_file
 from stickslip_ros.scenarios.sections import section_matches
 
 _READY_TIMEOUT = 30.0
-_ANSWER_TIMEOUT = 15.0
-_LAST_FIGURES_TIMEOUT = 2.0
-_CATCH_UP_TIMEOUT = 10.0
 _EXIT_TIMEOUT = 2.0 * GUARD_TIMEOUT + 2.0
 _DISCOVERY_TIME = 3.0
 """Time, s, for which something must stand before it is no longer a matter of discovery."""
@@ -172,7 +169,6 @@ class _Supervisor:
         signal.raise_signal(signal.SIGSTOP)
 
     def _start_user_controller(self, command: Sequence[str], file: Path) -> None:
-        """Start the user's controller with the parameters of the scenario."""
         executable, *further = command
         in_namespace = ["--ros-args", "-r", f"__ns:={self._namespace}"]
         # Its own parameters may stand in the scenario; overrides are in the other file. What was
@@ -290,7 +286,7 @@ class _Supervisor:
             if not finished and not self._is_dead(node):
                 self._deactivate(node)
             if node == "plant" and not self._is_dead(node):
-                self._spinner.spin_until(lambda: self._monitor.plant_stopped, _LAST_FIGURES_TIMEOUT)
+                self._spinner.spin_until(lambda: self._monitor.plant_stopped, timeout=2.0)
         for process in self._processes.values():
             process.terminate()
         deadline = time.monotonic() + _EXIT_TIMEOUT
@@ -308,7 +304,7 @@ class _Supervisor:
             before = self._monitor.unrecorded
             goes_on = self._spinner.spin_until(
                 lambda b=before: self._monitor.unrecorded < b or self._is_dead("analyzer"),
-                _CATCH_UP_TIMEOUT,
+                timeout=10.0,
             )
             if not goes_on:
                 if not self._hurry.done():
@@ -331,7 +327,7 @@ class _Supervisor:
 
     def _client(self, node: str) -> LifecycleClient:
         if node not in self._clients:
-            self._clients[node] = LifecycleClient(self._spinner, self._node, node, _ANSWER_TIMEOUT)
+            self._clients[node] = LifecycleClient(self._spinner, self._node, node, 15.0)
         return self._clients[node]
 
     def _is_dead(self, node: str) -> bool:

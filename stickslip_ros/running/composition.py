@@ -66,11 +66,8 @@ class Composition:
 
     def activate(self, node: ManagedNode[Any], timeout: float = 0.0) -> None:
         """Activate a node, within so much wall time (s) in which those it waits for may come."""
-
-        def activated() -> bool:
-            return node.trigger_activate() is TransitionCallbackReturn.SUCCESS
-
-        if not self.spinner.spin_until(activated, timeout):
+        done = TransitionCallbackReturn.SUCCESS
+        if not self.spinner.spin_until(lambda: node.trigger_activate() is done, timeout):
             reason = node.missing_peers() or "its log says why"
             raise RunError(f"{node.get_name()} could not be activated: {reason}")
 

@@ -1,20 +1,17 @@
 """Controllers in the ROS graph: which nodes close the loop, and which ones nearly do."""
 
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from itertools import filterfalse
 
 from rclpy.node import Node, NodeNameNonExistentError
-from rclpy.qos import QoSProfile
-from rclpy.topic_endpoint_info import TopicEndpointInfo
+from rclpy.topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum
 
-from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, Topic
-from stickslip_ros.nodes.base.matching import mismatch
-from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
+from stickslip_ros.nodes.base.qos import mismatch, qos_profile
 
 DASHBOARD = "dashboard"
 """Name of a node that reads joint_states and yet is meant to be no controller."""
-
-_CHANGE_STATE = "lifecycle_msgs/srv/ChangeState"
 
 
 class ControllerSearch:
@@ -43,13 +40,16 @@ class ControllerSearch:
         """
         readers = self._observer.get_subscriptions_info_by_topic(JOINT_STATES.name)
         writers = self._observer.get_publishers_info_by_topic(CONTROL_FORCE.name)
-        return sorted(_named(readers, _misfit_as_reader) & _named(writers, _misfit_as_writer))
+        return sorted(_named(filterfalse(_misfit, readers)) & _named(filterfalse(_misfit, writers)))
 
     def managed(self) -> list[str]:
         """Return the full names of all managed (lifecycle) nodes but ours."""
-        nodes = self._observer.get_node_names_and_namespaces()
-        managed = [node for node in nodes if _is_managed(self._observer, *node)]
-        names = [f"{namespace.rstrip('/')}/{name}" for name, namespace in managed]
+        names: list[str] = []
+        for name, namespace in self._observer.get_node_names_and_namespaces():
+            with suppress(NodeNameNonExistentError):  # it has gone meanwhile
+                services = self._observer.get_service_names_and_types_by_node(name, namespace)
+                if any("lifecycle_msgs/srv/ChangeState" in types for _, types in services):
+                    names.append(f"{namespace.rstrip('/')}/{name}")
         return [name for name in names if name not in self._ours]
 
     def near_misses(self) -> Iterator[str]:
@@ -63,10 +63,10 @@ class ControllerSearch:
         for node in sorted(writes - reads - self._ours):
             yield f"{node} publishes {control_force} but does not read {joint_states}"
         for info in readers:
-            if misfit := _misfit_as_reader(info):
+            if misfit := _misfit(info):
                 yield f"{_full_name(info)} cannot read {joint_states}: {misfit}"
         for info in writers:
-            if misfit := _misfit_as_writer(info):
+            if misfit := _misfit(info):
                 yield f"nobody can read {control_force} of {_full_name(info)}: {misfit}"
         yield from self._near_misses_elsewhere()
 
@@ -87,42 +87,20 @@ class ControllerSearch:
                     yield f"{node} publishes {topic}, the plant reads {self._control_force}"
 
 
-def _is_managed(observer: Node, name: str, namespace: str) -> bool:
-    try:
-        services = observer.get_service_names_and_types_by_node(name, namespace)
-    except NodeNameNonExistentError:  # it has gone meanwhile
-        return False
-    return any(_CHANGE_STATE in types for _, types in services)
-
-
-def _named(
-    endpoints: Iterable[TopicEndpointInfo],
-    misfit: Callable[[TopicEndpointInfo], str] = lambda _: "",
-) -> set[str]:
-    """Return the names of the nodes of endpoints that fit, as far as they are known already."""
-    return {
-        _full_name(info)
-        for info in endpoints
-        if not info.node_name.startswith("_") and not misfit(info)
-    }
+def _named(endpoints: Iterable[TopicEndpointInfo]) -> set[str]:
+    """Return the names of the nodes of endpoints, as far as they are known already."""
+    return {_full_name(info) for info in endpoints if not info.node_name.startswith("_")}
 
 
 def _full_name(info: TopicEndpointInfo) -> str:
     return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
 
 
-def _misfit_as_reader(info: TopicEndpointInfo) -> str:
-    return _misfit(info, JOINT_STATES, qos_profile(JOINT_STATES), info.qos_profile)
-
-
-def _misfit_as_writer(info: TopicEndpointInfo) -> str:
-    return _misfit(info, CONTROL_FORCE, info.qos_profile, qos_profile(CONTROL_FORCE))
-
-
-def _misfit(
-    info: TopicEndpointInfo, topic: Topic[Any], writer: QoSProfile, reader: QoSProfile
-) -> str:
+def _misfit(info: TopicEndpointInfo) -> str:
     """Return why an endpoint and the plant's do not match, or nothing."""
+    reads = info.endpoint_type == TopicEndpointTypeEnum.SUBSCRIPTION
+    topic = JOINT_STATES if reads else CONTROL_FORCE
     if info.topic_type != topic.type_name:
         return f"its type is {info.topic_type}, not {topic.type_name}"
-    return mismatch(writer, reader)
+    ours, theirs = qos_profile(topic), info.qos_profile
+    return mismatch(ours, theirs) if reads else mismatch(theirs, ours)

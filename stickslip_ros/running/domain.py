@@ -13,7 +13,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from stickslip_ros.errors import RunError
-from stickslip_ros.nodes.base.domain_ports import FIRST_PROCESS, is_free, port
+from stickslip_ros.nodes.base.machine import FIRST_PROCESS, is_free, port
 from stickslip_ros.nodes.base.network import this_machine_only
 from stickslip_ros.nodes.base.process import initialise
 
@@ -25,11 +25,6 @@ _NO_PEERS = {"ROS_STATIC_PEERS": ""}
 
 _NO_LOGS_ELSEWHERE = ("--disable-external-lib-logs", "--disable-rosout-logs")
 """No files in the home directory; and no topic, of which a process has one for each node name."""
-
-_FREE_PORT = 5
-"""A port of the domain that DDS leaves alone, as are those of TCP."""
-_DISCOVERY_PORTS = (0, 10, 12, 14, 16)
-"""What DDS listens on in every process of a domain, and in the first few."""
 
 _initialising = Lock()
 
@@ -43,11 +38,12 @@ def own_domain() -> Generator[int]:
     """
     for domain in DOMAINS:
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as held:
-            try:
-                held.bind(("127.0.0.1", port(domain, _FREE_PORT)))
+            try:  # a port that DDS leaves alone, as it does those of TCP
+                held.bind(("127.0.0.1", port(domain, 5)))
             except OSError:
                 continue
-            if all(is_free(port(domain, number)) for number in _DISCOVERY_PORTS):
+            # What DDS listens on in every process of a domain, and in the first few.
+            if all(is_free(port(domain, number)) for number in (0, 10, 12, 14, 16)):
                 yield domain
                 return
     raise RunError(f"every ROS domain from {DOMAINS[0]} to {DOMAINS[-1]} is in use on this machine")

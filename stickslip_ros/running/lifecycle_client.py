@@ -22,9 +22,6 @@ NEXT_TRANSITION = {
 
 _PARTICIPLE = {"unconfigured": "configured", "inactive": "activated"}
 
-_AUTOSTART_TIMEOUT = 1.0
-"""Wall time, s, in which a managed node may go on to its next state by itself."""
-
 
 class LifecycleClient:
     """Asks a managed node for its state, and for transitions."""
@@ -67,8 +64,9 @@ class LifecycleClient:
                 raise RunError(f"the controller {self.name} could not be {done}; its log says why")
             if monotonic() >= deadline:
                 raise RunError(f"the controller {self.name} was not active within {timeout:g} s")
+            # It may go on to its next state by itself.
             if state in NEXT_TRANSITION and not self._spinner.spin_until(
-                lambda before=state: self.state() != before, _AUTOSTART_TIMEOUT
+                lambda before=state: self.state() != before, timeout=1.0
             ):
                 asked.append(state)
                 self.change_state(NEXT_TRANSITION[state])

@@ -10,9 +10,6 @@ from hashlib import sha256
 
 from stickslip_ros.errors import InvalidInputError
 
-_CREDENTIALS = struct.Struct("3i")
-_TIMEOUT = 1.0
-
 
 class NamespaceInUseError(InvalidInputError):
     """Another run is in the namespace."""
@@ -46,10 +43,12 @@ def lock_namespace(namespace: str, domain: int) -> Generator[None]:
 def _holder(address: str) -> str:
     """Return which process holds an address, in words, as far as that can be found out."""
     with socket.socket(socket.AF_UNIX) as asking, suppress(OSError):
-        asking.settimeout(_TIMEOUT)
+        asking.settimeout(1.0)
         asking.connect(address)
-        credentials = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
-        process, _, _ = _CREDENTIALS.unpack(credentials)
+        layout = "3i"
+        length = struct.calcsize(layout)
+        credentials = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, length)
+        process, _, _ = struct.unpack(layout, credentials)
         if process:  # otherwise it is none of this container
             return f" (process {process})"
     return ""

@@ -3,6 +3,7 @@
 import shlex
 import shutil
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from threading import Event, Thread
 
 from rclpy.executors import SingleThreadedExecutor
@@ -13,7 +14,6 @@ from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.base.child_process import how_it_ended, start_child
 
 _END_TIMEOUT = 5.0
-_CALLBACK_TIMEOUT = 1.0
 
 
 class ControllerThread:
@@ -37,7 +37,17 @@ class ControllerThread:
     def start(self) -> None:
         """Bring the node up and run it; raises RunError if it refuses."""
         if isinstance(self.node, LifecycleNode):
-            _bring_up(self.node)
+            for transition, name in (
+                (self.node.trigger_configure, "configured"),
+                (self.node.trigger_activate, "activated"),
+            ):
+                with suppress(RuntimeError):  # rcl: not possible in the state it has come to itself
+                    result = transition()
+                    if result is not TransitionCallbackReturn.SUCCESS:
+                        raise RunError(
+                            f"the controller {self.node.get_name()} could not be {name}: "
+                            f"{result.name.lower()}"
+                        )
         self._thread.start()
 
     def check(self) -> None:
@@ -54,7 +64,7 @@ class ControllerThread:
         self._idle.clear()
         if self._failure is None:
             self._executor.create_task(self._idle.set)
-            self._idle.wait(_CALLBACK_TIMEOUT)
+            self._idle.wait(timeout=1.0)
 
     def close(self) -> None:
         """End the thread and destroy the node; raises RunError if it does not come back."""
@@ -106,18 +116,3 @@ class ControllerProcess:
         """End the process, and what it has started."""
         self._process.terminate()
         self._process.wait()
-
-
-def _bring_up(node: LifecycleNode) -> None:
-    for transition, name in (
-        (node.trigger_configure, "configured"),
-        (node.trigger_activate, "activated"),
-    ):
-        try:
-            result = transition()
-        except RuntimeError:  # rcl: not possible in the state that the node has brought itself to
-            continue
-        if result is not TransitionCallbackReturn.SUCCESS:
-            raise RunError(
-                f"the controller {node.get_name()} could not be {name}: {result.name.lower()}"
-            )

@@ -7,7 +7,6 @@ from contextlib import ExitStack
 from inspect import Parameter, signature
 from os import PathLike, fspath
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal, Self
 
 import rclpy
@@ -45,7 +44,6 @@ _EXPECTS_CONTROL, _BAG = "plant.expects_control", "analyzer.bag"
 
 _NODE_TIMEOUT, _PROCESS_TIMEOUT = 5.0, 30.0
 """Wall time, s, in which a controller has to be found, in this process or in one of its own."""
-_DEACTIVATION_TIMEOUT = 30.0
 _ANSWER_TIMEOUT = 2.0
 
 
@@ -129,8 +127,7 @@ class ClosedLoop:
             )
             self.context = opened.enter_context(ros_context(self._domain, self.ros_arguments))
             opened.callback(self._forget)  # before ROS ends: then nothing of it is left
-            bag = self._bag or Path(self._directory, "bag")
-            parameters = node_parameters(self.scenario, bag)
+            parameters = node_parameters(self.scenario, self._bag_of_run)
             if self._to_control != "washout":
                 parameters.pop("washout_controller", None)
             self._nodes = Composition(self.context, parameters)
@@ -139,12 +136,7 @@ class ClosedLoop:
             self._opened = opened.pop_all()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
         running = self._running
         with self._opened:
             if isinstance(running, ControllerThread) and running.unreported and error is None:
@@ -219,7 +211,7 @@ class ClosedLoop:
     @property
     def _bag_of_run(self) -> Path:
         bag = self._bag or Path(self._directory, "bag")
-        return bag if self._runs == 1 else bag.with_name(f"{bag.name}_{self._runs}")
+        return bag if self._runs <= 1 else bag.with_name(f"{bag.name}_{self._runs}")
 
     def _load(self, overrides: Mapping[str, str]) -> Scenario:
         if _BAG in overrides:
@@ -348,7 +340,7 @@ class ClosedLoop:
         if diagnostics["plant"].figures["dropped_messages"]:
             nodes.spinner.spin_for(VERDICT_TIME)
         nodes.analyzer.call_soon(nodes.analyzer.trigger_deactivate)
-        nodes.spinner.spin_until(lambda: not nodes.analyzer.active, _DEACTIVATION_TIMEOUT)
+        nodes.spinner.spin_until(lambda: not nodes.analyzer.active, timeout=30.0)
         return diagnostics
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.app.main import main
-from stickslip_ros.nodes.base.domain_ports import port
+from stickslip_ros.nodes.base.machine import port
 from tests.app.conftest import Run
 
 

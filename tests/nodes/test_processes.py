@@ -124,7 +124,7 @@ def test_bad_parameters_end_the_process_with_one_line(
     [
         (["-m", "stickslip_ros.nodes.plant"], "rclpy"),
         (["-m", "stickslip_ros.nodes.replay"], "rclpy"),
-        (["-c", "from stickslip_ros.nodes.executables import plant; plant()"], "rclpy"),
+        (["plant_node"], "rclpy"),
         (["-m", "stickslip_ros.app.main", "simulate", "paper"], "difflib"),
     ],
 )
@@ -133,10 +133,13 @@ def test_what_still_imports_ends_quietly(
 ) -> None:
     slow = "import signal; print('importing', flush=True); signal.pause()"
     (tmp_path / f"{imported}.py").write_text(slow, encoding="utf-8")
+    script = "from stickslip_ros.nodes.plant import main; main()"
+    (tmp_path / "plant_node").write_text(script, encoding="utf-8")
     path = [str(tmp_path), *filter(None, [process_environment.get("PYTHONPATH")])]
     process_environment["PYTHONPATH"] = os.pathsep.join(path)
     with subprocess.Popen(
         [sys.executable, *command],
+        cwd=tmp_path,
         env=process_environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

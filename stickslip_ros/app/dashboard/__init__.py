@@ -7,12 +7,13 @@ from contextlib import suppress
 from stickslip_ros.app.arguments import add_namespace, add_network, namespace_of
 from stickslip_ros.app.optional import check_dashboard, loading_ros
 from stickslip_ros.nodes.base.child_process import die_with_parent
-from stickslip_ros.nodes.base.domain_ports import LARGEST_PORT
 
 HELP = "show a running loop on a web page, live, and act on it"
 
 DEFAULT_PORT = 8642
 """The first that is tried where none is asked for."""
+
+LARGEST_PORT = 65_535
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -15,12 +15,11 @@ from nicegui import core, ui
 from rclpy.experimental import EventsExecutor
 from rclpy.task import Future
 
-from stickslip_ros.app.dashboard import DEFAULT_PORT
+from stickslip_ros.app.dashboard import DEFAULT_PORT, LARGEST_PORT
 from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.app.dashboard.page import add_page
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.nodes.base.domain_ports import LARGEST_PORT
 from stickslip_ros.nodes.base.process import initialise, spin
 
 _HOST = "127.0.0.1"

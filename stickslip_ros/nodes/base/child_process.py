@@ -17,7 +17,6 @@ GUARD_TIMEOUT = 3.0
 """Time, s, that a guarded command has to end after SIGINT, and again after SIGTERM."""
 
 _PARENT_VARIABLE = "STICKSLIP_ROS_PARENT"
-_PR_SET_PDEATHSIG = 1
 
 
 def start_child(command: Sequence[str], *, guarded: bool = False) -> subprocess.Popen[bytes]:
@@ -77,7 +76,11 @@ def main() -> None:
     with suppress(ProcessLookupError):  # what it has left behind
         os.killpg(child.pid, signal.SIGKILL)
     if child.returncode < 0:
-        _die_of(-child.returncode)
+        number = -child.returncode
+        with suppress(OSError):  # SIGKILL, which nobody handles
+            signal.signal(number, signal.SIG_DFL)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {number})
+        os.kill(os.getpid(), number)
     sys.exit(child.returncode)
 
 
@@ -92,15 +95,8 @@ def _end(child: subprocess.Popen[bytes]) -> None:
     child.wait()
 
 
-def _die_of(number: int) -> None:
-    with suppress(OSError):  # SIGKILL, which nobody handles
-        signal.signal(number, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {number})
-    os.kill(os.getpid(), number)
-
-
 def _signal_at_death_of_parent(number: signal.Signals) -> None:
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, number)
+    ctypes.CDLL(None).prctl(1, number)  # PR_SET_PDEATHSIG
 
 
 if __name__ == "__main__":

@@ -6,20 +6,13 @@ from typing import Any
 
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
-_COMPLAINT_TIME = 15.0
-"""Time, s, for which a dropped message is complained of."""
-
 
 class DroppedMessages:
-    """Messages that a node dropped: how many of them, and why the last one."""
+    """Messages that a node dropped: how many, and why the last one; for 15 s a complaint."""
 
     def __init__(self, logger: RcutilsLogger) -> None:
         """Count from now on; what is dropped after a quiet time is logged."""
         self._logger = logger
-        self.clear()
-
-    def clear(self) -> None:
-        """Count from 0."""
         self._number = 0
         self._last = ""
         self._complaint_ends = -inf
@@ -31,7 +24,7 @@ class DroppedMessages:
             self._logger.warning(reason)
         self._number += number
         self._last = reason
-        self._complaint_ends = now + _COMPLAINT_TIME
+        self._complaint_ends = now + 15.0
 
     @property
     def complaint(self) -> str:

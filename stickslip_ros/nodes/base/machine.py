@@ -1,5 +1,6 @@
 """What ROS needs of this machine: a domain with free ports, the clock, the loopback, memory."""
 
+import errno
 import os
 import re
 import socket
@@ -7,27 +8,18 @@ import time
 from datetime import UTC, datetime
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.nodes.base.domain_ports import (
-    DISCOVERY,
-    FIRST_PROCESS,
-    LARGEST_PORT,
-    MOST_PROCESSES,
-    is_free,
-    port,
-)
 from stickslip_ros.nodes.base.network import TRANSPORTS, is_fast_dds, is_kept_on_loopback
 from stickslip_ros.nodes.base.shared_memory import SHARED_MEMORY, free_shared_memory
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 
+FIRST_PROCESS = 10
+"""Number of the port in its domain that is the first process's own; each has two."""
+
 _DOMAIN = "ROS_DOMAIN_ID"
 _LARGEST_DOMAIN = 232
 _DECIMAL = re.compile(r"0|[1-9][0-9]{0,20}")
-_DISCOVERY_ADDRESSES = ("127.0.0.1", "239.255.0.1")
-"""On which Fast DDS listens where it is kept on this machine."""
-_WITHOUT_SHARED_MEMORY = ("", "NONE", "UDPv4", "UDPv6")
 _LEAST_SHARED_MEMORY = 1 << 20
 """Bytes that a process of Fast DDS takes at most, rounded up."""
-_ECHO_TIMEOUT = 1.0
 
 
 def check_machine(domain: int) -> None:
@@ -52,15 +44,33 @@ def check_machine(domain: int) -> None:
         _check_shared_memory()
 
 
+def port(domain: int, number: int) -> int:
+    """Return the UDP port of a domain with this number, from 0 to 249 (RTPS 2.5, 9.6.2.4)."""
+    return 7400 + 250 * domain + number
+
+
+def is_free(taken: int, address: str = "", *, shared: bool = False) -> bool:
+    """Return whether a UDP port can be listened on, or be `shared` with those who share it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, shared)
+        try:
+            probe.bind((address, taken))
+        except OSError as error:
+            return error.errno != errno.EADDRINUSE
+    return True
+
+
 def _check_ports(domain: int) -> None:
-    shared = port(domain, DISCOVERY)
-    for address in _DISCOVERY_ADDRESSES if is_kept_on_loopback() else ("",):
+    shared = port(domain, 0)
+    # On these two Fast DDS listens where it is kept on this machine.
+    for address in ("127.0.0.1", "239.255.0.1") if is_kept_on_loopback() else ("",):
         if not is_free(shared, address, shared=True):
             raise InvalidInputError(
                 f"UDP port {shared}, by which the nodes of {_DOMAIN} = {domain} find each other, "
                 "is taken by another program: end that, or choose another domain"
             )
-    own = range(port(domain, FIRST_PROCESS), LARGEST_PORT, 2)[:MOST_PROCESSES]
+    # Fast DDS looks for ports for no more than 100 processes.
+    own = range(port(domain, FIRST_PROCESS), 65_535, 2)[:100]
     if not any(is_free(first) and is_free(first + 1) for first in own):
         raise InvalidInputError(
             f"{_DOMAIN} = {domain} is refused: of its UDP ports, {own[0]} to {own[-1] + 1}, a node "
@@ -70,7 +80,7 @@ def _check_ports(domain: int) -> None:
 
 def _check_shared_memory() -> None:
     transports = os.environ.get(TRANSPORTS, "")
-    if transports in _WITHOUT_SHARED_MEMORY or not SHARED_MEMORY.is_dir():
+    if transports in ("", "NONE", "UDPv4", "UDPv6") or not SHARED_MEMORY.is_dir():
         return
     free = free_shared_memory()
     if free < _LEAST_SHARED_MEMORY:
@@ -100,7 +110,7 @@ def _reaches_itself() -> bool:
     kind = socket.AF_INET, socket.SOCK_DGRAM
     with socket.socket(*kind) as reader, socket.socket(*kind) as writer:
         reader.bind(("127.0.0.1", 0))
-        reader.settimeout(_ECHO_TIMEOUT)
+        reader.settimeout(1.0)
         try:
             writer.sendto(b"", reader.getsockname())
             reader.recv(1)

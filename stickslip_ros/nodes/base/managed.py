@@ -11,7 +11,6 @@ from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
-from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from rclpy.timer import Timer
@@ -19,10 +18,14 @@ from rclpy.timer import Timer
 from stickslip_ros.errors import BagError, InvalidInputError, StickslipError
 from stickslip_ros.messages.topics import DIAGNOSTICS, Topic
 from stickslip_ros.nodes.base.dropped_messages import DroppedMessages
-from stickslip_ros.nodes.base.matching import matching_readers, matching_writers
 from stickslip_ros.nodes.base.parameters import ParameterNode, ParametersT
 from stickslip_ros.nodes.base.polling import PollingNode
-from stickslip_ros.nodes.base.qos import message_class, qos_profile
+from stickslip_ros.nodes.base.qos import (
+    matching_readers,
+    matching_writers,
+    message_class,
+    qos_profile,
+)
 
 MessageT = TypeVar("MessageT")
 ThingT = TypeVar("ThingT")
@@ -39,8 +42,6 @@ STATE = "state"
 """Key under which a node's diagnostics say in which state of its life cycle it is."""
 
 _DIAGNOSTICS_PERIOD = 1.0
-_AUTOSTART_PERIOD = 0.05
-_DELIVERY_TIMEOUT = 1.0
 
 
 def diagnosis(complaints: Iterable[str], figures: dict[str, Any]) -> Diagnosis:
@@ -74,7 +75,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         self.every(_DIAGNOSTICS_PERIOD, self.publish_diagnostics)
         self._autostart_timer: Timer | None = None
         if self.parameters.autostart:
-            self._autostart_timer = self.every(_AUTOSTART_PERIOD, self._autostart)
+            self._autostart_timer = self.every(0.05, self._autostart)
 
     @abstractmethod
     def connect(self) -> None:
@@ -87,7 +88,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         """Stop working (deactivate), once the messages sent have arrived."""
         for publisher in self._kept:
             if isinstance(publisher, Publisher):
-                self.wait_for_delivery(publisher)
+                publisher.wait_for_all_acked(Duration(seconds=1))
 
     def diagnose(self) -> Diagnosis:
         """Return the node's health; by default what it tells of dropped messages."""
@@ -117,17 +118,15 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         """Destroy what is kept before the node is cleaned up."""
         self._kept.remove(thing)
         # The node has to let go of it, too: what is only destroyed by itself goes on to be heard.
-        match thing:
-            case Publisher():
-                self.destroy_publisher(thing)
-            case Subscription():
-                self.destroy_subscription(thing)
-            case Service():
-                self.destroy_service(thing)
-            case Timer():
-                self.destroy_timer(thing)
-            case _:
-                thing.destroy()
+        for destroy in (
+            self.destroy_publisher,
+            self.destroy_subscription,
+            self.destroy_service,
+            self.destroy_timer,
+        ):
+            if destroy(thing):
+                return
+        thing.destroy()
 
     def advertise(self, topic: Topic[Any]) -> Publisher:
         """Publish a topic until the node is cleaned up."""
@@ -168,14 +167,6 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         kind, qos = message_class(topic.type_name), qos_profile(topic, depth)
         return self.keep(self.create_subscription(kind, topic.name, callback, qos, raw=True))
 
-    def subscribe_polled(self, topic: Topic[Any]) -> Subscription:
-        """Let the messages of a topic wait to be taken, until the node is cleaned up."""
-        return self.keep(self.create_polled_subscription(topic, qos_profile(topic)))
-
-    def wait_for_delivery(self, publisher: Publisher) -> None:
-        """Wait, within bounds, until every reader has what was published."""
-        publisher.wait_for_all_acked(Duration(seconds=_DELIVERY_TIMEOUT))
-
     def publish_diagnostics(self) -> None:
         """Publish the node's health."""
         level, message, figures = self.diagnose()
@@ -204,12 +195,10 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start, if those waited for are there."""
-        missing = self.missing_peers()
-        if missing:
-            self._tell_waiting(missing)
+        if self._is_waiting():
             return TransitionCallbackReturn.FAILURE
         self._waiting = False
-        self.dropped.clear()
+        self.dropped = DroppedMessages(self.get_logger())
         result = self._transition(self.start, "active")
         self.active = result is TransitionCallbackReturn.SUCCESS
         return result
@@ -262,24 +251,22 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
             self.get_logger().info(done)
         return TransitionCallbackReturn.SUCCESS
 
-    def _tell_waiting(self, missing: str) -> None:
-        """Log once, until the node is active, whom it waits for."""
-        if not self._waiting:
+    def _is_waiting(self) -> bool:
+        """Return whether somebody is missing, and log whom, once until the node is active."""
+        missing = self.missing_peers()
+        if missing and not self._waiting:
             self._waiting = True
             whom = " for " + ", ".join(self.parameters.wait_for) if self.parameters.wait_for else ""
             self.get_logger().info(f"waiting{whom}: {missing}")
+        return bool(missing)
 
     def _autostart(self) -> None:
         """Configure, then try to activate until those waited for are there."""
         if not self.configured:
             self.trigger_configure()
         # In one go, if nobody is missing: a plant may take whoever is there for one that answers.
-        if self.lifecycle_state == "inactive":
-            missing = self.missing_peers()
-            if missing:
-                self._tell_waiting(missing)
-            else:
-                self.trigger_activate()
+        if self.lifecycle_state == "inactive" and not self._is_waiting():
+            self.trigger_activate()
         if self.active or self.stopped.done():
             self._end_autostart()
 

@@ -10,11 +10,8 @@ TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 
 _PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-_DISCOVERY_SERVER = "ROS_DISCOVERY_SERVER"
 _LOCALHOST_ONLY = "ROS_LOCALHOST_ONLY"
 """The range's predecessor, which overrules it."""
-_NO_PROFILES_FROM_HERE = "SKIP_DEFAULT_XML_FILE"
-"""Set, it keeps Fast DDS from reading profiles of the working directory, which overrule others."""
 
 
 def keep_on_this_machine(network: bool) -> str:
@@ -24,7 +21,7 @@ def keep_on_this_machine(network: bool) -> str:
     for more.
     """
     _heed_predecessor()
-    names = [_DISCOVERY_RANGE, *([_DISCOVERY_SERVER, _PROFILES] if is_fast_dds() else [])]
+    names = [_DISCOVERY_RANGE, *(["ROS_DISCOVERY_SERVER", _PROFILES] if is_fast_dds() else [])]
     said = [f"{name}={os.environ[name]}" for name in names if os.environ.get(name)]
     if network:
         os.environ[_DISCOVERY_RANGE] = "SUBNET"
@@ -47,7 +44,8 @@ def this_machine_only() -> dict[str, str]:
         _DISCOVERY_RANGE: "SYSTEM_DEFAULT",
         _LOCALHOST_ONLY: "",
         _PROFILES: _profile("loopback"),
-        _NO_PROFILES_FROM_HERE: "1",
+        # Profiles of the working directory would overrule this one.
+        "SKIP_DEFAULT_XML_FILE": "1",
     }
 
 

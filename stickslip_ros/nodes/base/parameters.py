@@ -25,7 +25,6 @@ from stickslip_ros.text import shown
 
 ParametersT = TypeVar("ParametersT", bound=NodeParameters)
 
-_LARGEST_ON_SLIDER = 2**31 - 1
 _OWNED_BY_ROS = ("start_type_description_service",)
 _ROS_TYPES = {
     bool: Parameter.Type.BOOL,
@@ -175,7 +174,7 @@ def _descriptor(parameter: ModelParameter) -> ParameterDescriptor:
     if parameter.range is not None and parameter.kind is float:
         least, largest = parameter.range
         descriptor.floating_point_range = [FloatingPointRange(from_value=least, to_value=largest)]
-    elif parameter.range is not None and parameter.range[1] <= _LARGEST_ON_SLIDER:
+    elif parameter.range is not None and parameter.range[1] < 2**31:
         least, largest = (int(end) for end in parameter.range)
         descriptor.integer_range = [IntegerRange(from_value=least, to_value=largest)]
     return descriptor

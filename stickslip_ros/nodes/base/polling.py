@@ -32,5 +32,4 @@ def waiting_messages(subscription: Subscription) -> Iterator[bytes]:
             yield taken[0]
 
 
-def _never_called(_: bytes) -> None:
-    """Stand for a callback where there is none."""
+def _never_called(_: bytes) -> None: ...

@@ -28,8 +28,6 @@ from stickslip_ros.streams import open_closed_streams
 ROS_ARGUMENTS = ["--ros-args", "--log-level", "warn", "--disable-external-lib-logs"]
 """Of the commands: they say on standard error what there is to say, and need no home directory."""
 
-_SPIN_TIMEOUT = 0.2
-
 
 def initialise(
     arguments: Sequence[str] = ROS_ARGUMENTS,
@@ -81,12 +79,9 @@ def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) 
     try:
         run_until_stopped(make())
         return 0
-    except InvalidInputError as error:
-        print(f"{parser.prog}: {error}", file=sys.stderr)
-        return 2
     except StickslipError as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)
-        return 1
+        return 2 if isinstance(error, InvalidInputError) else 1
     finally:
         rclpy.try_shutdown()
 
@@ -129,7 +124,7 @@ def spin(executor: Executor, until: Future) -> None:
     """Run callbacks until the future is done; one that raises is logged, and the rest go on."""
     while not until.done():
         try:
-            executor.spin_until_future_complete(until, timeout_sec=_SPIN_TIMEOUT)
+            executor.spin_until_future_complete(until, timeout_sec=0.2)
         except Exception as error:  # an impossible request from outside ends up here, too
             get_logger("stickslip_ros").error(f"{type(error).__name__}: {error}")
 

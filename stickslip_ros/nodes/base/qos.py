@@ -1,10 +1,21 @@
-"""Message class and quality of service of a topic, as rclpy takes them."""
+"""Message class and quality of service of a topic, as rclpy takes them, and who matches it."""
 
 from functools import cache
 from importlib import import_module
 from typing import Any
 
-from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.duration import Duration, Infinite
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import (
+    HistoryPolicy,
+    QoSCompatibility,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_check_compatible,
+)
+from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from stickslip_ros.messages.topics import Topic
 
@@ -26,3 +37,48 @@ def message_class(type_name: str) -> Any:
     """
     package, _, name = type_name.partition("/msg/")
     return getattr(import_module(f"{package}.msg"), name)
+
+
+def mismatch(writer: QoSProfile, reader: QoSProfile) -> str:
+    """Return why a reader cannot hear a writer, or nothing."""
+    compatibility, reason = qos_check_compatible(_explicit(writer), _explicit(reader))
+    return reason if compatibility == QoSCompatibility.ERROR else ""
+
+
+def matching_readers(node: Node, writer: Publisher) -> list[TopicEndpointInfo]:
+    """Return those in the graph that can read what a node's publisher writes."""
+    return [
+        reader
+        for reader in node.get_subscriptions_info_by_topic(writer.topic_name)
+        if _same_type(reader, writer) and not mismatch(writer.qos_profile, reader.qos_profile)
+    ]
+
+
+def matching_writers(node: Node, reader: Subscription) -> list[TopicEndpointInfo]:
+    """Return those in the graph that write what a node's subscription can read."""
+    return [
+        writer
+        for writer in node.get_publishers_info_by_topic(reader.topic_name)
+        if _same_type(writer, reader) and not mismatch(writer.qos_profile, reader.qos_profile)
+    ]
+
+
+def _same_type(other: TopicEndpointInfo, ours: Publisher | Subscription) -> bool:
+    kind: Any = ours.msg_type
+    package = kind.__module__.partition(".")[0]
+    return other.topic_type == f"{package}/msg/{kind.__name__}"
+
+
+def _explicit(profile: QoSProfile) -> QoSProfile:
+    """Return the profile as the graph tells it: there what is not set is infinite."""
+
+    def explicit(duration: Duration) -> Duration:
+        return duration if duration.nanoseconds > 0 else Infinite
+
+    return QoSProfile(
+        depth=1,
+        reliability=profile.reliability,
+        durability=profile.durability,
+        deadline=explicit(profile.deadline),
+        liveliness_lease_duration=explicit(profile.liveliness_lease_duration),
+    )

@@ -6,7 +6,7 @@ from pathlib import Path
 from stickslip_ros.errors import RunError
 
 SHARED_MEMORY = Path("/dev/shm")
-_TRACING, _TRACING_FILES = "lttng-ust-wait-*", 2
+_TRACING_FILES = 2
 """A page each, which the tracing library of ROS writes to when it is loaded."""
 
 
@@ -21,7 +21,7 @@ def check_shared_memory() -> None:
     least = _TRACING_FILES * os.sysconf("SC_PAGESIZE")
     if not SHARED_MEMORY.is_dir() or free_shared_memory() >= least:
         return
-    written = [file for file in SHARED_MEMORY.glob(_TRACING) if file.stat().st_blocks > 0]
+    written = [file for file in SHARED_MEMORY.glob("lttng-ust-wait-*") if file.stat().st_blocks > 0]
     if len(written) < _TRACING_FILES:
         raise RunError(
             f"shared memory is full: {SHARED_MEMORY} has {free_shared_memory()} bytes free, and to "

@@ -22,10 +22,6 @@ from stickslip_ros.stamps import NANOSECONDS
 
 PolicyT = TypeVar("PolicyT", bound=QoSPolicyEnum)
 
-_NOT_TO_OFFER = ("SYSTEM_DEFAULT", "UNKNOWN", "BEST_AVAILABLE")
-_LONGEST = 2**63 - 1
-_DEEPEST = 100_000
-
 
 def installed_message_class(type_name: str) -> Any:
     """Return the class of a message type such as `sensor_msgs/msg/JointState`.
@@ -63,7 +59,7 @@ def _profile(values: Mapping[str, Any]) -> QoSProfile:
     depth = int(values.get("depth", 0))
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
-        depth=min(max(depth, 1 if latches else DEEP), _DEEPEST),
+        depth=min(max(depth, 1 if latches else DEEP), 100_000),
         reliability=_policy(ReliabilityPolicy.RELIABLE, values.get("reliability")),
         durability=durability,
         deadline=_duration(values.get("deadline")),
@@ -81,10 +77,11 @@ def _policy(default: PolicyT, recorded: str | int | None) -> PolicyT:
         return default
     number = kind.get_from_short_key(recorded) if isinstance(recorded, str) else recorded
     policy = kind(number)
-    return default if policy.name in _NOT_TO_OFFER else policy
+    none_to_offer = ("SYSTEM_DEFAULT", "UNKNOWN", "BEST_AVAILABLE")
+    return default if policy.name in none_to_offer else policy
 
 
 def _duration(recorded: Mapping[str, int] | None) -> Duration:
     values = recorded or {}
     nanoseconds = int(values.get("sec", 0)) * NANOSECONDS + int(values.get("nsec", 0))
-    return Duration(nanoseconds=min(nanoseconds, _LONGEST))
+    return Duration(nanoseconds=min(nanoseconds, 2**63 - 1))

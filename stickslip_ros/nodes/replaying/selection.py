@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from math import inf
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.qos import QoSProfile
@@ -18,13 +18,6 @@ from stickslip_ros.nodes.replaying.timeline import JITTER, Timeline
 from stickslip_ros.scenarios.parameters import ReplayParameters
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import printable
-
-
-class ReplayedTopic(NamedTuple):
-    """How a topic is published."""
-
-    message_class: Any
-    qos: QoSProfile
 
 
 class Selection:
@@ -42,8 +35,8 @@ class Selection:
         Raises BagError for what is no bag or holds nothing that can be replayed, and
         InvalidInputError that names `source` and the parameter that asks for what the bag has not.
         """
-        self.topics: dict[str, ReplayedTopic] = {}
-        """By name."""
+        self.topics: dict[str, tuple[Any, QoSProfile]] = {}
+        """How each is published, by name: message class and quality of service."""
         self.left_out: list[str] = []
         """Topics that cannot be replayed, and why, in sentences."""
         self.lacking: list[str] = []
@@ -103,8 +96,7 @@ class Selection:
                 reason = str(error).splitlines()[0]
                 self.left_out.append(printable(f"{topic} is left out: {reason}"))
             else:
-                qos = recorded_profile(recording.offered_qos(topic))
-                self.topics[topic] = ReplayedTopic(kind, qos)
+                self.topics[topic] = kind, recorded_profile(recording.offered_qos(topic))
         if not self.topics:
             reasons = "; ".join(self.left_out)
             raise BagError(f"no topic of the bag {recording.path} can be replayed: {reasons}")
