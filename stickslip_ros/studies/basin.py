@@ -57,11 +57,8 @@ class Attractor:
         if (self.regime, self.steady) != (other.regime, other.steady):
             return False
         allowed = 0.02 * (self.amplitude or 0.0)
-        differences = (
-            (self.amplitude or 0.0) - (other.amplitude or 0.0),
-            (self.midpoint or 0.0) - (other.midpoint or 0.0),
-        )
-        return all(abs(difference) <= allowed for difference in differences)
+        pairs = (self.amplitude, other.amplitude), (self.midpoint, other.midpoint)
+        return all(abs((one or 0.0) - (two or 0.0)) <= allowed for one, two in pairs)
 
 
 @dataclass(frozen=True)
