@@ -132,7 +132,12 @@ def open_chunk(data: bytes, starts: IntArray) -> OpenChunk:
 
     Where these are not right it goes from record to record; DamageError where there are none.
     """
-    return _indexed(data, starts) or _walked(data)
+    indexed = _indexed(data, starts)
+    if indexed is not None:
+        return indexed
+    messages = (begin for opcode, begin, _ in records_in(data) if opcode == Opcode.MESSAGE)
+    starts = np.array(array("q", messages), np.int64) - HEAD.size
+    return OpenChunk(MessageBlock(data, starts), len(data))
 
 
 def _indexed(data: bytes, starts: IntArray) -> OpenChunk | None:
@@ -147,10 +152,3 @@ def _indexed(data: bytes, starts: IntArray) -> OpenChunk | None:
         return None
     joined = np.array_equal(messages.end[:-1], starts[1:]) and messages.end[-1] == len(data)
     return chunk if joined else None
-
-
-def _walked(data: bytes) -> OpenChunk:
-    """Find the messages by going from record to record."""
-    messages = (begin for opcode, begin, _ in records_in(data) if opcode == Opcode.MESSAGE)
-    starts = np.array(array("q", messages), np.int64) - HEAD.size
-    return OpenChunk(MessageBlock(data, starts), len(data))

@@ -85,11 +85,7 @@ def pack_wrench(stamp: int, force_x: float) -> bytes:
     """
     try:
         return _WRENCH.pack(
-            LITTLE_ENDIAN,
-            stamp // NANOSECONDS,
-            stamp % NANOSECONDS,
-            _WRENCH_FRAME,
-            force_x,
+            LITTLE_ENDIAN, stamp // NANOSECONDS, stamp % NANOSECONDS, _WRENCH_FRAME, force_x
         )
     except struct.error as error:
         raise _unpackable("wrench", stamp, error) from error

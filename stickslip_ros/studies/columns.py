@@ -149,11 +149,11 @@ def write_json(
     stream.write("{\n")
     for name, value in {**made_of, **how, "parameters": plan.parameters}.items():
         stream.write(f' "{name}": {json.dumps(value, allow_nan=False)},\n')
-    makers = dict(further)
+    makers: dict[str, Callable[[Point], Any]] = dict(further)
     if isinstance(plan, Grid):
         _write_values(stream, plan)
     else:
-        makers = {"values": lambda point: plan.values(point.number), **makers}
+        makers = {"values": lambda point: plan.values(point.number), **further}
     names = [*makers, *COLUMNS]
     with ExitStack() as stack:
         files = {name: stack.enter_context(TemporaryFile("w+")) for name in names}

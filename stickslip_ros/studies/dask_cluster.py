@@ -9,6 +9,8 @@ from typing import Any
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.studies.runner import IN_FLIGHT
 
+_TIMEOUT = "10s"
+
 
 class DaskError(RunError):
     """A task has ended several workers of a cluster."""
@@ -30,7 +32,7 @@ def dask_executor(address: str) -> Generator[tuple[Executor, int]]:
         ) from None
     with _silent_log():
         try:
-            client = Client(address, timeout="10s")
+            client = Client(address, timeout=_TIMEOUT)
         except (OSError, ValueError) as error:
             reason = " ".join(str(error).split()) or "nothing answers"
             raise InvalidInputError(f"{address}: no scheduler found: {reason}") from None

@@ -76,11 +76,7 @@ def failure_of(task: Task, check: Check) -> str | None:
 
 
 def throw_from_high_speeds(
-    task: Task,
-    bench: Bench,
-    drives: Sequence[Drive],
-    controller: WashoutParameters,
-    done: Progress,
+    task: Task, bench: Bench, drives: Sequence[Drive], controller: WashoutParameters, done: Progress
 ) -> tuple[str | None, str | None]:
     """Return what is to be said of motions that begin fast, and in what the controller fails."""
 
