@@ -192,7 +192,10 @@ class Recorder:
             self._topics.append(channel.topic)
             new.append(replace(channel, id=len(self._topics), schema_id=schema_id))
             _register(self._writer, new)
-            records = _records(new)
+            builder = RecordBuilder()
+            for definition in new:
+                definition.write(builder)
+            records = builder.end()
             self._stream.write(records)
             self._definitions += new
             self._definition_records += records
@@ -401,13 +404,6 @@ def _register(writer: Writer, definitions: Sequence[Schema | Channel]) -> None:
             writer.register_schema(new.name, new.encoding, new.data)
         else:
             writer.register_channel(new.topic, new.message_encoding, new.schema_id, new.metadata)
-
-
-def _records(definitions: Sequence[Schema | Channel]) -> bytes:
-    builder = RecordBuilder()
-    for definition in definitions:
-        definition.write(builder)
-    return builder.end()
 
 
 def _sync_directories(directories: Collection[Path]) -> None:

@@ -61,13 +61,8 @@ def _copy_tables(file: McapFile, recorder: Recorder) -> None:
         if table.name != "rosbag2":  # of which the new bag has one of its own
             recorder.add_metadata(table.name, table.metadata)
     for attachment in file.attachments():
-        recorder.attach(
-            attachment.name,
-            attachment.data,
-            attachment.media_type,
-            attachment.log_time,
-            attachment.create_time,
-        )
+        times = attachment.log_time, attachment.create_time
+        recorder.attach(attachment.name, attachment.data, attachment.media_type, *times)
 
 
 def _copy_messages(

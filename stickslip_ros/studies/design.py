@@ -24,9 +24,6 @@ from stickslip_ros.studies.design_search import CUBIC_SHARES, RESERVE, Candidate
 from stickslip_ros.studies.design_task import Task
 from stickslip_ros.studies.trial import FILTER_SETTLED, Bench, Vibration
 
-_ATTEMPTS, _RETREAT = 8, 0.8
-"""How often a proposal is tried, and by what factor the next one uses less of what is allowed."""
-
 _SHARE_OF_VIBRATIONS = 0.1
 """Share of the work, about, that it is to find the vibrations without control."""
 
@@ -102,7 +99,7 @@ def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Desi
     task, drives = candidates.task, candidates.task.drives()
     strength, shares = RESERVE, CUBIC_SHARES
     failure: str | None = None
-    for attempt in range(_ATTEMPTS):
+    for attempt in range(8):
         gains = candidates.best(strength, shares)
         if gains is None:
             return Design(task, remark=failure or candidates.why_none())
@@ -144,7 +141,7 @@ def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Desi
         elif gains.cubic != 0.0:
             shares = CUBIC_SHARES[:1]
         else:
-            strength *= _RETREAT
+            strength *= 0.8
     return Design(task, remark=failure)
 
 

@@ -26,10 +26,6 @@ control where the vibration is large, so that more linear gain fits under the fo
 RESERVE = 0.95
 """Share of what is allowed that the first proposal uses."""
 
-_COARSE, _FINE, _GRIDS, _ZOOM = (25, 41), (9, 9), 5, 0.3
-"""Corner frequencies and gains of the first grid, and of the next ones that close in on the best;
-how many grids in all, and the extent of each in that before."""
-
 
 class Candidates:
     """What theory says of gains: from the linear loops of the range, and the vibrations there."""
@@ -127,14 +123,14 @@ class Candidates:
         )
 
     def _fastest(self, strength: float, cubic: float) -> WashoutGains:
-        """Return the fastest gains: the best of a grid that closes in on them."""
+        """Return the fastest gains: the best of five grids, each around the best of that before."""
         # A softening cubic gain is one beside a negative linear gain.
         limits = np.array(
             [np.log(self._corner_frequencies(2)), [-1.0, 0.0 if cubic > 0.0 else 1.0]]
         )
-        window, counts = limits, _COARSE
+        window, counts = limits, (25, 41)
         best = WashoutGains(0.0, 0.0, 0.0)
-        for _ in range(_GRIDS):
+        for _ in range(5):
             logarithms, shares = (
                 np.linspace(low, high, count)
                 for (low, high), count in zip(window, counts, strict=True)
@@ -146,9 +142,9 @@ class Candidates:
             row, column = np.unravel_index(int(np.argmax(rates)), rates.shape)
             best = WashoutGains(*map(rounded, (corners[row], gains[row, column], cubic)))
             centre = np.array([[logarithms[row]], [shares[column]]])
-            reach = _ZOOM / 2.0 * (window[:, 1:] - window[:, :1])
+            reach = 0.3 / 2.0 * (window[:, 1:] - window[:, :1])
             window = np.clip(centre + reach * [-1.0, 1.0], limits[:, :1], limits[:, 1:])
-            counts = _FINE
+            counts = (9, 9)
         return best
 
     def _corner_frequencies(self, count: int) -> FloatArray:

@@ -26,13 +26,6 @@ _RESTS = (Regime.EQUILIBRIUM, Regime.STUCK)
 LONGEST = 1e6
 """Natural periods or cycles that a motion is followed for at most."""
 
-_LONGEST_LOADING = 50.0
-"""Natural periods beyond which a slow belt's loading of the spring is not waited for under control:
-without, the slide rides it in one step."""
-
-_TWICE_THE_SAME = 1e-4
-"""Share by which the amplitude may differ from that of one transient before."""
-
 
 @dataclass(frozen=True)
 class MotionState:
@@ -155,8 +148,8 @@ class Settler:
         loading = 0.0 if drive.belt_speed == 0.0 else loading_time(drive)
         transient = course.transient * drive.natural_period
         controlled = washout is not None or case.sampled is not None
-        if controlled:
-            loading = min(loading, _LONGEST_LOADING * drive.natural_period)
+        if controlled:  # without, the slide rides a slow belt in one step
+            loading = min(loading, 50.0 * drive.natural_period)
             transient += loading
         # One cycle is under way when it begins, and one when it ends.
         cycles = max(course.cycles, LEAST_CYCLES) + 2
@@ -235,7 +228,7 @@ def _alike(before: Measures, after: Measures) -> bool:
     one, other = before.amplitude, after.amplitude
     if before.regime is not after.regime or one is None or other is None:
         return before.regime is after.regime
-    return after.regime not in CYCLES or abs(other - one) <= _TWICE_THE_SAME * other
+    return after.regime not in CYCLES or abs(other - one) <= 1e-4 * other
 
 
 class _Section:

@@ -170,7 +170,10 @@ def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Sect
         notes["closed_loop.hopf_speeds"] = (
             "at no belt speed does a pair of eigenvalues cross the imaginary axis with these gains"
         )
-    cycles = _closed_loop_cycles(drive, gains)
+    possible = limit_cycle_from_hopf(drive, gains), limit_cycle_of_run(drive, 0.0, gains=gains)
+    cycles = [cycle for cycle in possible if cycle is not None]
+    if len(cycles) > 1 and isclose(cycles[0].position, cycles[1].position, rel_tol=1e-6):
+        cycles.pop()
     if not cycles:
         notes["closed_loop.limit_cycles"] = (
             "none found from rest at zero displacement, nor from the Hopf point at the critical "
@@ -182,15 +185,6 @@ def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Sect
         **_hopf_points(points),
         "limit_cycles": [_cycle(cycle) for cycle in cycles],
     }
-
-
-def _closed_loop_cycles(drive: Drive, gains: WashoutGains) -> list[LimitCycle]:
-    """Return the limit cycles that can be come by, each once, the smallest first."""
-    cycles = [limit_cycle_from_hopf(drive, gains), limit_cycle_of_run(drive, 0.0, gains=gains)]
-    found = [cycle for cycle in cycles if cycle is not None]
-    if len(found) > 1 and isclose(found[0].position, found[1].position, rel_tol=1e-6):
-        found.pop()
-    return found
 
 
 def _why_no_gain(drive: Drive, gains: WashoutGains) -> str:

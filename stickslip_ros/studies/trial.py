@@ -20,9 +20,6 @@ from stickslip_ros.physics.theory.returns import loading_time, release_position
 from stickslip_ros.physics.theory.sampled import SETTLED
 from stickslip_ros.stamps import NANOSECONDS
 
-_MEASURED_CYCLES = 10
-"""How many cycles a vibration is measured over."""
-
 FILTER_SETTLED = 5.0
 """Time after which the washout filter has forgotten its start, in 1/d."""
 
@@ -134,11 +131,11 @@ class Bench:
         return Vibration(drive, self._rate, found.regime, found.period, position, velocity)
 
     def _measured(self, loading: float) -> Measures:
-        """Go on for some cycles, each with `loading` (s) besides its slip, and measure them."""
+        """Measure the next ten cycles, each with `loading` (s) besides its slip."""
         motion = self._recording
         motion.take_breakpoints()
-        motion.advance((_MEASURED_CYCLES + 2) * (motion.drive.natural_period + loading))
-        meter = CycleMeter(_MEASURED_CYCLES)
+        motion.advance((10 + 2) * (motion.drive.natural_period + loading))
+        meter = CycleMeter(10)
         meter.feed(motion.take_breakpoints(), motion.drive.belt_speed)
         if motion.unbounded:
             meter.report_run_away()
