@@ -121,7 +121,12 @@ class McapFile:
     def damage(self) -> list[str]:
         """What is known to be missing from the file, in sentences; reading may find more."""
         name = self.path.name
-        gaps = self._merged_gaps()
+        gaps: list[tuple[int, int]] = []
+        for start, end in sorted(self._gaps.items()):
+            if gaps and start <= gaps[-1][1]:
+                gaps[-1] = gaps[-1][0], max(end, gaps[-1][1])
+            else:
+                gaps.append((start, end))
         found = [
             f"{name}: bytes {start} to {end - 1} of {self._size} cannot be read"
             for start, end in gaps[:_MOST_GAPS_TOLD]
@@ -365,15 +370,6 @@ class McapFile:
                 match = _CHUNK_HEAD.search(window, match.start() + 1)
             position += WINDOW
         return self._size
-
-    def _merged_gaps(self) -> list[tuple[int, int]]:
-        merged: list[tuple[int, int]] = []
-        for start, end in sorted(self._gaps.items()):
-            if merged and start <= merged[-1][1]:
-                merged[-1] = merged[-1][0], max(end, merged[-1][1])
-            else:
-                merged.append((start, end))
-        return merged
 
     def _named(
         self,
