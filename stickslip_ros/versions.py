@@ -3,13 +3,11 @@
 import platform
 from importlib import metadata
 
-_PACKAGES = ("stickslip_ros", "heyoka", "numpy", "mcap", "rclpy")
-
 
 def versions() -> dict[str, str]:
     """Return the versions of Python, of this package and of what its figures depend on."""
     found = {"python": platform.python_version()}
-    for package in _PACKAGES:
+    for package in ("stickslip_ros", "heyoka", "numpy", "mcap", "rclpy"):
         try:
             found[package] = metadata.version(package)
         except metadata.PackageNotFoundError:

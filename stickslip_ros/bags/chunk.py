@@ -3,6 +3,7 @@
 from array import array
 from collections import deque
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from copy import copy
 from typing import Any, NamedTuple
 
@@ -132,25 +133,13 @@ def open_chunk(data: bytes, starts: IntArray) -> OpenChunk:
 
     Where these are not right it goes from record to record; DamageError where there are none.
     """
-    return _indexed(data, starts) or _walked(data)
-
-
-def _indexed(data: bytes, starts: IntArray) -> OpenChunk | None:
-    """Take the messages that start there, which must follow each other up to the end."""
-    if len(starts) == 0:
-        return None
-    try:
-        messages = MessageBlock(data, starts)
-        chunk = OpenChunk(messages, int(starts[0]))
-        deque(chunk.definitions, maxlen=0)  # each of them has to be sound
-    except DamageError:
-        return None
-    joined = np.array_equal(messages.end[:-1], starts[1:]) and messages.end[-1] == len(data)
-    return chunk if joined else None
-
-
-def _walked(data: bytes) -> OpenChunk:
-    """Find the messages by going from record to record."""
+    if len(starts) > 0:
+        with suppress(DamageError):
+            chunk = OpenChunk(MessageBlock(data, starts), int(starts[0]))
+            deque(chunk.definitions, maxlen=0)  # each of them has to be sound
+            end = chunk.messages.end
+            if np.array_equal(end[:-1], starts[1:]) and end[-1] == len(data):
+                return chunk
     messages = (begin for opcode, begin, _ in records_in(data) if opcode == Opcode.MESSAGE)
     starts = np.array(array("q", messages), np.int64) - HEAD.size
     return OpenChunk(MessageBlock(data, starts), len(data))

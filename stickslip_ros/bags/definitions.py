@@ -9,7 +9,6 @@ from stickslip_ros.installed import prefixes
 _TYPE_NAME = re.compile(r"(\w+)/msg/(\w+)", re.ASCII)
 _FIELD_TYPE = re.compile(r"\s*([A-Za-z][\w/]*)", re.ASCII)
 _BUILT_IN_TYPES = re.compile(r"bool|byte|char|float(32|64)|u?int(8|16|32|64)|w?string")
-_SEPARATOR = "=" * 80
 
 
 def message_definition(type_name: str) -> str:
@@ -26,7 +25,7 @@ def message_definition(type_name: str) -> str:
         for nested in _nested_types(text, package=type_name.partition("/")[0]):
             if nested not in included:
                 included.add(nested)
-                text += f"\n{_SEPARATOR}\nMSG: {nested.replace('/msg/', '/')}\n{expand(nested)}"
+                text += f"\n{'=' * 80}\nMSG: {nested.replace('/msg/', '/')}\n{expand(nested)}"
         return text
 
     return expand(type_name)

@@ -11,7 +11,7 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
@@ -44,6 +44,8 @@ from stickslip_ros.bags.chunk import (
 from stickslip_ros.bags.compression import LARGEST, unpack
 from stickslip_ros.bags.records import FIELDS, HEAD, DamageError, ParsedT, parse, records_in
 from stickslip_ros.errors import BagError
+
+DefinitionT = TypeVar("DefinitionT", Schema, Channel)
 
 _INDEX_ENTRY = 16
 """Bytes of a log time and an offset in a message index."""
@@ -92,8 +94,6 @@ class McapFile:
         """By id."""
         self.statistics: Statistics | None = None
         """The file's own account of its messages, if it has one."""
-        self._definitions: Counter[tuple[int, int, bytes]] = Counter()
-        self._channel_ids: set[int] = set()
         self._tables: dict[int, str] = {}
         self._attachments: dict[int, str] = {}
         self._definitions_size = 0
@@ -121,7 +121,12 @@ class McapFile:
     def damage(self) -> list[str]:
         """What is known to be missing from the file, in sentences; reading may find more."""
         name = self.path.name
-        gaps = self._merged_gaps()
+        gaps: list[tuple[int, int]] = []
+        for start, end in sorted(self._gaps.items()):
+            if gaps and start <= gaps[-1][1]:
+                gaps[-1] = gaps[-1][0], max(end, gaps[-1][1])
+            else:
+                gaps.append((start, end))
         found = [
             f"{name}: bytes {start} to {end - 1} of {self._size} cannot be read"
             for start, end in gaps[:_MOST_GAPS_TOLD]
@@ -201,7 +206,6 @@ class McapFile:
                 elif record.opcode in _INVENTORY:
                     content = self._read(record.content, min(record.length, LARGEST_TABLE))
                     self._note(record.opcode, record.start, content, checked=False)
-            self._define()
         return begins_well and ends_well
 
     @property
@@ -235,7 +239,6 @@ class McapFile:
                 self._note(opcode, start, content, checked=True)
         except DamageError:
             return False
-        self._define()
         return True
 
     def _note(self, opcode: int, start: int, content: bytes, *, checked: bool) -> None:
@@ -245,17 +248,10 @@ class McapFile:
         """
         try:
             match opcode:
-                case Opcode.SCHEMA | Opcode.CHANNEL:
-                    number = int.from_bytes(content[:2], "little")
-                    if opcode == Opcode.CHANNEL:
-                        self._channel_ids.add(number)
-                    definition = opcode, number, content
-                    if definition not in self._definitions:
-                        self._definitions_size += len(content)
-                        if self._definitions_size > _LARGEST_DEFINITIONS:
-                            raise DamageError
-                    # One with a checksum counts for more than any number of those without.
-                    self._definitions[definition] += 1_000_000 if checked else 1
+                case Opcode.SCHEMA:
+                    self._define(self.schemas, parse(Schema.read, content), len(content), checked)
+                case Opcode.CHANNEL:
+                    self._define(self.channels, parse(Channel.read, content), len(content), checked)
                 case Opcode.STATISTICS:
                     self.statistics = parse(Statistics.read, content)
                     self._chunked = self.statistics.chunk_count > 0
@@ -278,18 +274,15 @@ class McapFile:
         """Note that this cannot be read."""
         self._gaps[start] = max(end, self._gaps.get(start, end))
 
-    def _define(self) -> None:
-        """Take of each schema and channel the definition found in a sound chunk, or most often."""
-        for (opcode, _, content), _ in reversed(self._definitions.most_common()):
-            try:
-                if opcode == Opcode.SCHEMA:
-                    schema = parse(Schema.read, content)
-                    self.schemas[schema.id] = schema
-                else:
-                    channel = parse(Channel.read, content)
-                    self.channels[channel.id] = channel
-            except DamageError:
-                continue
+    def _define(
+        self, known: dict[int, DefinitionT], found: DefinitionT, size: int, checked: bool
+    ) -> None:
+        """Keep a definition; of one id, one with a checksum, or else the first."""
+        if found.id not in known or (checked and known[found.id] != found):
+            self._definitions_size += size
+            if self._definitions_size > _LARGEST_DEFINITIONS:
+                raise DamageError
+            known[found.id] = found
 
     def _records(self, position: int) -> Iterator[tuple[_Record, OpenChunk | None]]:
         """Yield the sound records from a position on; behind damage go on at the next chunk."""
@@ -321,7 +314,7 @@ class McapFile:
         if record.opcode == Opcode.MESSAGE:
             channel = int.from_bytes(self._read(record.content, 2), "little")
             # Where there are chunks all messages are in them; this is something else, damaged.
-            sound = channel in self._channel_ids and MESSAGE_LENGTH <= record.length <= LARGEST
+            sound = channel in self.channels and MESSAGE_LENGTH <= record.length <= LARGEST
             return record if sound and not self._chunked else None
         if record.opcode not in FIELDS:
             # Another program's own kind, if another record follows.
@@ -377,15 +370,6 @@ class McapFile:
                 match = _CHUNK_HEAD.search(window, match.start() + 1)
             position += WINDOW
         return self._size
-
-    def _merged_gaps(self) -> list[tuple[int, int]]:
-        merged: list[tuple[int, int]] = []
-        for start, end in sorted(self._gaps.items()):
-            if merged and start <= merged[-1][1]:
-                merged[-1] = merged[-1][0], max(end, merged[-1][1])
-            else:
-                merged.append((start, end))
-        return merged
 
     def _named(
         self,

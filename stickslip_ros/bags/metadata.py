@@ -69,10 +69,7 @@ class BagDescription:
         All of it is written, or OSError is raised and the one that was there remains.
         """
         information = _information(
-            list(self._topics.values()),
-            self._start,
-            max(0, self._end - self._start),
-            self._files,
+            list(self._topics.values()), self._start, max(0, self._end - self._start), self._files
         )
         text = _as_yaml({"rosbag2_bagfile_information": information})
         temporary = directory / f".{METADATA_FILE}.part"
@@ -146,10 +143,7 @@ def _file_entry(name: str, message_count: int, start: int, duration: int) -> dic
 
 
 def _information(
-    topics: list[dict[str, Any]],
-    start: int,
-    duration: int,
-    files: list[dict[str, Any]],
+    topics: list[dict[str, Any]], start: int, duration: int, files: list[dict[str, Any]]
 ) -> dict[str, Any]:
     return {
         "version": 9,

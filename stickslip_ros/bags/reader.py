@@ -281,26 +281,24 @@ class Recording:
 
 
 def _joined_blocks(blocks: Sequence[RunBlock]) -> RunBlock:
-    states, forces, dropped = zip(*blocks, strict=True)
-    return RunBlock(
-        states[0].followed_by(*states[1:]),
-        forces[0].followed_by(*forces[1:]),
-        dropped[0].followed_by(*dropped[1:]),
-    )
+    parts: Any = zip(*blocks, strict=True)
+    return RunBlock(*(first.followed_by(*others) for first, *others in parts))
 
 
 def _mcap_files(path: Path) -> list[Path]:
     """Return the files of a bag in the order in which they were recorded."""
     if not os.path.exists(path):
         raise BagError(f"the bag {path} does not exist")
-    if not path.is_dir():
-        if path.suffix == ".db3":
-            raise _not_mcap(path)
-        return [path]
-    files = sorted([*path.glob("*.mcap"), *path.glob(f"*{_PACKED}")], key=_place_in_bag)
+    files, sqlite = [path], path.suffix == ".db3"
+    if path.is_dir():
+        files = sorted([*path.glob("*.mcap"), *path.glob(f"*{_PACKED}")], key=_place_in_bag)
+        sqlite = not files and any(path.glob("*.db3"))
+    if sqlite:
+        raise BagError(
+            f"the bag {path} is stored as sqlite3, and only MCAP can be read; "
+            "`ros2 bag convert` makes one of the other"
+        )
     if not files:
-        if next(path.glob("*.db3"), None):
-            raise _not_mcap(path)
         raise BagError(f"the directory {path} is not a bag: it holds no .mcap file")
     return files
 
@@ -322,10 +320,3 @@ def _place_in_bag(file: Path) -> tuple[int, str]:
     """Sort `bag_2.mcap` before `bag_10.mcap`, as rosbag2 numbers the files of a bag it splits."""
     number = re.search(r"_(\d+)\.mcap", file.name)
     return (int(number[1]) if number else 0), file.name
-
-
-def _not_mcap(path: Path) -> BagError:
-    return BagError(
-        f"the bag {path} is stored as sqlite3, and only MCAP can be read; "
-        "`ros2 bag convert` makes one of the other"
-    )

@@ -192,7 +192,10 @@ class Recorder:
             self._topics.append(channel.topic)
             new.append(replace(channel, id=len(self._topics), schema_id=schema_id))
             _register(self._writer, new)
-            records = _records(new)
+            builder = RecordBuilder()
+            for definition in new:
+                definition.write(builder)
+            records = builder.end()
             self._stream.write(records)
             self._definitions += new
             self._definition_records += records
@@ -367,16 +370,13 @@ class Recorder:
         """Close the file as it is: after half a record nothing more can be appended."""
         self._end()
         self._stream.cut()
-        raise BagError(
-            f"the bag {self.directory} cannot be written any more ({error}); {self._what_is_left()}"
-        ) from error
-
-    def _what_is_left(self) -> str:
-        """Say what a bag that failed holds: the first messages may have been too many for it."""
+        left = "it holds no message"  # the first ones may have been too many for the disk
         with suppress(BagError), Recording(self.directory) as recording:
-            for _ in recording.messages(*self._topics):
-                return "what it holds so far can be read"
-        return "it holds no message"
+            if next(recording.messages(*self._topics), None) is not None:
+                left = "what it holds so far can be read"
+        raise BagError(
+            f"the bag {self.directory} cannot be written any more ({error}); {left}"
+        ) from error
 
     def _end(self) -> None:
         self._closed = True
@@ -401,13 +401,6 @@ def _register(writer: Writer, definitions: Sequence[Schema | Channel]) -> None:
             writer.register_schema(new.name, new.encoding, new.data)
         else:
             writer.register_channel(new.topic, new.message_encoding, new.schema_id, new.metadata)
-
-
-def _records(definitions: Sequence[Schema | Channel]) -> bytes:
-    builder = RecordBuilder()
-    for definition in definitions:
-        definition.write(builder)
-    return builder.end()
 
 
 def _sync_directories(directories: Collection[Path]) -> None:

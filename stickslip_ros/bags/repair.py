@@ -14,8 +14,6 @@ from stickslip_ros.errors import BagError
 from stickslip_ros.text import printable
 
 _Definition = tuple[object, ...]
-_ROSBAG2 = "rosbag2"
-"""Name of rosbag2's own table in every file, of which the new bag has one of its own."""
 
 
 @dataclass
@@ -60,16 +58,11 @@ def repair(path: Path, out: Path, progress: Callable[[int], None] = lambda _: No
 
 def _copy_tables(file: McapFile, recorder: Recorder) -> None:
     for table in file.tables():
-        if table.name != _ROSBAG2:
+        if table.name != "rosbag2":  # of which the new bag has one of its own
             recorder.add_metadata(table.name, table.metadata)
     for attachment in file.attachments():
-        recorder.attach(
-            attachment.name,
-            attachment.data,
-            attachment.media_type,
-            attachment.log_time,
-            attachment.create_time,
-        )
+        times = attachment.log_time, attachment.create_time
+        recorder.attach(attachment.name, attachment.data, attachment.media_type, *times)
 
 
 def _copy_messages(

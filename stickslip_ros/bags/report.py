@@ -14,13 +14,8 @@ from stickslip_ros.stamps import NANOSECONDS
 
 _DEFAULT_WINDOW = 20
 """Cycles to average over for a bag of somebody else's."""
-_LARGEST_WINDOW = 100_000
 _LONGEST = 9e9
 """Time, s, that stamps can tell."""
-_MOST_EARLY = 1_000_000
-"""Forces that are kept until there is a joint state."""
-_MEASURED_AT_ONCE = 20_000
-"""Messages; to measure each chunk by itself would take twice as long."""
 
 
 def report_of_bag(
@@ -53,7 +48,8 @@ def report_of_bag(
             observer=observer,
         )
         run = _RunReader(meter, start, end, observer)
-        for block in recording.blocks(least=_MEASURED_AT_ONCE):
+        # To measure each chunk by itself would take twice as long.
+        for block in recording.blocks(least=20_000):
             run.feed(*block)
         run.finish()
         missing = recording.missing
@@ -106,7 +102,7 @@ class _RunReader:
                 self._observer.take_friction(time, part.friction_force)
         if self.first is None:
             self._early.append((forces, dropped))
-            if sum(len(forces.stamp) for forces, _ in self._early) > _MOST_EARLY:
+            if sum(len(forces.stamp) for forces, _ in self._early) > 1_000_000:  # for the memory
                 self._begin_without_states()
         else:
             self._feed_forces(forces, dropped, self.first)
@@ -144,4 +140,4 @@ def _window_at_recording(recording: Recording) -> int:
         window = int(kept["window"])
     except (KeyError, ValueError):
         return _DEFAULT_WINDOW
-    return window if 0 < window <= _LARGEST_WINDOW else _DEFAULT_WINDOW
+    return window if 0 < window <= 100_000 else _DEFAULT_WINDOW

@@ -168,7 +168,9 @@ def decode(
         # Where every message has a structure of its own, to compare them all would take for ever.
         compared = left if attempt < _STRUCTURES else left[:1]
         taken = end[compared] - begin[compared] == layout.size
-        messages = _rows(data, begin[compared[taken]], layout.size)
+        shape, item = (max(0, len(data) - layout.size + 1),), np.dtype((np.void, layout.size))
+        stretches = np.ndarray(shape, item, data, strides=(1,))  # one from each byte on
+        messages = stretches[begin[compared[taken]]]
         fits = layout.fits(messages)
         taken[taken] = fits
         parts.append((compared[taken], *layout.table(messages if fits.all() else messages[fits])))
@@ -178,11 +180,3 @@ def decode(
     places, stamps, values = zip(*parts, strict=True)
     order = np.argsort(np.concatenate(places))
     return np.concatenate(stamps)[order], np.concatenate(values, axis=1)[:, order], refused
-
-
-def _rows(data: bytes, starts: IntArray, size: int) -> NDArray[np.void]:
-    """Return the stretches of `size` bytes that begin there as items of an array, copied."""
-    stretches = np.ndarray(
-        (max(0, len(data) - size + 1),), np.dtype((np.void, size)), data, strides=(1,)
-    )
-    return stretches[starts]

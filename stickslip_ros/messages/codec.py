@@ -85,11 +85,7 @@ def pack_wrench(stamp: int, force_x: float) -> bytes:
     """
     try:
         return _WRENCH.pack(
-            LITTLE_ENDIAN,
-            stamp // NANOSECONDS,
-            stamp % NANOSECONDS,
-            _WRENCH_FRAME,
-            force_x,
+            LITTLE_ENDIAN, stamp // NANOSECONDS, stamp % NANOSECONDS, _WRENCH_FRAME, force_x
         )
     except struct.error as error:
         raise _unpackable("wrench", stamp, error) from error
@@ -130,23 +126,10 @@ def unpack_joint_state(data: bytes) -> Sample:
             effort,
             _,
         ) = _JOINT_STATE.unpack(data)
-        if (
-            encapsulation,
-            frame,
-            slide,
-            belt,
-            position_count,
-            velocity_count,
-            effort_count,
-        ) == _JOINT_STATE_CONSTANTS:
-            return Sample(
-                sec * NANOSECONDS + nanosec,
-                position,
-                velocity,
-                effort,
-                belt_position,
-                belt_velocity,
-            )
+        constants = encapsulation, frame, slide, belt, position_count, velocity_count, effort_count
+        if constants == _JOINT_STATE_CONSTANTS:
+            stamp = sec * NANOSECONDS + nanosec
+            return Sample(stamp, position, velocity, effort, belt_position, belt_velocity)
     stamp, values = _joint_state_layout(data).read(data)
     return Sample(stamp, *values)
 

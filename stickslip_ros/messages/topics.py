@@ -86,9 +86,7 @@ STICK_FRACTION: Topic[Any] = Topic(
     meaning="Share of that cycle during which the slide stuck.",
 )
 FREQUENCY: Topic[Any] = Topic(
-    "limit_cycle/frequency",
-    _NUMBER,
-    meaning="One over the period of that cycle, Hz.",
+    "limit_cycle/frequency", _NUMBER, meaning="One over the period of that cycle, Hz."
 )
 DIAGNOSTICS: Topic[Any] = Topic(
     "/diagnostics",

@@ -158,14 +158,11 @@ def _find(name_or_path: str) -> Path:
     shipped = {path.stem: path for d in config_directories()[::-1] for path in d.glob("*.yaml")}
     if name in shipped:
         return shipped[name]
-    if given_as_file:
-        raise InvalidInputError(
-            f"no scenario file {name_or_path}; {did_you_mean(name, shipped, _NAMED_BY_PATH)}"
-        )
-    every = f"known by name are {', '.join(sorted(shipped))}; {_NAMED_BY_PATH}"
-    raise InvalidInputError(
-        f"unknown scenario {name_or_path!r}; {did_you_mean(name, shipped, every)}"
-    )
+    missing, otherwise = f"no scenario file {name_or_path}", _NAMED_BY_PATH
+    if not given_as_file:
+        missing = f"unknown scenario {name_or_path!r}"
+        otherwise = f"known by name are {', '.join(sorted(shipped))}; {_NAMED_BY_PATH}"
+    raise InvalidInputError(f"{missing}; {did_you_mean(name, shipped, otherwise)}")
 
 
 def _path_of_base(file: ScenarioFile) -> Path | None:

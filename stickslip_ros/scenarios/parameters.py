@@ -58,10 +58,7 @@ class Friction(ParameterGroup):
     slope: float = field(0.45, "Fall of the coefficient with relative speed (linear).", "s/m")
     kinetic: float = field(0.25, "Kinetic coefficient mu_k (exponential).", ge=0.0)
     decay_speed: float = field(
-        0.5,
-        "Speed v_s over which the static coefficient decays (exponential).",
-        "m/s",
-        ge=SMALLEST,
+        0.5, "Speed v_s over which the static coefficient decays (exponential).", "m/s", ge=SMALLEST
     )
     viscous: float = field(0.0, "Rise of the coefficient with speed (exponential).", "s/m")
 
@@ -221,11 +218,7 @@ class PlantParameters(NodeParameters):
     def drive_names(self) -> list[str]:
         """Return the flat names of what makes the drive: those that its friction law uses, too."""
         constants = LAWS[self.friction.law].constants()
-        return [
-            *_OF_DRIVE,
-            "friction.law",
-            *(f"friction.{name}" for name in constants),
-        ]
+        return [*_OF_DRIVE, "friction.law", *(f"friction.{name}" for name in constants)]
 
     def as_disturbance(self) -> Disturbance:
         """Return the disturbance of the scenario."""

@@ -1,7 +1,7 @@
 """A scenario file read: sections of node name patterns, each with parameters."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -10,6 +10,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios import ros_yaml
 from stickslip_ros.scenarios.parameter import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.scenarios.validation import flattened
 from stickslip_ros.text import did_you_mean, shown
 
 PARAMETERS_KEY = "ros__parameters"
@@ -37,14 +38,23 @@ def read_file(path: Path, namespace: str, *, other_nodes: bool) -> ScenarioFile:
     values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
     other_sections: list[str] = []
     base: str | None = None
+    prefix = namespace.rstrip("/")
     for pattern, parameters in _sections(path):
-        own = section_matches(pattern, f"{namespace.rstrip('/')}/{_SCENARIO}")
+        nodes = [node for node in NODE_PARAMETERS if section_matches(pattern, f"{prefix}/{node}")]
+        own = section_matches(pattern, f"{prefix}/{_SCENARIO}")
         if own and pattern.endswith(f"/{_SCENARIO}"):
             base = _base_of(path, pattern, parameters)
-        elif other_nodes and not _matching(pattern, namespace):
+        elif nodes:
+            _apply(values, path, pattern, parameters, nodes)
+        elif other_nodes:
             other_sections.append(pattern)
         else:
-            _apply(values, path, pattern, parameters, namespace)
+            node = pattern.rpartition("/")[2]
+            every = f"in namespace {namespace} there are {', '.join(NODE_PARAMETERS)}"
+            raise InvalidInputError(
+                f"{path}: section {pattern} matches no node; "
+                + did_you_mean(node, NODE_PARAMETERS.keys() - {node}, every)
+            )
     return ScenarioFile(path, values, other_sections, base)
 
 
@@ -53,11 +63,6 @@ def section_matches(pattern: str, node: str) -> bool:
     tokens = {"**": r"(/\w+)*", "*": r"/\w+"}
     expression = "".join(tokens.get(t, "/" + re.escape(t)) for t in pattern.split("/")[1:])
     return re.fullmatch(expression, node) is not None
-
-
-def _matching(pattern: str, namespace: str) -> list[str]:
-    """Return the nodes in `namespace` to which a section applies."""
-    return [n for n in NODE_PARAMETERS if section_matches(pattern, f"{namespace.rstrip('/')}/{n}")]
 
 
 def _base_of(path: Path, pattern: str, parameters: Mapping[str, Any]) -> str:
@@ -80,20 +85,9 @@ def _apply(
     path: Path,
     pattern: str,
     parameters: Mapping[str, Any],
-    namespace: str,
+    nodes: Sequence[str],
 ) -> None:
-    """Give the parameters of a section to every node that it matches."""
-    nodes = _matching(pattern, namespace)
-    if not nodes:
-        node = pattern.rpartition("/")[2]
-        raise InvalidInputError(
-            f"{path}: section {pattern} matches no node; "
-            + did_you_mean(
-                node,
-                NODE_PARAMETERS.keys() - {node},
-                f"in namespace {namespace} there are {', '.join(NODE_PARAMETERS)}",
-            )
-        )
+    """Give the parameters of a section to the nodes that it matches."""
     known = {node: known_parameters(NODE_PARAMETERS[node]) for node in nodes}
     for name, value in parameters.items():
         takers = [node for node in nodes if len(nodes) == 1 or name in known[node]]
@@ -130,14 +124,6 @@ def _walk(tree: Any, name: str, path: Path) -> Iterator[tuple[str, Mapping[str, 
         if key != PARAMETERS_KEY:
             yield from _walk(below, f"{name}/{str(key).strip('/')}", path)
         elif isinstance(below, dict):
-            yield name, dict(_flatten(cast(dict[Any, Any], below)))
+            yield name, dict(flattened(cast(dict[Any, Any], below)))
         else:
             raise InvalidInputError(f"{path}: {name}: {PARAMETERS_KEY} must be names and values")
-
-
-def _flatten(values: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    for name, value in values.items():
-        if isinstance(value, dict):
-            yield from _flatten(cast(dict[Any, Any], value), f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from math import inf
-from typing import Any, Self
+from typing import Any, Self, cast
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -59,7 +59,8 @@ class ParameterGroup(BaseModel):
 
     def flat(self) -> dict[str, Any]:
         """Return the values by their flat names, as plain Python types."""
-        return dict(_flat(self.model_dump(mode="python")))
+        values = flattened(self.model_dump(mode="python"))
+        return {name: str(value) if isinstance(value, StrEnum) else value for name, value in values}
 
 
 def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str, Any]) -> str:
@@ -77,19 +78,15 @@ def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str
         if parameter.kind is float and parameter.finite:
             allowed = "a finite number"
         value = values.get(name, detail["input"])
-        bounds = parameter.limits if _is_extreme(value) else parameter.bounds
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        extreme = number and (LARGEST < abs(value) < inf or 0 < value < SMALLEST)
+        bounds = parameter.limits if extreme else parameter.bounds
         if bounds:
             allowed = bounds if parameter.choices else f"{allowed} {bounds}"
         unit = f"{'' if bounds else ' in'} {parameter.unit}" if parameter.unit else ""
         text = ", not text" if isinstance(value, str) and parameter.kind is not str else ""
         complaints.append(f"{name} = {shown(value)} is refused: must be {allowed}{unit}{text}")
     return "; ".join(complaints)
-
-
-def _is_extreme(value: Any) -> bool:
-    """Return whether a number is beyond limits that are not told otherwise."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and (LARGEST < abs(value) < inf or 0 < value < SMALLEST)
 
 
 def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -100,9 +97,10 @@ def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
     return nested
 
 
-def _flat(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def flattened(values: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield nested values by their flat names, such as friction.static."""
     for name, value in values.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{name}.")
+        if isinstance(value, dict):
+            yield from flattened(cast(dict[Any, Any], value), f"{prefix}{name}.")
         else:
-            yield prefix + name, str(value) if isinstance(value, StrEnum) else value
+            yield f"{prefix}{name}", value

@@ -57,11 +57,8 @@ class Attractor:
         if (self.regime, self.steady) != (other.regime, other.steady):
             return False
         allowed = 0.02 * (self.amplitude or 0.0)
-        differences = (
-            (self.amplitude or 0.0) - (other.amplitude or 0.0),
-            (self.midpoint or 0.0) - (other.midpoint or 0.0),
-        )
-        return all(abs(difference) <= allowed for difference in differences)
+        pairs = (self.amplitude, other.amplitude), (self.midpoint, other.midpoint)
+        return all(abs((one or 0.0) - (two or 0.0)) <= allowed for one, two in pairs)
 
 
 @dataclass(frozen=True)
@@ -90,11 +87,14 @@ class Basins:
                 counts.append(0)
             counts[place] += 1
         ranked = sorted(range(len(found)), key=lambda place: -counts[place])
-        return cls(
-            tuple(_with_share(found[place], counts[place], sum(counts)) for place in ranked),
-            tuple(ranked.index(place) for place in range(len(found))),
-            tuple(found),
-        )
+        attractors: list[Attractor] = []
+        for place in ranked:
+            share = counts[place] / sum(counts)
+            error = sqrt(share * (1.0 - share) / sum(counts))
+            one = replace(found[place], count=counts[place], share=share, standard_error=error)
+            attractors.append(one)
+        order = tuple(ranked.index(place) for place in range(len(found)))
+        return cls(tuple(attractors), order, tuple(found))
 
     def place(self, point: Point) -> int:
         """Return the place in `attractors` of that which a point has come to."""
@@ -141,9 +141,3 @@ def _place(attractor: Attractor, found: Sequence[Attractor]) -> int:
     """Return the first of those found that is like it, or, without, how many there are."""
     places = (place for place, other in enumerate(found) if other.is_like(attractor))
     return next(places, len(found))
-
-
-def _with_share(attractor: Attractor, count: int, starts: int) -> Attractor:
-    share = count / starts
-    error = sqrt(share * (1.0 - share) / starts)
-    return replace(attractor, count=count, share=share, standard_error=error)

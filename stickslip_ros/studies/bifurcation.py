@@ -37,9 +37,7 @@ class BifurcationDiagram:
 
 
 def bifurcation_diagram(
-    drives: Sequence[Drive],
-    progress: Progress = lambda _: None,
-    course: SettlingCourse = COURSE,
+    drives: Sequence[Drive], progress: Progress = lambda _: None, course: SettlingCourse = COURSE
 ) -> BifurcationDiagram:
     """Return what each drive settles on from rest at X = 0."""
     settler = Settler()

@@ -145,21 +145,18 @@ def write_json(
     """
     study = journal.study
     plan = study.plan
-    values: dict[str, Callable[[Point], Any]] = {}
     how = {name: found for name, found in study.as_dict().items() if name != "scenario"}
     stream.write("{\n")
     for name, value in {**made_of, **how, "parameters": plan.parameters}.items():
         stream.write(f' "{name}": {json.dumps(value, allow_nan=False)},\n')
+    makers: dict[str, Callable[[Point], Any]] = dict(further)
     if isinstance(plan, Grid):
         _write_values(stream, plan)
     else:
-        values["values"] = lambda point: plan.values(point.number)
-    makers = {**values, **further}
+        makers = {"values": lambda point: plan.values(point.number), **further}
     names = [*makers, *COLUMNS]
     with ExitStack() as stack:
-        files: dict[str, TextIO] = {}
-        for name in names:
-            files[name] = stack.enter_context(TemporaryFile("w+"))
+        files = {name: stack.enter_context(TemporaryFile("w+")) for name in names}
         separator = ""
         for point in journal.points():
             cells = [*(make(point) for make in makers.values()), *point.as_json()[1:]]

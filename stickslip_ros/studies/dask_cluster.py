@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Generator
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from stickslip_ros.errors import InvalidInputError, RunError
@@ -30,7 +30,11 @@ def dask_executor(address: str) -> Generator[tuple[Executor, int]]:
         raise InvalidInputError(
             f"{address}: Dask is not installed: pip install 'stickslip_ros[dask]'"
         ) from None
-    with _silent_log():
+    logger = logging.getLogger("distributed")
+    with ExitStack() as stack:
+        # Dask logs, with tracebacks, what is raised here as an error.
+        stack.callback(logger.setLevel, logger.level)
+        logger.setLevel(logging.CRITICAL)
         try:
             client = Client(address, timeout=_TIMEOUT)
         except (OSError, ValueError) as error:
@@ -42,15 +46,3 @@ def dask_executor(address: str) -> Generator[tuple[Executor, int]]:
                 yield client.get_executor(), max(2 * sum(threads.values()), IN_FLIGHT)
             except KilledWorker as error:
                 raise DaskError(f"{address}: {error}") from None
-
-
-@contextmanager
-def _silent_log() -> Generator[None]:
-    """Keep Dask from logging, with tracebacks, what is raised here as an error."""
-    logger = logging.getLogger("distributed")
-    level = logger.level
-    logger.setLevel(logging.CRITICAL)
-    try:
-        yield
-    finally:
-        logger.setLevel(level)

@@ -10,7 +10,6 @@ from math import copysign, inf, isinf, sqrt
 
 from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.measures.cycles import Regime
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.sampled import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import parameter_file
@@ -24,17 +23,6 @@ from stickslip_ros.studies.design_margins import Margins, little_margin, margins
 from stickslip_ros.studies.design_search import CUBIC_SHARES, RESERVE, Candidates, rounded
 from stickslip_ros.studies.design_task import Task
 from stickslip_ros.studies.trial import FILTER_SETTLED, Bench, Vibration
-
-_ATTEMPTS, _RETREAT = 8, 0.8
-"""How often a proposal is tried, and by what factor the next one uses less of what is allowed."""
-
-_LEAST_LIMIT, _LIMIT_SPACING = 1e-3, 1.015
-"""Of the force limit that would do: where its search begins, in that without any limit, and up to
-which ratio it goes on."""
-
-_SLOWEST_DECAY = 0.01
-"""In a natural period, of small deviations, with the force limit that would do: what decays more
-slowly takes too long to be tried, and needs hardly less force."""
 
 _SHARE_OF_VIBRATIONS = 0.1
 """Share of the work, about, that it is to find the vibrations without control."""
@@ -93,24 +81,17 @@ def design(task: Task, progress: Progress = lambda _: None) -> Design:
         vibrations.append(bench.vibration(drive))
         progress(_SHARE_OF_VIBRATIONS * number / len(drives))
         if vibrations[-1].regime is Regime.UNBOUNDED:
-            reason = (
-                "without control the motion runs away at a belt speed of "
-                f"{task.shown(drive.belt_speed, 'm/s')}, so there is no limit cycle to catch it "
-                "from"
-            )
-            return Design(task, remark=reason)
+            speed = task.shown(drive.belt_speed, "m/s")
+            reason = f"without control the motion runs away at a belt speed of {speed}"
+            return Design(task, remark=f"{reason}, so there is no limit cycle to catch it from")
     candidates = Candidates(task, vibrations)
     found = _propose(bench, candidates, progress)
-    if found.controller is not None or isinf(task.force_limit):
-        return found
-    enough = _sufficient_limit(bench, candidates)
-    if enough is None:
-        return found
-    remark = (
-        f"{found.remark}; from a force limit of about {task.shown(enough, 'N')} on there is a "
-        "proposal"
-    )
-    return replace(found, remark=remark)
+    if found.controller is None and not isinf(task.force_limit):
+        enough = _sufficient_limit(bench, candidates)
+        if enough is not None:
+            limit = f"a force limit of about {task.shown(enough, 'N')}"
+            return replace(found, remark=f"{found.remark}; from {limit} on there is a proposal")
+    return found
 
 
 def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Design:
@@ -118,12 +99,18 @@ def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Desi
     task, drives = candidates.task, candidates.task.drives()
     strength, shares = RESERVE, CUBIC_SHARES
     failure: str | None = None
-    for attempt in range(_ATTEMPTS):
+    for attempt in range(8):
         gains = candidates.best(strength, shares)
         if gains is None:
             return Design(task, remark=failure or candidates.why_none())
-        controller = _controller(task, gains)
-
+        waits = FILTER_SETTLED / gains.corner_frequency if gains.linear != 0.0 else 0.0
+        controller = WashoutParameters(
+            corner_frequency=gains.corner_frequency,
+            linear_gain=gains.linear,
+            cubic_gain=gains.cubic,
+            force_limit=task.force_limit,
+            start_after=rounded(waits, digits=2, up=True),
+        )
         left = (1.0 - _SHARE_OF_VIBRATIONS) * 0.5**attempt
 
         def done(share: float, left: float = left) -> None:
@@ -136,8 +123,7 @@ def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Desi
             failure = failure_of(task, checks[-1])
             done(0.5 * len(checks) / len(drives))
         slowest = candidates.slowest(gains)
-        remark, found = candidates.why_zero(), None
-        little: str | None = None
+        remark, found, little = candidates.why_zero(), None, None
         if failure is None and gains.linear != 0.0:
             found = margins(candidates.loops, gains)
             little = little_margin(task, found)
@@ -155,7 +141,7 @@ def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Desi
         elif gains.cubic != 0.0:
             shares = CUBIC_SHARES[:1]
         else:
-            strength *= _RETREAT
+            strength *= 0.8
     return Design(task, remark=failure)
 
 
@@ -177,13 +163,14 @@ def _sufficient_limit(bench: Bench, candidates: "Candidates") -> float | None:
         return gains is not None and limited.slowest(gains).decay_rate(gains) > slowest
 
     def narrowed(does: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
-        low = max(low, _LEAST_LIMIT * high)
-        while high > _LIMIT_SPACING * low:
+        low = max(low, 1e-3 * high)
+        while high > 1.015 * low:
             middle = sqrt(low * high)
             low, high = (low, middle) if does(middle) else (middle, high)
         return low, rounded(high, up=True)
 
-    slowest = _SLOWEST_DECAY / candidates.task.drive.natural_period
+    # What decays more slowly takes too long to be tried, and needs hardly less force.
+    slowest = 0.01 / candidates.task.drive.natural_period
     limit = least = candidates.task.force_limit
     # To try one limit takes longer than to narrow it down in theory.
     enough = candidates.free_peak_force() / RESERVE
@@ -197,14 +184,3 @@ def _sufficient_limit(bench: Bench, candidates: "Candidates") -> float | None:
         return None
     _, enough = narrowed(tried, least, enough)
     return enough if tried(enough) else None
-
-
-def _controller(task: Task, gains: WashoutGains) -> WashoutParameters:
-    waits = FILTER_SETTLED / gains.corner_frequency if gains.linear != 0.0 else 0.0
-    return WashoutParameters(
-        corner_frequency=gains.corner_frequency,
-        linear_gain=gains.linear,
-        cubic_gain=gains.cubic,
-        force_limit=task.force_limit,
-        start_after=rounded(waits, digits=2, up=True),
-    )

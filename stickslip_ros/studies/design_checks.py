@@ -12,9 +12,6 @@ from stickslip_ros.studies.design_search import Candidates
 from stickslip_ros.studies.design_task import Task
 from stickslip_ros.studies.trial import Bench
 
-_THROWN = (3.0, 30.0, 300.0)
-"""Dimensionless speeds from which the slide is to come back."""
-
 
 @dataclass(frozen=True)
 class Check:
@@ -44,22 +41,22 @@ def check_at_speed(
     decay_rate = loop.decay_rate(gains)
     predicted = settling_time(decay_rate)
     assert predicted is not None
-    settling_times: list[float | None] = []
+    slowest: float | None = None
     peaks: list[float] = []
     if vibration.vibrates:
         patience = 5.0 * predicted + 20.0 * loop.drive.natural_period
         for outcome in bench.catch(vibration, controller, 4, patience):
-            settling_times.append(outcome.settling_time)
             peaks.append(outcome.peak_force)
             if outcome.settling_time is None:
+                slowest = None
                 break
-    settled = [time for time in settling_times if time is not None]
+            slowest = max(slowest or 0.0, outcome.settling_time)
     return Check(
         belt_speed=loop.drive.belt_speed,
         vibrates=vibration.vibrates,
         decay_rate=decay_rate,
         predicted_settling_time=predicted,
-        settling_time=max(settled) if settled and len(settled) == len(settling_times) else None,
+        settling_time=slowest,
         predicted_peak_force=vibration.peak_force(gains),
         peak_force=max(peaks, default=None),
     )
@@ -79,11 +76,7 @@ def failure_of(task: Task, check: Check) -> str | None:
 
 
 def throw_from_high_speeds(
-    task: Task,
-    bench: Bench,
-    drives: Sequence[Drive],
-    controller: WashoutParameters,
-    done: Progress,
+    task: Task, bench: Bench, drives: Sequence[Drive], controller: WashoutParameters, done: Progress
 ) -> tuple[str | None, str | None]:
     """Return what is to be said of motions that begin fast, and in what the controller fails."""
 
@@ -93,7 +86,8 @@ def throw_from_high_speeds(
 
     remark: str | None = None
     unlimited = replace(controller, force_limit=inf)
-    throws = [(drive, share * drive.speed_scale) for drive in drives for share in _THROWN]
+    dimensionless = 3.0, 30.0, 300.0
+    throws = [(drive, speed * drive.speed_scale) for drive in drives for speed in dimensionless]
     for number, (drive, speed) in enumerate(throws, 1):
         if escapes(drive, speed, controller):
             slide = (

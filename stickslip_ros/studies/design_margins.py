@@ -11,9 +11,6 @@ from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.physics.theory.sampled import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.studies.design_task import Task
 
-_LITTLE_GAIN, _LITTLE_DELAY = 1.1, 0.02
-"""What is next to no margin: a factor in the linear gain, and a delay in natural periods."""
-
 
 @dataclass(frozen=True)
 class Margins:
@@ -60,11 +57,11 @@ def _delay_margin(loop: LinearSampledLoop, gains: WashoutGains) -> float | None:
 
 def little_margin(task: Task, found: Margins) -> str | None:
     """Return what is to be said of loops that are next to instability; None where none is."""
-    little: list[str] = []
-    if found.gain_down is not None and found.gain_down > 1.0 / _LITTLE_GAIN:
-        little.append(f"{found.gain_down:.3g} times the linear gain is unstable")
-    if found.gain_up is not None and found.gain_up < _LITTLE_GAIN:
-        little.append(f"{found.gain_up:.3g} times the linear gain is unstable")
-    if found.delay is not None and found.delay < _LITTLE_DELAY * task.drive.natural_period:
+    little = [
+        f"{factor:.3g} times the linear gain is unstable"
+        for factor in (found.gain_down, found.gain_up)
+        if factor is not None and 1.0 / 1.1 < factor < 1.1
+    ]
+    if found.delay is not None and found.delay < 0.02 * task.drive.natural_period:
         little.append(f"a further delay of {task.shown(found.delay, 's')} makes it unstable")
     return f"there is next to no margin: {', '.join(little)}" if little else None

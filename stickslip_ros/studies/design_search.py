@@ -16,9 +16,6 @@ from stickslip_ros.studies.design_task import Task
 from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
 from stickslip_ros.studies.trial import Vibration
 
-_CORNER_FREQUENCIES = (0.02, 20.0)
-"""Between which the best is looked for, in natural angular frequencies."""
-
 CUBIC_SHARES = (0.0, 0.125, 0.25, 0.5)
 """Cubic gains that are considered, in the friction law's own cubic coefficient.
 
@@ -28,13 +25,6 @@ control where the vibration is large, so that more linear gain fits under the fo
 
 RESERVE = 0.95
 """Share of what is allowed that the first proposal uses."""
-
-_COARSE, _FINE, _GRIDS, _ZOOM = (25, 41), (9, 9), 5, 0.3
-"""Corner frequencies and gains of the first grid, and of the next ones that close in on the best;
-how many grids in all, and the extent of each in that before."""
-
-_LITTLE_SPEED = 1.05
-"""Factor from the Hopf speed that is next to no margin."""
 
 
 class Candidates:
@@ -57,6 +47,7 @@ class Candidates:
         self._largest_gain = (4.0 + 2.0 * max(map(abs, slopes))) * unit
         self._cubic_coefficient = _cubic_coefficient(task.drive)
         self._peaks: dict[float, float] = {}
+        """By corner frequency, the largest filtered speed of all vibrations, m/s."""
 
     def limited(self, force_limit: float) -> Self:
         """Return those for another force limit, N."""
@@ -107,14 +98,20 @@ class Candidates:
         said = ["nothing vibrates without control at these belt speeds: the gains are zero"]
         if distances:
             nearest = min(distances)
-            little = ", with next to no margin" if nearest < log10(_LITTLE_SPEED) else ""
+            little = ", with next to no margin" if nearest < log10(1.05) else ""
             said.append(distances[nearest] + little)
         return "; ".join(said)
 
     def why_none(self) -> str:
         """Return why no gains are stable at all speeds within the force limit."""
         frequencies = self._corner_frequencies(17).tolist()
-        if not any(map(self._can_be_stable, frequencies)):
+        sets = [[loop.stable_linear_gains(d) for loop in self._extremes] for d in frequencies]
+        if not any(
+            max(one.low, other.low) < min(one.high, other.high)
+            for each in sets
+            for one in each[0]
+            for other in each[-1]
+        ):
             return (
                 "no linear gain makes the equilibrium stable at all these belt speeds, at this "
                 "rate and delay"
@@ -125,24 +122,15 @@ class Candidates:
             "vibration"
         )
 
-    def _can_be_stable(self, corner_frequency: float) -> bool:
-        """Return whether some linear gain is stable at all speeds."""
-        sets = [loop.stable_linear_gains(corner_frequency) for loop in self._extremes]
-        return any(
-            max(one.low, other.low) < min(one.high, other.high)
-            for one in sets[0]
-            for other in sets[-1]
-        )
-
     def _fastest(self, strength: float, cubic: float) -> WashoutGains:
-        """Return the fastest gains: the best of a grid that closes in on them."""
+        """Return the fastest gains: the best of five grids, each around the best of that before."""
         # A softening cubic gain is one beside a negative linear gain.
         limits = np.array(
             [np.log(self._corner_frequencies(2)), [-1.0, 0.0 if cubic > 0.0 else 1.0]]
         )
-        window, counts = limits, _COARSE
+        window, counts = limits, (25, 41)
         best = WashoutGains(0.0, 0.0, 0.0)
-        for _ in range(_GRIDS):
+        for _ in range(5):
             logarithms, shares = (
                 np.linspace(low, high, count)
                 for (low, high), count in zip(window, counts, strict=True)
@@ -154,32 +142,28 @@ class Candidates:
             row, column = np.unravel_index(int(np.argmax(rates)), rates.shape)
             best = WashoutGains(*map(rounded, (corners[row], gains[row, column], cubic)))
             centre = np.array([[logarithms[row]], [shares[column]]])
-            reach = _ZOOM / 2.0 * (window[:, 1:] - window[:, :1])
+            reach = 0.3 / 2.0 * (window[:, 1:] - window[:, :1])
             window = np.clip(centre + reach * [-1.0, 1.0], limits[:, :1], limits[:, 1:])
-            counts = _FINE
+            counts = (9, 9)
         return best
 
     def _corner_frequencies(self, count: int) -> FloatArray:
         """Return corner frequencies (rad/s), up to the rate: a faster filter passes nothing on."""
         omega = self.task.drive.angular_frequency
-        low, high = (share * omega for share in _CORNER_FREQUENCIES)
+        low, high = 0.02 * omega, 20.0 * omega
         return np.geomspace(low, max(min(high, self.task.rate), 2.0 * low), count)
-
-    def _peak(self, corner_frequency: float) -> float:
-        """Return the largest filtered speed, m/s, of all vibrations."""
-        if corner_frequency not in self._peaks:
-            self._peaks[corner_frequency] = max(
-                float(np.abs(vibration.filtered(corner_frequency)).max(initial=0.0))
-                for vibration in self.vibrations
-            )
-        return self._peaks[corner_frequency]
 
     def _largest(self, corner_frequency: float, strength: float, cubic: float) -> float:
         """Return the magnitude of the linear gain that is allowed.
 
         With a softening cubic gain the force k v - k2 v^3 may be largest short of the peak.
         """
-        peak, limit = self._peak(corner_frequency), strength * self.task.force_limit
+        if corner_frequency not in self._peaks:
+            self._peaks[corner_frequency] = max(
+                float(np.abs(vibration.filtered(corner_frequency)).max(initial=0.0))
+                for vibration in self.vibrations
+            )
+        peak, limit = self._peaks[corner_frequency], strength * self.task.force_limit
         gain = limit / peak + cubic * peak**2 if peak > 0.0 else inf
         if gain < 3.0 * cubic * peak**2:
             gain = (6.75 * cubic * limit**2) ** (1.0 / 3.0)

@@ -14,9 +14,6 @@ from stickslip_ros.scenarios.files import Scenario
 OWN_SPEED_RANGE = 0.1
 """Share of a scenario's belt speed by which the range goes below and above it by default."""
 
-_SPEEDS = 5
-"""Belt speeds that are designed for and tried."""
-
 
 @dataclass(frozen=True)
 class Task:
@@ -63,7 +60,7 @@ class Task:
     def drives(self) -> list[Drive]:
         """Return the drive at speeds throughout the range."""
         low, high = self.belt_speeds
-        speeds = np.linspace(low, high, _SPEEDS if low < high else 1)
+        speeds = np.linspace(low, high, 5 if low < high else 1)
         return [replace(self.drive, belt_speed=speed) for speed in speeds.tolist()]
 
     def shown(self, value: float, unit: str) -> str:

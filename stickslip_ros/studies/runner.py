@@ -12,10 +12,10 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager
+from dataclasses import dataclass
 from multiprocessing import active_children, get_context, parent_process
 from os import _exit
 from threading import Thread
-from typing import Self
 
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.studies.journal import Journal
@@ -25,18 +25,11 @@ from stickslip_ros.studies.study import Piece, compute, pieces_of
 IN_FLIGHT = 64
 """Tasks that an executor holds at a time, unless told otherwise: memory is for these only."""
 
-_SECONDS_PER_TASK, _LARGEST_TASK = 0.25, 1000
-"""What a task takes, about, and how many points it has at most."""
+_LARGEST_TASK = 1000
+"""Points of a task, at most."""
 
 _SCANNED = 100_000
 """Points that are looked at, at most, before those missing among them are begun."""
-
-_TASKS_PER_WORKER = 16
-"""That a study is cut into at least, so that workers end at about the same time."""
-
-_DEATHS = 3
-"""So often in a row may workers die without a piece having been done."""
-
 
 CountPoints = Callable[[int], None]
 """Takes how many points are done."""
@@ -65,21 +58,23 @@ def run(
     study = journal.study
     size = _task_size(journal, 1 if executor is None else in_flight)
     progress(journal.count)
-    chains = (_Chain(points, size, start) for points, start in _missing(journal))
+    chains = (_Chain(pieces_of(points, size), start) for points, start in _missing(journal))
     if executor is None:
         for chain in chains:
-            for points in chain:
+            for points in chain.pieces:
                 chain.start = _record(journal, compute(study, points, chain.start), progress)
         return
     waiting: dict[Future[Piece], _Chain] = {}
 
-    def submit(chain: "_Chain") -> bool:
-        points = next(chain, None)
+    def submit(chain: "_Chain") -> None:
+        points = next(chain.pieces, None)
         if points is not None:
             waiting[executor.submit(compute, study, points, chain.start)] = chain
-        return points is not None
 
-    parallel = _parallel(chains, carried=study.plan.carried)
+    if study.plan.carried:
+        parallel = chains
+    else:  # each piece may be begun at once
+        parallel = (_Chain(iter((piece,)), None) for chain in chains for piece in chain.pieces)
     try:
         while True:
             while len(waiting) < in_flight and (chain := next(parallel, None)) is not None:
@@ -121,7 +116,7 @@ def run_here(journal: Journal, workers: int, progress: CountPoints = lambda _: N
                 run(journal, pool, in_flight=2 * workers, progress=progress)
         except WorkersDiedError:
             deaths = 1 if journal.count > before else deaths + 1
-            if deaths == _DEATHS:
+            if deaths == 3:
                 raise RunError(
                     f"worker processes were killed {deaths} times without getting anywhere, "
                     f"{journal.count} of {journal.study.plan.size} points being done: is memory "
@@ -144,7 +139,7 @@ def local_processes(workers: int) -> Generator[ProcessPoolExecutor]:
         unblocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             for _ in range(workers):
-                pool.submit(_stand_ready)
+                pool.submit(bool)  # it does nothing, in a process that begins for it
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, unblocked)
         yield pool
@@ -155,10 +150,6 @@ def local_processes(workers: int) -> Generator[ProcessPoolExecutor]:
         raise
     else:
         pool.shutdown()
-
-
-def _stand_ready() -> None:
-    """Do nothing, in a process that begins for it."""
 
 
 def _begin_worker() -> None:
@@ -172,29 +163,13 @@ def _end_with_parent() -> None:
     _exit(1)
 
 
+@dataclass
 class _Chain:
-    """Pieces that are computed one after the other; an iterator of them."""
+    """Pieces that are computed one after the other."""
 
-    def __init__(self, points: range, size: int, start: MotionState | None) -> None:
-        self.start = start
-        """Where the next piece begins."""
-        self._pieces = pieces_of(points, size)
-
-    def __iter__(self) -> Self:
-        return self
-
-    def __next__(self) -> range:
-        return next(self._pieces)
-
-
-def _parallel(chains: Iterator[_Chain], *, carried: bool) -> Iterator[_Chain]:
-    """Yield a chain for every piece that may be begun now, which is all unless carried on."""
-    for chain in chains:
-        if carried:
-            yield chain
-        else:
-            for piece in chain:
-                yield _Chain(piece, len(piece), None)
+    pieces: Iterator[range]
+    start: MotionState | None
+    """Where the next piece begins."""
 
 
 def _missing(journal: Journal) -> Iterator[tuple[range, MotionState | None]]:
@@ -221,7 +196,8 @@ def _record(journal: Journal, piece: Piece, progress: CountPoints) -> MotionStat
 
 
 def _task_size(journal: Journal, in_flight: int) -> int:
-    size = min(int(_SECONDS_PER_TASK / journal.study.cost()), _LARGEST_TASK)
+    size = min(int(0.25 / journal.study.cost()), _LARGEST_TASK)  # tasks of 0.25 s, about
     if in_flight > 1 and not journal.study.plan.carried:
-        size = min(size, journal.study.plan.size // (_TASKS_PER_WORKER * in_flight // 2))
+        # 16 tasks for each worker, at least, so that they end at about the same time.
+        size = min(size, journal.study.plan.size // (16 * in_flight // 2))
     return max(size, 1)

@@ -26,13 +26,6 @@ _RESTS = (Regime.EQUILIBRIUM, Regime.STUCK)
 LONGEST = 1e6
 """Natural periods or cycles that a motion is followed for at most."""
 
-_LONGEST_LOADING = 50.0
-"""Natural periods beyond which a slow belt's loading of the spring is not waited for under control:
-without, the slide rides it in one step."""
-
-_TWICE_THE_SAME = 1e-4
-"""Share by which the amplitude may differ from that of one transient before."""
-
 
 @dataclass(frozen=True)
 class MotionState:
@@ -58,18 +51,13 @@ class SettlingCourse:
     measured twice the same: near an unstable cycle it may seem steady for a while."""
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.transient <= LONGEST:
-            raise InvalidInputError(
-                f"a transient of {self.transient:g} natural periods: must be from 0 to {LONGEST:g}"
-            )
-        if not 1 <= self.cycles <= LONGEST:
-            raise InvalidInputError(
-                f"{self.cycles} cycles to measure: must be from 1 to {LONGEST:g}"
-            )
-        if not 1 <= self.patience <= LONGEST:
-            raise InvalidInputError(
-                f"a patience of {self.patience} transients: must be from 1 to {LONGEST:g}"
-            )
+        for shown, value, least in (
+            (f"a transient of {self.transient:g} natural periods", self.transient, 0),
+            (f"{self.cycles} cycles to measure", self.cycles, 1),
+            (f"a patience of {self.patience} transients", self.patience, 1),
+        ):
+            if not least <= value <= LONGEST:
+                raise InvalidInputError(f"{shown}: must be from {least} to {LONGEST:g}")
 
 
 @dataclass(frozen=True)
@@ -151,14 +139,17 @@ class Settler:
         """
         drive, washout = case.drive, case.washout
         continuous = washout is not None and case.sampled is None
-        motion = self._motion(drive, continuous)
+        motion = self._motions.get(continuous)
+        if motion is None:
+            motion = Motion(drive, 0.0, 0.0, continuous_control=continuous, record=True)
+            self._motions[continuous] = motion
         motion.recording = False
         motion.begin(drive, start.position, start.velocity)
         loading = 0.0 if drive.belt_speed == 0.0 else loading_time(drive)
         transient = course.transient * drive.natural_period
         controlled = washout is not None or case.sampled is not None
-        if controlled:
-            loading = min(loading, _LONGEST_LOADING * drive.natural_period)
+        if controlled:  # without, the slide rides a slow belt in one step
+            loading = min(loading, 50.0 * drive.natural_period)
             transient += loading
         # One cycle is under way when it begins, and one when it ends.
         cycles = max(course.cycles, LEAST_CYCLES) + 2
@@ -212,13 +203,6 @@ class Settler:
             low_passed = law.low_passed
         return section.settled(MotionState(motion.position, motion.velocity, low_passed))
 
-    def _motion(self, drive: Drive, continuous: bool) -> Motion:
-        if continuous not in self._motions:
-            self._motions[continuous] = Motion(
-                drive, 0.0, 0.0, continuous_control=continuous, record=True
-            )
-        return self._motions[continuous]
-
 
 def _begin_control(motion: Motion, washout: WashoutParameters, start: MotionState) -> None:
     """Let the filter run for `start_after`, and the controller act from then on."""
@@ -241,11 +225,10 @@ def _is_settled(measures: Measures) -> bool:
 
 def _alike(before: Measures, after: Measures) -> bool:
     """Return whether regime and amplitude are the same."""
-    if before.regime is not after.regime or after.regime not in CYCLES:
+    one, other = before.amplitude, after.amplitude
+    if before.regime is not after.regime or one is None or other is None:
         return before.regime is after.regime
-    assert before.amplitude is not None
-    assert after.amplitude is not None
-    return abs(after.amplitude - before.amplitude) <= _TWICE_THE_SAME * after.amplitude
+    return after.regime not in CYCLES or abs(other - one) <= 1e-4 * other
 
 
 class _Section:

@@ -31,9 +31,6 @@ Notes = dict[str, str]
 
 _NO_CONTROL = "the scenario has no controller"
 
-_BALANCE = 1e-12
-"""Slope of the friction less the damping, dimensionless, that is rounding."""
-
 _SAMPLED_LOOP = (
     "spectral_radius",
     "stable",
@@ -42,10 +39,6 @@ _SAMPLED_LOOP = (
     "critical_linear_gain",
     "stable_linear_gains",
 )
-
-_MAP_RATES, _MAP_DELAY, _MAP_DELAYS = (0.1, 0.3, 1.0), 0.2, 41
-"""Of the critical gain: rates, in the scenario's, the longest delay, in natural periods, and how
-many delays."""
 
 
 def stability(scenario: Scenario) -> tuple[Section, Notes]:
@@ -117,7 +110,7 @@ def _open_loop(drive: Drive, expansion: Expansion | None, notes: Notes) -> Secti
 def _why_no_hopf_speed(drive: Drive) -> str:
     moving = expand(replace(drive, belt_speed=drive.belt_speed or drive.speed_scale))
     assert moving is not None
-    if abs(moving.jacobian[SPEED, SPEED]) < _BALANCE:
+    if abs(moving.jacobian[SPEED, SPEED]) < 1e-12:  # that is rounding
         return "the slope of the friction and the damping balance: the equilibrium is neutral"
     return (
         "the slope of the friction and the damping balance at no belt speed; the equilibrium is "
@@ -136,12 +129,10 @@ def _hopf_points(points: list[HopfPoint]) -> Section:
 
 def _sticking(drive: Drive, notes: Notes) -> Section:
     onset = sticking_onset(drive)
-    for name, reason in (
-        ("onset_speed_approximate", onset.no_approximate),
-        ("onset_speed", onset.no_exact),
-    ):
-        if reason is not None:
-            notes[f"sticking.{name}"] = reason
+    if onset.no_approximate is not None:
+        notes["sticking.onset_speed_approximate"] = onset.no_approximate
+    if onset.no_exact is not None:
+        notes["sticking.onset_speed"] = onset.no_exact
     lowest, highest = onset.followed
     if not onset.ranges:
         notes["sticking.speed_ranges"] = (
@@ -179,7 +170,10 @@ def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Sect
         notes["closed_loop.hopf_speeds"] = (
             "at no belt speed does a pair of eigenvalues cross the imaginary axis with these gains"
         )
-    cycles = _closed_loop_cycles(drive, gains)
+    possible = limit_cycle_from_hopf(drive, gains), limit_cycle_of_run(drive, 0.0, gains=gains)
+    cycles = [cycle for cycle in possible if cycle is not None]
+    if len(cycles) > 1 and isclose(cycles[0].position, cycles[1].position, rel_tol=1e-6):
+        cycles.pop()
     if not cycles:
         notes["closed_loop.limit_cycles"] = (
             "none found from rest at zero displacement, nor from the Hopf point at the critical "
@@ -191,15 +185,6 @@ def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Sect
         **_hopf_points(points),
         "limit_cycles": [_cycle(cycle) for cycle in cycles],
     }
-
-
-def _closed_loop_cycles(drive: Drive, gains: WashoutGains) -> list[LimitCycle]:
-    """Return the limit cycles that can be come by, each once, the smallest first."""
-    cycles = [limit_cycle_from_hopf(drive, gains), limit_cycle_of_run(drive, 0.0, gains=gains)]
-    found = [cycle for cycle in cycles if cycle is not None]
-    if len(found) > 1 and isclose(found[0].position, found[1].position, rel_tol=1e-6):
-        found.pop()
-    return found
 
 
 def _why_no_gain(drive: Drive, gains: WashoutGains) -> str:
@@ -306,8 +291,8 @@ def stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]
     drive, gains = plant.as_drive(), scenario.washout_controller.as_washout().gains
     loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay)
     assert loop is not None
-    rates = plant.rate * np.array(_MAP_RATES)
-    latest = min(_MAP_DELAY * drive.natural_period, LONGEST_DELAY / rates.max())
-    delays = np.linspace(0.0, latest, _MAP_DELAYS)
+    rates = plant.rate * np.array((0.1, 0.3, 1.0))
+    latest = min(0.2 * drive.natural_period, LONGEST_DELAY / rates.max())
+    delays = np.linspace(0.0, latest, 41)
     curves = CriticalGainCurves.over(drive, gains.corner_frequency, rates, delays)
     return StabilityMap.around(loop, gains), curves

@@ -1,6 +1,7 @@
 """A study: many points of one scenario, each followed from its start to what it settles on."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, replace
 from threading import local
 from typing import Any, NamedTuple, Self
@@ -12,7 +13,6 @@ from stickslip_ros.studies.plan import Plan
 from stickslip_ros.studies.settled import (
     ControlledDrive,
     MotionState,
-    Settled,
     Settler,
     SettlingCourse,
 )
@@ -93,34 +93,28 @@ class Study:
 
     def check(self) -> None:
         """Raise InvalidInputError if no corner of the plan, nor its middle, can be."""
-        refused: StickslipError | None = None
+        refusals: list[StickslipError] = []
         for index in (*self.plan.corners(), self.plan.size // 2):
             try:
                 self.case(index)
             except StickslipError as error:
-                refused = refused or error
+                refusals.append(error)
             else:
                 return
-        if refused is not None:
-            raise refused
+        raise refusals[0]
 
     def cost(self) -> float:
         """Return how long a point takes, about, s."""
-        case, _ = self._middle()
+        for index in (self.plan.size // 2, 0, self.plan.size - 1):
+            with suppress(StickslipError):
+                case, _ = self.case(index)
+                break
+        else:
+            case = ControlledDrive.from_scenario(self.scenario, continuous=self.continuous)
         periods = self.course.transient + self.course.cycles + 2
         if case.sampled is None:
             return periods * 2e-5
         return periods * case.drive.natural_period * case.sampled.rate * 1e-5
-
-    def _middle(self) -> tuple[ControlledDrive, MotionState]:
-        for index in (self.plan.size // 2, 0, self.plan.size - 1):
-            try:
-                return self.case(index)
-            except StickslipError:
-                continue
-        return ControlledDrive.from_scenario(
-            self.scenario, continuous=self.continuous
-        ), MotionState(0.0, 0.0)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what the result depends on, ready for JSON."""
@@ -160,6 +154,7 @@ def compute(study: Study, points: Sequence[int], start: MotionState | None) -> P
 def _compute_point(
     study: Study, index: int, start: MotionState | None
 ) -> tuple[Point, MotionState | None]:
+    """Return what becomes of a point, and where the next one of a chain begins."""
     try:
         case, initial = study.case(index)
         if start is not None and case.washout is not None:
@@ -169,30 +164,18 @@ def _compute_point(
         _SETTLERS.settler = Settler()
         nothing = Measures(None, None, None, None, None, None, 0, None)
         return Point(index, nothing, False, (), " ".join(str(error).split())), None
-    point = Point(
-        index,
-        replace(settled.measures, steady=None, trend=None),
-        settled.steady,
-        tuple(settled.turning_points.tolist()),
-        _REASONS.get(settled.measures.regime),
-    )
-    return point, _carried_on(settled, case)
-
-
-def _carried_on(settled: Settled, case: ControlledDrive) -> MotionState | None:
-    """Return where the next point of a chain begins."""
-    end, regime = settled.end, settled.measures.regime
-    if regime is Regime.UNBOUNDED:
-        return None
-    if regime is Regime.EQUILIBRIUM:
-        return replace(end, velocity=end.velocity - _NUDGE * case.drive.belt_speed)
-    return end
-
-
-_REASONS: dict[Regime | None, str] = {
-    Regime.UNBOUNDED: "the motion runs away",
-    None: "no whole cycle in the time that is measured",
-}
+    measures, end, reason = replace(settled.measures, steady=None, trend=None), settled.end, None
+    match measures.regime:
+        case Regime.UNBOUNDED:
+            end, reason = None, "the motion runs away"
+        case Regime.EQUILIBRIUM:
+            end = replace(end, velocity=end.velocity - _NUDGE * case.drive.belt_speed)
+        case None:
+            reason = "no whole cycle in the time that is measured"
+        case _:
+            pass
+    turning_points = tuple(settled.turning_points.tolist())
+    return Point(index, measures, settled.steady, turning_points, reason), end
 
 
 def pieces_of(points: range, size: int) -> Iterator[range]:

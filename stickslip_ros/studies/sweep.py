@@ -8,8 +8,6 @@ from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.settled import SettlingCourse
 from stickslip_ros.studies.study import Study
 
-MOST_AXES = 2
-
 
 def sweep_study(
     scenario: Scenario,
@@ -25,7 +23,7 @@ def sweep_study(
     is sampled as between the nodes, or `continuous` (eq. 19); without control it is
     `plant.expects_control` that is false. Raises InvalidInputError for what cannot be.
     """
-    if not 1 <= len(axes) <= MOST_AXES:
+    if not 1 <= len(axes) <= 2:
         raise InvalidInputError(f"{len(axes)} parameters: a sweep is over one or two")
     without = [axis for axis in axes if axis.parameter.startswith("washout_controller.")]
     if without and not scenario.plant.expects_control:

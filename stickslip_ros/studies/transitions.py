@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from math import nan, tanh
 
@@ -17,6 +18,8 @@ from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.settled import ControlledDrive
 from stickslip_ros.studies.study import Study
 
+_Margin = Callable[[ControlledDrive], float]
+
 HOPF_POINT = "Hopf point"
 
 STABILITY_LIMIT = "limit of stability"
@@ -24,9 +27,6 @@ STABILITY_LIMIT = "limit of stability"
 
 STICKING_LIMIT = "limit of sticking"
 """An end of a range in which a slide that stuck sticks again; there may be several ranges."""
-
-_SCANNED = 201
-"""Values of an axis between which sign changes are looked for."""
 
 _MAPPED = 50
 """Values of each of two axes for which there are margins."""
@@ -87,13 +87,10 @@ def transitions(study: Study, axis: Axis) -> dict[str, list[float]]:
     All else is as in the study's scenario. Two closer than a two-hundredth of the axis may be
     overlooked.
     """
-    values = replace(axis, count=_SCANNED).values().tolist()
+    values = replace(axis, count=201).values().tolist()
     found: dict[str, list[float]] = {}
     for name, margin in _margins(study).items():
-
-        def at(value: float, margin: Callable[[ControlledDrive], float] = margin) -> float:
-            return _at(study, {axis.parameter: value}, margin)
-
+        at = partial(_at, study, [axis.parameter], margin)
         if places := list(sign_changes(at, values)):
             found[name] = places
     return found
@@ -103,18 +100,15 @@ def transition_map(study: Study, axes: tuple[Axis, Axis]) -> TransitionMap:
     """Return the margins over two axes of those transitions of which theory has a say."""
     first, second = (replace(axis, count=_MAPPED).values() for axis in axes)
     names = [axis.parameter for axis in axes]
-    places = [dict(zip(names, (one, two), strict=True)) for one in first for two in second]
     margins: dict[str, FloatArray] = {}
     for name, margin in _margins(study, coarse=True).items():
-        found = np.array([_at(study, place, margin) for place in places])
+        found = np.array([[_at(study, names, margin, x, y) for y in second] for x in first])
         if not np.isnan(found).all():
-            margins[name] = found.reshape(len(first), len(second))
+            margins[name] = found
     return TransitionMap(first, second, margins)
 
 
-def _margins(
-    study: Study, *, coarse: bool = False
-) -> dict[str, Callable[[ControlledDrive], float]]:
+def _margins(study: Study, *, coarse: bool = False) -> dict[str, _Margin]:
     release = Release()
     sampled = study.scenario.plant.expects_control and not study.continuous
     return {
@@ -123,14 +117,10 @@ def _margins(
     }
 
 
-def _at(
-    study: Study, values: Mapping[str, float], margin: Callable[[ControlledDrive], float]
-) -> float:
+def _at(study: Study, parameters: Sequence[str], margin: _Margin, *values: float) -> float:
     """Return the margin where parameters have these values; NaN where they cannot, or it cannot."""
     try:
-        case = ControlledDrive.from_scenario(
-            study.scenario.changed(values), continuous=study.continuous
-        )
-        return margin(case)
+        scenario = study.scenario.changed(dict(zip(parameters, values, strict=True)))
+        return margin(ControlledDrive.from_scenario(scenario, continuous=study.continuous))
     except (StickslipError, ArithmeticError, np.linalg.LinAlgError):
         return nan

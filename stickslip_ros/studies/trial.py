@@ -20,14 +20,6 @@ from stickslip_ros.physics.theory.returns import loading_time, release_position
 from stickslip_ros.physics.theory.sampled import SETTLED
 from stickslip_ros.stamps import NANOSECONDS
 
-_TRANSIENTS, _TRANSIENT_PERIODS, _STEADY = 6, 300, 1e-4
-"""How often at most a vibration is given so many natural periods until its amplitude changes no
-more than by this share in them."""
-
-_MEASURED_CYCLES, _RECORDED_CYCLES, _NEARLY = 10, 12, 1e-4
-"""How many cycles a vibration is measured over, and at most recorded over; and the share by which
-the samples recorded may differ from whole cycles."""
-
 FILTER_SETTLED = 5.0
 """Time after which the washout filter has forgotten its start, in 1/d."""
 
@@ -117,15 +109,19 @@ class Bench:
         # On a slow belt a cycle is mostly the time in which the belt loads the spring.
         loading = loading_time(drive)
         found, before = self._measured(loading), inf
-        for _ in range(_TRANSIENTS):
+        for _ in range(6):
             amplitude = found.velocity_amplitude
-            if found.period is None or amplitude is None or abs(amplitude / before - 1.0) < _STEADY:
+            if found.period is None or amplitude is None or abs(amplitude / before - 1.0) < 1e-4:
                 break
-            motion.advance(_TRANSIENT_PERIODS * drive.natural_period)
+            motion.advance(300 * drive.natural_period)
             found, before = self._measured(loading), amplitude
         if found.period is None:
             return Vibration(drive, self._rate, found.regime, None, np.empty(0), np.empty(0))
-        samples = _whole_cycles(found.period * self._rate)
+        # The samples of the fewest cycles that have nearly a whole number, or some most nearly.
+        lengths = np.arange(1, 13) * (found.period * self._rate)
+        counts = np.maximum(np.rint(lengths), 1.0)
+        misses = np.abs(counts / lengths - 1.0)
+        samples = int(counts[np.argmax(misses <= max(1e-4, misses.min()))])
         states: list[tuple[float, float]] = []
         for _ in range(samples):
             states.append((motion.position, motion.velocity))
@@ -135,11 +131,11 @@ class Bench:
         return Vibration(drive, self._rate, found.regime, found.period, position, velocity)
 
     def _measured(self, loading: float) -> Measures:
-        """Go on for some cycles, each with `loading` (s) besides its slip, and measure them."""
+        """Measure the next ten cycles, each with `loading` (s) besides its slip."""
         motion = self._recording
         motion.take_breakpoints()
-        motion.advance((_MEASURED_CYCLES + 2) * (motion.drive.natural_period + loading))
-        meter = CycleMeter(_MEASURED_CYCLES)
+        motion.advance((10 + 2) * (motion.drive.natural_period + loading))
+        meter = CycleMeter(10)
         meter.feed(motion.take_breakpoints(), motion.drive.belt_speed)
         if motion.unbounded:
             meter.report_run_away()
@@ -228,12 +224,3 @@ class Bench:
             last / self._rate if settled else None,
             loop.unbounded or (not settled and recent >= size),
         )
-
-
-def _whole_cycles(samples_per_cycle: float) -> int:
-    """Return the number of samples that the fewest cycles have nearly, or some most nearly."""
-    cycles = np.arange(1, _RECORDED_CYCLES + 1)
-    counts = np.maximum(np.rint(cycles * samples_per_cycle), 1.0)
-    misses = np.abs(counts / (cycles * samples_per_cycle) - 1.0)
-    near = misses <= max(_NEARLY, misses.min())
-    return int(counts[int(np.argmax(near))])
