@@ -29,7 +29,7 @@ from stickslip_ros.studies.columns import write_csv
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.runner import run_here
-from stickslip_ros.studies.settled import SettlingCourse
+from stickslip_ros.studies.settling import SettlingCourse
 from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.sweep import sweep_study
 

@@ -17,7 +17,7 @@ from api import PUBLIC, reference
 from stickslip_ros.messages.topics import TOPICS
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.scenarios.parameter import Parameter, parameters_of
+from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters, ReplayParameters
 from stickslip_ros.studies.stability import stability
 

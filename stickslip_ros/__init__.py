@@ -5,6 +5,6 @@ from stickslip_ros.interrupts import NODE_SCRIPTS, end_quietly_if_interrupted, i
 if is_run(__name__, "stickslip", *NODE_SCRIPTS):
     end_quietly_if_interrupted()
 
-from stickslip_ros.moved import find_moved_modules  # what takes time comes second
+from stickslip_ros.deprecated_names import find_moved_modules  # what takes time comes second
 
 find_moved_modules()

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, Table
-from stickslip_ros.moved import Renamed
+from stickslip_ros.deprecated_names import Renamed
 
 LARGEST = 1e100
 """Magnitude up to which positions (m) and speeds (m/s) are believed, and nothing overflows."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from velocity_feedback import VelocityFeedback
 
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.controller_comparison import ControlledRun, comparison_figure
 from stickslip_ros.plots.style import save
 from stickslip_ros.testing import ClosedLoop, RunResult

@@ -16,7 +16,7 @@ from stickslip_ros.scenarios.files import (
     Scenario,
     load_scenario,
 )
-from stickslip_ros.scenarios.parameter import known_parameters
+from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.text import printable, shown
 from stickslip_ros.versions import versions

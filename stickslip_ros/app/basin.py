@@ -16,7 +16,7 @@ from stickslip_ros.app.arguments import (
 from stickslip_ros.app.output import print_table
 from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.basin import (

@@ -2,7 +2,7 @@
 
 import sys
 
-from stickslip_ros.app.optional import loading_ros
+from stickslip_ros.app.optional_dependencies import loading_ros
 from stickslip_ros.app.output import print_figures
 from stickslip_ros.app.run import default_bag, record
 from stickslip_ros.bags import Recording

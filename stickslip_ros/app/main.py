@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from stickslip_ros.app import INTERRUPTED
-from stickslip_ros.app.optional import interrupts_kept
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.interrupts import raise_interrupts
-from stickslip_ros.streams import nowhere, open_closed_streams
+from stickslip_ros.standard_streams import nowhere, open_closed_streams
 from stickslip_ros.text import did_you_mean
 from stickslip_ros.versions import versions
 

@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table
 from rich.text import Text
 
-from stickslip_ros.physics.measures.cycles import Regime, with_trend
+from stickslip_ros.physics.measures.cycle_measures import Regime, with_trend
 from stickslip_ros.plots.units import NOISE, SI, Units
 from stickslip_ros.text import printable
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.arguments import add_network, seconds
-from stickslip_ros.app.optional import loading_ros
+from stickslip_ros.app.optional_dependencies import loading_ros
 from stickslip_ros.app.output import progress_bar
 from stickslip_ros.text import printable
 

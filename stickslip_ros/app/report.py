@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from stickslip_ros.app.arguments import add_json, add_plot, check_picture, seconds, write_picture
-from stickslip_ros.app.no_cycle import why_no_cycle
 from stickslip_ros.app.output import print_figures, print_json
+from stickslip_ros.app.why_no_cycle import why_no_cycle
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycles import Measures
+from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.parameter import known_parameters
+from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.text import printable
 from stickslip_ros.versions import versions

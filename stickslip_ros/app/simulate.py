@@ -15,14 +15,14 @@ from stickslip_ros.app.arguments import (
     seconds,
     write_picture,
 )
-from stickslip_ros.app.no_cycle import why_no_cycle
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
-from stickslip_ros.physics.measures.cycles import Measures
+from stickslip_ros.app.why_no_cycle import why_no_cycle
+from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.physics.model.disturbance import DisturbanceKind
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.settled import check_continuous
+from stickslip_ros.studies.settling import check_continuous
 from stickslip_ros.studies.simulate import simulate
 
 HELP = "run a scenario without ROS and measure its motion"

@@ -16,7 +16,7 @@ from stickslip_ros.studies.columns import ExtraColumns, write_csv, write_json
 from stickslip_ros.studies.dask_cluster import DaskError, dask_executor
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.runner import run, run_here
-from stickslip_ros.studies.settled import SettlingCourse
+from stickslip_ros.studies.settling import SettlingCourse
 from stickslip_ros.studies.study import Study
 
 _TABLES = (".csv", ".json")

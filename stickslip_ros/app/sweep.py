@@ -17,12 +17,12 @@ from stickslip_ros.app.arguments import (
 from stickslip_ros.app.output import print_table
 from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.units import Units
 from stickslip_ros.studies.columns import Columns, ExtraColumns
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settled import SettlingCourse
+from stickslip_ros.studies.settling import SettlingCourse
 from stickslip_ros.studies.study import Point
 from stickslip_ros.studies.sweep import sweep_study
 from stickslip_ros.studies.transitions import transitions

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.bags.compression import ZSTD_MAGIC, unpack_message
-from stickslip_ros.bags.records import HEAD, DamageError, records_in
+from stickslip_ros.bags.mcap_records import HEAD, DamageError, records_in
 from stickslip_ros.messages.cdr import joined
 
 _MESSAGE = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")

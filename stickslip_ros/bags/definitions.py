@@ -4,7 +4,7 @@ import json
 import re
 
 from stickslip_ros.errors import BagError
-from stickslip_ros.installed import prefixes
+from stickslip_ros.installed_packages import prefixes
 
 _TYPE_NAME = re.compile(r"(\w+)/msg/(\w+)", re.ASCII)
 _FIELD_TYPE = re.compile(r"\s*([A-Za-z][\w/]*)", re.ASCII)

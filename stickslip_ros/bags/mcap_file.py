@@ -42,7 +42,7 @@ from stickslip_ros.bags.chunk import (
     open_chunk,
 )
 from stickslip_ros.bags.compression import LARGEST, unpack
-from stickslip_ros.bags.records import FIELDS, HEAD, DamageError, ParsedT, parse, records_in
+from stickslip_ros.bags.mcap_records import FIELDS, HEAD, DamageError, ParsedT, parse, records_in
 from stickslip_ros.errors import BagError
 
 DefinitionT = TypeVar("DefinitionT", Schema, Channel)

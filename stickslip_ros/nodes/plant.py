@@ -23,8 +23,8 @@ from stickslip_ros.messages.topics import (
 from stickslip_ros.nodes.base.duplicate_publishers import duplicate_publishers
 from stickslip_ros.nodes.base.managed import ERROR, OK, Diagnosis, ManagedNode, diagnosis
 from stickslip_ros.nodes.base.process import run_node
+from stickslip_ros.nodes.lateness_warning import Punctuality
 from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer
-from stickslip_ros.nodes.punctuality import Punctuality
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, Verdict
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.samples import Sample

@@ -19,7 +19,7 @@ from std_srvs.srv import Trigger
 from stickslip_ros.messages.topics import CLOCK, JOINT_STATES, RECORDED
 from stickslip_ros.nodes.base.managed import ERROR, OK, WARN, Diagnosis, ManagedNode
 from stickslip_ros.nodes.base.process import run_node
-from stickslip_ros.nodes.base.qos import message_class
+from stickslip_ros.nodes.base.ros_topics import message_class
 from stickslip_ros.nodes.pacing import FlowWindow
 from stickslip_ros.nodes.replaying.player import Message, Player
 from stickslip_ros.nodes.replaying.selection import Selection

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from stickslip_ros.paper.figures import BifurcationFigure, bifurcation_drive
 from stickslip_ros.physics.theory.sticking import Release
-from stickslip_ros.studies.settled import ControlledDrive
+from stickslip_ros.studies.settling import ControlledDrive
 from stickslip_ros.studies.transitions import (
     HOPF_POINT,
     STICKING_LIMIT,

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.cycles import Measures, with_trend
+from stickslip_ros.physics.measures.cycle_measures import Measures, with_trend
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.decimation import intervals, peaks
 from stickslip_ros.plots.regimes import REGIMES

@@ -8,7 +8,7 @@ from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum
 
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
-from stickslip_ros.nodes.base.qos import mismatch, qos_profile
+from stickslip_ros.nodes.base.ros_topics import mismatch, qos_profile
 
 DASHBOARD = "dashboard"
 """Name of a node that reads joint_states and yet is meant to be no controller."""

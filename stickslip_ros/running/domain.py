@@ -13,7 +13,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from stickslip_ros.errors import RunError
-from stickslip_ros.nodes.base.machine import FIRST_PROCESS, is_free, port
+from stickslip_ros.nodes.base.machine_check import FIRST_PROCESS, is_free, port
 from stickslip_ros.nodes.base.network import this_machine_only
 from stickslip_ros.nodes.base.process import initialise
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any, Self
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.installed import prefixes
+from stickslip_ros.installed_packages import prefixes
 from stickslip_ros.scenarios import ros_yaml
-from stickslip_ros.scenarios.parameter import known_parameters
+from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import (
     NODE_PARAMETERS,
     AnalyzerParameters,

@@ -19,7 +19,7 @@ from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
 from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.scenarios.parameter import SMALLEST, Fixed, field
+from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field
 from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import shown
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, cast
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios import ros_yaml
-from stickslip_ros.scenarios.parameter import known_parameters
+from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.scenarios.validation import flattened
 from stickslip_ros.text import did_you_mean, shown

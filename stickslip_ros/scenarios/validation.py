@@ -8,7 +8,7 @@ from typing import Any, Self, cast
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.scenarios.parameter import LARGEST, SMALLEST, known_parameters
+from stickslip_ros.scenarios.parameter_field import LARGEST, SMALLEST, known_parameters
 from stickslip_ros.text import did_you_mean, shown
 
 _KIND_NAMES = {

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Self
 
+from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.moved import Renamed
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.plan import Axis, Plan
-from stickslip_ros.studies.settled import CYCLES, SettlingCourse
+from stickslip_ros.studies.settling import CYCLES, SettlingCourse
 from stickslip_ros.studies.study import Point, Study
 
 POSITION, VELOCITY = "plant.initial.position", "plant.initial.velocity"

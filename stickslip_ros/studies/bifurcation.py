@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.cycles import Measures
+from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.progress import Progress
-from stickslip_ros.studies.settled import (
+from stickslip_ros.studies.settling import (
     ControlledDrive,
     MotionState,
     Settled,

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.moved import Renamed
+from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Grid, Plan
 from stickslip_ros.studies.runner import IN_FLIGHT, CountPoints, run, run_here

@@ -9,10 +9,11 @@ from dataclasses import asdict, dataclass, replace
 from math import copysign, inf, isinf, sqrt
 
 from stickslip_ros.physics.loop.washout import WashoutParameters
-from stickslip_ros.physics.measures.cycles import Regime
-from stickslip_ros.physics.theory.sampled import LinearSampledLoop, why_no_linear_loop
+from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import parameter_file
+from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench, Vibration
 from stickslip_ros.studies.design_checks import (
     Check,
     check_at_speed,
@@ -22,7 +23,6 @@ from stickslip_ros.studies.design_checks import (
 from stickslip_ros.studies.design_margins import Margins, little_margin, margins
 from stickslip_ros.studies.design_search import CUBIC_SHARES, RESERVE, Candidates, rounded
 from stickslip_ros.studies.design_task import Task
-from stickslip_ros.studies.trial import FILTER_SETTLED, Bench, Vibration
 
 _SHARE_OF_VIBRATIONS = 0.1
 """Share of the work, about, that it is to find the vibrations without control."""

@@ -6,11 +6,11 @@ from math import inf
 
 from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.theory.sampled import settling_time
+from stickslip_ros.physics.theory.linear_sampled_loop import settling_time
 from stickslip_ros.progress import Progress
+from stickslip_ros.studies.controller_trial import Bench
 from stickslip_ros.studies.design_search import Candidates
 from stickslip_ros.studies.design_task import Task
-from stickslip_ros.studies.trial import Bench
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import SPEED, WashoutGains
-from stickslip_ros.physics.theory.sampled import LinearSampledLoop
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.studies.controller_trial import Vibration
 from stickslip_ros.studies.design_task import Task
 from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
-from stickslip_ros.studies.trial import Vibration
 
 CUBIC_SHARES = (0.0, 0.125, 0.25, 0.5)
 """Cubic gains that are considered, in the friction law's own cubic coefficient.

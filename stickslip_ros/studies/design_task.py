@@ -6,8 +6,8 @@ from typing import Self
 
 import numpy as np
 
+from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.moved import Renamed
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.scenarios.files import Scenario
 

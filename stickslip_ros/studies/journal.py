@@ -15,7 +15,7 @@ from typing import Any, BinaryIO, Self
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.studies.settled import MotionState
+from stickslip_ros.studies.settling import MotionState
 from stickslip_ros.studies.study import Piece, Point, Study
 from stickslip_ros.versions import versions
 

@@ -10,9 +10,9 @@ from typing import ClassVar, Self
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.deprecated_names import moved_from
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.moved import moved_from
-from stickslip_ros.scenarios.parameter import Parameter, known_parameters
+from stickslip_ros.scenarios.parameter_field import Parameter, known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.text import did_you_mean
 

@@ -19,7 +19,7 @@ from threading import Thread
 
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.studies.journal import Journal
-from stickslip_ros.studies.settled import MotionState
+from stickslip_ros.studies.settling import MotionState
 from stickslip_ros.studies.study import Piece, compute, pieces_of
 
 IN_FLIGHT = 64

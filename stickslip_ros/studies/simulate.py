@@ -1,14 +1,14 @@
 """The closed loop of a scenario without ROS, measured on the motion itself."""
 
+from stickslip_ros.physics.loop.motion_tracer import MotionTracer
 from stickslip_ros.physics.loop.simulation import simulate_continuous, simulate_sampled
-from stickslip_ros.physics.loop.tracer import MotionTracer
 from stickslip_ros.physics.loop.washout import Washout
-from stickslip_ros.physics.measures.cycles import CycleMeter, Measures
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import RunObserver
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.settled import check_continuous
+from stickslip_ros.studies.settling import check_continuous
 
 
 def simulate(

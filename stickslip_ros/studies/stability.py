@@ -10,12 +10,12 @@ import numpy as np
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import SPEED, WashoutGains
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
-from stickslip_ros.physics.theory.closed_loop import critical_gains
+from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
 from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import Expansion, expand
-from stickslip_ros.physics.theory.sampled import (
+from stickslip_ros.physics.theory.linear_sampled_loop import (
     LONGEST_DELAY,
     LinearSampledLoop,
     why_no_linear_loop,

@@ -7,10 +7,10 @@ from threading import local
 from typing import Any, NamedTuple, Self
 
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.physics.measures.cycles import EQUILIBRIUM_SPEED, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import EQUILIBRIUM_SPEED, Measures, Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.plan import Plan
-from stickslip_ros.studies.settled import (
+from stickslip_ros.studies.settling import (
     ControlledDrive,
     MotionState,
     Settler,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settled import SettlingCourse
+from stickslip_ros.studies.settling import SettlingCourse
 from stickslip_ros.studies.study import Study
 
 

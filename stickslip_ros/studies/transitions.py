@@ -11,11 +11,11 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.physics.theory.roots import zero_between
-from stickslip_ros.physics.theory.sampled import LinearSampledLoop
 from stickslip_ros.physics.theory.sticking import Release
 from stickslip_ros.studies.plan import Axis
-from stickslip_ros.studies.settled import ControlledDrive
+from stickslip_ros.studies.settling import ControlledDrive
 from stickslip_ros.studies.study import Study
 
 _Margin = Callable[[ControlledDrive], float]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.app.main import main
-from stickslip_ros.nodes.base.machine import port
+from stickslip_ros.nodes.base.machine_check import port
 from tests.app.conftest import Run
 
 
@@ -187,7 +187,7 @@ def test_a_domain_whose_ports_are_taken_is_refused(
 def test_shared_memory_that_is_full_is_told(
     stickslip: Run, process_environment: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip_ros.nodes.base.machine.free_shared_memory", lambda: 4096)
+    monkeypatch.setattr("stickslip_ros.nodes.base.machine_check.free_shared_memory", lambda: 4096)
     process_environment["FASTDDS_BUILTIN_TRANSPORTS"] = "DEFAULT"
     done = stickslip("run", "paper", "--duration", "1")
     assert done.returncode == 2

@@ -13,7 +13,7 @@ import pytest
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.columns import compute_columns
 from stickslip_ros.studies.plan import Axis
-from stickslip_ros.studies.settled import SettlingCourse
+from stickslip_ros.studies.settling import SettlingCourse
 from stickslip_ros.studies.sweep import sweep_study
 from tests.app.conftest import Run
 from tests.nodes.graph import PATIENCE

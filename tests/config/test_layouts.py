@@ -25,7 +25,7 @@ from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.network import this_machine_only
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, load_scenario
 from stickslip_ros.testing import own_domain
 from tests.nodes.graph import Graph

@@ -17,7 +17,7 @@ from rclpy.task import Future
 
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.base.process import spin
-from stickslip_ros.nodes.base.qos import message_class, qos_profile
+from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
 
 PATIENCE = 60.0
 """How long a test waits, s, for what should happen at once on an idle machine."""

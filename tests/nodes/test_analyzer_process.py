@@ -15,7 +15,7 @@ from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import pack_joint_state
 from stickslip_ros.messages.topics import JOINT_STATES
-from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.nodes.base.ros_topics import qos_profile
 from tests.nodes.graph import PATIENCE, Graph
 
 PERIOD = 1_000_000

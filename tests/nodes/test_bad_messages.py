@@ -38,7 +38,7 @@ from stickslip_ros.messages.topics import (
 )
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import OK, WARN
-from stickslip_ros.nodes.base.qos import message_class, qos_profile
+from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import PATIENCE, Graph

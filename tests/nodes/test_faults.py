@@ -18,7 +18,7 @@ from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, RECORDED, Topic
-from stickslip_ros.nodes.base.qos import message_class, qos_profile
+from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
 from tests.nodes.graph import PATIENCE, Graph, wait_for
 from tests.nodes.processes import Processes
 

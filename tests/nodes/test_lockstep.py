@@ -14,7 +14,7 @@ from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.messages.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
 from stickslip_ros.nodes.base.managed import STATE, WARN
-from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph

@@ -28,7 +28,7 @@ from stickslip_ros.nodes.base.managed import ERROR, ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.scenarios.parameter import parameters_of
+from stickslip_ros.scenarios.parameter_field import parameters_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ReplayParameters
 from tests.nodes.graph import Graph
 from tests.scenarios.values import UNKNOWN, bad_values, good_values

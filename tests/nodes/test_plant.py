@@ -26,7 +26,7 @@ from stickslip_ros.messages.topics import (
     JOINT_STATES,
     RECORDED,
 )
-from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop

@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 
 from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.messages.topics import DIAGNOSTICS, JOINT_STATES
-from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.pacing import RealtimePacer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.motion.motion import Motion

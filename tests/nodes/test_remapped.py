@@ -10,7 +10,7 @@ from stickslip_ros.bags.reader import Recording
 from stickslip_ros.messages.codec import pack_header, unpack_header
 from stickslip_ros.messages.topics import JOINT_STATES, RECORDED
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph

@@ -14,7 +14,7 @@ from stickslip_ros.messages.codec import pack_header, pack_wrench, unpack_header
 from stickslip_ros.messages.topics import CLOCK, CONTROL_FORCE, JOINT_STATES, RECORDED
 from stickslip_ros.nodes import replay
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph

@@ -8,7 +8,7 @@ from sensor_msgs.msg import JointState
 
 from stickslip_ros.messages.codec import pack_joint_state, unpack_wrench
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
-from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.scenarios.parameters import WashoutControllerParameters

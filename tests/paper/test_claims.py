@@ -21,7 +21,7 @@ from stickslip_ros.paper.claims import (
 )
 from stickslip_ros.paper.claims.claim import Formula, Number, Observation, agrees
 from stickslip_ros.paper.claims.normal_form import Nonlinearity, samples
-from stickslip_ros.paper.claims.reference import FILTER, arrivals, expansion, hopf_point
+from stickslip_ros.paper.claims.paper_values import FILTER, arrivals, expansion, hopf_point
 from stickslip_ros.paper.figures import (
     NUMBERS,
     PRINTED_SLOPE,
@@ -34,7 +34,7 @@ from stickslip_ros.paper.figures import (
     unit_drive,
 )
 from stickslip_ros.paper.portraits import PortraitCase, portraits
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.limit_cycles import limit_cycles

@@ -18,7 +18,7 @@ from stickslip_ros.paper.figures import (
     unit_drive,
 )
 from stickslip_ros.paper.portraits import Portrait
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 
 
 def bifurcation(number: int, points: int) -> BifurcationFigure:

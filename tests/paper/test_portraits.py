@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.paper.portraits import SETTLED, Portrait, PortraitCase, portraits
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Linear
 from stickslip_ros.physics.motion.motion import Motion

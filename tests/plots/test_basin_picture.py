@@ -8,7 +8,7 @@ import numpy.typing as npt
 import pytest
 from PIL import Image
 
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.basin_picture import basin_figure
 from stickslip_ros.plots.regimes import REGIMES as LOOKS
 from stickslip_ros.plots.style import GREEN, ORANGE, SKY_BLUE, save

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_bag
-from stickslip_ros.physics.measures.cycles import Cycle, CycleMeter, Measures
+from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import MeasuredMotion
 from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.physics.model.drive import Drive

@@ -9,7 +9,7 @@ import pytest
 
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
-from stickslip_ros.physics.theory.sampled import LinearSampledLoop
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
 from stickslip_ros.plots.stability_map import stability_figure
 from stickslip_ros.plots.style import save

@@ -14,7 +14,7 @@ from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.runner import run
-from stickslip_ros.studies.settled import SettlingCourse
+from stickslip_ros.studies.settling import SettlingCourse
 from stickslip_ros.studies.study import Study
 
 pytestmark = pytest.mark.usefixtures("coarse_maps")

@@ -7,7 +7,7 @@ import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import load_scenario, parameter_file
-from stickslip_ros.scenarios.parameter import Parameter, parameters_of
+from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters, ReplayParameters
 from tests.scenarios.files import refusal, scenario_file
 from tests.scenarios.values import UNKNOWN, bad_values, good_values

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.friction import LAWS
-from stickslip_ros.scenarios.parameter import Parameter, parameters_of
+from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters, PlantParameters
 
 # Names and units that people rely on, by node.

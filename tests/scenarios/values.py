@@ -4,7 +4,7 @@ import re
 from math import inf, nan
 from typing import Any
 
-from stickslip_ros.scenarios.parameter import Parameter
+from stickslip_ros.scenarios.parameter_field import Parameter
 
 OF_EVERY_TYPE: list[Any] = [None, True, 7, 0.5, "no such word", [True], [7], [0.5], [b"\1"]]
 """One value of each type that ROS knows, a list of strings excepted."""

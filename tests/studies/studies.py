@@ -3,7 +3,7 @@
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settled import SettlingCourse
+from stickslip_ros.studies.settling import SettlingCourse
 from stickslip_ros.studies.study import Study
 
 SHORT = SettlingCourse(transient=5.0, cycles=2)

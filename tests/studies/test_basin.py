@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycles import Measures, Regime
-from stickslip_ros.physics.theory.closed_loop import critical_gains
+from stickslip_ros.physics.measures.cycle_measures import Measures, Regime
+from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.basin import (
     POSITION,
@@ -23,7 +23,7 @@ from stickslip_ros.studies.basin import (
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid, Plan, RandomSample
 from stickslip_ros.studies.runner import run
-from stickslip_ros.studies.settled import SettlingCourse
+from stickslip_ros.studies.settling import SettlingCourse
 from stickslip_ros.studies.study import Point
 from tests.studies.studies import EXPONENTIAL, free, paper
 

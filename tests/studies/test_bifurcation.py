@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear
 from stickslip_ros.studies.bifurcation import BifurcationDiagram, bifurcation_diagram
-from stickslip_ros.studies.settled import SettlingCourse
+from stickslip_ros.studies.settling import SettlingCourse
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
 
 RUNS_AWAY = replace(PAPER, belt_speed=0.2, friction=Linear(0.4, 0.9))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.measures.cycles import Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import Measures, Regime
 from stickslip_ros.studies.columns import (
     COLUMNS,
     Columns,
@@ -26,7 +26,7 @@ from stickslip_ros.studies.columns import (
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid, RandomSample
 from stickslip_ros.studies.runner import run
-from stickslip_ros.studies.settled import SettlingCourse
+from stickslip_ros.studies.settling import SettlingCourse
 from stickslip_ros.studies.study import MEASURES, Piece, Point, Study
 from tests.studies.studies import SHORT, free, speeds
 

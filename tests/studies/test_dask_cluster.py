@@ -21,7 +21,7 @@ from stickslip_ros.studies.dask_cluster import dask_executor
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry
 from stickslip_ros.studies.runner import WorkersDiedError, run
-from stickslip_ros.studies.settled import SettlingCourse
+from stickslip_ros.studies.settling import SettlingCourse
 from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.sweep import sweep_study
 

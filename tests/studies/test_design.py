@@ -13,12 +13,12 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.loop.simulation import simulate_sampled
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
-from stickslip_ros.physics.measures.cycles import CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear
 from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.physics.theory.sampled import LinearSampledLoop
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.design import Design, Task, design, margins
 from tests.physics.drives import FEED_DRIVE

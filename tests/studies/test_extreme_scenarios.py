@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.scenarios.files import Scenario, load_scenario
-from stickslip_ros.scenarios.parameter import parameters_of
+from stickslip_ros.scenarios.parameter_field import parameters_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.studies.simulate import simulate
 from tests.examples import examples

@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycles import Measures
+from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.studies import runner
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settled import MotionState, SettlingCourse
+from stickslip_ros.studies.settling import MotionState, SettlingCourse
 from stickslip_ros.studies.study import Piece, Point, Study
 from tests.studies.studies import SHORT, free, speeds, stop_at
 

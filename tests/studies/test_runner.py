@@ -22,7 +22,7 @@ from stickslip_ros.studies import runner
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.runner import local_processes, run, run_here
-from stickslip_ros.studies.settled import SettlingCourse
+from stickslip_ros.studies.settling import SettlingCourse
 from stickslip_ros.studies.study import Piece, Point, Study, compute
 from tests.studies.studies import SHORT, free, paper, speeds, stop_at
 

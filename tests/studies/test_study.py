@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycles import Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import Measures, Regime
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.columns import Columns, compute_columns
 from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settled import MotionState, SettlingCourse
+from stickslip_ros.studies.settling import MotionState, SettlingCourse
 from stickslip_ros.studies.study import Point, Study, compute, pieces_of
 from stickslip_ros.studies.sweep import sweep_study
 from tests.studies.studies import CYCLE_LOST_SPEED, EXPONENTIAL, HOPF_SPEED, SHORT, free, paper

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycles import Regime
-from stickslip_ros.physics.theory.closed_loop import critical_gains
+from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.studies.columns import compute_columns
 from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settled import SettlingCourse
+from stickslip_ros.studies.settling import SettlingCourse
 from stickslip_ros.studies.sweep import sweep_study
 from tests.physics.drives import LIMIT_CYCLES
 from tests.studies.studies import free, paper

@@ -8,11 +8,11 @@ import pytest
 
 from stickslip_ros.physics.model.friction import Exponential
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
-from stickslip_ros.physics.theory.sampled import LinearSampledLoop
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.physics.theory.sticking import Release, sticking_onset
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.plan import Axis, Grid
-from stickslip_ros.studies.settled import ControlledDrive
+from stickslip_ros.studies.settling import ControlledDrive
 from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.transitions import (
     HOPF_POINT,

@@ -39,11 +39,11 @@ from stickslip_ros.messages.topics import (
 )
 from stickslip_ros.nodes.base.managed import STATE
 from stickslip_ros.nodes.base.polling import PollingNode, waiting_messages
-from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.base.service_call import ANSWER_TIME, ServiceCall, parameters_call
 from stickslip_ros.running.controller_search import DASHBOARD
 from stickslip_ros.samples import ForceColumns, SampleColumns
-from stickslip_ros.scenarios.parameter import known_parameters
+from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.stamps import NANOSECONDS
 

@@ -16,11 +16,11 @@ from stickslip_ros.app.dashboard.charts import CYCLES, PORTRAIT, TRACE
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
 from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, Health, ListenerNode
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.style import BLUE, GREY, ORANGE
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.parameter import Fixed, known_parameters
+from stickslip_ros.scenarios.parameter_field import Fixed, known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 
 _CONTROLLER = "washout_controller"

@@ -20,7 +20,7 @@ from stickslip_ros.messages.topics import DIAGNOSTICS, Topic
 from stickslip_ros.nodes.base.dropped_messages import DroppedMessages
 from stickslip_ros.nodes.base.parameters import ParameterNode, ParametersT
 from stickslip_ros.nodes.base.polling import PollingNode
-from stickslip_ros.nodes.base.qos import (
+from stickslip_ros.nodes.base.ros_topics import (
     matching_readers,
     matching_writers,
     message_class,

@@ -8,7 +8,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from stickslip_ros.messages.topics import Topic
-from stickslip_ros.nodes.base.qos import message_class
+from stickslip_ros.nodes.base.ros_topics import message_class
 
 
 class PollingNode(Node):

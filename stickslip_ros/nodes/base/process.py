@@ -17,13 +17,13 @@ from rclpy.utilities import remove_ros_args
 
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.nodes.base.child_process import die_with_parent
-from stickslip_ros.nodes.base.machine import check_machine, domain_of_environment
+from stickslip_ros.nodes.base.machine_check import check_machine, domain_of_environment
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.base.network import prefer_prompt_middleware
 from stickslip_ros.nodes.base.ros_errors import first_line
-from stickslip_ros.scenarios.parameter import parameters_of
+from stickslip_ros.scenarios.parameter_field import parameters_of
 from stickslip_ros.scenarios.parameters import NodeParameters
-from stickslip_ros.streams import open_closed_streams
+from stickslip_ros.standard_streams import open_closed_streams
 
 ROS_ARGUMENTS = ["--ros-args", "--log-level", "warn", "--disable-external-lib-logs"]
 """Of the commands: they say on standard error what there is to say, and need no home directory."""

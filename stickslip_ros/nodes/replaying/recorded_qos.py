@@ -17,7 +17,7 @@ from stickslip_ros.bags.definitions import message_definition
 from stickslip_ros.bags.metadata import offered_profiles
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.topics import DEEP
-from stickslip_ros.nodes.base.qos import message_class
+from stickslip_ros.nodes.base.ros_topics import message_class
 from stickslip_ros.stamps import NANOSECONDS
 
 PolicyT = TypeVar("PolicyT", bound=QoSPolicyEnum)

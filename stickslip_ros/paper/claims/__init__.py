@@ -7,7 +7,7 @@ from stickslip_ros.paper.claims import (
     bifurcation_diagrams,
     coefficients,
     conclusions,
-    control,
+    control_effect,
     model,
     phase_portraits,
     stability,
@@ -22,7 +22,7 @@ COMPUTATIONS = (
     | bifurcation_diagrams.computes
     | phase_portraits.computes
     | washout.computes
-    | control.computes
+    | control_effect.computes
     | conclusions.computes
 )
 """What computes each claim that is decidable, by its identifier."""

@@ -8,7 +8,7 @@ from math import sqrt
 import numpy as np
 
 from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.paper.claims.reference import (
+from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     PRINTED_HOPF_SPEED,
     STATES,
@@ -24,7 +24,7 @@ from stickslip_ros.paper.claims.reference import (
 )
 from stickslip_ros.paper.claims.summaries import VIBRATING, listed
 from stickslip_ros.paper.figures import STRIBECK, BifurcationFigure, unit_drive
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.roots import zero_between
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
 from stickslip_ros.paper.claims.normal_form import Nonlinearity, samples
-from stickslip_ros.paper.claims.reference import (
+from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     FILTER,
     PRINTED_HOPF_SPEED,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from stickslip_ros.paper.claims.claim import Computations, Evidence, Observation
-from stickslip_ros.paper.claims.reference import (
+from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     FILTER,
     controlled_amplitude,

@@ -5,7 +5,7 @@ from math import isclose, sqrt
 import numpy as np
 
 from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.paper.claims.reference import (
+from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     FASTER,
     STATES,
@@ -20,7 +20,7 @@ from stickslip_ros.paper.claims.reference import (
 )
 from stickslip_ros.paper.claims.summaries import listed
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import Equations
 from stickslip_ros.physics.model.friction import Stribeck

@@ -8,7 +8,7 @@ from math import sqrt
 import numpy as np
 
 from stickslip_ros.paper.claims.claim import Computations, Evidence, Number, Observation
-from stickslip_ros.paper.claims.reference import (
+from stickslip_ros.paper.claims.paper_values import (
     FASTER,
     PRINTED_HOPF_SPEED,
     SLOWER,
@@ -37,7 +37,7 @@ from stickslip_ros.paper.claims.summaries import (
 )
 from stickslip_ros.paper.figures import PRINTED_SLOPE, STRIBECK, TANGENT_SLOPE, unit_drive
 from stickslip_ros.paper.portraits import Portrait
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Linear, Stribeck
 from stickslip_ros.physics.theory.hopf import hopf_points

@@ -6,7 +6,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.paper.claims.reference import (
+from stickslip_ros.paper.claims.paper_values import (
     BELT_SPEEDS,
     DAMPING,
     FASTER,
@@ -27,7 +27,7 @@ from stickslip_ros.paper.claims.reference import (
     trace,
 )
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.motion.motion import Motion
 
 computes = Computations()

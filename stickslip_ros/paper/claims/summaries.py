@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from stickslip_ros.paper.portraits import Portrait
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 
 VIBRATING = (Regime.STICK_SLIP, Regime.PURE_SLIP)
 

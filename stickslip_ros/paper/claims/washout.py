@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.claims.claim import Computations, Evidence, Formula, Number, Observation
-from stickslip_ros.paper.claims.reference import (
+from stickslip_ros.paper.claims.paper_values import (
     BELT_SPEEDS,
     DAMPING,
     FILTER,

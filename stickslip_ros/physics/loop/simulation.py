@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from stickslip_ros.physics.loop.motion_tracer import MotionTracer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.loop.tracer import MotionTracer
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
-from stickslip_ros.physics.measures.cycles import CycleMeter, Measures
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver, RunObserver
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.progress import Progress

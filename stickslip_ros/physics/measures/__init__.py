@@ -1,5 +1,5 @@
 """What is measured of a motion: cycles, from its breakpoints or from samples."""
 
-from stickslip_ros.physics.measures.cycles import Cycle, CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures, Regime
 
 __all__ = ["Cycle", "CycleMeter", "Measures", "Regime"]

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
-from stickslip_ros.physics.measures.cycles import Cycle
+from stickslip_ros.physics.measures.cycle_measures import Cycle
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,12 @@ from math import inf
 import numpy as np
 
 from stickslip_ros.physics.measures.breakpoints import breakpoints_from_samples
-from stickslip_ros.physics.measures.cycles import UNBOUNDED_BELT_SPEEDS, Cycle, CycleMeter, Measures
+from stickslip_ros.physics.measures.cycle_measures import (
+    UNBOUNDED_BELT_SPEEDS,
+    Cycle,
+    CycleMeter,
+    Measures,
+)
 from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver
 from stickslip_ros.physics.measures.sampling_grid import LONGEST_GAP, SamplingGrid
 from stickslip_ros.samples import SampleColumns

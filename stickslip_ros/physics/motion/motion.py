@@ -6,8 +6,8 @@ from typing import ClassVar
 import heyoka as hy
 import numpy as np
 
+from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import RunError
-from stickslip_ros.moved import Renamed
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains

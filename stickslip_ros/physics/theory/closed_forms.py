@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import Self
 
-from stickslip_ros.moved import Renamed
+from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Stribeck
 

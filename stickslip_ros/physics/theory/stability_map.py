@@ -8,8 +8,8 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
-from stickslip_ros.physics.theory.closed_loop import critical_gains
-from stickslip_ros.physics.theory.sampled import LinearSampledLoop
+from stickslip_ros.physics.theory.critical_gains import critical_gains
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 
 
 @dataclass(frozen=True)

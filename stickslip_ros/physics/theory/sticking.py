@@ -11,7 +11,7 @@ from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.averaging import averaged_growth
-from stickslip_ros.physics.theory.returns import follow, least_cycle, release_position
+from stickslip_ros.physics.theory.cycle_bounds import follow, least_cycle, release_position
 from stickslip_ros.physics.theory.roots import zero_between
 
 _AVERAGED = np.geomspace(1e-4, 1e4, 200)

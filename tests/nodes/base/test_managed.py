@@ -9,7 +9,7 @@ from std_msgs.msg import Float64, Header
 from stickslip_ros.messages.codec import pack_header
 from stickslip_ros.messages.topics import AMPLITUDE, DIAGNOSTICS, RECORDED
 from stickslip_ros.nodes.base.managed import OK, WARN, ManagedNode
-from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.scenarios.parameters import NodeParameters
 from tests.nodes.graph import Graph
 

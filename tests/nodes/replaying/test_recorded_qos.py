@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 from stickslip_ros.bags.recorder import QosProfile
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.topics import DEEP, JOINT_STATES
-from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.replaying.recorded_qos import installed_message_class, recorded_profile
 
 # As rosbag2 keeps them: names since Iron, numbers before; `unknown` is what Fast DDS tells.

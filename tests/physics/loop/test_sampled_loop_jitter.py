@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.loop.simulation import simulate_sampled
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
-from stickslip_ros.physics.measures.cycles import CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.motion.motion import Motion
 from tests.physics.drives import FEED_DRIVE, PAPER
 

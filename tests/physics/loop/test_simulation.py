@@ -9,7 +9,7 @@ import pytest
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.loop.simulation import simulate_continuous, simulate_sampled
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
-from stickslip_ros.physics.measures.cycles import CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.motion.motion import Motion

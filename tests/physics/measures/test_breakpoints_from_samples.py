@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.physics.measures.breakpoints import Breakpoints, breakpoints_from_samples
-from stickslip_ros.physics.measures.cycles import CycleMeter, Measures
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.motion import Motion
 from tests.physics.drives import LIMIT_CYCLES, PAPER

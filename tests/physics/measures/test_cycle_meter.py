@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
-from stickslip_ros.physics.measures.cycles import Cycle, CycleMeter, Measures, Regime, Trend
+from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures, Regime, Trend
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.motion import Motion
 from tests.examples import examples

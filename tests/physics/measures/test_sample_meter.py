@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.physics.motion.motion import Motion

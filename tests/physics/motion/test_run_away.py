@@ -5,7 +5,7 @@ from math import inf, isfinite
 
 import pytest
 
-from stickslip_ros.physics.measures.cycles import CycleMeter, Regime
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Regime
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear
 from stickslip_ros.physics.motion.motion import Motion
 from tests.physics.drives import PAPER

@@ -10,7 +10,7 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Exponential, Linear
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
-from stickslip_ros.physics.theory.closed_loop import critical_gains
+from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.physics.theory.linear import expand
 from tests.physics.drives import PAPER
 from tests.physics.theory.test_hopf import cubic_drives

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.measures.cycles import CycleMeter
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear, Stribeck
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
-from stickslip_ros.physics.theory.closed_loop import critical_gains
+from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants, jacobians
 from tests.physics.drives import FEED_DRIVE, PAPER

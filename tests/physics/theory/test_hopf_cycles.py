@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.measures.cycles import CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.motion.variational import SensitiveMotion
-from stickslip_ros.physics.theory.closed_loop import critical_gains
+from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run
 from tests.physics.drives import FEED_DRIVE, PAPER

@@ -11,12 +11,13 @@ from scipy.integrate import solve_ivp
 
 from stickslip_ros.physics.loop.simulation import simulate_continuous
 from stickslip_ros.physics.loop.washout import WashoutParameters
-from stickslip_ros.physics.measures.cycles import CycleMeter, Regime
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.motion.variational import SensitiveMotion
+from stickslip_ros.physics.theory.cycle_bounds import largest_cycle, least_cycle
 from stickslip_ros.physics.theory.limit_cycles import (
     LimitCycle,
     limit_cycle_of_run,
@@ -24,7 +25,6 @@ from stickslip_ros.physics.theory.limit_cycles import (
     shoot,
 )
 from stickslip_ros.physics.theory.linear import expand
-from stickslip_ros.physics.theory.returns import largest_cycle, least_cycle
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from tests.physics import drives
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER

@@ -16,7 +16,7 @@ from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.linear import expand
-from stickslip_ros.physics.theory.sampled import (
+from stickslip_ros.physics.theory.linear_sampled_loop import (
     LONGEST_DELAY,
     LinearSampledLoop,
     why_no_linear_loop,

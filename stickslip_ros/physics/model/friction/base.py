@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from stickslip_ros.moved import Renamed
+from stickslip_ros.deprecated_names import Renamed
 
 
 @dataclass(frozen=True)

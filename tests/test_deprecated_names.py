@@ -6,11 +6,11 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from stickslip_ros.moved import MOVED
+from stickslip_ros.deprecated_names import MOVED
 from stickslip_ros.physics.model.friction import Exponential, FrictionLaw, Linear
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
-from stickslip_ros.physics.theory.sampled import LinearSampledLoop
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.studies.basin import Attractor, Basins
 from stickslip_ros.studies.columns import Columns

@@ -9,9 +9,9 @@ from sensor_msgs.msg import JointState
 
 from stickslip_ros.messages.codec import pack_wrench, unpack_header
 from stickslip_ros.messages.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
-from stickslip_ros.nodes.base.qos import qos_profile
+from stickslip_ros.nodes.base.ros_topics import qos_profile
+from stickslip_ros.nodes.lateness_warning import Punctuality
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.punctuality import Punctuality
 from tests.nodes.graph import Graph
 
 

@@ -7,14 +7,13 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.moved import moved_from
 from stickslip_ros.physics.loop.simulation import measure_block, simulate_sampled
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
-from stickslip_ros.physics.measures.cycles import LEAST_CYCLES, CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, CycleMeter, Measures, Regime
 from stickslip_ros.physics.measures.observer import MeasuredMotion
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.physics.theory.returns import loading_time, release_position
+from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
 
@@ -259,6 +258,3 @@ class _Section:
         elif measures.regime is Regime.EQUILIBRIUM:
             section = np.array([measures.midpoint])
         return Settled(measures, section, end)
-
-
-__getattr__ = moved_from(__name__)

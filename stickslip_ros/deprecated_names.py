@@ -48,7 +48,15 @@ MOVED: dict[str, dict[str, str]] = {
         name: f"{_LOOP}.simulation.{name}" for name in ("simulate_sampled", "simulate_continuous")
     },
     "stickslip_ros.studies.plan": {"Sample": "stickslip_ros.studies.plan.RandomSample"},
-    "stickslip_ros.studies.settled": {"Course": "stickslip_ros.studies.settled.SettlingCourse"},
+    "stickslip_ros.studies.settled": {"Course": "stickslip_ros.studies.settling.SettlingCourse"},
+    "stickslip_ros.physics.theory.closed_loop": {
+        name: f"stickslip_ros.physics.theory.critical_gains.{name}"
+        for name in ("critical_gains", "CriticalGains")
+    },
+    "stickslip_ros.physics.theory.sampled": {
+        name: f"stickslip_ros.physics.theory.linear_sampled_loop.{name}"
+        for name in ("LinearSampledLoop", "GainInterval")
+    },
 }
 
 

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.physics.loop.washout import WashoutParameters
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.settled import (
+from stickslip_ros.studies.settling import (
     LONGEST,
     ControlledDrive,
     MotionState,

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.moved import Renamed
+from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.loop.sampled_loop import whole_and_rest
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains

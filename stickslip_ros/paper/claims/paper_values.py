@@ -19,11 +19,11 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import Equations, W, WashoutGains, X, Y
 from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.physics.theory.closed_loop import CriticalGains, critical_gains
+from stickslip_ros.physics.theory.critical_gains import CriticalGains, critical_gains
+from stickslip_ros.physics.theory.cycle_bounds import follow, release_position
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import Expansion, expand
-from stickslip_ros.physics.theory.returns import follow, release_position
 from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.physics.theory.sticking import StickingOnset, sticking_onset
 

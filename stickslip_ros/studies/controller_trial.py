@@ -12,12 +12,12 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
-from stickslip_ros.physics.measures.cycles import CycleMeter, Measures, Regime
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.physics.theory.returns import loading_time, release_position
-from stickslip_ros.physics.theory.sampled import SETTLED
+from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
+from stickslip_ros.physics.theory.linear_sampled_loop import SETTLED
 from stickslip_ros.stamps import NANOSECONDS
 
 FILTER_SETTLED = 5.0

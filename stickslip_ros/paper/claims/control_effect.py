@@ -5,7 +5,7 @@ from functools import cache
 from math import log
 
 from stickslip_ros.paper.claims.claim import Computations, Evidence, Number, Observation
-from stickslip_ros.paper.claims.reference import (
+from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     FASTER,
     FILTER,
@@ -26,7 +26,7 @@ from stickslip_ros.paper.claims.reference import (
 )
 from stickslip_ros.paper.claims.summaries import VIBRATING, amplitude, border, falling, listed
 from stickslip_ros.paper.figures import unit_drive
-from stickslip_ros.physics.measures.cycles import Regime
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.hopf import hopf_points
 
