@@ -25,7 +25,7 @@ CHECKOUT = Path(__file__).parents[1]
 PHYSICS = Path("stickslip_ros/physics")
 TIERS = (
     ("tests/physics",),
-    ("tests/studies", "tests/plots", "tests/testing", "tests/bags", "tests/app"),
+    ("tests/studies", "tests/paper", "tests/plots", "tests/scenarios", "tests/bags", "tests/app"),
 )
 TIMEOUT = 600.0
 
