@@ -49,7 +49,7 @@ class _OneReplay(ReplayNode):
 
     def connect(self) -> None:
         super().connect()
-        self._offering(list(self._writers))
+        self._offering(sorted(self._writers))
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         self.end_process(RunError("the replay failed for the reason above"))
