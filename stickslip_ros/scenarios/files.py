@@ -105,24 +105,24 @@ def load_scenario(
     of bounds; with `other_nodes`, sections of unknown nodes are left alone.
     """
     path = _find(name_or_path)
-    files = [read_file(path, namespace, other_nodes=other_nodes)]
+    files = [read_file(path, namespace)]
     below = _path_of_base(files[0]) if base is None else _find(base)
     while below is not None:
         if any(below.samefile(file.path) for file in files):
             raise InvalidInputError(f"{path}: base {below} is a file that it completes")
-        files.append(read_file(below, namespace, other_nodes=other_nodes))
+        files.append(read_file(below, namespace))
         below = _path_of_base(files[-1])
-    values: dict[str, dict[str, Any]] = {
-        node: {name: value for file in files[::-1] for name, value in file.values[node].items()}
-        for node in NODE_PARAMETERS
-    }
+    values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
+    other_sections: list[str] = []
+    for file in files[::-1]:
+        other_sections = file.apply(values, namespace, other_nodes=other_nodes)
     for node, parameters in values.items():
         NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
     given = dict.fromkeys(NODE_PARAMETERS, "")
     for override in overrides:
         node, parameter, value = _parse_override(override)
         values[node][parameter] = value
-        given[node] += f" -p {override:.80}"
+        given[node] += f" {override:.80}"
     models: dict[str, Any] = {
         node: NODE_PARAMETERS[node].validated(
             parameters, f"{path} with{given[node]}, {node}" if given[node] else f"{path}, {node}"
@@ -133,7 +133,7 @@ def load_scenario(
         name=path.stem,
         overrides=tuple(overrides),
         path=path,
-        other_sections=tuple(files[0].other_sections),
+        other_sections=tuple(other_sections),
         given=frozenset(f"{node}.{name}" for node in values for name in values[node]),
         **models,
     )
@@ -186,11 +186,11 @@ def _parse_override(override: str) -> tuple[str, str, Any]:
         for node, model in NODE_PARAMETERS.items()
         for name in known_parameters(model)
     ]
-    given = f"-p {override:.80}"
+    given = f"{override:.80}"
     if equals and target in known:
         return node, parameter, ros_yaml.parse(text, f"{given}: the value")
     if not equals or not parameter:
-        meant = did_you_mean(target, known, "as in -p plant.belt_speed=0.2")
+        meant = did_you_mean(target, known, "as in plant.belt_speed=0.2")
         raise InvalidInputError(f"{given}: must be NODE.PARAMETER=VALUE; {meant}")
     if node not in NODE_PARAMETERS:
         meant = did_you_mean(node, NODE_PARAMETERS)

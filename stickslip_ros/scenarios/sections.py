@@ -21,41 +21,54 @@ _SCENARIO = "scenario"
 
 
 class ScenarioFile(NamedTuple):
-    """What a scenario file says."""
+    """A scenario file as it stands."""
 
     path: Path
-    values: dict[str, dict[str, Any]]
-    """By node and flat name."""
-    other_sections: list[str]
+    sections: list[tuple[str, Mapping[str, Any]]]
+    """Node name patterns, each with parameters by flat name."""
     base: str | None
+    """Name or path of the scenario that completes it."""
+
+    def apply(
+        self, values: Mapping[str, dict[str, Any]], namespace: str, *, other_nodes: bool
+    ) -> list[str]:
+        """Set what it says of the nodes in `namespace` in `values`, by node and flat name.
+
+        Return the sections of unknown nodes. Raises InvalidInputError for anything unknown; with
+        `other_nodes`, but for unknown nodes.
+        """
+        other_sections: list[str] = []
+        prefix = namespace.rstrip("/")
+        for pattern, parameters in self.sections:
+            nodes = [node for node in values if section_matches(pattern, f"{prefix}/{node}")]
+            if nodes:
+                _apply(values, self.path, pattern, parameters, nodes)
+            elif other_nodes:
+                other_sections.append(pattern)
+            else:
+                node = pattern.rpartition("/")[2]
+                every = f"in namespace {namespace} there are {', '.join(values)}"
+                raise InvalidInputError(
+                    f"{self.path}: section {pattern} matches no node; "
+                    + did_you_mean(node, values.keys() - {node}, every)
+                )
+        return other_sections
 
 
-def read_file(path: Path, namespace: str, *, other_nodes: bool) -> ScenarioFile:
-    """Read what a scenario file says of the nodes in `namespace`.
+def read_file(path: Path, namespace: str) -> ScenarioFile:
+    """Read the sections of a scenario file, and the base of what is in `namespace`.
 
-    Raises InvalidInputError for anything unknown; with `other_nodes`, but for unknown nodes.
+    Raises InvalidInputError for what is no scenario file.
     """
-    values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
-    other_sections: list[str] = []
+    sections: list[tuple[str, Mapping[str, Any]]] = []
     base: str | None = None
-    prefix = namespace.rstrip("/")
     for pattern, parameters in _sections(path):
-        nodes = [node for node in NODE_PARAMETERS if section_matches(pattern, f"{prefix}/{node}")]
-        own = section_matches(pattern, f"{prefix}/{_SCENARIO}")
+        own = section_matches(pattern, f"{namespace.rstrip('/')}/{_SCENARIO}")
         if own and pattern.endswith(f"/{_SCENARIO}"):
             base = _base_of(path, pattern, parameters)
-        elif nodes:
-            _apply(values, path, pattern, parameters, nodes)
-        elif other_nodes:
-            other_sections.append(pattern)
         else:
-            node = pattern.rpartition("/")[2]
-            every = f"in namespace {namespace} there are {', '.join(NODE_PARAMETERS)}"
-            raise InvalidInputError(
-                f"{path}: section {pattern} matches no node; "
-                + did_you_mean(node, NODE_PARAMETERS.keys() - {node}, every)
-            )
-    return ScenarioFile(path, values, other_sections, base)
+            sections.append((pattern, parameters))
+    return ScenarioFile(path, sections, base)
 
 
 def section_matches(pattern: str, node: str) -> bool:
@@ -81,7 +94,7 @@ def _base_of(path: Path, pattern: str, parameters: Mapping[str, Any]) -> str:
 
 
 def _apply(
-    values: dict[str, dict[str, Any]],
+    values: Mapping[str, dict[str, Any]],
     path: Path,
     pattern: str,
     parameters: Mapping[str, Any],

@@ -61,8 +61,8 @@ class RunMeter:
         if motion.steps_back:
             notes.append(
                 f"the stamp of {motion.steps_back} of {motion.samples} samples is not later than "
-                "the one before, and the motion is cut there: the plant was started anew, or "
-                "several nodes publish joint_states"
+                "the one before, and the motion is cut there: the plant was restarted, or the "
+                "samples of several plants are mixed"
             )
         return {
             **motion.measures().as_dict(),

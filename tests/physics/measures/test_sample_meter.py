@@ -397,4 +397,4 @@ def test_two_publishers_on_one_topic_are_noted(size: int) -> None:
         meter.motion.feed(both[first : first + size])
     (note,) = meter.report()["notes"]
     assert "200 of 400 samples" in note
-    assert "several nodes publish joint_states" in note
+    assert "the samples of several plants are mixed" in note
