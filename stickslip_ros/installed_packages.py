@@ -23,12 +23,20 @@ def prefixes() -> list[Path]:
 def find_executable(name: str) -> Path:
     """Return the file of the executable PACKAGE/EXECUTABLE, found as `ros2 run` finds it.
 
-    Raises InvalidInputError for one that is not installed.
+    A name that ends in .py may also be the path of a script. Raises InvalidInputError for one that
+    is not installed, or does not exist.
     """
+    if name.endswith(".py"):
+        script = Path(name)
+        if script.is_file():
+            return script.absolute()
+        if name.count("/") != 1:
+            raise InvalidInputError(f"{name}: there is no such file")
     package, _, executable = name.partition("/")
     if not package or not executable or "/" in executable:
         raise InvalidInputError(
-            f"{name}: must be PACKAGE/EXECUTABLE, such as stickslip_ros/washout_controller_node"
+            f"{name}: must be PACKAGE/EXECUTABLE, such as stickslip_ros/washout_controller_node, "
+            "or the path of a Python script"
         )
     prefix = next((p for p in prefixes() if (p / _MARKERS / package).is_file()), None)
     if prefix is None:

@@ -47,8 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     control = add_scenario(parser)
     control.add_argument(
         "--controller",
-        metavar="PACKAGE/EXECUTABLE",
-        help="start this controller, found as by `ros2 run`, in place of the washout controller; "
+        metavar="CONTROLLER",
+        help="start this controller in place of the washout controller: a Python script, or "
+        "PACKAGE/EXECUTABLE as for `ros2 run`; "
         "what follows -- are arguments for it, as in -- --ros-args -p gain:=3.0",
     )
     control.add_argument(

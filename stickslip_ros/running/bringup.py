@@ -1,5 +1,6 @@
 """Bringing the nodes up and down: as processes or composed in one, activated in order."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -174,7 +175,8 @@ class _Supervisor:
         # Its own parameters may stand in the scenario; overrides are in the other file. What was
         # given with the command comes last, and so has the last word.
         files = ["--params-file", str(self._scenario.path), "--params-file", str(file)]
-        command = [executable, *in_namespace, *files, "--", *further]
+        interpreter = [] if os.access(executable, os.X_OK) else [sys.executable]
+        command = [*interpreter, executable, *in_namespace, *files, "--", *further]
         self._processes[executable] = start_child(command, guarded=True)
 
     def _bring_up(self, nodes: Iterable[str]) -> None:

@@ -188,6 +188,24 @@ def test_a_controller_of_a_user(
     assert forces.force.tolist() == (-0.5 * states.velocity).tolist()
 
 
+def test_a_controller_that_is_a_script(stickslip: Run, tmp_path: Path) -> None:
+    (tmp_path / "my_controller.py").write_text(damper("Damper"), encoding="utf-8")
+    arguments = ("paper", "--pace", "lockstep", "--duration", "1", "--bag", "bag", "--json")
+    done = stickslip("run", *arguments, "--composed", "--controller", "my_controller.py")
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    made_by = (result["controller"], result["controller_command"])
+    assert made_by == ("/feed_drive/damper", "my_controller.py")
+    assert result["report"]["peak_force"] > 0.0
+
+
+@pytest.mark.parametrize("name", ["missing.py", "here/and/missing.py"])
+def test_a_script_that_does_not_exist(stickslip: Run, name: str) -> None:
+    done = stickslip("run", "paper", "--controller", name)
+    assert done.returncode == 2
+    assert f"--controller {name}: there is no such file" in done.stderr
+
+
 @pytest.mark.long
 def test_arguments_for_the_controller(stickslip: Run, install: Install, tmp_path: Path) -> None:
     name = install(damper("Damper"))
