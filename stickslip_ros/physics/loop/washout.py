@@ -68,8 +68,8 @@ class Washout:
 
         A stamp that was already answered is not answered again. Neither is an older one, unless the
         next measurement continues from it: then time has gone back, and the filter restarts at rest
-        from that older one. A filter at rest answers a stamp that is not later than the first: such a
-        stamp may start a run whose next sample waits for the answer.
+        from that older one. A filter at rest answers a stamp that is not later than the first: it
+        may start a run whose next sample waits for the answer.
 
         Parameters
         ----------
