@@ -60,7 +60,7 @@ class SampleMeter:
         ends = [*(segment.start for segment in segments[1:]), len(samples)]
         for (start, jittered), end in zip(segments, ends, strict=True):
             segment = samples[start:end]
-            self._look_for_run_away(segment)
+            self._look_for_unbounded(segment)
             if len(segment) == 1 and end < len(samples):
                 continue  # a single sample is no motion, and there may be very many of them
             if start > 0:
@@ -115,7 +115,7 @@ class SampleMeter:
             )
         return cycles
 
-    def _look_for_run_away(self, samples: SampleColumns) -> None:
+    def _look_for_unbounded(self, samples: SampleColumns) -> None:
         belt_speed = np.abs(samples.belt_velocity)
         fast = np.abs(samples.velocity) > UNBOUNDED_BELT_SPEEDS * belt_speed
         if fast.any() and belt_speed.all():

@@ -114,7 +114,7 @@ class SamplingGrid:
             return self._jittered.follow(steps)
         if self._step == 0:
             self._step = int(steps[0])
-        # Looking further ahead than the last gap is back could take quadratic time.
+        # A longer look ahead than the stretch since the last gap could take quadratic time.
         steps = steps[: max(64, self._since_gap)]
         steps = steps[: _first(self._odd(steps))]
         if len(steps) > 0:

@@ -13,8 +13,8 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.motion.integrator import (
     BELT_SPEED_REACHED,
-    RUN_AWAY,
     UNBOUNDED_SPEED,
+    UNBOUNDED_SPEED_REACHED,
     Integrator,
     Integrators,
 )
@@ -334,7 +334,7 @@ class Motion:
         """Move with the belt until the reaction exceeds its limit, or to `end`; return the time."""
         integrator = self._sticking
         if integrator is None:
-            breaks, now = self._ride_straight(now, end)
+            breaks, now = self._stick_straight(now, end)
         else:
             reaction = self._reaction()
             margin = self._rounding(reaction)
@@ -349,7 +349,7 @@ class Motion:
             self._sign = -copysign(1.0, self._reaction())
         return now
 
-    def _ride_straight(self, now: float, end: float) -> tuple[bool, float]:
+    def _stick_straight(self, now: float, end: float) -> tuple[bool, float]:
         """Move with the belt, force held; return whether the limit was reached, and the time."""
         speed = self._belt_speed
         if speed != 0.0:
@@ -403,11 +403,11 @@ class Motion:
             reached = taylor.propagate_until(end, self._steps_left, self._longest_step())
         outcome = reached[0].value
         self._steps_left -= reached[3] + _STEPS_OF_A_PHASE
-        if outcome == _NOT_FINITE:  # such forces take the slide past any speed immediately
+        if outcome == _NOT_FINITE:  # what causes this exceeds any speed immediately
             taylor.reset_cooldowns()
             self._sign = copysign(1.0, -self._reaction())
             self._y = self._sign * UNBOUNDED_SPEED
-            return RUN_AWAY, now
+            return UNBOUNDED_SPEED_REACHED, now
         self._x, self._y = variables[0], variables[1]
         if self._continuous_control:
             self._w = variables[2]

@@ -65,12 +65,12 @@ def least_cycle(drive: Drive, gains: WashoutGains | None = None) -> float | None
     """
     speed, force = _net_force(drive)
     if gains is not None:
-        force += _greatest_help(gains.scaled(drive), speed)
+        force += _control_bound(gains.scaled(drive), speed)
     gaining = np.abs(speed)[speed * force > 0.0]
     return None if len(gaining) == 0 else 0.95 * float(gaining.min())
 
 
-def _greatest_help(gains: WashoutGains, speed: FloatArray) -> FloatArray:
+def _control_bound(gains: WashoutGains, speed: FloatArray) -> FloatArray:
     """Return forces on the speed that give a cycle at least the energy that the controller gives.
 
     With v = w' and d w the parts of y that pass the filter and do not, both periodic, int v w = 0:
