@@ -248,6 +248,11 @@ class SampledLoop:
         -------
         Sample
             State of slide and belt at the next sample.
+
+        Raises
+        ------
+        RunError
+            If the motion is so stiff that it would take too many steps.
         """
         motion, period = self._motion, self.period
         number, force = self._newest
