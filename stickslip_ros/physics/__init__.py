@@ -1,1 +1,1 @@
-"""The motion, the control and the measures; no ROS, no files, no clock."""
+"""Physics: model, motion, measures, sampled loop and theory. No ROS, no files, no clock."""

@@ -1,1 +1,1 @@
-"""The sampled loop, the control law in it, and its simulation."""
+"""The sampled loop, its control law, and the simulation of both."""

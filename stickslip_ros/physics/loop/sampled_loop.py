@@ -1,7 +1,7 @@
 """The sampled loop: samples out, forces in, with hold, delay and time-outs, as a state machine.
 
-It knows no clock and no messages: whoever drives it decides when to advance. The plant node and
-`simulate` run this same loop.
+It knows no clock and no messages: its user decides when to advance. The plant node and `simulate`
+run this same loop.
 """
 
 from collections import Counter, deque
@@ -18,11 +18,11 @@ from stickslip_ros.samples import Sample
 from stickslip_ros.stamps import NANOSECONDS
 
 LOCKSTEP_START = NANOSECONDS
-"""Stamp of the first sample where no clock gives one, ns; ROS takes zero for "not set"."""
+"""Stamp of the first sample if no clock gives one, ns; ROS uses zero for "not set"."""
 
 
 class Verdict(StrEnum):
-    """What became of a force that was offered."""
+    """Result of offering a force to the loop."""
 
     ACCEPTED = "accepted"
     NOT_FINITE = "not finite"
@@ -31,25 +31,69 @@ class Verdict(StrEnum):
     ANSWERED = "already answered stamp"
     TOO_LATE = "answers a sample that has passed"
     OVERTAKEN = "overtaken by a newer one"
-    """It was accepted, and a newer one came before it could act."""
+    """The force was accepted, and a newer one came before it could act."""
 
 
 class SampledLoop:
-    """A motion that is sampled at a fixed rate and driven by forces that answer the samples.
+    """Motion that is sampled at a fixed rate, and driven by forces that answer the samples.
 
     Force n, the answer to sample n, arrives at n T + delay, T = 1/rate, and acts until the next
-    one arrives. Where it is missing when the loop advances, the newest one is held on if
-    `hold_late` is set (as in real time) and not older than `force_timeout`; otherwise there is no
-    force. What stands in for force n in this way arrives when force n would have.
+    force arrives. If it is missing when the loop advances, the newest force is held if `hold_late`
+    is set (as in real time) and the force is not older than `force_timeout`; otherwise the force is
+    zero. This replacement arrives when force n would have arrived.
 
-    The delay of force n is `force_delay` and a share of `force_jitter`, uniformly distributed and
-    independent from sample to sample; it depends on n and `force_jitter_seed`, and on nothing else.
-    So jittered forces arrive at uneven intervals, and may overtake one another: then the newer one
-    acts, and the older one, arriving after it, is lost. A jitter of zero is a constant delay: force
-    n acts from n T + delay to (n + 1) T + delay.
+    The delay of force n is `force_delay` plus a share of `force_jitter`, uniformly distributed and
+    independent from sample to sample; it depends only on n and `force_jitter_seed`. Forces with
+    jitter therefore arrive at uneven intervals, and may overtake one another: then the newer force
+    acts, and the older one, which arrives after it, is lost. Without jitter the delay is constant:
+    force n acts from n T + delay to (n + 1) T + delay.
 
-    A force that was accepted and will never act, because a newer one came or arrived before it, is
-    told to `overtaken`: the stamp (ns) of the sample that it answers, and the force (N).
+    Parameters
+    ----------
+    motion : Motion
+        Motion to sample and to drive; sample 0 is its present state.
+    rate : float
+        Samples per second, Hz.
+    start : int
+        Stamp of sample 0, ns.
+    force_delay : float, optional
+        Shortest delay from a sample to its force, s.
+    force_jitter : float, optional
+        Longest additional delay, s.
+    force_jitter_seed : int, optional
+        Seed of the additional delays.
+    force_timeout : float, optional
+        Age up to which a force is held, s.
+    hold_late : bool, optional
+        Whether the newest force is held while a force is missing. By default the force is zero.
+    expects_control : bool, optional
+        Whether a controller is expected: then missing forces count as late.
+    disturbance : Disturbance, optional
+        Disturbance force of the scenario. By default there is none.
+    overtaken : callable, optional
+        Called as overtaken(stamp, force) for each force that was accepted and will never act,
+        because a newer one came or arrived before it: the stamp (ns) of the sample that it answers,
+        and the force (N).
+    advance : callable, optional
+        Replaces the `advance` of `motion` (see `MotionTracer`); its argument is the duration, s.
+
+    Examples
+    --------
+    A velocity feedback of -500 N s/m at 1 kHz for 0.1 s:
+
+    >>> from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.motion import Motion
+    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
+    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
+    >>> loop = SampledLoop(Motion(drive, 0.0, 0.0), rate=1000.0, start=0)
+    >>> sample = loop.sample
+    >>> for _ in range(100):
+    ...     verdict = loop.offer(sample.stamp, -500.0 * sample.velocity)
+    ...     sample = loop.advance()
+    >>> sample.stamp, round(1e6 * sample.position, 1)
+    (100000000, 645.0)
     """
 
     def __init__(
@@ -68,35 +112,31 @@ class SampledLoop:
         overtaken: Callable[[int, float], None] = lambda stamp, force: None,
         advance: Callable[[float], None] | None = None,
     ) -> None:
-        """Take sample 0 of `motion` at the stamp `start` (ns); rate in Hz, times in s.
-
-        `advance` stands in for the motion's own (see `MotionTracer`).
-        """
         self.period = 1.0 / rate
-        """T, s."""
+        """Sample period T, s."""
         self.late_forces = 0
-        """Samples whose force had not come when it was due."""
+        """Number of samples whose force was missing when it was due."""
         self.dropped: Counter[Verdict] = Counter()
-        """Forces that did not act, by reason."""
+        """Number of forces that did not act, by reason."""
         self.controller_present = expects_control
-        """Whether an answer to the present sample may be hoped for: one came since the last gap."""
+        """Whether an answer to the present sample can be expected: one came since the last gap."""
         self._motion = motion
         self._advance = advance or motion.advance
         self._start = start
-        # So many samples take so many ns, exactly.
+        # Sample period in ns, as an exact ratio.
         self._nanoseconds, self._samples = (NANOSECONDS / Fraction(rate)).as_integer_ratio()
-        # In periods.
+        # Delays in periods.
         self._delay, self._jitter = force_delay / self.period, force_jitter / self.period
         self._shortest_delay = whole, rest = whole_and_rest(self._delay)
-        # Whether each force acts at once: then none is ever under way.
+        # Whether each force acts immediately: then none is ever under way.
         self._immediate = self._shortest_delay == (0, 0.0) and self._jitter == 0.0
-        # Of all generators, the one whose numbers are promised to stay the same.
+        # The only generator with a guarantee that its numbers stay the same.
         self._random = Random(force_jitter_seed)
         self._force_timeout = force_timeout
         self._hold_late = hold_late
         self._expects_control = expects_control
-        # In the order of arrival: number of the period, the share of it that is over, force, and
-        # number of the sample that it answers, -1 where there is none, as before force 0.
+        # In the order of arrival: number of the period, elapsed share of it, force, and number of
+        # the sample that it answers, -1 for no sample, as before force 0.
         self._under_way = deque((number, rest, 0.0, -1) for number in range(whole))
         self._acting = 0.0
         self._acting_number = -1
@@ -106,9 +146,9 @@ class SampledLoop:
         self.scenario_disturbance = disturbance or Disturbance()
         """Disturbance of the scenario; a new one acts from the next sample on."""
         self.asked_disturbance = 0.0
-        """What `disturb` has asked for, N; acts from the next sample on."""
+        """Disturbance force set by `disturb`, N; acts from the next sample on."""
         self.disturbance = 0.0
-        """Disturbance force that acts from the present sample to the next, N."""
+        """Disturbance force from the present sample to the next, N."""
         self._next_drive: Drive | None = None
         self._next_start: tuple[float, float] | None = None
         self.sample_number = 0
@@ -118,20 +158,44 @@ class SampledLoop:
 
     @property
     def answered(self) -> bool:
-        """Whether the force for the present sample has come."""
+        """Whether the force for the present sample has arrived."""
         return self._newest[0] == self.sample_number
 
     @property
     def unbounded(self) -> bool:
-        """Whether the motion has run away."""
+        """Whether the motion is unbounded."""
         return self._motion.unbounded
 
     def stamp(self, number: int) -> int:
-        """Return the stamp (ns) of sample `number`."""
+        """Return the stamp of a sample.
+
+        Parameters
+        ----------
+        number : int
+            Number of the sample, from 0.
+
+        Returns
+        -------
+        int
+            Stamp, ns.
+        """
         return self._start + _rounded(number * self._nanoseconds, self._samples)
 
     def offer(self, stamp: int, force: float) -> Verdict:
-        """Take `force` (N) as the answer to the sample of that stamp (ns), if it is one."""
+        """Offer a force as the answer to a sample.
+
+        Parameters
+        ----------
+        stamp : int
+            Stamp of the sample that the force answers, ns.
+        force : float
+            Control force, N.
+
+        Returns
+        -------
+        Verdict
+            ACCEPTED, or the reason why the force will not act.
+        """
         number = self.number(stamp)
         refusal = self._refusal(number, stamp, force)
         if refusal is None:
@@ -146,19 +210,50 @@ class SampledLoop:
         return refusal
 
     def disturb(self, force: float) -> None:
-        """Add a disturbance of `force` (N) from the next sample on, until it is set again."""
+        """Add a disturbance force from the next sample on, until you set it again.
+
+        Parameters
+        ----------
+        force : float
+            Disturbance force, N; added to that of the scenario.
+        """
         self.asked_disturbance = force
 
     def change_drive(self, drive: Drive) -> None:
-        """Go on with this drive from the next sample on."""
+        """Replace the drive from the next sample on.
+
+        Parameters
+        ----------
+        drive : Drive
+            New drive; the slide keeps its position and velocity.
+        """
         self._next_drive = drive
 
     def reset(self, position: float, velocity: float) -> None:
-        """Put the slide at `position` (m) and `velocity` (m/s) at the next sample."""
+        """Set the state of the slide at the next sample.
+
+        Parameters
+        ----------
+        position : float
+            Displacement of the slide, m.
+        velocity : float
+            Velocity of the slide, m/s.
+        """
         self._next_start = (position, velocity)
 
     def advance(self) -> Sample:
-        """Move on to the next sample with the forces that have come, and return it."""
+        """Advance to the next sample with the forces that have arrived.
+
+        Returns
+        -------
+        Sample
+            State of slide and belt at the next sample.
+
+        Raises
+        ------
+        RunError
+            If the motion is so stiff that it would take too many steps.
+        """
         motion, period = self._motion, self.period
         number, force = self._newest
         if number != self.sample_number:
@@ -179,7 +274,7 @@ class SampledLoop:
         return sample
 
     def _deliver(self) -> float:
-        """Let the forces that arrive in the present period act up to the newest; return when.
+        """Apply the forces that arrive in the present period; return when the newest one does.
 
         In periods from the present sample on.
         """
@@ -196,7 +291,7 @@ class SampledLoop:
         return now
 
     def _send(self, answered: int, force: float) -> None:
-        """Let the force for the present sample set out; what it overtakes is lost."""
+        """Send the force for the present sample; forces that it overtakes are lost."""
         whole, rest = self._shortest_delay
         number = self.sample_number
         if self._jitter > 0.0:
@@ -205,7 +300,7 @@ class SampledLoop:
             while self._under_way and self._under_way[-1][:2] >= (number + whole, rest):
                 _, _, overtaken, overtaken_number = self._under_way.pop()
                 lost[overtaken_number] = overtaken
-            # A force that stands in for others is under way several times.
+            # A force that replaces others is under way several times.
             left = {self._acting_number, answered, *(entry[3] for entry in self._under_way)}
             for overtaken_number in sorted(lost.keys() - left):
                 if overtaken_number > self._acting_number:
@@ -237,9 +332,9 @@ class SampledLoop:
         )
 
     def _stand_in(self) -> tuple[int, float]:
-        """Return what acts in place of the force for the present sample, which has not come.
+        """Return the replacement for the missing force of the present sample.
 
-        And, before it, the number of the sample that it answers, -1 where no force acts.
+        The first value is the number of the sample that it answers, -1 for no force.
         """
         if self._expects_control:
             self.late_forces += 1
@@ -267,21 +362,32 @@ class SampledLoop:
         return None
 
     def number(self, stamp: int) -> int:
-        """Return the number of the sample whose stamp is nearest."""
+        """Return the number of the sample whose stamp is nearest.
+
+        Parameters
+        ----------
+        stamp : int
+            Stamp, ns.
+
+        Returns
+        -------
+        int
+            Number of the sample; negative before sample 0.
+        """
         if stamp == self.sample.stamp:
             return self.sample_number
         return _rounded((stamp - self._start) * self._samples, self._nanoseconds)
 
 
 def _rounded(numerator: int, denominator: int) -> int:
-    """Return the quotient rounded to the nearest whole number, a half to the even one."""
+    """Return the quotient rounded to the nearest whole number; a half is rounded to even."""
     whole, rest = divmod(numerator, denominator)
     excess = 2 * rest - denominator
     return whole + (excess > 0 or (excess == 0 and whole % 2))
 
 
 def whole_and_rest(delay: float) -> tuple[int, float]:
-    """Split a delay in periods; what is whole but for rounding counts as whole."""
+    """Split a delay in periods into whole periods and the remainder, ignoring rounding errors."""
     whole = round(delay)
     if abs(delay - whole) < 1e-9:
         return whole, 0.0

@@ -1,4 +1,4 @@
-"""The washout control law, for measurements that come at instants and are held in between."""
+"""The washout control law, for measurements at instants that are held in between."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,14 +9,14 @@ from stickslip_ros.physics.model.equations import WashoutGains
 
 @dataclass(frozen=True)
 class WashoutParameters:
-    """Constants of the law in SI units, eq. 17 and 18."""
+    """Constants of the washout law in SI units, eq. 17 and 18."""
 
     corner_frequency: float
-    """Corner frequency d of the filter, rad/s."""
+    """Cutoff frequency d of the filter, rad/s."""
     linear_gain: float
-    """k1, N s/m."""
+    """Linear gain k1, N s/m."""
     cubic_gain: float
-    """k2, N s^3/m^3."""
+    """Cubic gain k2, N s^3/m^3."""
     force_limit: float = float("inf")
     """Largest magnitude of the force, N."""
     start_after: float = 0.0
@@ -24,7 +24,7 @@ class WashoutParameters:
 
     @cached_property
     def gains(self) -> WashoutGains:
-        """The corner frequency and the gains."""
+        """Cutoff frequency and gains."""
         return WashoutGains(self.corner_frequency, self.linear_gain, self.cubic_gain)
 
 
@@ -32,29 +32,56 @@ class Washout:
     """Washout filter and force, eq. 17 and 18, discretised exactly for a held measurement.
 
     The filter w' = y - d w, v = y - d w is kept as z = d w, the low-passed speed, z' = d (y - z),
-    so that its output does not jump when the corner frequency is changed.
+    so that its output does not jump when the cutoff frequency changes.
+
+    Parameters
+    ----------
+    parameters : WashoutParameters
+        Constants of the law.
+    low_passed : float, optional
+        Low-passed speed z at the first measurement, m/s. By default it is the first measured speed,
+        so that the filter starts at rest.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
+    >>> washout = Washout(WashoutParameters(20.0, linear_gain=-3000.0, cubic_gain=0.0))
+    >>> washout.answer(0, 0.04)
+    0.0
+    >>> round(washout.answer(1_000_000, 0.05), 3)
+    -30.0
     """
 
     def __init__(self, parameters: WashoutParameters, low_passed: float | None = None) -> None:
-        """Begin with what the filter holds back of the first measurement, m/s; None: all of it."""
         self.parameters = parameters
-        """May be replaced at any time; acts from the next measurement on."""
+        """Constants of the law; a new value acts from the next measurement on."""
         self._stamp: int | None = None
         self._first_stamp = 0
         self._velocity = 0.0
         self._older: tuple[int, float] | None = None
         self._begins_with = low_passed
         self.low_passed = 0.0
-        """What the filter held back of the newest measurement, z, m/s."""
+        """Low-passed speed z at the newest measurement, m/s."""
 
     def answer(self, stamp: int, velocity: float) -> float | None:
-        """Return the force (N) for the slide's finite `velocity` (m/s) measured at `stamp` (ns).
+        """Return the control force for a measurement.
 
-        A stamp that was answered already gets None. So does an older one, and the filter goes on,
-        unless the next measurement goes on from there: then time has gone back, and the filter
-        restarts, at rest, on that older one. One that is no later than the first is answered by a
-        filter at rest, for it may begin a run whose next sample waits for the answer. The force is
-        not finite where it overflows.
+        A stamp that was already answered is not answered again. Neither is an older one, unless the
+        next measurement continues from it: then time has gone back, and the filter restarts at rest
+        from that older one. A filter at rest answers a stamp that is not later than the first: it
+        may start a run whose next sample waits for the answer.
+
+        Parameters
+        ----------
+        stamp : int
+            Stamp of the measurement, ns.
+        velocity : float
+            Velocity of the slide, m/s; finite.
+
+        Returns
+        -------
+        float or None
+            Force, N, not finite if it overflows; None for no answer.
         """
         parameters = self.parameters
         if self._stamp is None:
@@ -82,10 +109,10 @@ class Washout:
         self.low_passed = velocity if begins_with is None else begins_with
 
     def _answer_older(self, stamp: int, velocity: float, newest: int) -> float | None:
-        """Answer a measurement that is not later than the newest one answered."""
+        """Answer a measurement that is not later than the newest answered one."""
         first = self._first_stamp
         older, self._older = self._older, None
-        # Past the beginning, the newest one again is just a measurement that came twice.
+        # After the beginning, the newest one again is only a measurement that came twice.
         if older and older[0] < stamp and (stamp < newest or older[0] <= first):
             self._start(*older)
             return self.answer(stamp, velocity)

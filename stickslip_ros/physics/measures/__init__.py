@@ -1,4 +1,4 @@
-"""What is measured of a motion: cycles, from its breakpoints or from samples."""
+"""Measures of a motion: its cycles, from breakpoints or from samples."""
 
 from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures, Regime
 

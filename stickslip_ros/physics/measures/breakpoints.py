@@ -1,7 +1,7 @@
-"""Breakpoints: the few points of a motion between which displacement and speed have no extremes.
+"""Breakpoints: points of a motion between which displacement and speed have no extremes.
 
-The motion itself marks them exactly; from samples they are interpolated. Either way the cycle
-measures then only compare and subtract.
+The motion records them exactly; from samples they are interpolated. The cycle measures then only
+compare and subtract.
 """
 
 from collections.abc import Callable
@@ -16,25 +16,34 @@ from stickslip_ros.arrays import BoolArray, FloatArray, Table
 
 @dataclass(frozen=True)
 class Breakpoints(Table):
-    """A stretch of motion as columns of equal length, in order of time."""
+    """Breakpoints of a part of a motion, as columns of equal length, in order of time.
+
+    `len(breakpoints)` is the number of rows, and `breakpoints[rows]` selects rows.
+    """
 
     time: FloatArray
-    """s"""
+    """Time, s; shape (n,)."""
     position: FloatArray
-    """Displacement of the slide, m."""
+    """Displacement of the slide, m; shape (n,)."""
     velocity: FloatArray
-    """Velocity of the slide, m/s; exactly zero where it crosses zero."""
+    """Velocity of the slide, m/s, exactly zero at turning points; shape (n,)."""
     sticking: BoolArray
-    """Whether the slide stuck to the belt since the breakpoint before."""
+    """Whether the slide stuck to the belt since the previous breakpoint; shape (n,)."""
 
     @property
     def stuck(self) -> BoolArray:
-        """Whether the slide stuck at each: since the one before, or from there to the next."""
+        """Whether the slide stuck next to each breakpoint, before or after it; shape (n,)."""
         return self.sticking | np.append(self.sticking[1:], False)[: len(self)]
 
     @classmethod
     def empty(cls) -> Self:
-        """Return no rows."""
+        """Return no breakpoints: columns of length 0.
+
+        Returns
+        -------
+        Breakpoints
+            Table without rows.
+        """
         none = np.empty(0)
         return cls(none, none, none, np.empty(0, dtype=bool))
 
@@ -47,12 +56,13 @@ def breakpoints_from_samples(
     *,
     exact_times: bool = True,
 ) -> Breakpoints:
-    """Return samples of a motion with stick edges, turning points and peaks put in between.
+    """Return the samples of a motion with interpolated stick edges, turning points and peaks.
 
     A sample sticks when its velocity is that of the belt. Between two samples the displacement is
-    taken for the cubic that has both positions and both velocities. Arrays of equal length n, SI
-    units; the result has the n samples and what was inserted. Without `exact_times` that is no
-    peaks: they follow from the distance over the time, and might be far too high.
+    interpolated by the cubic that has both positions and both velocities. The arrays have equal
+    length n and SI units; the result has the n samples and the inserted points. Without
+    `exact_times` no peaks are inserted: they follow from distance over time and could be far too
+    high.
     """
     stuck = velocity == belt_velocity
     breakpoints = Breakpoints(
@@ -76,9 +86,9 @@ def _with_stick_edges(
     """Insert the instant at which the slide lands on the belt or leaves it.
 
     The slide slips for a part s of the interval, next to its slipping end, where the relative
-    speed is r; the rest it rides the belt. The displacement relative to the belt is then r s / 2
-    on landing (the relative speed falls linearly) and r s / 3 on leaving (the spring has just
-    reached the limit, so the relative speed starts quadratically).
+    speed is r; for the other part it moves with the belt. The displacement relative to the belt is
+    then r s / 2 on landing (the relative speed falls linearly) and r s / 3 on leaving (the spring
+    has just reached the limit, so the relative speed starts quadratically).
     """
     edges = np.flatnonzero(stuck[1:] != stuck[:-1])
     if len(edges) == 0:
@@ -132,7 +142,7 @@ class _Cubics:
         """Return u where the velocity crosses zero, NaN where it does not."""
         with np.errstate(all="ignore"):
             root = np.sqrt(self.slope * self.slope - 4.0 * self.curvature * self.start)
-            # The form of the root that cancels nothing.
+            # The form of the root without cancellation.
             u = -2.0 * self.start / (self.slope + np.copysign(root, self.end - self.start))
             straight = self.start / (self.start - self.end)
         u = np.where((u > 0.0) & (u < 1.0), u, straight)
@@ -148,10 +158,10 @@ class _Cubics:
 def _with_interior_points(
     breakpoints: Breakpoints, find: Callable[[_Cubics], FloatArray], velocity: float | None = None
 ) -> Breakpoints:
-    """Insert the points that `find` finds while slipping, with `velocity` where it is known."""
+    """Insert the points that `find` returns for slip, with `velocity` where it is known."""
     cubics = _Cubics.through(breakpoints)
     u = np.where(breakpoints.sticking[1:], np.nan, find(cubics))
-    # A leap onto the belt takes no time: there is nothing within it.
+    # A jump onto the belt takes no time: there are no points within it.
     at = np.flatnonzero(np.isfinite(u) & (np.diff(breakpoints.time) > 0.0))
     if len(at) == 0:
         return breakpoints

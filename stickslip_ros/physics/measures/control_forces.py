@@ -1,4 +1,4 @@
-"""The measures of control forces, and which of those that were sent acted."""
+"""The measures of control forces, and which of the published forces acted."""
 
 from itertools import islice
 from math import isfinite
@@ -10,14 +10,14 @@ from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.samples import ForceColumns
 
 HELD_FORCES = 20_000
-"""Forces behind which it may still be told of one that it did not act."""
+"""Number of later forces during which a force may still be reported as dropped."""
 
 
 class ForceMeter:
     """Measures the control force, fed in blocks of columns of any length.
 
-    What it says does not depend on how the run is cut into blocks. Of the past it keeps only the
-    magnitudes that are larger than all later ones: no other will be the largest up to the end.
+    The result does not depend on how the run is divided into blocks. The meter keeps only past
+    magnitudes that are larger than all later ones: no other can be the largest up to the end.
     """
 
     def __init__(self) -> None:
@@ -27,9 +27,10 @@ class ForceMeter:
         self._magnitude = np.empty(0)
 
     def feed(self, forces: ForceColumns) -> None:
-        """Take the forces that follow.
+        """Add the forces that follow.
 
-        What is not finite is left out; where time goes back, the time at rest is that from there.
+        Forces that are not finite are skipped. Where time goes back, the last tenth is
+        that of the time from there.
         """
         finite = np.isfinite(forces.force)
         stamp = np.concatenate([self._stamp, forces.stamp[finite]])
@@ -55,25 +56,25 @@ class ForceMeter:
 
     @property
     def resting_force(self) -> float | None:
-        """Largest magnitude over the last tenth of the time, N; None without forces."""
+        """Final force, the largest magnitude in the last tenth of the time, N, or None."""
         return None if self._first is None else float(self._magnitude[0])
 
 
 class SettledForces(NamedTuple):
-    """Forces that were sent, and whether each acted."""
+    """Published forces, and whether each acted."""
 
     sent: ForceColumns
     acted: BoolArray
 
 
 class DroppedForces:
-    """Forces that are known to have been dropped, each until it is found among those sent."""
+    """Forces that are reported as dropped, each kept until it is found among the published ones."""
 
     def __init__(self) -> None:
         self._number: dict[tuple[int, float], int] = {}
 
     def add(self, forces: ForceColumns) -> None:
-        """Take forces that were dropped; what is not finite never acts anyway."""
+        """Add forces that were dropped; forces that are not finite never act anyway."""
         for dropped in zip(forces.stamp.tolist(), forces.force.tolist(), strict=True):
             if isfinite(dropped[1]):
                 self._number[dropped] = self._number.get(dropped, 0) + 1
@@ -81,7 +82,7 @@ class DroppedForces:
             del self._number[oldest]
 
     def among(self, sent: ForceColumns) -> IntArray:
-        """Return the rows of forces sent that were dropped, and forget these: each counts once."""
+        """Return the rows of published forces that were dropped; each drop counts once."""
         if not self._number:
             return np.empty(0, np.int64)
         rows: list[int] = []
@@ -97,19 +98,19 @@ class DroppedForces:
 
 
 class ForceSettler:
-    """Tells which of the forces that were sent acted, from those that were dropped.
+    """Determines which published forces acted, from those that were dropped.
 
-    A force and the news that it was dropped may come in either order, some 20,000 forces apart.
+    A force and the report that it was dropped may come in either order, up to 20,000 forces apart.
     """
 
     def __init__(self) -> None:
         self._held = ForceColumns(np.empty(0, np.int64), np.empty(0))
         self._acted = np.empty(0, np.bool_)
-        """Whether each of those held did, as far as it is known."""
+        """Whether each held force acted, as far as it is known."""
         self._dropped = DroppedForces()
 
     def feed(self, sent: ForceColumns, dropped: ForceColumns) -> SettledForces:
-        """Take forces that were sent, and that were dropped; return what is settled."""
+        """Add published forces and dropped ones; return the forces that are settled."""
         self._held = self._held.followed_by(sent)
         self._acted = np.concatenate([self._acted, np.isfinite(sent.force)])
         self._dropped.add(dropped)
@@ -118,7 +119,7 @@ class ForceSettler:
         return self._release(max(len(self._held) - HELD_FORCES, 0))
 
     def finish(self) -> SettledForces:
-        """Return what was held back: no more is told of it."""
+        """Return the forces still held: no more reports follow."""
         return self._release(len(self._held))
 
     def _release(self, number: int) -> SettledForces:

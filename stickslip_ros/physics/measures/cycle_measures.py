@@ -12,33 +12,38 @@ import numpy as np
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 
 EQUILIBRIUM_SPEED = 1e-3
-"""Speed amplitude, in belt speeds, below which the slide counts as resting in equilibrium."""
+"""Speed amplitude, in belt speeds, below which the slide counts as at rest in equilibrium."""
 
 UNBOUNDED_BELT_SPEEDS = 1e3
-"""Speed of the slide, in belt speeds, beyond which a sampled motion is said to run away."""
+"""Speed of the slide, in belt speeds, above which a sampled motion counts as unbounded."""
 
 STEADY = 1e-3
-"""Share by which the amplitudes of the cycles measured may differ in a motion that has settled."""
+"""Largest relative difference between the amplitudes of the measured cycles of a steady motion."""
 
 LEAST_CYCLES = 3
-"""Cycles from which on it is told whether a motion is steady."""
+"""Number of cycles needed to decide whether a motion is steady."""
 
 GRAZING = 1e-8
-"""Stick fraction up to which a cycle only touches the belt's speed, and slips all the time.
+"""Stick fraction up to which a cycle counts as touching the belt speed without sticking.
 
-The stick fraction grows with the root of the distance from grazing: this is what the rounding of
-the belt's speed makes of it.
+The stick fraction grows with the root of the distance from grazing; this value is the effect of
+rounding the belt speed.
 """
 
 _NOISE = 1e-9
-"""Share of the belt speed, or of the fastest motion seen, below which speeds are rounding."""
+"""Speeds below this share of the belt speed, or of the highest speed so far, are rounding."""
 
 _STALE_PERIODS = 3.0
-"""A motion without a turn for so many of its last periods has stopped cycling."""
+"""A motion without a turning point for this many of its last periods has stopped cycling."""
 
 
 class Regime(StrEnum):
-    """What kind of motion it is."""
+    """Kind of motion.
+
+    `stick_slip` cycles have a stick phase and `pure_slip` cycles do not; in `equilibrium` the slide
+    is at rest on a moving belt; `stuck` is a slide that sticks to a belt at rest; `unbounded` is a
+    motion that diverges.
+    """
 
     STICK_SLIP = "stick_slip"
     PURE_SLIP = "pure_slip"
@@ -48,7 +53,24 @@ class Regime(StrEnum):
 
     @classmethod
     def label(cls, regime: str | None) -> str:
-        """Return what a person reads of a regime, or of none, wherever one is shown."""
+        """Return the display text of a regime.
+
+        Parameters
+        ----------
+        regime : str or None
+            Value of a regime, or None.
+
+        Returns
+        -------
+        str
+            Text such as "stick-slip"; "no whole cycle" for None.
+
+        Examples
+        --------
+        >>> from stickslip_ros.physics.measures import Regime
+        >>> Regime.label("pure_slip")
+        'pure slip'
+        """
         return "no whole cycle" if regime is None else _LABELS[cls(regime)]
 
 
@@ -62,7 +84,7 @@ _LABELS = {
 
 
 class Trend(StrEnum):
-    """How the amplitude changes in a motion that is not steady."""
+    """Change of the amplitude in a motion that is not steady."""
 
     DECAYING = "decaying"
     GROWING = "growing"
@@ -70,7 +92,7 @@ class Trend(StrEnum):
 
 
 def with_trend(regime: str, trend: str | None) -> str:
-    """Return a regime as a person reads it: what is not steady says so."""
+    """Return the display text of a regime with its trend, if it is not steady."""
     return f"{regime}, not steady: {trend}" if trend else regime
 
 
@@ -78,19 +100,25 @@ class Cycle(NamedTuple):
     """One cycle, from one upward zero crossing of the velocity to the next; SI units."""
 
     amplitude: float
+    """Half the peak-to-peak displacement, m."""
     velocity_amplitude: float
+    """Half the peak-to-peak velocity, m/s."""
     midpoint: float
+    """Middle of the displacement, m."""
     period: float
+    """Period, s."""
     frequency: float
+    """Frequency, Hz."""
     stick_fraction: float
+    """Stick time divided by the period."""
 
 
 @dataclass(frozen=True)
 class Measures:
-    """Means of the last whole cycles; null (None) is what does not exist.
+    """Means over the last whole cycles; None is what does not exist.
 
-    In equilibrium, stuck and unbounded there is no period and no frequency. While no cycle has
-    been completed and the motion has not come to rest either, the regime too is null.
+    Period and frequency are None in equilibrium, stuck and unbounded. The regime is None while no
+    cycle has been completed and the slide has not settled at rest.
     """
 
     amplitude: float | None
@@ -100,30 +128,39 @@ class Measures:
     midpoint: float | None
     """Middle of the displacement, m."""
     period: float | None
-    """s"""
+    """Period, s."""
     frequency: float | None
-    """Hz"""
+    """Frequency, Hz."""
     stick_fraction: float | None
-    """Stick time over time."""
+    """Stick time divided by the time."""
     cycles: int
-    """How many cycles the means are over."""
+    """Number of cycles in the means."""
     regime: Regime | None
+    """Kind of motion."""
     steady: bool | None = None
-    """Whether the motion has settled: the amplitudes of the cycles measured, three at least, differ
-    by no more than a thousandth; a rest has lasted for as many cycles as are measured at most, and
-    small ones around it do not grow. What runs away has settled, too. Null is too little to tell.
+    """Whether the motion has settled; None if there is too little data.
+
+    The amplitudes of the measured cycles, at least three, differ by a thousandth at most. A rest
+    is steady once it has lasted for as many cycles as the window has, if small cycles around it do
+    not grow. An unbounded motion is steady, too.
     """
     trend: Trend | None = None
-    """How the amplitude changes, null unless `steady` is false."""
+    """Change of the amplitude; None unless `steady` is False."""
 
     def as_dict(self) -> dict[str, float | int | str | None]:
-        """Return the measures by their names, ready for JSON."""
+        """Return the measures by name, ready for JSON.
+
+        Returns
+        -------
+        dict
+            Value of each attribute by its name.
+        """
         return asdict(self)
 
 
 @dataclass
 class _Stretch:
-    """Ends, extremes and stick time of a stretch of motion that goes on."""
+    """Ends, extremes and stick time of a part of a motion, extended as the motion continues."""
 
     start: float
     end: float
@@ -142,11 +179,11 @@ class _Stretch:
         return cls(time, time, position, position, velocity, velocity)
 
     def extend(self, breakpoints: Breakpoints, first: int, last: int) -> None:
-        """Go on to the breakpoint `last`, the one before `first` being the end so far."""
+        """Continue to the breakpoint `last`; the one before `first` is the end so far."""
         if last < first:
             return
         rows = slice(first, last + 1)
-        # Stretches are short: lists take a fraction of the time that arrays would.
+        # Stretches are short: lists take a fraction of the time of arrays.
         position = breakpoints.position[rows].tolist()
         velocity = breakpoints.velocity[rows].tolist()
         self.end = float(breakpoints.time[last])
@@ -176,21 +213,44 @@ class _Stretch:
 
 
 class CycleMeter:
-    """Measures a motion as it comes, in blocks of breakpoints of any length, in constant memory."""
+    """Measures a motion, fed in blocks of breakpoints of any length, in constant memory.
+
+    Parameters
+    ----------
+    window : int
+        Largest number of cycles to average over: the last ones.
+
+    Examples
+    --------
+    The limit cycle of a drive:
+
+    >>> from stickslip_ros.physics.measures import CycleMeter
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.motion import Motion
+    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
+    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
+    >>> motion = Motion(drive, position=0.0, velocity=0.0, record=True)
+    >>> motion.advance(5.0)
+    >>> meter = CycleMeter(window=20)
+    >>> cycles = meter.feed(motion.take_breakpoints(), drive.belt_speed)
+    >>> measures = meter.measures()
+    >>> measures.regime.value, round(1e6 * measures.amplitude, 1)
+    ('stick_slip', 434.1)
+    """
 
     def __init__(self, window: int) -> None:
-        """Average over the last `window` cycles at most."""
         self._cycles: deque[Cycle] = deque(maxlen=window)
         self._amplitudes: deque[float] = deque(maxlen=max(window, LEAST_CYCLES))
         self._belt_speed = 0.0
         self._fastest = 0.0
         self._unbounded = False
         self.ends: list[float] = []
-        """Time, s, at which each cycle was complete that `feed` returned last."""
+        """Time, s, at which each cycle ended that `feed` returned last."""
         self.interrupt()
 
     def interrupt(self) -> None:
-        """Drop the cycle under way: the next breakpoint does not continue the motion so far."""
+        """Drop the current cycle: the next breakpoint does not continue the motion so far."""
         self._last = Breakpoints.empty()
         self._direction = 0.0
         self._open: _Stretch | None = None
@@ -199,13 +259,23 @@ class CycleMeter:
         self._sticking_since: float | None = None
 
     def report_run_away(self) -> None:
-        """Say that the motion has left all bounds."""
+        """Report that the motion is unbounded."""
         self._unbounded = True
 
     def feed(self, breakpoints: Breakpoints, belt_speed: float) -> list[Cycle]:
-        """Take the breakpoints that follow, the belt moving at `belt_speed` (m/s).
+        """Add the breakpoints that follow.
 
-        Return the cycles that were completed by them.
+        Parameters
+        ----------
+        breakpoints : Breakpoints
+            Breakpoints that continue the motion, in SI units.
+        belt_speed : float
+            Belt speed, m/s.
+
+        Returns
+        -------
+        list of Cycle
+            Cycles completed by these breakpoints.
         """
         self.ends = []
         if len(breakpoints) == 0:
@@ -235,7 +305,13 @@ class CycleMeter:
         return completed
 
     def measures(self) -> Measures:
-        """Return the means over the last whole cycles."""
+        """Return the means over the last whole cycles.
+
+        Returns
+        -------
+        Measures
+            Measures in SI units.
+        """
         if self._unbounded:
             return _without_cycles(None, Regime.UNBOUNDED, steady=True)
         period = self._cycles[-1].period if self._cycles else 0.0
@@ -250,7 +326,7 @@ class CycleMeter:
             if (
                 recent is None
                 or recent.velocity_amplitude >= self._equilibrium_speed
-                or recent.stick_fraction > 0.0  # it rides a slow belt
+                or recent.stick_fraction > 0.0  # it sticks to a slow belt
             ):
                 return _without_cycles(None, None)
             steady = True if self._lasts(since_turn) else None
@@ -266,7 +342,7 @@ class CycleMeter:
         return Measures(**mean._asdict(), cycles=count, regime=regime, steady=steady, trend=trend)
 
     def _lasts(self, rest: float) -> bool:
-        """Return whether a rest of so long (s) has lasted for a window of the last cycles."""
+        """Return whether a rest of this duration (s) has lasted for a window of the last cycles."""
         window = self._cycles.maxlen or 0
         return not self._cycles or rest >= window * self._cycles[-1].period
 
@@ -275,7 +351,7 @@ class CycleMeter:
         return EQUILIBRIUM_SPEED * abs(self._belt_speed)
 
     def _upward_crossings(self, breakpoints: Breakpoints) -> list[int]:
-        """Return the breakpoints at which the velocity goes from negative to positive."""
+        """Return the breakpoints at which the velocity changes from negative to positive."""
         speed = np.abs(breakpoints.velocity)
         self._fastest = max(self._fastest, float(speed.max()))
         moving = np.flatnonzero(speed > _NOISE * max(self._fastest, abs(self._belt_speed)))
@@ -288,10 +364,10 @@ class CycleMeter:
         return np.where(speed[before] <= speed[rising], before, rising).tolist()
 
     def _follow_recent(self, breakpoints: Breakpoints, first: int) -> None:
-        """Keep the extremes of the last half, at least, of the stretch since the last crossing.
+        """Keep the extremes of at least the last half of the stretch since the last crossing.
 
-        Whenever the stretch, once longer than the last cycle, has doubled, what went before the
-        last doubling is forgotten.
+        Once the stretch is longer than the last cycle, everything before the last doubling is
+        dropped whenever it doubles again.
         """
         assert self._open is not None
         if not self._recent:
@@ -332,10 +408,10 @@ class CycleMeter:
 
 
 def _trend(amplitudes: Sequence[float], resting: bool) -> Trend | None:
-    """Return how the amplitude changes from cycle to cycle; None if it does not, or for few.
+    """Return the change of the amplitude from cycle to cycle; None without one or with few cycles.
 
-    Around a slide that is `resting` only growth from each cycle to the next counts: else it comes
-    to rest still, or what is measured is noise.
+    Around a slide that is `resting` only growth from each cycle to the next counts: otherwise it is
+    still settling, or the measured amplitude is noise.
     """
     if len(amplitudes) < LEAST_CYCLES:
         return None

@@ -1,4 +1,4 @@
-"""Observers: they see a run as it is measured, be it simulated, live or recorded."""
+"""Observers: they receive a run as it is measured, whether simulated, live or recorded."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,34 +12,34 @@ from stickslip_ros.physics.measures.cycle_measures import Cycle
 
 @dataclass(frozen=True)
 class MeasuredMotion:
-    """Breakpoints that follow those before, and what was measured with them."""
+    """Breakpoints that continue a motion, and the cycles measured with them."""
 
     breakpoints: Breakpoints
     belt_velocity: FloatArray
     """Velocity of the belt at each breakpoint, m/s."""
     cycles: Sequence[Cycle]
-    """Those completed by these breakpoints."""
+    """Cycles completed by these breakpoints."""
     cycle_ends: Sequence[float]
-    """Time at which each of them was complete, s."""
+    """Time at which each of these cycles ended, s."""
     longest_step: float = inf
-    """Time, s, between two breakpoints beyond which nothing is known of the motion between them."""
+    """Longest time between two breakpoints, s, over which the motion between them is known."""
 
 
 class MotionObserver(Protocol):
-    """Sees a motion as it is measured; times in s from the start of the run, else SI units."""
+    """Receives a motion as it is measured; times in s from the start of the run, SI units."""
 
     def take_motion(self, motion: MeasuredMotion) -> None:
-        """Take the motion that follows."""
+        """Receive the motion that follows."""
         ...
 
 
 class RunObserver(MotionObserver, Protocol):
-    """Sees a run as it is measured; times in s from the start of the run, else SI units."""
+    """Receives a run as it is measured; times in s from the start of the run, SI units."""
 
     def take_friction(self, time: FloatArray, force: FloatArray) -> None:
-        """Take the friction force on the slide at the samples that follow, NaN if not known."""
+        """Receive the friction force on the slide at the samples that follow; NaN if unknown."""
         ...
 
     def take_control(self, time: FloatArray, force: FloatArray, acted: BoolArray) -> None:
-        """Take the control forces that follow, and whether each acted, as far as it is known."""
+        """Receive the control forces that follow, and whether each acted, as far as it is known."""
         ...

@@ -12,35 +12,35 @@ from stickslip_ros.stamps import NANOSECONDS
 
 
 class RunMeter:
-    """Measures a run from what is recorded of it: the samples and the control force."""
+    """Measures a run from its record: the samples and the control forces."""
 
     def __init__(
         self, window: int, *, dropped_known: bool = False, observer: RunObserver | None = None
     ) -> None:
-        """Average over the last `window` cycles at most; an `observer` sees motion and forces.
+        """Average over the last `window` cycles at most; an `observer` receives motion and forces.
 
-        `dropped_known` says whether it is told which forces were dropped; only then it is known
-        which acted.
+        `dropped_known` says whether dropped forces are reported; only then is it known which forces
+        acted.
         """
         self.motion = SampleMeter(window, observer)
         self.force = ForceMeter()
-        """The force as it was sent."""
+        """Control force as it was published."""
         self.applied = ForceMeter()
-        """The force that acted; one that was dropped counts as none."""
+        """Control force that acted; a dropped one counts as zero."""
         self.dropped_known = dropped_known
         self.dropped = 0
-        """Forces that were told to be dropped."""
+        """Number of forces reported as dropped."""
         self._settler = ForceSettler()
         self._observer = observer
 
     def feed_forces(self, forces: ForceColumns, dropped: ForceColumns) -> SettledForces:
-        """Take the forces that follow, sent and dropped; return those of which it is settled."""
+        """Add the forces that follow, published and dropped; return those that are settled."""
         self.force.feed(forces)
         self.dropped += len(dropped)
         return self._apply(self._settler.feed(forces, dropped))
 
     def finish(self) -> SettledForces:
-        """End the run: what was not told to be dropped has acted. Return these forces."""
+        """End the run: forces not reported as dropped have acted. Return these forces."""
         return self._apply(self._settler.finish())
 
     def _apply(self, settled: SettledForces) -> SettledForces:
@@ -54,7 +54,7 @@ class RunMeter:
     def report(self) -> dict[str, Any]:
         """Return the measures and counts by name, ready for JSON; SI units.
 
-        `notes` are sentences on what makes the measures doubtful.
+        `notes` are sentences that say why the measures may be wrong.
         """
         motion = self.motion
         notes: list[str] = []

@@ -21,20 +21,20 @@ from stickslip_ros.stamps import NANOSECONDS
 class SampleMeter:
     """Measures a motion from its samples, fed in blocks of columns of any length.
 
-    A gap of a whole number of sample periods is loss, up to ten million of them; any other, and a
-    stamp that goes back, is the start of a new segment and not lost. Stamps that are on no grid,
-    as those read from a clock, are measured too: then what is missing between two samples is loss
-    up to ten periods, and beyond that a new segment starts.
+    A gap of a whole number of sample periods, up to ten million, is a loss. Any other gap, and a
+    stamp that goes back, starts a new segment and is not a loss. Stamps on no grid, for example
+    those read from a clock, are measured, too: then a gap of up to ten periods is a loss, and a
+    longer one starts a new segment.
     """
 
     def __init__(self, window: int, observer: MotionObserver | None = None) -> None:
-        """Average over the last `window` cycles at most; an `observer` sees what is measured."""
+        """Average over the last `window` cycles at most; an `observer` receives the motion."""
         self.origin = 0
-        """Stamp, ns, from which the observer's times count."""
+        """Stamp of time zero for the observer, ns."""
         self.samples = 0
-        """Samples seen."""
+        """Number of samples so far."""
         self.steps_back = 0
-        """Samples whose stamp was not later than the one before."""
+        """Number of samples whose stamp is not later than the previous one."""
         self._observer = observer
         self._grid = SamplingGrid()
         self._meter = CycleMeter(window)
@@ -42,9 +42,9 @@ class SampleMeter:
         self._elapsed = 0
 
     def feed(self, samples: SampleColumns) -> list[Cycle]:
-        """Take the samples that follow; return the cycles completed by them.
+        """Add the samples that follow; return the cycles completed by them.
 
-        Samples that are not to be believed, see `SampleColumns`, count as lost.
+        Samples that are not valid, see `SampleColumns.believed`, count as lost.
         """
         believed = samples.believed
         if not believed.all():
@@ -60,9 +60,9 @@ class SampleMeter:
         ends = [*(segment.start for segment in segments[1:]), len(samples)]
         for (start, jittered), end in zip(segments, ends, strict=True):
             segment = samples[start:end]
-            self._look_for_run_away(segment)
+            self._look_for_unbounded(segment)
             if len(segment) == 1 and end < len(samples):
-                continue  # a lone sample is no motion, and there may be very many of them
+                continue  # a single sample is no motion, and there may be very many of them
             if start > 0:
                 self._meter.interrupt()
                 self._last = None
@@ -72,7 +72,7 @@ class SampleMeter:
 
     @property
     def lost_samples(self) -> int:
-        """Samples that the stamps say are missing."""
+        """Number of missing samples, from the stamps."""
         return self._grid.lost
 
     @property
@@ -97,11 +97,11 @@ class SampleMeter:
                 exact_times=not jittered,
             )
         if self._last is not None:
-            breakpoints = breakpoints[1:]  # the sample carried over was fed with its own block
+            breakpoints = breakpoints[1:]  # the first sample was fed with the previous block
         cycles = self._meter.feed(breakpoints, float(samples.belt_velocity[-1]))
         if self._observer is not None:
             observed = (stamp - self.origin) / NANOSECONDS
-            # A breakpoint's time may be rounded beyond that of the last sample.
+            # Rounding may put a breakpoint after the last sample.
             ends = np.minimum(np.searchsorted(time, breakpoints.time), len(time) - 1)
             known = LONGEST_GAP * float(np.median(np.diff(observed))) if len(observed) > 1 else inf
             self._observer.take_motion(
@@ -115,7 +115,7 @@ class SampleMeter:
             )
         return cycles
 
-    def _look_for_run_away(self, samples: SampleColumns) -> None:
+    def _look_for_unbounded(self, samples: SampleColumns) -> None:
         belt_speed = np.abs(samples.belt_velocity)
         fast = np.abs(samples.velocity) > UNBOUNDED_BELT_SPEEDS * belt_speed
         if fast.any() and belt_speed.all():

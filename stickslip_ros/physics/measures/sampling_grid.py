@@ -1,4 +1,4 @@
-"""The grid of instants that samples are on: its period, its gaps and its jitter, from stamps."""
+"""The grid of sampling instants: its period, its gaps and its jitter, from stamps."""
 
 from statistics import median
 from typing import NamedTuple
@@ -9,27 +9,27 @@ from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.stamps import NANOSECONDS
 
 LONGEST_GAP = 10
-"""Periods over which a motion may still be interpolated."""
+"""Longest gap, in periods, over which a motion may be interpolated."""
 
 _FEW_STEPS = 10
-"""Steps after which the period is taken as known."""
+"""Number of steps after which the period counts as known."""
 
 _LONGEST_STEP = 86_400 * NANOSECONDS
-"""A longer step is neither a period nor a loss: one of the two stamps is not of this run."""
+"""A longer step is neither a period nor a loss: one of the two stamps is not from this run."""
 
 _LONGEST_LOSS = 10**7
-"""Periods up to which a gap on the grid may be a loss."""
+"""Longest gap on the grid, in periods, that may be a loss."""
 
 
 class Segment(NamedTuple):
-    """A part of a block without a cut: from the row `start` to the next one's."""
+    """Part of a block without a cut: from row `start` to the start of the next segment."""
 
     start: int
     jittered: bool
 
 
 class _JitteredSteps:
-    """Steps that vary about a period, as those between readings of a clock do."""
+    """Steps that vary about a period, for example between readings of a clock."""
 
     def __init__(self, period: float) -> None:
         self._period = period
@@ -41,11 +41,11 @@ class _JitteredSteps:
 
     @property
     def lost(self) -> int:
-        """How many samples are missing; a late one and one in time behind it make up a loss."""
+        """Number of missing samples; a late sample and the punctual one after it cancel out."""
         return max(self._missing, 0)
 
     def follow(self, steps: IntArray) -> int:
-        """Follow some of the steps (ns) up to the next gap; return how many, none at a gap."""
+        """Follow some of the steps (ns) up to the next gap; return how many, 0 at a gap."""
         steps = steps[: self._next_estimate - self._count]
         steps = steps[: _first((steps <= 0) | (steps > LONGEST_GAP * self._period))]
         periods = np.rint(steps / self._period)
@@ -62,11 +62,12 @@ class _JitteredSteps:
 
 
 class SamplingGrid:
-    """The grid of instants that samples are on, found from their stamps, and what it misses.
+    """Grid of sampling instants, found from the stamps, and the number of missing samples.
 
-    Stamps are rounded to the nanosecond. The period is known all the better the more of it were
-    seen, so that a long gap of a whole number of periods can be told from one between segments.
-    Stamps that soon leave the grid again and again are on none: their steps are jittered.
+    Stamps are rounded to the nanosecond. The more periods have been seen, the more exactly the
+    period is known, so that a long gap of a whole number of periods can be distinguished from one
+    between segments. Stamps that leave the grid soon and repeatedly are on no grid: their steps are
+    jittered.
     """
 
     def __init__(self) -> None:
@@ -84,15 +85,15 @@ class SamplingGrid:
 
     @property
     def lost(self) -> int:
-        """How many instants of the grid had no sample."""
+        """Number of instants of the grid without a sample."""
         lost = self._lost_before + self._periods - self._intervals
         return lost if self._jittered is None else lost + self._jittered.lost
 
     def segments(self, stamp: IntArray) -> list[Segment]:
-        """Follow the stamps (ns), the first of them known; return what the motion is cut into.
+        """Follow the stamps (ns), the first of which is known; return the segments of the motion.
 
-        It is cut where a new segment begins, which is no loss, and behind a gap that is too long
-        to interpolate over. The first of them goes on from before.
+        The motion is cut where a new segment starts, which is no loss, and after a gap that is too
+        long for interpolation. The first segment continues the motion so far.
         """
         steps = np.diff(stamp)
         segments = [Segment(0, self._jittered is not None)]
@@ -108,12 +109,12 @@ class SamplingGrid:
         return segments
 
     def _follow(self, steps: IntArray) -> int:
-        """Follow some of the steps up to the next that is odd; return how many."""
+        """Follow some of the steps up to the next irregular one; return how many."""
         if self._jittered is not None:
             return self._jittered.follow(steps)
         if self._step == 0:
             self._step = int(steps[0])
-        # To look further ahead than came since the last gap could take quadratic time.
+        # A longer look ahead than the stretch since the last gap could take quadratic time.
         steps = steps[: max(64, self._since_gap)]
         steps = steps[: _first(self._odd(steps))]
         if len(steps) > 0:
@@ -132,7 +133,7 @@ class SamplingGrid:
         return off_grid | (periods < 1.0) | (periods > LONGEST_GAP)
 
     def _reconsider(self, step: int) -> bool:
-        """Take the first few steps for several periods each if a shorter one fits into them."""
+        """Count the first few steps as several periods each if a shorter step divides them."""
         times = round(self._step / step) if step > 0 else 0
         fits = 1 < times <= _LONGEST_LOSS and abs(self._step - times * step) <= times + 1
         if not fits or self._intervals > _FEW_STEPS:
@@ -142,7 +143,7 @@ class SamplingGrid:
         return True
 
     def _jump(self, gap: int) -> None:
-        """Count a long gap as loss if it is on the grid, otherwise begin a new one."""
+        """Count a long gap as a loss if it is on the grid, otherwise start a new grid."""
         self._since_gap = 0
         if 0 < gap <= _LONGEST_STEP and self._periods > 0:
             period = self._covered / self._periods
@@ -158,15 +159,15 @@ class SamplingGrid:
         self._begin()
 
     def _jitter(self, gap: int) -> _JitteredSteps | None:
-        """Return what comes behind a gap off the grid if that was left too often."""
-        if self._intervals > 1000:  # it is steady: to leave it once is no sign of jitter
+        """Return jittered steps for a gap off the grid if the grid was left too often."""
+        if self._intervals > 1000:  # a steady grid: leaving it once is no sign of jitter
             self._off_grid.clear()
         period = self._covered / self._periods if self._periods > 0 else 0.0
         if not 0.0 < period / 5 <= gap <= 5 * period:
             self._off_grid.clear()
             return None
         self._off_grid += [period, gap]
-        if len(self._off_grid) < 6:  # two for each gap: one or two gaps do not tell
+        if len(self._off_grid) < 6:  # two for each gap: one or two gaps are not enough
             return None
         steps = _JitteredSteps(median(self._off_grid))
         self._off_grid.clear()
@@ -174,5 +175,5 @@ class SamplingGrid:
 
 
 def _first(found: BoolArray) -> int:
-    """Return the first row that is true, or their number if none is."""
+    """Return the index of the first row that is true, or the number of rows if there is none."""
     return int(np.argmax(found)) if found.any() else len(found)

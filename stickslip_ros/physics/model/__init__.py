@@ -1,1 +1,1 @@
-"""The drive, its friction laws and what acts on it, as equations."""
+"""The drive, its friction laws and the forces on it, as equations."""

@@ -1,4 +1,4 @@
-"""Disturbance forces on the slide that a scenario brings with it."""
+"""Disturbance forces on the slide that a scenario defines."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -6,7 +6,7 @@ from math import isfinite, pi, sin
 
 
 class DisturbanceKind(StrEnum):
-    """Time course of a disturbance force."""
+    """Shape of a disturbance force over time."""
 
     NONE = "none"
     STEP = "step"
@@ -16,23 +16,45 @@ class DisturbanceKind(StrEnum):
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A force that is held from sample to sample like the control force."""
+    """Disturbance force on the slide; like the control force it is held between samples.
+
+    Examples
+    --------
+    A step of 50 N for 0.2 s, sampled every 0.1 s, starts at sample 5:
+
+    >>> from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
+    >>> step = Disturbance(DisturbanceKind.STEP, amplitude=50.0, start=0.5, duration=0.2)
+    >>> [step.force(number, 0.1) for number in range(4, 8)]
+    [0.0, 50.0, 50.0, 0.0]
+    """
 
     kind: DisturbanceKind = DisturbanceKind.NONE
-    """A step lasts for `duration`, an impulse for one sample; a sine starts from zero."""
+    """A step lasts for `duration`, an impulse for one sample; a sine starts at zero."""
     amplitude: float = 0.0
-    """N"""
+    """Amplitude, N."""
     start: float = 0.0
-    """Simulated time at which it begins, s."""
+    """Simulated time at which the force starts, s."""
     duration: float = float("inf")
-    """How long it lasts, s."""
+    """Duration of a step or a sine, s."""
     frequency: float = 1.0
-    """Of the sine, Hz."""
+    """Frequency of the sine, Hz."""
 
     def force(self, number: int, period: float) -> float:
-        """Return the force (N) of sample `number`, samples being `period` (s) apart.
+        """Return the disturbance force at a sample.
 
-        The first sample that it acts on is the one nearest to the start.
+        The force starts at the sample nearest to `start`.
+
+        Parameters
+        ----------
+        number : int
+            Number of the sample, from 0.
+        period : float
+            Sample period, s.
+
+        Returns
+        -------
+        float
+            Force, N; 0 before the start and after the end.
         """
         if self.kind is DisturbanceKind.NONE:
             return 0.0

@@ -9,10 +9,23 @@ from stickslip_ros.physics.model.friction import FrictionLaw
 
 @dataclass(frozen=True)
 class Drive:
-    """A feed drive in SI units, eq. 1: m x'' + c x' + k x = N mu(x' - v_belt) + u.
+    """Feed drive in SI units, eq. 1: m x'' + c x' + k x = N mu(x' - v_belt) + u.
 
     The scales make it dimensionless, eq. 2: X'' + 2 beta X' + X = mu(X' - v0) + U.
     A drive with m = k = N = 1 is the dimensionless system itself.
+
+    Examples
+    --------
+    The slide of a machine tool:
+
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
+    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
+    >>> drive.angular_frequency
+    100.0
+    >>> round(1e6 * drive.equilibrium_position, 3)
+    258.4
     """
 
     mass: float
@@ -22,20 +35,20 @@ class Drive:
     stiffness: float
     """Stiffness k of the transmission, N/m."""
     normal_force: float
-    """Force N pressing slide and belt together, N."""
+    """Force N that presses the slide onto the belt, N."""
     belt_speed: float
-    """Belt (feed) speed, m/s, of either sign or zero."""
+    """Belt (feed) speed v_belt, m/s; positive, negative or zero."""
     friction: FrictionLaw
-    """Friction law, its speeds in m/s."""
+    """Friction law; its speeds are in m/s."""
 
     @cached_property
     def angular_frequency(self) -> float:
-        """Natural angular frequency w0 = sqrt(k/m), rad/s: one over the scale of time."""
+        """Natural angular frequency w0 = sqrt(k/m), rad/s; the scale of time is 1/w0."""
         return sqrt(self.stiffness / self.mass)
 
     @property
     def is_dimensionless(self) -> bool:
-        """Whether it is the dimensionless system itself, whose figures have no units."""
+        """Whether m = k = N = 1: the dimensionless system, whose values have no units."""
         return self.mass == self.stiffness == self.normal_force == 1.0
 
     @property
@@ -55,7 +68,10 @@ class Drive:
 
     @property
     def equilibrium_position(self) -> float:
-        """Displacement of a slide at rest, m, eq. 6; on a belt at rest it may be any other too."""
+        """Displacement of the slide in equilibrium, m, eq. 6.
+
+        With the belt at rest it is one of many possible rest positions.
+        """
         return float(self.friction.at_rest(self.belt_speed)) * self.length_scale
 
     @property

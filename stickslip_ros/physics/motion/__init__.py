@@ -1,4 +1,4 @@
-"""The exact motion of a drive."""
+"""The motion of a drive, integrated to machine precision."""
 
 from stickslip_ros.physics.motion.motion import Motion
 

@@ -1,4 +1,4 @@
-"""The exact stick-slip motion of a drive under a held force, or under continuous control."""
+"""The stick-slip motion of a drive with a held force or with continuous control."""
 
 from math import copysign, inf, ulp
 from typing import ClassVar
@@ -13,39 +13,68 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.motion.integrator import (
     BELT_SPEED_REACHED,
-    RUN_AWAY,
     UNBOUNDED_SPEED,
+    UNBOUNDED_SPEED_REACHED,
     Integrator,
     Integrators,
 )
 
 _LARGEST_FORCE = 1e100
-"""Dimensionless; any that is larger makes the motion run away at once, too, and is taken for it."""
+"""Largest dimensionless force; a larger one is clipped to it: both make the motion unbounded."""
 
 _SPARE_STEPS, _STEPS_PER_RADIAN = 4_000_000, 10_000
-"""Steps of integration that a motion may take: seconds of work, and a thousand times the usual."""
+"""Integration steps that a motion may take: seconds of work, a thousand times the usual number."""
 _STEPS_PER_ADVANCE = 1_000
-"""That it may take besides, however short the advance: milliseconds of work."""
+"""Extra steps for each advance, however short: milliseconds of work."""
 _MOST_STEPS = 1e18
-"""That heyoka can be told."""
+"""Largest number of steps that heyoka accepts."""
 _STEPS_OF_A_PHASE = 10
-"""For which the work counts that a phase of stick or slip causes besides its integration."""
+"""Number of steps that the work around the integration of one stick or slip is worth."""
 
 _NO_EVENT = hy.taylor_outcome.time_limit.value
 _NOT_FINITE = hy.taylor_outcome.err_nf_state.value
 
 
 class Motion:
-    """A drive in motion: stick, slip and the passages between them, to machine precision.
+    """Motion of a drive: stick, slip and the transitions between them, to machine precision.
 
-    Slipping is integrated by heyoka's adaptive Taylor method, which finds the instant at which the
-    slide reaches the belt's speed. There it sticks if friction can hold it, |h| <= mu_s N with the
-    reaction h = k x + c v_belt - u, and otherwise passes through or slips the other way. Sticking
-    is motion with the belt until the reaction exceeds that limit: in a straight line while the
-    force is held; under continuous control the filter goes on, and heyoka finds the instant.
+    heyoka's adaptive Taylor method integrates the slip and finds the instant at which the slide
+    reaches the belt speed. There the slide sticks if friction can hold it, |h| <= mu_s N with the
+    reaction h = k x + c v_belt - u; otherwise it passes the belt speed or slips the other way.
+    During stick the slide moves with the belt until the reaction exceeds that limit: in a straight
+    line while the force is held. With continuous control the filter keeps running, and heyoka
+    finds the instant.
 
-    All quantities in and out are SI; drive, force and gains may be changed between calls of
-    `advance` and act from then on.
+    All inputs and outputs are in SI units. You may change drive, force and gains between calls of
+    `advance`; the changes take effect from then on.
+
+    Parameters
+    ----------
+    drive : Drive
+        Drive in motion.
+    position : float
+        Displacement of the slide at the start, m.
+    velocity : float
+        Velocity of the slide at the start, m/s.
+    continuous_control : bool, optional
+        Whether the force is that of the washout controller without sampling, eq. 19. Its filter
+        starts at rest and its gains at zero (see `set_gains`). By default the force is `force`.
+    record : bool, optional
+        Whether to record the breakpoints of the motion (see `take_breakpoints`).
+
+    Examples
+    --------
+    The first millisecond of a slide that starts at rest:
+
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.motion import Motion
+    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
+    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
+    >>> motion = Motion(drive, position=0.0, velocity=0.0)
+    >>> motion.advance(0.001)
+    >>> round(1e6 * motion.position, 3), motion.sticking
+    (1.297, False)
     """
 
     _with_derivatives: ClassVar[bool] = False
@@ -60,14 +89,8 @@ class Motion:
         continuous_control: bool = False,
         record: bool = False,
     ) -> None:
-        """Start at `position` (m) and `velocity` (m/s) with no force.
-
-        With `continuous_control` the force is that of the washout controller acting without
-        sampling (eq. 19), its filter at rest; set `gains`. With `record` the breakpoints of the
-        motion are kept for `take_breakpoints`; see `recording`.
-        """
         self.unbounded = False
-        """Whether the motion has run away; it does not advance any further then."""
+        """Whether the motion is unbounded; then it does not advance any further."""
         self._recording = record
         self._recorded: list[tuple[float, float, float, bool]] = []
         self._continuous_control = continuous_control
@@ -87,7 +110,17 @@ class Motion:
         self.restart(position, velocity)
 
     def begin(self, drive: Drive, position: float, velocity: float) -> None:
-        """Be as a motion newly made with these; only `recording` and the gains stay."""
+        """Start again with a drive, as a new motion would; only `recording` and the gains are kept.
+
+        Parameters
+        ----------
+        drive : Drive
+            Drive in motion from now on.
+        position : float
+            Displacement of the slide at the start, m.
+        velocity : float
+            Velocity of the slide at the start, m/s.
+        """
         self.drive = drive
         self.force = 0.0
         self._recorded.clear()
@@ -96,7 +129,15 @@ class Motion:
         self.restart(position, velocity)
 
     def restart(self, position: float, velocity: float) -> None:
-        """Put the slide at `position` (m) and `velocity` (m/s); force and gains stay."""
+        """Set the state of the slide; force and gains are kept, and the filter is at rest.
+
+        Parameters
+        ----------
+        position : float
+            Displacement of the slide, m.
+        velocity : float
+            Velocity of the slide, m/s.
+        """
         drive = self._drive
         self.unbounded = False
         self._x, self._y = position / drive.length_scale, velocity / drive.speed_scale
@@ -106,7 +147,7 @@ class Motion:
 
     @property
     def drive(self) -> Drive:
-        """The drive; a new one keeps the slide's position and velocity."""
+        """Drive in motion; a new one keeps the position and velocity of the slide."""
         return self._drive
 
     @drive.setter
@@ -124,7 +165,7 @@ class Motion:
 
     @property
     def recording(self) -> bool:
-        """Whether breakpoints are kept from now on: that costs more than the motion itself."""
+        """Whether breakpoints are recorded: this costs more than the motion itself."""
         return self._recording
 
     @recording.setter
@@ -139,7 +180,7 @@ class Motion:
 
     @property
     def force(self) -> float:
-        """Control and disturbance force on the slide, N, held until it is set again."""
+        """Control and disturbance force on the slide, N; held until you set it again."""
         return self._force * self._drive.normal_force
 
     @force.setter
@@ -151,15 +192,24 @@ class Motion:
 
     @property
     def applied_force(self) -> float:
-        """Force on the slide at present, N: the one held, or that of the continuous controller."""
+        """Present force on the slide, N: the held one, or that of the continuous controller."""
         if self._continuous_control:
             return self._controller.force(self.velocity - self.low_passed)
         return self.force
 
     def set_gains(self, corner_frequency: float, linear: float, cubic: float) -> None:
-        """Set the continuous controller: d (rad/s), k1 (N s/m), k2 (N s^3/m^3), eq. 17 and 18.
+        """Set the cutoff frequency and gains of the continuous controller, eq. 17 and 18.
 
-        The filter's output goes on without a jump when d changes.
+        The output of the filter does not jump when d changes.
+
+        Parameters
+        ----------
+        corner_frequency : float
+            Cutoff frequency d, rad/s.
+        linear : float
+            Linear gain k1, N s/m.
+        cubic : float
+            Cubic gain k2, N s^3/m^3.
         """
         filter_output = self._filter_output
         self._controller = WashoutGains(corner_frequency, linear, cubic)
@@ -168,7 +218,7 @@ class Motion:
 
     @property
     def low_passed(self) -> float:
-        """What the washout filter holds back of the speed, d w of eq. 17, m/s."""
+        """Low-passed speed in the washout filter, d w of eq. 17, m/s."""
         return self._w * self._gains.corner_frequency * self._drive.speed_scale
 
     @low_passed.setter
@@ -182,19 +232,19 @@ class Motion:
 
     @property
     def velocity(self) -> float:
-        """Velocity of the slide, m/s; exactly the belt's while it sticks."""
+        """Velocity of the slide, m/s; during stick exactly the belt speed."""
         if self._sign == 0.0:
             return self._drive.belt_speed
         return self._y * self._drive.speed_scale
 
     @property
     def sticking(self) -> bool:
-        """Whether the slide rode the belt at the end of the last advance."""
+        """Whether the slide stuck to the belt at the end of the last advance."""
         return self._sign == 0.0
 
     @property
     def friction_force(self) -> float:
-        """Friction force on the slide, N, under the force held up to now."""
+        """Friction force on the slide, N, with the force held so far."""
         if self._sign == 0.0:
             return self._reaction() * self._drive.normal_force
         relative_speed = (self._y - self._belt_speed) * self._drive.speed_scale
@@ -202,15 +252,23 @@ class Motion:
         return float(coefficient) * self._drive.normal_force
 
     def advance(self, duration: float) -> None:
-        """Integrate over `duration` (s), the force held; stop early if the motion runs away.
+        """Integrate over a duration, the force held; stop early if the motion becomes unbounded.
 
-        Raises RunError for a motion so stiff that it would take for ever.
+        Parameters
+        ----------
+        duration : float
+            Duration, s.
+
+        Raises
+        ------
+        RunError
+            If the motion is so stiff that it would take too many steps.
         """
         if self.unbounded:
             return
         end = duration * self._drive.angular_frequency
         now = 0.0
-        # Not by `min`, two calls of which cost a twentieth of a tick of the sampled loop.
+        # Without `min`: two calls cost a twentieth of a step of the sampled loop.
         if self._steps_left > _SPARE_STEPS:
             self._steps_left = _SPARE_STEPS
         steps = _STEPS_PER_RADIAN * end
@@ -223,7 +281,13 @@ class Motion:
     take_knots = Renamed("take_breakpoints")
 
     def take_breakpoints(self) -> Breakpoints:
-        """Return the breakpoints recorded since the last call."""
+        """Return the breakpoints recorded since the last call, and clear them.
+
+        Returns
+        -------
+        Breakpoints
+            Breakpoints in order of time, in SI units; time 0 is the start of the motion.
+        """
         if not self._recorded:
             return Breakpoints.empty()
         time, x, y, sticking = zip(*self._recorded, strict=True)
@@ -237,11 +301,11 @@ class Motion:
 
     @property
     def _filter_output(self) -> float:
-        """What the washout filter lets through of the speed, m/s."""
+        """Output of the washout filter, m/s."""
         return self._gains.filtered(self._y, self._w) * self._drive.speed_scale
 
     def _scale_controller(self, filter_output: float) -> None:
-        """Make the controller dimensionless, its filter letting `filter_output` (m/s) through."""
+        """Make the controller dimensionless; the output of its filter is `filter_output` (m/s)."""
         self._gains = self._controller.scaled(self._drive)
         filtered = filter_output / self._drive.speed_scale
         self._w = (self._y - filtered) / self._gains.corner_frequency
@@ -254,7 +318,7 @@ class Motion:
         return self._x + self._damping * self._y - force
 
     def _settle(self) -> None:
-        """Decide from speed and reaction whether the slide sticks, or which way it slips."""
+        """Set from speed and reaction whether the slide sticks, or in which direction it slips."""
         relative_speed = self._y - self._belt_speed
         if relative_speed != 0.0:
             self._sign = copysign(1.0, relative_speed)
@@ -263,14 +327,14 @@ class Motion:
         reaction = self._reaction()
         self._sign = -copysign(1.0, reaction) if abs(reaction) > self._static else 0.0
 
-    # heyoka misses an event in a step that begins on one. Where a phase begins at a limit of its
-    # own, it is therefore begun some rounding errors away from it.
+    # heyoka misses an event in a step that starts on one. A phase that starts at one of its own
+    # limits is therefore started some rounding errors away from it.
 
     def _stick(self, now: float, end: float) -> float:
-        """Ride the belt until the reaction exceeds its limit, or to `end`; return the time."""
+        """Move with the belt until the reaction exceeds its limit, or to `end`; return the time."""
         integrator = self._sticking
         if integrator is None:
-            breaks, now = self._ride_straight(now, end)
+            breaks, now = self._stick_straight(now, end)
         else:
             reaction = self._reaction()
             margin = self._rounding(reaction)
@@ -285,8 +349,8 @@ class Motion:
             self._sign = -copysign(1.0, self._reaction())
         return now
 
-    def _ride_straight(self, now: float, end: float) -> tuple[bool, float]:
-        """Ride the belt under a held force; return whether the limit was reached, and the time."""
+    def _stick_straight(self, now: float, end: float) -> tuple[bool, float]:
+        """Move with the belt, force held; return whether the limit was reached, and the time."""
         speed = self._belt_speed
         if speed != 0.0:
             limit = copysign(self._static, speed) - self._damping * speed + self._force
@@ -298,7 +362,7 @@ class Motion:
         return False, end
 
     def _slip(self, now: float, end: float) -> float:
-        """Slip until the belt's speed is reached, or to `end`; return the time."""
+        """Slip until the slide reaches the belt speed, or to `end`; return the time."""
         parameters, index = self._slipping.parameters, self._equations.index
         parameters[index["force"]], parameters[index["sign"]] = self._force, self._sign
         if self._y == self._belt_speed:
@@ -327,7 +391,7 @@ class Motion:
     def _propagate(
         self, integrator: Integrator, now: float, end: float
     ) -> tuple[int | None, float]:
-        """Integrate the state from `now` to `end`; return what event ended it, and when."""
+        """Integrate the state from `now` to `end`; return the event that ended it, and the time."""
         taylor, variables = integrator.taylor, integrator.variables
         variables[0], variables[1] = self._x, self._y
         if self._continuous_control:
@@ -339,11 +403,11 @@ class Motion:
             reached = taylor.propagate_until(end, self._steps_left, self._longest_step())
         outcome = reached[0].value
         self._steps_left -= reached[3] + _STEPS_OF_A_PHASE
-        if outcome == _NOT_FINITE:  # what it takes for that drives it past any speed in no time
+        if outcome == _NOT_FINITE:  # what causes this exceeds any speed immediately
             taylor.reset_cooldowns()
             self._sign = copysign(1.0, -self._reaction())
             self._y = self._sign * UNBOUNDED_SPEED
-            return RUN_AWAY, now
+            return UNBOUNDED_SPEED_REACHED, now
         self._x, self._y = variables[0], variables[1]
         if self._continuous_control:
             self._w = variables[2]
@@ -351,20 +415,20 @@ class Motion:
             return None, end
         if self._steps_left <= 0:
             taylor.reset_cooldowns()
-            self._marks.clear()  # those of a slip that nobody will hear of
+            self._marks.clear()  # of a slip that is not reported
             frequency = self._drive.angular_frequency
             raise RunError(
                 "the motion is too stiff to be followed: it takes more than "
                 f"{_STEPS_PER_RADIAN} steps of integration for {1.0 / frequency:g} s"
             )
-        taylor.reset_cooldowns()  # what it integrates next is another slip or stick
+        taylor.reset_cooldowns()  # the next integration is another slip or stick
         return -outcome - 1, float(taylor.time)
 
     def _longest_step(self) -> float:
-        """Return a time in which the slide's speed changes by the law's characteristic one at most.
+        """Return a time in which the speed changes by the law's characteristic speed at most.
 
-        heyoka judges a step by what the series shows where it starts. An exponential that is next
-        to nothing there, and rises before the step ends, would not be seen.
+        heyoka chooses a step from the series at its start. It would miss an exponential that is
+        negligible there and rises before the step ends.
         """
         acceleration = abs(self._reaction()) + abs(self._x) + abs(self._y) + self._static
         return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
@@ -372,7 +436,7 @@ class Motion:
     def _append_breakpoint(self, now: float, x: float, y: float, *, sticking: bool) -> None:
         if self._recording:
             time = self._time + now / self._drive.angular_frequency
-            # Not back by the rounding of a step.
+            # Rounding must not take the time back.
             self._breakpoint_time = max(self._breakpoint_time, time)
             self._recorded.append((self._breakpoint_time, x, y, sticking))
 
@@ -397,5 +461,5 @@ class Motion:
             count = len(parameters)
             for name, value in values.items():
                 index = indices[name]
-                if index < count:  # heyoka keeps those up to the last one an equation uses
+                if index < count:  # heyoka keeps them up to the last one that an equation uses
                     parameters[index] = value

@@ -1,4 +1,4 @@
-"""The exact motion and its derivatives by the state it started from."""
+"""The motion and its derivatives by the state at its start."""
 
 import numpy as np
 
@@ -10,27 +10,27 @@ from stickslip_ros.physics.motion.integrator import Integrator
 from stickslip_ros.physics.motion.motion import Motion
 
 _GREATEST_EFFORT = 8e6
-"""Time of slipping times how stiff it is, dimensionless, to spend on a motion: some seconds."""
+"""Limit of slip time times stiffness, dimensionless, for a motion: some seconds of work."""
 
 
 class TooStiffError(Exception):
-    """The motion takes more steps than are worth taking; not a matter of the machine's speed."""
+    """Raised when a motion takes too many steps; it does not depend on the speed of the machine."""
 
 
 class SensitiveMotion(Motion):
-    """A motion that carries the derivatives of its state by the state it started from.
+    """Motion with the derivatives of its state by the state at its start.
 
-    The state is dimensionless: (X, Y), or (X, Y, W) under continuous control. Within a slip or a
-    stick heyoka integrates the variational equations along with the motion. From one to the next
+    The state is dimensionless: (X, Y), or (X, Y, W) with continuous control. During a slip or a
+    stick heyoka integrates the variational equations along with the motion. At the transitions
     the derivatives jump by the saltation matrix (Leine and Nijmeijer, Dynamics and Bifurcations of
-    Non-Smooth Mechanical Systems, 2004, ch. 7). Breakpoints are recorded. Raises TooStiffError
-    where the integration becomes too costly, starts counted together.
+    Non-Smooth Mechanical Systems, 2004, ch. 7). Breakpoints are recorded. `advance` raises
+    TooStiffError when the integration becomes too costly, summed over all starts.
     """
 
     _with_derivatives = True
 
     def __init__(self, drive: Drive, gains: WashoutGains | None = None) -> None:
-        """Start at rest at X = 0: without force, or with `gains` (SI) under continuous control."""
+        """Start at rest at X = 0, with continuous control if `gains` (SI) are given."""
         super().__init__(drive, 0.0, 0.0, continuous_control=gains is not None, record=True)
         if gains is not None:
             self.set_gains(gains.corner_frequency, gains.linear, gains.cubic)
@@ -39,12 +39,12 @@ class SensitiveMotion(Motion):
 
     @property
     def order(self) -> int:
-        """Number of the state's components."""
+        """Number of components of the state."""
         return 3 if self._continuous_control else 2
 
     @property
     def state(self) -> FloatArray:
-        """X, Y and, under continuous control, W."""
+        """X, Y and, with continuous control, W."""
         return np.array([self._x, self._y, self._w][: self.order])
 
     @property
@@ -54,21 +54,21 @@ class SensitiveMotion(Motion):
         return np.array([self._y, self._acceleration(self._sign), filtered][: self.order])
 
     def start(self, state: FloatArray) -> None:
-        """Start again at `state`, at time zero and with no breakpoints."""
+        """Start again at `state`, at time zero and without breakpoints."""
         self.take_breakpoints()
         self._time = self._breakpoint_time = 0.0
         self.restart(state[0] * self.drive.length_scale, state[SPEED] * self.drive.speed_scale)
         if self._continuous_control:
             self._w = float(state[2])
         self.transition: FloatArray = np.eye(self.order)
-        """Derivatives of the state (rows) by that at the start (columns)."""
+        """Derivatives of the state (rows) by the state at the start (columns)."""
         self.landed = False
-        """Whether the slide came to stick since the start."""
+        """Whether the slide has stuck since the start."""
 
     def _propagate(
         self, integrator: Integrator, now: float, end: float
     ) -> tuple[int | None, float]:
-        # From the identity each time: heyoka's error is relative to the largest of the variables.
+        # Start from the identity: heyoka's error is relative to the largest of the variables.
         derivatives = integrator.state[self.order :].reshape(self.order, self.order)
         derivatives[:] = np.eye(self.order)
         try:
@@ -85,23 +85,23 @@ class SensitiveMotion(Motion):
         if self._effort > _GREATEST_EFFORT:
             raise TooStiffError
         if self._sign != sign:
-            # I + (f_after - f_before) n^T / (n^T f_before), n along Y, where only Y' jumps. On
-            # leaving the belt nothing jumps.
+            # I + (f_after - f_before) n^T / (n^T f_before), n along Y, where only Y' jumps. When
+            # the slide leaves the belt nothing jumps.
             after = self._acceleration(self._sign)
             self.transition[SPEED] *= after / self._acceleration(sign) if after != 0.0 else 0.0
             self.landed |= self.sticking
         return now
 
     def _stiffness(self, sign: float) -> float:
-        """Return |dX''/dX'| while slipping with sgn(v_r) = `sign`."""
-        step = 1e-30j  # along the imaginary axis nothing cancels
+        """Return |dX''/dX'| during slip with sgn(v_r) = `sign`."""
+        step = 1e-30j  # imaginary, so that nothing cancels
         law = self._drive.friction.scaled(self._drive.speed_scale)
         friction = law.coefficient(self._y - self._belt_speed + step, sign)
         control = self._gains.force(self._gains.filtered(self._y, self._w) + step)
         return abs((friction + control).imag / step.imag - self._damping)
 
     def _acceleration(self, sign: float) -> float:
-        """Return X'' while slipping with sgn(v_r) = `sign`, or sticking (0)."""
+        """Return X'' during slip with sgn(v_r) = `sign`, or during stick (0)."""
         if sign == 0.0:
             return 0.0
         relative_speed = (self._y - self._belt_speed) * self._drive.speed_scale

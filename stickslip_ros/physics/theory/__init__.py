@@ -1,1 +1,1 @@
-"""What is known of the motion without running it: stability, bifurcations, limit cycles."""
+"""Theory without a simulation: stability, bifurcations, limit cycles."""

@@ -1,4 +1,4 @@
-"""First-order averaging: a vibration taken for harmonic, X' = A cos t."""
+"""First-order averaging: the vibration is treated as harmonic, X' = A cos t."""
 
 from typing import Any
 
@@ -14,13 +14,13 @@ _ROUNDING = 4.0 * float(np.finfo(float).eps)
 
 
 def averaged_growth(drive: Drive, belt_speed: Any, amplitude: Any) -> FloatArray:
-    """Return twice dA/dt of the speed amplitude A, the belt speed being above zero.
+    """Return twice dA/dt of the speed amplitude A, for a belt speed above zero.
 
     It is (1/pi) int_0^{2 pi} mu(A cos t - v0) cos t dt - 2 beta A (Guckenheimer and Holmes,
-    Nonlinear Oscillations, section 4.1, of eq. 5). Dimensionless, arguments too, which may be
-    arrays. The trapezoidal rule is exact but for rounding while A <= v0, where the slide does not
-    overtake the belt, and the law is not much more sudden than v0 / 10,000. What cannot be told
-    from rounding is zero.
+    Nonlinear Oscillations, section 4.1, of eq. 5). All values are dimensionless, and the arguments
+    may be arrays. The trapezoidal rule is exact to rounding while A <= v0, where the slide does not
+    overtake the belt, if the law's characteristic speed is not much below v0 / 10,000. A result
+    that cannot be distinguished from rounding is zero.
     """
     law = drive.friction.scaled(drive.speed_scale)
     belt_speed, amplitude = np.asarray(belt_speed, float), np.asarray(amplitude, float)

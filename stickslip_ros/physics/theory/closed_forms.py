@@ -1,4 +1,4 @@
-"""What the cubic Stribeck law allows to be written down; the general theory must agree with it.
+"""Closed forms for the cubic Stribeck law; the general theory must agree with them.
 
 Everything is dimensionless (see `Drive`) and for v0 > 0. With mu = -mu_s s + a v_r - b v_r^3
 (eq. 3) and the damping coefficient 2 beta, the slope of the acceleration over the speed is
@@ -16,24 +16,51 @@ from stickslip_ros.physics.model.friction import Stribeck
 
 @dataclass(frozen=True)
 class CubicLoop:
-    """The drive with the cubic Stribeck law, by its coefficients."""
+    """Drive with the cubic Stribeck law, by its dimensionless coefficients.
+
+    Examples
+    --------
+    The system of the paper:
+
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.theory.closed_forms import CubicLoop
+    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
+    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
+    >>> cubic = CubicLoop.from_drive(drive)
+    >>> round(cubic.trace, 6), round(cubic.hopf_speed, 6)
+    (0.142, 0.488763)
+    >>> round(cubic.critical_linear_gain(2.0), 6)
+    -0.935296
+    """
 
     static: float
-    """mu_s."""
+    """Static coefficient mu_s."""
     slope: float
-    """a."""
+    """Coefficient a of eq. 3."""
     cubic: float
-    """b."""
+    """Coefficient b of eq. 3."""
     damping: float
-    """2 beta."""
+    """Damping coefficient 2 beta."""
     belt_speed: float
-    """v0, above zero."""
+    """Belt speed v0, above zero."""
 
     of = Renamed("from_drive")
 
     @classmethod
     def from_drive(cls, drive: Drive) -> Self | None:
-        """Return the coefficients of `drive`; None if its law is another or its belt rests."""
+        """Return the coefficients of a drive.
+
+        Parameters
+        ----------
+        drive : Drive
+            Drive in SI units.
+
+        Returns
+        -------
+        CubicLoop or None
+            Dimensionless coefficients; None if the drive has another law or its belt is at rest.
+        """
         law = drive.friction.scaled(drive.speed_scale)
         if not isinstance(law, Stribeck) or drive.belt_speed == 0.0:
             return None
@@ -48,7 +75,7 @@ class CubicLoop:
 
     @property
     def equilibrium(self) -> float:
-        """X at rest, eq. 6: mu_s - a v0 + b v0^3."""
+        """Equilibrium X, eq. 6: mu_s - a v0 + b v0^3."""
         return self.static - self.slope * self.belt_speed + self.cubic * self.belt_speed**3
 
     @property
@@ -79,28 +106,62 @@ class CubicLoop:
         return None if self.hopf_speed is None else sqrt(0.8) * self.hopf_speed
 
     def critical_linear_gain(self, corner_frequency: float) -> float | None:
-        """Return k1* = d - p - d / (1 - p d), of eq. 21; None for p d >= 1."""
+        """Return the critical linear gain k1* = d - p - d / (1 - p d), from eq. 21.
+
+        Parameters
+        ----------
+        corner_frequency : float
+            Cutoff frequency d, dimensionless.
+
+        Returns
+        -------
+        float or None
+            k1*, dimensionless; None for p d >= 1.
+        """
         d, p = corner_frequency, self.trace
         return None if p * d >= 1.0 else d - p - d / (1.0 - p * d)
 
     def critical_lyapunov_coefficient(self, corner_frequency: float, cubic: float) -> float | None:
-        """Return sigma of the closed loop at its critical linear gain, None for p d >= 1.
+        """Return sigma of the closed loop at its critical linear gain.
 
         By harmonic balance. With H = s / (s + d), the loop is D(s) y = s N(y) with
         D = s^2 + 1 - s (p + k1 H) and N = 3 b v0 y^2 - b y^3 + k2 (H y)^3. At first order
-        y = r cos(w t), w^2 = 1 - p d; the square drives the second harmonic, of which the beat with
-        the first one and the cubes make up the slow change of r.
+        y = r cos(w t), w^2 = 1 - p d. The square drives the second harmonic. Its beat with the
+        first harmonic and the cubes make up the slow change of r.
+
+        Parameters
+        ----------
+        corner_frequency : float
+            Cutoff frequency d, dimensionless.
+        cubic : float
+            Cubic gain k2, dimensionless.
+
+        Returns
+        -------
+        float or None
+            First Lyapunov coefficient sigma, dimensionless; None for p d >= 1.
         """
         terms = self._critical_lyapunov_terms(corner_frequency)
         return None if terms is None else terms[0] + cubic * terms[1]
 
     def critical_cubic_gain(self, corner_frequency: float) -> float | None:
-        """Return the cubic gain at which that coefficient changes sign."""
+        """Return the cubic gain at which `critical_lyapunov_coefficient` changes sign.
+
+        Parameters
+        ----------
+        corner_frequency : float
+            Cutoff frequency d, dimensionless.
+
+        Returns
+        -------
+        float or None
+            Cubic gain k2, dimensionless; None for p d >= 1.
+        """
         terms = self._critical_lyapunov_terms(corner_frequency)
         return None if terms is None else -terms[0] / terms[1]
 
     def _critical_lyapunov_terms(self, corner_frequency: float) -> tuple[float, float] | None:
-        """Return what the friction contributes to it, and what a cubic gain of one does."""
+        """Return the contributions of the friction and of a cubic gain of one."""
         linear = self.critical_linear_gain(corner_frequency)
         if linear is None:
             return None

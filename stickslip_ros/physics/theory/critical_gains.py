@@ -1,4 +1,4 @@
-"""The loop with the washout controller acting without sampling, eq. 19: its critical gains."""
+"""Critical gains of the loop with the washout controller without sampling, eq. 19."""
 
 from dataclasses import dataclass, replace
 
@@ -8,33 +8,58 @@ from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
 
 _ROUNDING = 1e-9
-"""Change of a determinant with the gain, as a share of it, below which it is taken for none."""
+"""Relative change of a determinant with the gain below which it is treated as zero."""
 
 
 @dataclass(frozen=True)
 class CriticalGains:
-    """Where the closed loop becomes unstable, and to which side the vibration then begins."""
+    """Critical gains of the closed loop, and the direction of the bifurcation there."""
 
     linear: float
-    """Critical linear gain k1*, N s/m: the equilibrium is stable below it."""
+    """Critical linear gain k1*, N s/m; the equilibrium is stable below it."""
     first_lyapunov_coefficient: float
-    """sigma there, under the cubic gain given (see `theory.hopf`); dimensionless."""
+    """sigma at k1* with the given cubic gain, dimensionless (see `first_lyapunov_coefficient`)."""
     cubic: float | None
     """Cubic gain at which sigma changes sign, N s^3/m^3; below it small vibrations are stable."""
 
 
 def critical_gains(drive: Drive, gains: WashoutGains) -> CriticalGains | None:
-    """Return the critical gains for the corner frequency and the cubic gain of `gains` (SI units).
+    """Return the critical gains for a cutoff frequency and a cubic gain.
 
-    None if the belt rests, or if no linear gain stabilises the equilibrium.
+    Parameters
+    ----------
+    drive : Drive
+        Drive in SI units.
+    gains : WashoutGains
+        Controller in SI units; its linear gain is not used.
+
+    Returns
+    -------
+    CriticalGains or None
+        Critical gains in SI units; None if the belt is at rest, or if no linear gain stabilises the
+        equilibrium.
+
+    Examples
+    --------
+    The system of the paper:
+
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.equations import WashoutGains
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.theory.critical_gains import critical_gains
+    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
+    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
+    >>> critical = critical_gains(drive, WashoutGains(2.0, linear=0.0, cubic=-1.0))
+    >>> round(critical.linear, 6), round(critical.cubic, 4)
+    (-0.935296, 31.468)
     """
     linear = _critical_linear_gain(drive, gains)
     if linear is None:
         return None
     critical = replace(gains, linear=linear)
     sigma = _sigma(drive, critical)
-    # sigma is affine in the cubic gain, which the third derivatives alone contain, linearly. A
-    # large one drowns the rounding of the rest.
+    # sigma is affine in the cubic gain: only the third derivatives contain it, linearly. With a
+    # large one the rounding of the other terms does not matter.
     large = 1e9 * drive.normal_force / drive.speed_scale**3
     without, with_large = (_sigma(drive, replace(critical, cubic=cubic)) for cubic in (0.0, large))
     slope = with_large - without
@@ -43,7 +68,7 @@ def critical_gains(drive: Drive, gains: WashoutGains) -> CriticalGains | None:
 
 
 def _critical_linear_gain(drive: Drive, gains: WashoutGains) -> float | None:
-    """Return the linear gain at which Routh and Hurwitz' last determinant changes sign.
+    """Return the linear gain at which the last determinant of Routh and Hurwitz changes sign.
 
     A static friction law enters the Jacobian of eq. 20 by its slope at the belt speed only. The
     determinant is then affine in the gain: two values give its zero.

@@ -1,7 +1,7 @@
-"""From one cycle to the next: where the belt lets go, how long and how far the slide may be gone.
+"""Bounds on a cycle: where the belt releases the slide, how long and how far the slide may go.
 
-What is said of energy is exact, but that g is looked at for so many speeds only. With x the
-distance from the equilibrium, dimensionless, x'' + x = g(x') in the open loop, where
+The statements on energy are exact, except that g is evaluated at a finite number of speeds. With x
+the distance from the equilibrium, dimensionless, x'' + x = g(x') in the open loop, where
 g(y) = mu(y - v0) - mu(-v0) - 2 beta y, and the energy (x^2 + x'^2) / 2 changes by g dx.
 """
 
@@ -23,18 +23,18 @@ _ROUNDING = 16.0 * float(np.finfo(float).eps)
 
 
 def release_position(drive: Drive) -> float:
-    """Return the displacement (m) at which the belt lets go of the slide, there being no control.
+    """Return the displacement (m) at which the belt releases the slide without control.
 
-    There friction is at its limit and the slide not yet accelerated: k x + c v_belt = N mu_s.
+    There friction is at its limit and the slide is not yet accelerated: k x + c v_belt = N mu_s.
     """
     limit = copysign(drive.normal_force * drive.friction.static, drive.belt_speed)
     return (limit - drive.damping * drive.belt_speed) / drive.stiffness
 
 
 def longest_return(drive: Drive) -> float:
-    """Return a time (s) in which a slide comes back, or never; the belt moves.
+    """Return a time (s) within which a slide comes back if it ever does; the belt moves.
 
-    It may ride the belt, and creep at a like speed, as far as static friction can bend the spring.
+    It may stick, and creep at a similar speed, as far as static friction can bend the spring.
     """
     return 4.0 * drive.natural_period + 2.0 * loading_time(drive)
 
@@ -45,7 +45,7 @@ def loading_time(drive: Drive) -> float:
 
 
 def follow(motion: Motion) -> Iterator[Breakpoints]:
-    """Yield the breakpoints of a recording `motion` from now on, in turns, until it is late."""
+    """Yield all breakpoints of a recording `motion` so far, repeatedly, up to `longest_return`."""
     drive = motion.drive
     breakpoints, now = Breakpoints.empty(), 0.0
     while now < longest_return(drive) and not motion.unbounded:
@@ -59,19 +59,19 @@ def follow(motion: Motion) -> Iterator[Breakpoints]:
 def least_cycle(drive: Drive, gains: WashoutGains | None = None) -> float | None:
     """Return the least speed, dimensionless, at which energy may be gained; the belt moves.
 
-    That is in the open loop, where every cycle turns at least as far from the equilibrium, or with
-    `gains` (SI) of eq. 19. None if there is no such speed: on a cycle the gain makes up for the
-    loss, so that there is none up to `UNBOUNDED_SPEED`, but where energy is conserved.
+    It is the speed in the open loop, where every cycle turns at least as far from the equilibrium,
+    or with `gains` (SI) of eq. 19. None if there is no such speed: on a cycle the gain balances the
+    loss, so that there is no cycle up to `UNBOUNDED_SPEED`, unless energy is conserved.
     """
     speed, force = _net_force(drive)
     if gains is not None:
-        force += _greatest_help(gains.scaled(drive), speed)
+        force += _control_bound(gains.scaled(drive), speed)
     gaining = np.abs(speed)[speed * force > 0.0]
     return None if len(gaining) == 0 else 0.95 * float(gaining.min())
 
 
-def _greatest_help(gains: WashoutGains, speed: FloatArray) -> FloatArray:
-    """Return forces on the speed that give a cycle at least the energy that the controller does.
+def _control_bound(gains: WashoutGains, speed: FloatArray) -> FloatArray:
+    """Return forces on the speed that give a cycle at least the energy that the controller gives.
 
     With v = w' and d w the parts of y that pass the filter and do not, both periodic, int v w = 0:
     int v y = int v^2 <= int y^2. Where k2 < 0, by Young's inequality
@@ -85,11 +85,11 @@ def _greatest_help(gains: WashoutGains, speed: FloatArray) -> FloatArray:
 def largest_cycle(drive: Drive) -> float | None:
     """Return a distance below the equilibrium (dimensionless) beyond which no cycle turns upward.
 
-    That is of cycles that do not stick; the belt moves. With g >= -l and g <= p at speeds from 0
-    to v0, g <= -u above and g >= -n below, u > n >= 0, a slide that turns at -d turns next at
+    This holds for cycles that do not stick; the belt moves. With g >= -l and g <= p at speeds from
+    0 to v0, g <= -u above and g >= -n below, u > n >= 0, a slide that turns at -d turns next at
     d' >= d - 2 n if it comes back to -d, and passes v0 within v0^2 / D of either turning point,
     where D = d - 2 n - max(l, p) is at least sqrt(2) v0. The energy then changes by less than
-    2 (p + n) v0^2 / D - 2 (u - n) (D - v0^2 / D). None where there is no such u.
+    2 (p + n) v0^2 / D - 2 (u - n) (D - v0^2 / D). None if there is no such u.
     """
     speed, force = _net_force(drive)
     belt_speed = abs(drive.belt_speed) / drive.speed_scale
@@ -103,7 +103,7 @@ def largest_cycle(drive: Drive) -> float | None:
 
 
 def _net_force(drive: Drive) -> tuple[FloatArray, FloatArray]:
-    """Return speeds y on either side of rest and of the belt's speed, and g there."""
+    """Return speeds y on both sides of rest and of the belt speed, and g there."""
     law = drive.friction.scaled(drive.speed_scale)
     belt_speed = abs(drive.belt_speed) / drive.speed_scale
     least = 1e-6 * min(belt_speed, drive.friction.characteristic_speed / drive.speed_scale)

@@ -1,4 +1,4 @@
-"""Hopf bifurcations: at which belt speeds, how fast the eigenvalues cross, and to which side."""
+"""Hopf bifurcations over the belt speed: points, crossing speeds and Lyapunov coefficients."""
 
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -13,31 +13,31 @@ from stickslip_ros.physics.theory.linear import Expansion, expand, hurwitz_deter
 from stickslip_ros.physics.theory.roots import zero_between
 
 _BELT_SPEEDS = np.geomspace(1e-6, 1e3, 4001)
-"""Dimensionless speeds between which sign changes are looked for, half a percent apart."""
+"""Dimensionless belt speeds, half a percent apart, between which sign changes are searched for."""
 
 
 @dataclass(frozen=True)
 class HopfPoint:
-    """A belt speed at which a pair of eigenvalues crosses the imaginary axis."""
+    """Belt speed at which a pair of eigenvalues crosses the imaginary axis."""
 
     belt_speed: float
-    """m/s, above zero; the point at the opposite speed mirrors it."""
+    """Belt speed, m/s, above zero; there is a mirrored point at the opposite speed."""
     angular_frequency: float
-    """Imaginary part of the pair, rad/s: the frequency of the vibration that begins here."""
+    """Imaginary part of the pair, rad/s: the frequency of the vibration that starts here."""
     crossing_speed: float
     """Rate of change of the pair's real part with the belt speed, 1/s per m/s; eq. 11 and 22."""
     first_lyapunov_coefficient: float
-    """See `first_lyapunov_coefficient`."""
+    """sigma, dimensionless; see the function `first_lyapunov_coefficient`."""
 
     @property
     def supercritical(self) -> bool:
-        """Whether stable vibrations begin here, small ones first."""
+        """Whether a stable vibration starts here with a small amplitude."""
         return self.first_lyapunov_coefficient < 0.0
 
 
 @dataclass(frozen=True)
 class ComplexPair:
-    """The complex pair of eigenvalues; of two or three there cannot be another."""
+    """The complex pair of eigenvalues; among two or three eigenvalues there is one at most."""
 
     growth: float
     """Real part."""
@@ -62,10 +62,35 @@ class ComplexPair:
 
 
 def hopf_points(drive: Drive, gains: WashoutGains | None = None) -> list[HopfPoint]:
-    """Return the Hopf points over the belt speed, lowest first.
+    """Return the Hopf points over the belt speed.
 
-    Of the open loop, or under continuous control (eq. 19) with `gains` in SI units. Looked for are
-    speeds from 1e-6 to 1e3 N/sqrt(k m); two points closer than half a percent may be overlooked.
+    The search covers belt speeds from 1e-6 to 1e3 N/sqrt(k m). It may miss two points closer than
+    half a percent.
+
+    Parameters
+    ----------
+    drive : Drive
+        Drive in SI units; its belt speed is not used.
+    gains : WashoutGains, optional
+        Continuous controller of eq. 19 in SI units. By default the loop is open.
+
+    Returns
+    -------
+    list of HopfPoint
+        Points in SI units, in order of the belt speed.
+
+    Examples
+    --------
+    The system of the paper:
+
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.theory.hopf import hopf_points
+    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
+    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
+    >>> (point,) = hopf_points(drive)
+    >>> round(point.belt_speed, 6), point.supercritical
+    (0.488763, True)
     """
     margins = _hopf_margins(drive, gains, _BELT_SPEEDS)
     before = np.flatnonzero(np.sign(margins[:-1]) * np.sign(margins[1:]) < 0.0)
@@ -96,10 +121,20 @@ def hopf_points(drive: Drive, gains: WashoutGains | None = None) -> list[HopfPoi
 def first_lyapunov_coefficient(expansion: Expansion) -> float | None:
     """Return sigma of r' = alpha r + sigma r^3, r the amplitude of the dimensionless speed.
 
-    For the expansion at a Hopf point, which is supercritical where sigma is below zero; None if no
-    eigenvalues are complex. By projection onto the critical eigenvectors, for any order n:
-    Kuznetsov, Elements of Applied Bifurcation Theory, section 5.4. His coefficient is that of the
-    amplitude along the eigenvector and is divided by the frequency.
+    By projection onto the critical eigenvectors, for any order n: Kuznetsov, Elements of Applied
+    Bifurcation Theory, section 5.4. His coefficient is that of the amplitude along the eigenvector
+    and is divided by the frequency.
+
+    Parameters
+    ----------
+    expansion : Expansion
+        Expansion at a Hopf point.
+
+    Returns
+    -------
+    float or None
+        sigma, dimensionless; below zero the Hopf point is supercritical. None if all eigenvalues
+        are real.
     """
     jacobian, quadratic, cubic = expansion.jacobian, expansion.quadratic, expansion.cubic
     pair = ComplexPair.from_expansion(expansion)
@@ -120,7 +155,18 @@ def first_lyapunov_coefficient(expansion: Expansion) -> float | None:
 
 
 def crossing_speed(expansion: Expansion) -> float | None:
-    """Return d Re(l)/d v0 of the complex pair l, eq. 11 and 22, dimensionless; None without one."""
+    """Return d Re(l)/d v0 of the complex pair l, eq. 11 and 22.
+
+    Parameters
+    ----------
+    expansion : Expansion
+        Expansion at the belt speed v0.
+
+    Returns
+    -------
+    float or None
+        Slope, dimensionless; None if all eigenvalues are real.
+    """
     pair = ComplexPair.from_expansion(expansion)
     if pair is None:
         return None

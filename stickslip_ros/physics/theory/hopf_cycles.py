@@ -1,4 +1,4 @@
-"""The limit cycle that is born at the critical linear gain, followed to other gains."""
+"""The limit cycle that starts at the critical linear gain, continued to other gains."""
 
 from dataclasses import replace
 from math import pi, sqrt
@@ -14,17 +14,43 @@ from stickslip_ros.physics.theory.limit_cycles import LimitCycle, shoot
 from stickslip_ros.physics.theory.linear import expand
 
 _STEPS = 16
-"""Gains between the critical one and the one that is wanted, closest where the cycle is small."""
+"""Number of gains from the critical to the requested one, densest where the cycle is small."""
 
 
 def limit_cycle_from_hopf(drive: Drive, gains: WashoutGains) -> LimitCycle | None:
-    """Return the limit cycle of the continuous loop (eq. 19) with `gains` (SI), stable or not.
+    """Return the limit cycle that starts at the critical linear gain, with continuous control.
 
-    It is the one that branches off the equilibrium at the critical linear gain, above that gain if
-    the Hopf point is supercritical and below it otherwise. Its first size is sqrt(-alpha / sigma),
-    by the normal form; from gain to gain it is then extrapolated and solved for again. None if
-    there is no critical gain, if the gain is on the other side of it, and where the cycle is lost
-    on the way: where it ends or folds back.
+    It is a cycle of eq. 19, stable or not. It branches off the equilibrium at the critical linear
+    gain: above that gain if the Hopf point is supercritical and below it otherwise. Its first size
+    is sqrt(-alpha / sigma), by the normal form. From gain to gain it is then extrapolated and
+    solved for again.
+
+    Parameters
+    ----------
+    drive : Drive
+        Drive in SI units.
+    gains : WashoutGains
+        Controller in SI units, at whose linear gain the cycle is requested.
+
+    Returns
+    -------
+    LimitCycle or None
+        Limit cycle in SI units. None if there is no critical gain, if the gain is on the other side
+        of it, and where the cycle is lost on the way: where it ends or folds back.
+
+    Examples
+    --------
+    The system of the paper, at a linear gain just above the critical one of -0.9353:
+
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.equations import WashoutGains
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
+    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
+    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
+    >>> cycle = limit_cycle_from_hopf(drive, WashoutGains(2.0, linear=-0.9, cubic=-1.0))
+    >>> round(cycle.measures.amplitude, 4), cycle.stable
+    (0.1154, True)
     """
     critical = critical_gains(drive, gains)
     if critical is None:
@@ -32,7 +58,7 @@ def limit_cycle_from_hopf(drive: Drive, gains: WashoutGains) -> LimitCycle | Non
     found: list[FloatArray] = []
     cycle = None
     for step in range(1, _STEPS + 1):
-        part = (step / _STEPS) ** 2  # the size grows with the root of the distance
+        part = (step / _STEPS) ** 2  # the amplitude grows with the root of the distance
         linear = critical.linear + part * (gains.linear - critical.linear)
         at_gain = replace(gains, linear=linear)
         guess = (

@@ -1,9 +1,9 @@
 """Limit cycles as solutions of a boundary-value problem, stable or not, with Floquet multipliers.
 
-They are found by shooting on the event-exact motion: the state after one period is to be the state
-it began with (Seydel, Practical Bifurcation and Stability Analysis, ch. 7). A cycle is cut where
-the slide turns upward: X' = 0 and X'' > 0. Inside everything is dimensionless (see `Drive`) but
-durations; arguments and results are SI.
+They are found by shooting on the event-exact motion: the state after one period must be the state
+at its start (Seydel, Practical Bifurcation and Stability Analysis, ch. 7). A cycle starts where
+the slide turns upward: X' = 0 and X'' > 0. Internal values are dimensionless (see `Drive`) except
+durations; arguments and results are in SI units.
 """
 
 from collections.abc import Iterator
@@ -34,33 +34,33 @@ _ROUNDING = 1e-13
 """Share of the displacement below which a difference is rounding."""
 
 _NEAR = 1e-6
-"""Share within which a turn of a run, or a measured period, is to agree with the one before it."""
+"""Relative tolerance for a turn of a run, or a measured period, to agree with the previous one."""
 
 _CORNER = 1e-6
-"""Share of its distance within which the cycle that sticks is looked for."""
+"""Relative distance within which the cycle that sticks is searched for."""
 
 _RATIO = 1.1
-"""Of one distance to the next."""
+"""Ratio of one distance to the previous one."""
 
 
 @dataclass(frozen=True)
 class LimitCycle:
-    """A periodic motion, from one upward turning point to the next; SI units."""
+    """Periodic motion, from one upward turning point to the next; SI units."""
 
     position: float
     """Displacement at the turning point, m."""
     filter_state: float | None
-    """State W of the washout filter there, m; None in the open loop."""
+    """State W of the washout filter at the turning point, m; None in the open loop."""
     period: float
-    """s"""
+    """Period, s."""
     multipliers: tuple[complex, ...]
-    """Floquet multipliers without the trivial one, the largest first; the last 0 if it sticks."""
+    """Floquet multipliers without the trivial one, the largest first; the last is 0 with stick."""
     measures: Measures
-    """Of one cycle."""
+    """Measures of one cycle."""
 
     @property
     def stable(self) -> bool:
-        """Whether what starts nearby comes back to it."""
+        """Whether motions that start nearby return to the cycle."""
         return all(abs(multiplier) < 1.0 for multiplier in self.multipliers)
 
 
@@ -72,11 +72,40 @@ def shoot(
     gains: WashoutGains | None = None,
     filter_state: float = 0.0,
 ) -> LimitCycle | None:
-    """Return the limit cycle near a guess; None where Newton's method does not arrive at one.
+    """Return the limit cycle near a guess, by Newton's method.
 
-    The guess is a displacement (m) at an upward turning point, a period (s) and, under continuous
-    control (eq. 19) with `gains` (SI), the state of the filter (m). Orbits that are one of a
-    family, or take several turns to close, do not count, nor those too stiff to follow.
+    Orbits that belong to a family or close only after several turns do not count. Neither do those
+    that are too stiff to follow.
+
+    Parameters
+    ----------
+    drive : Drive
+        Drive in SI units.
+    position : float
+        Guess of the displacement at an upward turning point, m.
+    period : float
+        Guess of the period, s.
+    gains : WashoutGains, optional
+        Continuous controller of eq. 19 in SI units. By default the loop is open.
+    filter_state : float, optional
+        Guess of the filter state W at the turning point, m; with `gains` only.
+
+    Returns
+    -------
+    LimitCycle or None
+        Limit cycle; None if the iteration does not converge to one, or if the belt is at rest.
+
+    Examples
+    --------
+    The system of the paper:
+
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.theory.limit_cycles import shoot
+    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
+    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
+    >>> round(shoot(drive, position=-0.1, period=6.4).period, 6)
+    6.392424
     """
     if drive.belt_speed == 0.0:
         return None
@@ -96,11 +125,29 @@ def limit_cycle_of_run(
     gains: WashoutGains | None = None,
     turns: int = 200,
 ) -> LimitCycle | None:
-    """Return the limit cycle that the motion from `position` (m) and `velocity` (m/s) leads to.
+    """Return the limit cycle that a motion leads to.
 
-    It runs until it repeats itself, for so many upward turns at most, the filter at rest at first;
-    from there a cycle is shot at. None where the motion settles or runs away, where Newton's method
-    does not arrive, or where the motion is too stiff to follow.
+    The motion runs until it repeats itself. From there `shoot` finds the cycle.
+
+    Parameters
+    ----------
+    drive : Drive
+        Drive in SI units.
+    position : float
+        Displacement of the slide at the start, m.
+    velocity : float, optional
+        Velocity of the slide at the start, m/s.
+    gains : WashoutGains, optional
+        Continuous controller of eq. 19 in SI units, its filter at rest at the start. By default the
+        loop is open.
+    turns : int, optional
+        Largest number of upward turns to run.
+
+    Returns
+    -------
+    LimitCycle or None
+        Limit cycle; None if the motion settles or is unbounded, if the iteration does not converge,
+        if the motion is too stiff to follow, or if the belt is at rest.
     """
     if drive.belt_speed == 0.0 or least_cycle(drive, gains) is None:
         return None
@@ -113,13 +160,36 @@ def limit_cycle_of_run(
 
 
 def limit_cycles(drive: Drive) -> list[LimitCycle]:
-    """Return all limit cycles of the open loop, stable and unstable, from the smallest on.
+    """Return all limit cycles of the open loop, stable and unstable.
 
     The motion is planar, so that a cycle surrounds the equilibrium and crosses the half-line
-    X' = 0, X < X_eq once. From one such crossing to the next the half-line is mapped to itself;
-    the cycles are where this map leaves a point alone. It is followed outwards as long as the
-    slide comes back. There are no cycles on a belt at rest, none where no
-    energy is gained, and none are given where the motion is too stiff to follow.
+    X' = 0, X < X_eq once. The motion from one such crossing to the next maps the half-line to
+    itself; the cycles are the fixed points of this map. The search goes outward as long as the
+    slide comes back.
+
+    Parameters
+    ----------
+    drive : Drive
+        Drive in SI units.
+
+    Returns
+    -------
+    list of LimitCycle
+        Cycles, the smallest first. The list is empty if the belt is at rest, if no energy is
+        gained, or if the motion is too stiff to follow.
+
+    Examples
+    --------
+    The system of the paper:
+
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.theory.limit_cycles import limit_cycles
+    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
+    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
+    >>> (cycle,) = limit_cycles(drive)
+    >>> round(cycle.measures.amplitude, 6), cycle.stable
+    (0.434086, True)
     """
     if drive.belt_speed == 0.0 or least_cycle(drive) is None:
         return []
@@ -133,7 +203,7 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
 
 
 def _cycle_ahead(motion: SensitiveMotion, turns: int) -> LimitCycle | None:
-    """Return the cycle that the motion comes to within so many upward turns."""
+    """Return the cycle that the motion reaches within this number of upward turns."""
     drive = motion.drive
     state, duration = motion.state, 0.0
     for _ in range(turns):
@@ -150,7 +220,7 @@ def _cycle_ahead(motion: SensitiveMotion, turns: int) -> LimitCycle | None:
 
 
 class _ReturnMap:
-    """The map from a distance below the equilibrium, the slide turning upward, to the next one."""
+    """Map from a distance below the equilibrium, where the slide turns upward, to the next one."""
 
     def __init__(self, drive: Drive) -> None:
         self._motion = SensitiveMotion(drive)
@@ -160,7 +230,7 @@ class _ReturnMap:
         self._outermost = _outermost(drive)
 
     def growth(self, distance: float) -> float:
-        """Return by how much the distance grows; -`distance` where the slide turns no more."""
+        """Return the growth of the distance; -`distance` if the slide does not turn again."""
         found = _next_turn(self._motion, self._state(distance))
         if found is None:
             return UNBOUNDED_SPEED if self._motion.unbounded else -distance
@@ -202,10 +272,10 @@ class _ReturnMap:
                 outer = min(further)
 
     def _last_landing(self, first: float) -> float:
-        """Return a distance about as far out as any from which the slide sticks before it turns.
+        """Return nearly the largest distance from which the slide sticks before it turns.
 
-        Orbits do not cross, so that it does from all distances between this one and `first`. All
-        these have the same next turn: the cycle that sticks is the only one there.
+        Orbits do not cross, so that it sticks from all distances between this one and `first`. All
+        of them have the same next turn: the cycle that sticks is the only one there.
         """
         if self._lands(self._outermost):
             return self._outermost
@@ -220,9 +290,9 @@ class _ReturnMap:
         return self._motion.landed
 
     def _corners(self) -> list[float]:
-        """Return two distances, just within and without that of a cycle that sticks, if any.
+        """Return two distances, just inside and just outside a cycle that sticks, if there is one.
 
-        Within it the growth may rise as suddenly as the law. Every slide that stuck comes there.
+        Inside it the growth may rise as steeply as the law. Every slide that stuck comes there.
         """
         drive = self._motion.drive
         position = release_position(drive) / drive.length_scale
@@ -236,7 +306,7 @@ class _ReturnMap:
     def _peak(self, inner: float, outer: float, growth: float) -> float | None:
         """Return a distance at which the growth has another sign than at both ends, if any.
 
-        From either end it comes nearer to zero, and is nearest where its slope changes sign.
+        From either end the growth approaches zero, and it is nearest where its slope changes sign.
         """
         for _ in range(60):
             middle = (inner + outer) / 2.0
@@ -249,7 +319,7 @@ class _ReturnMap:
         return None
 
     def _slope(self) -> float:
-        """Return the derivative of the growth found last; the time of the turn has no part in it.
+        """Return the derivative of the latest growth; the time of the turn does not affect it.
 
         There Y = X' is zero.
         """
@@ -262,8 +332,8 @@ class _ReturnMap:
 def _outermost(drive: Drive) -> float:
     """Return a distance beyond which there are no limit cycles but those that stick.
 
-    Where the energy does not tell: against a distance of many N/k friction is weak, unless it damps
-    strongly, and averaging is right about whether the vibration grows.
+    Where energy gives no bound: at a distance of many N/k friction is weak, unless it damps
+    strongly, and averaging correctly predicts whether the vibration grows.
     """
     largest = largest_cycle(drive)
     if largest is not None:
@@ -297,30 +367,33 @@ def _first_turn(breakpoints: Breakpoints) -> float | None:
 
 @dataclass(frozen=True)
 class _Shot:
-    """A motion from an upward turning point over a guessed period, and where it ends."""
+    """Motion from an upward turning point over a guessed period, and the state at its end."""
 
     unknowns: FloatArray
-    """The state at the start, with the period in the place of the speed, which is zero."""
+    """State at the start, with the period in the place of the speed, which is zero."""
     residual: FloatArray
-    """The state at the end less that at the start."""
+    """State at the end minus that at the start."""
     miss: float
-    """Its largest component, as a share of the displacement, at the start, from zero or rest."""
+    """Largest component of the residual, relative to the displacement at the start.
+
+    The displacement is measured from zero or from rest, whichever is larger.
+    """
     transition: FloatArray
-    """Derivatives of the state at the end by that at the start."""
+    """Derivatives of the state at the end by the state at the start."""
     rate: FloatArray
     """Derivative of the state at the end by time."""
     landed: bool
-    """Whether it came to stick on the way."""
+    """Whether the slide stuck on the way."""
 
     @classmethod
     def fire(cls, motion: SensitiveMotion, unknowns: FloatArray) -> Self | None:
-        """Return the shot; None where it does not start upward, or does not end."""
+        """Return the shot; None if it does not start upward, or does not end."""
         drive = motion.drive
         start, period = unknowns.copy(), float(unknowns[SPEED]) / drive.angular_frequency
         start[SPEED] = 0.0
         motion.start(start)
         distance = float(motion.rate[SPEED])
-        # Closer than this it is taken for the equilibrium.
+        # Closer than this the state is treated as the equilibrium.
         smallest = 1e-6 * abs(drive.belt_speed) / drive.speed_scale
         if distance < smallest or not 0.0 < period < longest_return(drive):
             return None
@@ -345,15 +418,15 @@ class _Shot:
         found = np.linalg.eigvals((self.transition - by_time_of_turn)[np.ix_(kept, kept)])
         multipliers = sorted(found.astype(complex).tolist(), key=abs, reverse=True)
         if self.landed:
-            multipliers[-1] = 0j  # in exact arithmetic too: a stick forgets its landing
+            multipliers[-1] = 0j  # exactly zero: a stick forgets its landing
         return tuple(multipliers)
 
 
 def _solve(motion: SensitiveMotion, state: FloatArray, period: float) -> LimitCycle | None:
-    """Solve for the cycle by Newton's method, each step halved until it comes nearer.
+    """Solve for the cycle by Newton's method; each step is halved until the residual decreases.
 
-    It ends where rounding lets no step come nearer. None where it misses still, or a multiplier of
-    one tells that it is one of a family.
+    The iteration ends where rounding prevents any further decrease. None if the residual is still
+    too large, or if a multiplier of one shows that the cycle belongs to a family.
     """
     guess = state.copy()
     guess[SPEED] = period * motion.drive.angular_frequency
@@ -380,13 +453,13 @@ def _nearer(motion: SensitiveMotion, shot: _Shot) -> _Shot | None:
 
 
 def _cycle(motion: SensitiveMotion, shot: _Shot) -> LimitCycle | None:
-    """Return the cycle that a shot closes; None where it took several turns."""
+    """Return the cycle that a shot closes; None if it took several turns."""
     drive = motion.drive
     start = shot.unknowns.copy()
     start[SPEED] = 0.0
     period = float(shot.unknowns[SPEED]) / drive.angular_frequency
     motion.start(start)
-    motion.advance(2.25 * period)  # the meter wants to see an upward turn from both sides
+    motion.advance(2.25 * period)  # the meter needs both sides of an upward turning point
     meter = CycleMeter(window=1)
     meter.feed(motion.take_breakpoints(), drive.belt_speed)
     measures = meter.measures()

@@ -1,8 +1,8 @@
-"""The slipping motion near its equilibrium: the derivatives of its right-hand side there.
+"""Expansion of the slip equations at the equilibrium: the derivatives of the right-hand side.
 
-They are heyoka's derivatives of the symbolic equations, whatever the friction law. Everything is
-dimensionless (see `Drive`); n is 2 for the open loop, with the state (X, Y), and 3 under continuous
-control, with the filter's W as well.
+heyoka differentiates the symbolic equations, for any friction law. Everything is dimensionless
+(see `Drive`); n is 2 for the open loop, with the state (X, Y), and 3 with continuous control,
+with the filter state W, too.
 """
 
 from collections.abc import Mapping
@@ -26,39 +26,64 @@ _HIGHEST_ORDER = 3
 
 @dataclass(frozen=True)
 class Expansion:
-    """The right-hand side f at the equilibrium, to third order: f = A z + B(z, z)/2 + C(z, z, z)/6.
+    """Right-hand side f at the equilibrium to third order: f = A z + B(z, z)/2 + C(z, z, z)/6.
 
-    z is the deviation of the state from the equilibrium.
+    z is the deviation of the state from the equilibrium. All values are dimensionless.
     """
 
     equilibrium: FloatArray
-    """The state at rest: X = mu(-v0), eq. 6, Y = 0, W = 0; shape (n,)."""
+    """State in equilibrium: X = mu(-v0), eq. 6, Y = 0, W = 0; shape (n,)."""
     jacobian: FloatArray
     """A, eq. 7 and 20; shape (n, n)."""
     quadratic: FloatArray
-    """B; shape (n, n, n), symmetric in the last two."""
+    """B; shape (n, n, n), symmetric in the last two indices."""
     cubic: FloatArray
-    """C; shape (n, n, n, n), symmetric in the last three."""
+    """C; shape (n, n, n, n), symmetric in the last three indices."""
     jacobian_by_belt_speed: FloatArray
     """dA/dv0 along the equilibrium; shape (n, n)."""
 
     @cached_property
     def eigenvalues(self) -> npt.NDArray[np.complex128]:
-        """Of A, the largest real part first, of a pair the positive imaginary part; shape (n,)."""
+        """Eigenvalues of A, sorted by decreasing real part, then imaginary part; shape (n,)."""
         found = np.linalg.eigvals(self.jacobian).astype(np.complex128)
         return np.array(sorted(found, key=lambda value: (-round(value.real, 14), -value.imag)))
 
     @property
     def stable(self) -> bool:
-        """Whether a small deviation dies out, by the criterion of Routh and Hurwitz."""
+        """Whether a small deviation decays, by the criterion of Routh and Hurwitz."""
         return bool(np.all(hurwitz_determinants(self.jacobian) > 0.0))
 
 
 def expand(drive: Drive, gains: WashoutGains | None = None) -> Expansion | None:
-    """Return the expansion of the open loop, or with `gains` (SI units) of eq. 19.
+    """Return the expansion of the equations of motion at the equilibrium.
 
-    None where the belt rests: friction then holds the slide anywhere within its limit, and no
-    smooth motion surrounds that.
+    Parameters
+    ----------
+    drive : Drive
+        Drive in SI units.
+    gains : WashoutGains, optional
+        Continuous controller of eq. 19 in SI units. By default the loop is open.
+
+    Returns
+    -------
+    Expansion or None
+        Dimensionless expansion. None if the belt is at rest: friction then holds the slide anywhere
+        within its limit, and the motion around is not smooth.
+
+    Examples
+    --------
+    The system of the paper is unstable without control:
+
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.theory.linear import expand
+    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
+    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
+    >>> expansion = expand(drive)
+    >>> expansion.stable
+    False
+    >>> round(float(expansion.eigenvalues[0].real), 6)
+    0.071
     """
     if drive.belt_speed == 0.0:
         return None
@@ -78,16 +103,17 @@ def expand(drive: Drive, gains: WashoutGains | None = None) -> Expansion | None:
 
 
 def jacobians(drive: Drive, gains: WashoutGains | None, belt_speeds: FloatArray) -> FloatArray:
-    """Return A, shape (m, n, n), at m dimensionless belt speeds of one sign instead of its own."""
+    """Return A, shape (m, n, n), at m dimensionless belt speeds of one sign."""
     _, (first, *_) = _at_equilibrium(drive, gains, belt_speeds)
     return np.moveaxis(first[:, : len(first)], -1, 0)
 
 
 def hurwitz_determinants(jacobian: FloatArray) -> FloatArray:
-    """Return what Routh and Hurwitz want above zero, for Jacobians (..., n, n): shape (..., n).
+    """Return the Routh-Hurwitz determinants of Jacobians (..., n, n): shape (..., n).
 
     With the characteristic polynomial l^n + c1 l^(n-1) + ... + cn they are c2, c1, or for order 3
-    c3, c1, c1 c2 - c3. The last one is zero at a Hopf point, the others being above zero.
+    c3, c1, c1 c2 - c3. All are above zero if the equilibrium is stable. At a Hopf point the last
+    one is zero, and the others are above zero.
     """
     trace = np.trace(jacobian, axis1=-2, axis2=-1)
     determinant = np.linalg.det(jacobian)
@@ -101,7 +127,7 @@ def hurwitz_determinants(jacobian: FloatArray) -> FloatArray:
 
 
 class _SmoothField:
-    """The compiled derivatives of one law's slipping motion, by the state and the belt speed."""
+    """Compiled derivatives of the slip equations of one law, by the state and the belt speed."""
 
     def __init__(self, law: type[FrictionLaw], continuous_control: bool) -> None:
         self.equations = Equations(law, continuous_control)
@@ -124,8 +150,9 @@ class _SmoothField:
     ) -> list[FloatArray]:
         """Return the derivatives of orders 1 to 3 at states of shape (n, m).
 
-        `values` are those of the equations' parameters, by name. The first axis of a result is the
-        component, the last one of length m, those between are the state and then the belt speed.
+        `values` are the parameter values of the equations, by name. The first axis of a result is
+        the component, and the last one has length m. The axes between are the state and then the
+        belt speed.
         """
         points = states.shape[1]
         parameters = np.zeros((len(self.equations.index), points))
@@ -148,7 +175,7 @@ _smooth_field = lru_cache(maxsize=None)(_SmoothField)
 def _at_equilibrium(
     drive: Drive, gains: WashoutGains | None, belt_speeds: FloatArray
 ) -> tuple[FloatArray, list[FloatArray]]:
-    """Return X at rest for belt speeds of one sign, shape (m,), and the derivatives there."""
+    """Return X in equilibrium at belt speeds of one sign, shape (m,), and the derivatives there."""
     field = _smooth_field(type(drive.friction), gains is not None)
     sign = -copysign(1.0, belt_speeds[0])
     law = drive.friction.scaled(drive.speed_scale)

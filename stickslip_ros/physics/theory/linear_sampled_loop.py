@@ -1,7 +1,7 @@
-"""The loop as the nodes run it, linear near its equilibrium: sampled, held, washed out, delayed.
+"""The loop of the nodes, linear near its equilibrium: sampled, held, washed out and delayed.
 
-It is the loop of `SampledLoop` and `Washout`, exactly: between samples the force is constant, so
-that the matrix exponential takes the slide from one sample to the next.
+It is exactly the loop of `SampledLoop` and `Washout`: between samples the force is constant, so
+that the matrix exponential gives the motion from one sample to the next.
 """
 
 from collections.abc import Iterator
@@ -21,92 +21,165 @@ from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.linear import expand
 
 LONGEST_DELAY = 300
-"""Whole periods of delay up to which the loop's matrix is built; its order grows with them."""
+"""Largest delay, in whole periods, for which the matrix is built; its order grows with it."""
 
 SETTLED = 0.01
-"""Share of its first size to which a deviation has fallen after the settling time."""
+"""Share of its first size that a deviation has at the 1 % settling time."""
 
 _ROUNDING = 1e-14
-"""Share by which a multiplier is not known better."""
+"""Relative error of a multiplier."""
 
 _SLIDE, _FILTER = slice(0, 2), 2
-"""Where X, Y and the filter's z = d w stand in the state; forces under way follow."""
+"""Indices of X, Y and of the filter's z = d w in the state; the forces under way follow."""
 
 
 class GainInterval(NamedTuple):
-    """Linear gains, N s/m, between which the loop is stable."""
+    """Interval of linear gains in which the loop is stable, N s/m."""
 
     low: float
+    """Lower end, N s/m."""
     high: float
+    """Upper end, N s/m."""
 
     @property
     def critical(self) -> float:
-        """The end that a gain passes on its way to zero, or above zero if zero is inside."""
+        """End nearest to zero, N s/m; the upper end if zero is inside."""
         return self.low if self.low >= 0.0 else self.high
 
 
 def why_no_linear_loop(drive: Drive, rate: float, force_delay: float) -> str | None:
-    """Return in one sentence why `LinearSampledLoop.of` gives None, or None if it does not."""
+    """Return a sentence that says why `LinearSampledLoop.from_drive` returns None, or None."""
     if drive.belt_speed == 0.0:
-        return "the belt rests, so friction holds the slide and nothing is linear near it"
+        return "the belt rests: friction holds the slide, and the motion near it is not linear"
     if force_delay * rate > LONGEST_DELAY:
         return (
             f"the force comes {force_delay * rate:g} periods late; the theory of the sampled loop "
-            f"goes up to {LONGEST_DELAY}"
+            f"covers at most {LONGEST_DELAY}"
         )
     return None
 
 
 @dataclass(frozen=True)
 class LinearSampledLoop:
-    """A drive at its equilibrium under a sampled washout controller, whatever its gains.
+    """Drive at its equilibrium under a sampled washout controller, linearised; for any gains.
 
     With the period T, v_n = y_n - z_n and q = 1 - exp(-d T) the controller is z_(n+1) = z_n + q v_n
     and force n = k1 v_n, which acts from n T + delay to (n + 1) T + delay. The state is X, Y, z and
     the forces under way, the newest first.
+
+    Examples
+    --------
+    The slide of a machine tool, sampled at 1 kHz without delay:
+
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.equations import WashoutGains
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
+    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
+    >>> loop = LinearSampledLoop.from_drive(drive, rate=1000.0)
+    >>> round(loop.critical_linear_gain(corner_frequency=20.0), 1)
+    -1451.2
+    >>> round(loop.settling_time(WashoutGains(20.0, linear=-3000.0, cubic=0.0)), 3)
+    0.601
     """
 
     drive: Drive
+    """Drive in SI units."""
     rate: float
     """Samples per second, Hz."""
     force_delay: float
-    """From a sample to the start of its force, s."""
+    """Delay from a sample to the start of its force, s."""
     jacobian: FloatArray
-    """Of the open loop, dimensionless (see `theory.linear`); shape (2, 2)."""
+    """Jacobian of the open loop, dimensionless (see `Expansion.jacobian`); shape (2, 2)."""
 
     of = Renamed("from_drive")
 
     @classmethod
     def from_drive(cls, drive: Drive, rate: float, force_delay: float = 0.0) -> Self | None:
-        """Return the loop at `rate` (Hz) with `force_delay` (s); None as `why_no_linear_loop`."""
+        """Return the linear loop of a drive.
+
+        Parameters
+        ----------
+        drive : Drive
+            Drive in SI units.
+        rate : float
+            Samples per second, Hz.
+        force_delay : float, optional
+            Delay from a sample to the start of its force, s.
+
+        Returns
+        -------
+        LinearSampledLoop or None
+            Loop; None if the belt is at rest, or if the delay is longer than 300 periods.
+        """
         expansion = expand(drive)
         if expansion is None or why_no_linear_loop(drive, rate, force_delay):
             return None
         return cls(drive, rate, force_delay, expansion.jacobian)
 
     def transition_matrix(self, gains: WashoutGains) -> FloatArray:
-        """Return what takes the state, dimensionless, from one sample to the next.
+        """Return the matrix from the state at one sample to the state at the next.
 
-        Of `gains`, in SI units, the cubic one does not matter. Shape (n, n), n being 3 and one more
-        for each period that the delay has or has begun.
+        Parameters
+        ----------
+        gains : WashoutGains
+            Controller in SI units; its cubic gain is not used.
+
+        Returns
+        -------
+        ndarray
+            Matrix for the dimensionless state, shape (n, n); n is 3 plus the number of periods of
+            the delay, rounded up.
         """
         scaled = gains.scaled(self.drive)
         return self._transitions(np.float64(scaled.corner_frequency), np.float64(scaled.linear))
 
     def spectral_radius(self, gains: WashoutGains) -> float:
-        """Return by what factor a small deviation grows per sample, in the long run."""
+        """Return the factor by which a small deviation grows per sample, in the long run.
+
+        Parameters
+        ----------
+        gains : WashoutGains
+            Controller in SI units; its cubic gain is not used.
+
+        Returns
+        -------
+        float
+            Spectral radius of the transition matrix; the loop is stable below 1.
+        """
         return float(_spectral_radius(self.transition_matrix(gains)))
 
     def decay_rate(self, gains: WashoutGains) -> float:
-        """Return how fast a small deviation dies out, 1/s; below zero it grows."""
+        """Return the rate at which a small deviation decays.
+
+        Parameters
+        ----------
+        gains : WashoutGains
+            Controller in SI units; its cubic gain is not used.
+
+        Returns
+        -------
+        float
+            Decay rate, 1/s; below zero the deviation grows.
+        """
         radius = self.spectral_radius(gains)
         return -log(radius) * self.rate if radius > 0.0 else inf
 
     def decay_rates(self, corner_frequencies: FloatArray, linear_gains: FloatArray) -> FloatArray:
-        """Return the decay rates, 1/s, over m corner frequencies (rad/s) and gains (N s/m).
+        """Return the decay rates over cutoff frequencies and linear gains.
 
-        The gains are n for all, shape (n,), or n for each corner frequency, shape (m, n). The
-        result has shape (m, n).
+        Parameters
+        ----------
+        corner_frequencies : ndarray
+            Cutoff frequencies, rad/s; shape (m,).
+        linear_gains : ndarray
+            Linear gains, N s/m; shape (n,) for all cutoff frequencies, or (m, n).
+
+        Returns
+        -------
+        ndarray
+            Decay rates, 1/s; shape (m, n).
         """
         shape = (len(corner_frequencies), linear_gains.shape[-1])
         rows = zip(corner_frequencies, np.broadcast_to(linear_gains, shape), strict=True)
@@ -115,18 +188,39 @@ class LinearSampledLoop:
             return -np.log(radii) * self.rate
 
     def settling_time(self, gains: WashoutGains) -> float | None:
-        """Return the time (s) in which a small deviation falls to a hundredth; None if it grows."""
+        """Return the 1 % settling time of a small deviation.
+
+        Parameters
+        ----------
+        gains : WashoutGains
+            Controller in SI units; its cubic gain is not used.
+
+        Returns
+        -------
+        float or None
+            Time in which a deviation decays to a hundredth, s; None if it grows.
+        """
         return settling_time(self.decay_rate(gains))
 
     def stable_linear_gains(self, corner_frequency: float) -> list[GainInterval]:
-        """Return all linear gains for which the loop is stable with this corner frequency (rad/s).
+        """Return all linear gains with which the loop is stable.
 
-        By D-decomposition (Neimark): a multiplier e^(j theta) on the unit circle wants
+        By D-decomposition (Neimark): a multiplier e^(j theta) on the unit circle requires
         k1 = 1/G(e^(j theta)), which is a gain where it is real. These gains bound intervals in each
-        of which as many multipliers are outside the circle; where Im(1/G) rises with theta, they
-        become more with the gain. Where least are outside there are none, or no gain is stable.
-        Beyond the last ones none is: G has more poles than zeros, so that a multiplier grows with
-        the gain.
+        of which the number of multipliers outside the circle is constant; where Im(1/G) rises with
+        theta, the number increases with the gain. In the intervals where it is smallest it is zero,
+        or no gain is stable. Beyond the last of these gains no gain is stable: G has more poles
+        than zeros, so that a multiplier grows with the gain.
+
+        Parameters
+        ----------
+        corner_frequency : float
+            Cutoff frequency, rad/s.
+
+        Returns
+        -------
+        list of GainInterval
+            Stable intervals in ascending order; empty if no gain is stable.
         """
         boundary = _Boundary(self, corner_frequency / self.drive.angular_frequency)
         crossings = sorted(boundary.crossings())
@@ -142,7 +236,7 @@ class LinearSampledLoop:
         fewest = min(number for number, _ in counted)
         intervals = [interval for number, interval in counted if number == fewest]
         nearest = min(intervals, key=_distance)
-        # Next to an end the loop is slow, at a high rate also far from zero.
+        # Near an end the loop is slow; at a high rate also far from zero.
         low, high = nearest
         tried = (0.0, 2.0 * nearest.critical, (low + high) / 2.0)
         radius = min(
@@ -153,20 +247,31 @@ class LinearSampledLoop:
         return intervals if radius < 1.0 - _ROUNDING else []
 
     def critical_linear_gain(self, corner_frequency: float) -> float | None:
-        """Return the gain (N s/m) that the loop needs to be stable, or may have while it is.
+        """Return the linear gain that the loop needs, or that it allows, to be stable.
 
-        It is the critical end of the stable interval nearest to zero: at a high rate and without
-        delay k1* of the continuous loop, below which that is stable. None if no gain stabilises.
+        It is the critical end of the stable interval nearest to zero. At a high rate and without
+        delay it is k1* of the continuous loop, which is stable below it.
+
+        Parameters
+        ----------
+        corner_frequency : float
+            Cutoff frequency, rad/s.
+
+        Returns
+        -------
+        float or None
+            Critical linear gain, N s/m; None if no gain stabilises the loop.
         """
         intervals = self.stable_linear_gains(corner_frequency)
         return min(intervals, key=_distance).critical if intervals else None
 
     def coarsened(self) -> Self:
-        """Return nearly the same loop at a rate at which even a long delay is few periods.
+        """Return a similar loop at a rate at which even a long delay is few periods, for searches.
 
-        For searches. To hold the force delays it too, by half a period on average; the sum stays.
+        To hold the force also delays it, by half a period on average; the sum is kept. A loop of
+        small order is returned as it is.
         """
-        if self.order <= 24:  # to look at many gains takes no long time
+        if self.order <= 24:  # searching many gains is quick
             return self
         rate = min(self.rate, max(20.0 / self.force_delay, 5.0 * self.drive.angular_frequency))
         mean_delay = self.force_delay + 0.5 / self.rate
@@ -174,26 +279,26 @@ class LinearSampledLoop:
 
     @property
     def order(self) -> int:
-        """Number n of the state's components."""
+        """Number n of components of the state."""
         whole, rest = self.delay
         return 3 + whole + (rest > 0.0)
 
     @cached_property
     def period(self) -> float:
-        """T, dimensionless."""
+        """Sample period T, dimensionless."""
         return self.drive.angular_frequency / self.rate
 
     @cached_property
     def delay(self) -> tuple[int, float]:
-        """The delay in whole periods, and what is left of it in periods, below one."""
+        """Delay in whole periods, and the remainder in periods, below one."""
         return whole_and_rest(self.force_delay * self.rate)
 
     @cached_property
     def held(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """What one period does: the slide's transition, and the effects of two forces of one.
+        """Effect of one period: transition of the slide, and the effects of two unit forces.
 
-        These are the force that starts during the period (or with it), and the one that it ends.
-        Shapes (2, 2), (2,), (2,).
+        The first force starts during the period (or with it), and the second ends in it. Shapes (2,
+        2), (2,), (2,).
         """
         split = self.delay[1]
         before, ending = self._slide(split)
@@ -201,7 +306,7 @@ class LinearSampledLoop:
         return after @ before, starting, after @ ending
 
     def _slide(self, periods: float) -> tuple[FloatArray, FloatArray]:
-        """Return the slide's transition over so many periods and the effect of a force of one."""
+        """Return the transition of the slide over some periods, and the effect of a unit force."""
         block = np.zeros((3, 3))
         block[:2, :2] = self.jacobian
         block[1, 2] = 1.0
@@ -235,7 +340,7 @@ class LinearSampledLoop:
 
 
 def settling_time(decay_rate: float) -> float | None:
-    """Return the time (s) in which what decays at that rate (1/s) falls to a hundredth."""
+    """Return the time (s) in which a deviation with this decay rate (1/s) falls to a hundredth."""
     return -log(SETTLED) / decay_rate if decay_rate > 0.0 else None
 
 
@@ -244,9 +349,9 @@ class _Boundary:
 
     From the force to v, with l = e^(j theta) and the whole periods m of the delay,
     G = (l - 1)^2 (b l + c) / (l^(m+1) (l - e^(-d T)) (l - e^(s1 T)) (l - e^(s2 T))),
-    s1 and s2 being the eigenvalues of the open loop. One factor l - 1 is the filter's, the other
-    one says that a constant force does not move the slide for good; b and c are the force that
-    starts during a period, and the one that it ends. In this form nothing cancels at high rates.
+    s1 and s2 being the eigenvalues of the open loop. One factor l - 1 is the filter's; the other
+    one shows that a constant force does not move the slide permanently. b and c are the force that
+    starts during a period, and the one that ends in it. In this form nothing cancels at high rates.
     """
 
     def __init__(self, loop: LinearSampledLoop, corner_frequency: float) -> None:
@@ -261,7 +366,7 @@ class _Boundary:
     def gain(self, theta: Any) -> Any:
         """Return 1/G, an array of the shape of theta."""
         forward = np.exp(1j * theta)
-        # The form of l - e^s that overflows on neither side.
+        # The form of l - e^s that does not overflow on either side.
         differences = np.prod(
             [
                 np.exp(pole) * np.expm1(1j * theta - pole)
@@ -301,10 +406,9 @@ class _Boundary:
                 yield gain * (-1.0) ** (self._whole + 1), -int(np.sign(imaginary[-1]))
 
     def _angles(self) -> FloatArray:
-        """Return angles above 0 and below pi between which each factor turns but little.
+        """Return angles above 0 and below pi between which the phase of each factor changes little.
 
-        A factor l - e^s turns near the angle of e^s, the more suddenly the nearer it is to the
-        circle.
+        The phase of a factor l - e^s changes near the angle of e^s, fast if it is near the circle.
         """
         steps = 16 * (self._whole + 2)
         parts: list[Any] = [np.arange(1, steps) * (pi / steps), self._near(0.0, self._period)]
@@ -324,12 +428,12 @@ class _Boundary:
 def _exponential(matrix: FloatArray) -> FloatArray:
     """Return the exponential of a small matrix: the series of a part of it, squared repeatedly.
 
-    scipy's shares each one among threads, which takes hundreds of times as long.
+    scipy's version divides each one among threads, which takes hundreds of times as long.
     """
     squarings = max(frexp(float(np.abs(matrix).sum(axis=0).max()))[1] + 1, 0)
     part, one = matrix * 0.5**squarings, np.eye(len(matrix))
     found = one
-    # Of a norm of one half: rounding hides what is left of the series.
+    # With a norm of one half the remaining terms are below rounding.
     for order in range(16, 0, -1):
         found = one + part @ found / order
     for _ in range(squarings):

@@ -1,4 +1,4 @@
-"""Where the sampled loop is stable: over its gains, and over rate and delay."""
+"""Stability of the sampled loop over its gains, and over rate and delay."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -14,23 +14,23 @@ from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 
 @dataclass(frozen=True)
 class StabilityMap:
-    """Decay rates of a loop over corner frequency and linear gain, around some gains; SI units."""
+    """Decay rates of a loop over cutoff frequency and linear gain, around given gains; SI units."""
 
     loop: LinearSampledLoop
     gains: WashoutGains
-    """Those that the map is around."""
+    """Gains at the centre of the map."""
     corner_frequencies: FloatArray
     """rad/s, shape (m,)."""
     linear_gains: FloatArray
-    """N s/m, shape (n,); zero is among those spanned."""
+    """N s/m, shape (n,); their range includes zero."""
     decay_rates: FloatArray
-    """1/s, shape (m, n); above zero where the loop is stable. For a long delay an approximation."""
+    """1/s, shape (m, n); above zero where the loop is stable. Approximate for a long delay."""
     continuous: FloatArray
-    """Critical linear gain without sampling and delay, shape (m,); NaN where there is none."""
+    """Critical linear gain without sampling and delay, shape (m,); NaN if there is none."""
 
     @classmethod
     def around(cls, loop: LinearSampledLoop, gains: WashoutGains, points: int = 81) -> Self:
-        """Return the map around `gains` (SI units) with so many points along each axis."""
+        """Return the map around `gains` (SI units) with this number of points along each axis."""
         corners = np.geomspace(0.1 * gains.corner_frequency, 10.0 * gains.corner_frequency, points)
         continuous = np.full(points, np.nan)
         for row, corner_frequency in enumerate(corners):
@@ -53,13 +53,13 @@ class CriticalGainCurves:
     force_delays: FloatArray
     """s, shape (n,)."""
     linear_gains: FloatArray
-    """See `LinearSampledLoop.critical_linear_gain`, N s/m; (m, n), NaN where there is none."""
+    """See `LinearSampledLoop.critical_linear_gain`, N s/m; (m, n), NaN if there is none."""
 
     @classmethod
     def over(
         cls, drive: Drive, corner_frequency: float, rates: FloatArray, force_delays: FloatArray
     ) -> Self:
-        """Return those of a drive with this corner frequency (rad/s)."""
+        """Return the curves of a drive for this cutoff frequency (rad/s)."""
         gains = np.full((len(rates), len(force_delays)), np.nan)
         for row, rate in enumerate(rates.tolist()):
             for column, force_delay in enumerate(force_delays.tolist()):

@@ -15,10 +15,10 @@ from stickslip_ros.physics.theory.cycle_bounds import follow, least_cycle, relea
 from stickslip_ros.physics.theory.roots import zero_between
 
 _AVERAGED = np.geomspace(1e-4, 1e4, 200)
-"""Dimensionless belt speeds between which averaging looks for an onset."""
+"""Dimensionless belt speeds between which averaging searches for an onset."""
 
 _FOLLOWED = np.geomspace(4.0, 0.02, 100)
-"""Belt speeds between which the motion is followed, in averaged onsets, or else in the drive's."""
+"""Belt speeds tried for the exact onset, relative to the averaged one or the drive's."""
 
 _ROUNDING = 1e-12
 """Share of the belt speed below which a difference of speeds is rounding."""
@@ -26,35 +26,65 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class StickingOnset:
-    """The highest belt speed with a cycle that sticks: m/s, above zero."""
+    """Highest belt speed with a cycle that sticks, m/s, above zero."""
 
     approximate: float | None
-    """By averaging: the speed amplitude of a harmonic vibration is the speed of the belt.
+    """Onset by averaging, m/s: the speed amplitude of a harmonic vibration equals the belt speed.
 
-    For the cubic law that is sqrt(4/5) of the Hopf speed.
+    For the cubic law this is sqrt(4/5) of the Hopf speed.
     """
     exact: float | None
-    """By the motion: a periodic orbit touches the speed of the belt; to rounding."""
+    """Onset of the motion itself, m/s: a periodic orbit touches the belt speed; to rounding."""
     no_approximate: str | None
-    """Where there is no approximate speed, a sentence that says why."""
+    """Sentence that says why there is no approximate speed, if there is none."""
     no_exact: str | None
-    """Where there is no exact speed, a sentence that says why."""
+    """Sentence that says why there is no exact speed, if there is none."""
     ranges: tuple[tuple[float, float], ...]
     """Least and highest belt speed (m/s) of each range with a cycle that sticks, ascending.
 
-    Below the onset a slide may come back to the belt with forces that friction cannot hold, and
+    Below the onset a slide may return to the belt with forces that friction cannot hold, and
     overtake it. The exact onset is the upper end of the last range.
     """
     followed: tuple[float, float]
-    """Belt speeds (m/s) between which the ranges were looked for: one that begins at the lower end
-    goes on below it."""
+    """Belt speeds (m/s) between which the ranges were searched for.
+
+    A range that starts at the lower end continues below it.
+    """
 
 
 def sticking_onset(drive: Drive) -> StickingOnset:
-    """Return the onset of sticking for whatever belt speed; that of `drive` is not its matter.
+    """Return the onset of sticking over the belt speed.
 
-    The exact one is looked for up to four times the approximate one, or, without that, up to four
-    times the belt speed of `drive`.
+    The search for the exact onset goes up to four times the approximate one or, without that, up to
+    four times the belt speed of the drive.
+
+    Parameters
+    ----------
+    drive : Drive
+        Drive in SI units; its belt speed limits the search only.
+
+    Returns
+    -------
+    StickingOnset
+        Approximate and exact onset, m/s, and the ranges of sticking.
+
+    Raises
+    ------
+    RunError
+        If the motion is too stiff to follow.
+
+    Examples
+    --------
+    The system of the paper:
+
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.theory.sticking import sticking_onset
+    >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,
+    ...               belt_speed=0.4, friction=Stribeck(0.4, 0.25, 0.5))
+    >>> onset = sticking_onset(drive)
+    >>> round(onset.approximate, 6), round(onset.exact, 6)
+    (0.437163, 0.439472)
     """
     averaged = _averaged(drive)
     reference = averaged if isinstance(averaged, float) else abs(drive.belt_speed)
@@ -73,13 +103,13 @@ def sticking_onset(drive: Drive) -> StickingOnset:
 
 
 def _averaged(drive: Drive) -> float | str:
-    """Return the approximate onset (m/s), or why there is none."""
+    """Return the approximate onset (m/s), or the reason why there is none."""
     growth = averaged_growth(drive, _AVERAGED, _AVERAGED)
     low, high = _AVERAGED[[0, -1]] * drive.speed_scale
     if not np.any(growth):
         return (
-            "by averaging vibrations up to the belt's speed neither grow nor die out at any belt "
-            f"speed from {low:.3g} to {high:.3g} m/s"
+            "by averaging vibrations up to the belt speed neither grow nor decay at any belt speed "
+            f"from {low:.3g} to {high:.3g} m/s"
         )
     growing = np.flatnonzero(growth > 0.0)
     if len(growing) == 0:
@@ -91,7 +121,7 @@ def _averaged(drive: Drive) -> float | str:
         last = _AVERAGED[highest] * drive.speed_scale
         return (
             f"by averaging it still sticks at {last:.3g} m/s, and at higher belt speeds vibrations "
-            "up to the belt's speed neither grow nor die out"
+            "up to the belt speed neither grow nor decay"
         )
     onset = zero_between(
         lambda speed: float(averaged_growth(drive, speed, speed)), *_AVERAGED[highest : highest + 2]
@@ -100,7 +130,7 @@ def _averaged(drive: Drive) -> float | str:
 
 
 def _followed(drive: Drive, release: "Release", speeds: Sequence[float]) -> float | str:
-    """Return the exact onset (m/s), or why there is none; the speeds to follow descend."""
+    """Return the exact onset (m/s), or the reason why there is none; the speeds to try descend."""
 
     def excess(speed: float) -> float:
         at_speed = replace(drive, belt_speed=speed)
@@ -123,7 +153,7 @@ def _followed(drive: Drive, release: "Release", speeds: Sequence[float]) -> floa
         return f"it still sticks at {speed:.3g} m/s, the highest belt speed tried"
     return (
         f"above {sticking:.3g} m/s, up to {speed:.3g} m/s at least, it overtakes the belt and does "
-        "not stick: no orbit touches the belt's speed"
+        "not stick: no orbit touches the belt speed"
     )
 
 
@@ -137,7 +167,7 @@ def _ranges(
         return -1.0 if least_cycle(at_speed) is None else tanh(release.stick_margin(at_speed))
 
     tried = [(speed, margin(speed)) for speed in speeds if onset is None or speed < onset]
-    if onset is not None:  # below it there is a range, be it ever so narrow
+    if onset is not None:  # below it there is a range, however narrow
         tried.insert(0, (onset * (1.0 - 1e-9), 1.0))
     tried.reverse()
     low = tried[0][0] if tried[0][1] > 0.0 else None
@@ -155,9 +185,9 @@ def _ranges(
 
 
 class Release:
-    """What a slide does when the belt lets go of it, which it always does in the same state.
+    """Motion of a slide after the belt releases it, which always happens in the same state.
 
-    The belt moves, at a speed above zero. To be asked about many drives: compiling the integrator
+    The belt moves, at a speed above zero. Use one object for many drives: compiling the integrator
     costs more than most motions.
     """
 
@@ -165,12 +195,12 @@ class Release:
         self._motion: Motion | None = None
 
     def excess(self, drive: Drive) -> float:
-        """Return by what share of the belt's speed the slide's next upward speed is above.
+        """Return the share of the belt speed by which the slide's next upward speed exceeds it.
 
-        -1 where it does not come up again. Beyond the belt's speed friction turns round: there the
-        peak is that of the parabola which begins with the slide's acceleration and loses v0 of it
-        per unit of time, as an orbit does that touches. Raises RunError for a motion too stiff to
-        be followed.
+        -1 if the slide does not move upward again. Above the belt speed friction reverses: there
+        the peak is that of the parabola which starts with the slide's acceleration and loses v0 of
+        it per unit of time, as an orbit does that touches. Raises RunError for a motion too stiff
+        to follow.
         """
         peaks = (_highest(breakpoints, drive.belt_speed) for breakpoints in self._follow(drive))
         peak = next((peak for peak in peaks if peak is not None), None)
@@ -185,12 +215,12 @@ class Release:
         return excess if excess > _ROUNDING else 0.0
 
     def stick_margin(self, drive: Drive) -> float:
-        """Return what is above zero where the slide sticks again, and below where it does not.
+        """Return a value above zero if the slide sticks again, and below zero if it does not.
 
-        Zero is where it only just sticks: because it only just comes up to the belt's speed, or
-        because it comes with a force that friction only just holds. A slide that overtakes the belt
-        sticks when it falls back to the belt's speed, or never: in the plane of position and speed
-        its orbit then encloses all those before. Raises RunError like `excess`.
+        It is zero where the slide only just sticks: because it only just reaches the belt speed, or
+        because its force is the largest that friction can hold. A slide that overtakes the belt
+        sticks when it falls back to the belt speed, or never: in the plane of position and speed
+        its orbit then encloses all previous ones. Raises RunError like `excess`.
         """
         excess = self.excess(drive)
         if excess <= 0.0:
@@ -210,9 +240,9 @@ class Release:
 
 
 def _highest(breakpoints: Breakpoints, belt_speed: float) -> tuple[float, float] | None:
-    """Return position and velocity where it is fastest, once it went back and until it does again.
+    """Return position and velocity where the slide is fastest, between two backward motions.
 
-    If it comes to the belt's speed: there. None as long as the motion has not got so far.
+    If it reaches the belt speed: there. None while the motion has not got so far.
     """
     backward = breakpoints.velocity < 0.0
     forward = np.flatnonzero(np.logical_or.accumulate(backward) & ~backward)
@@ -231,9 +261,9 @@ def _highest(breakpoints: Breakpoints, belt_speed: float) -> tuple[float, float]
 
 
 def _entry(breakpoints: Breakpoints, belt_speed: float) -> float | None:
-    """Return the position where the slide sticks, or falls back to the belt's speed from above.
+    """Return the position where the slide sticks, or falls back to the belt speed from above.
 
-    That is once it went back; None as long as the motion has not got so far.
+    This is after the slide went back; None while the motion has not got so far.
     """
     level = belt_speed * (1.0 + _ROUNDING)
     returned = np.logical_or.accumulate(breakpoints.velocity < 0.0)

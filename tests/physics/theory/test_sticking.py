@@ -134,7 +134,7 @@ def test_what_neither_grows_nor_dies_out_has_no_onset(law: FrictionLaw, damping:
     assert onset.approximate is None
     assert onset.exact is None
     assert onset.no_approximate is not None
-    assert "neither grow nor die out" in onset.no_approximate
+    assert "neither grow nor decay" in onset.no_approximate
 
 
 @pytest.mark.parametrize("minimum_speed", [3e-3, pytest.param(1e-3, marks=pytest.mark.long)])

@@ -1,4 +1,4 @@
-"""The friction laws: one short file each, and one line in `LAWS`."""
+"""The friction laws: one file each, and one entry each in `LAWS`."""
 
 from stickslip_ros.physics.model.friction.base import FrictionLaw
 from stickslip_ros.physics.model.friction.coulomb import Coulomb

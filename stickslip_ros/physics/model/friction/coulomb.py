@@ -8,10 +8,30 @@ from stickslip_ros.physics.model.friction.base import FrictionLaw
 
 @dataclass(frozen=True)
 class Coulomb(FrictionLaw):
-    """Coulomb law (Fig. 8 of the paper): -mu_s s, whatever the speed."""
+    """Coulomb law (Fig. 8 of the paper): mu = -mu_s s at any speed.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.model.friction import Coulomb
+    >>> Coulomb(static=0.4).coefficient(-0.3, -1.0)
+    0.4
+    """
 
     name: ClassVar[str] = "coulomb"
 
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        """Return mu(v_r)."""
+        """Return mu(v_r); see `FrictionLaw.coefficient`.
+
+        Parameters
+        ----------
+        relative_speed : float, array or expression
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float, array or expression
+            sgn(v_r), -1 or 1.
+
+        Returns
+        -------
+        float, array or expression
+            Coefficient, dimensionless.
+        """
         return -self.static * sign + 0.0 * relative_speed

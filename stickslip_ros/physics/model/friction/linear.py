@@ -8,14 +8,34 @@ from stickslip_ros.physics.model.friction.base import FrictionLaw
 
 @dataclass(frozen=True)
 class Linear(FrictionLaw):
-    """Linear law (Fig. 9 of the paper): -mu_s s + slope v_r; friction falls with speed."""
+    """Linear law (Fig. 9 of the paper): mu = -mu_s s + slope v_r; friction decreases with speed.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.model.friction import Linear
+    >>> round(Linear(static=0.4, slope=0.45).coefficient(-0.4, -1.0), 3)
+    0.22
+    """
 
     name: ClassVar[str] = "linear"
     inverse_speed_power: ClassVar[dict[str, int]] = {"slope": 1}
 
     slope: Any
-    """Fall of the coefficient with the relative speed, s/m."""
+    """Decrease of the coefficient with the relative speed, s/m."""
 
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        """Return mu(v_r)."""
+        """Return mu(v_r); see `FrictionLaw.coefficient`.
+
+        Parameters
+        ----------
+        relative_speed : float, array or expression
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float, array or expression
+            sgn(v_r), -1 or 1.
+
+        Returns
+        -------
+        float, array or expression
+            Coefficient, dimensionless.
+        """
         return -self.static * sign + self.slope * relative_speed

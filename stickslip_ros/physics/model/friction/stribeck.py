@@ -8,9 +8,16 @@ from stickslip_ros.physics.model.friction.base import FrictionLaw
 
 @dataclass(frozen=True)
 class Stribeck(FrictionLaw):
-    """Cubic Stribeck law, eq. 3: -mu_s s + a v_r - b v_r^3.
+    """Cubic Stribeck law, eq. 3: mu = -mu_s s + a v_r - b v_r^3.
 
     a = 3 (mu_s - mu_m) / (2 v_m) and b = (mu_s - mu_m) / (2 v_m^3).
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> law = Stribeck(static=0.4, minimum=0.25, minimum_speed=0.5)
+    >>> law.coefficient(-0.5, -1.0)
+    0.25
     """
 
     name: ClassVar[str] = "stribeck"
@@ -19,10 +26,23 @@ class Stribeck(FrictionLaw):
     minimum: Any
     """Smallest kinetic coefficient mu_m."""
     minimum_speed: Any
-    """Relative speed v_m at which it is reached, m/s."""
+    """Relative speed v_m at which the coefficient is smallest, m/s."""
 
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        """Return mu(v_r), eq. 3."""
+        """Return mu(v_r), eq. 3; see `FrictionLaw.coefficient`.
+
+        Parameters
+        ----------
+        relative_speed : float, array or expression
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float, array or expression
+            sgn(v_r), -1 or 1.
+
+        Returns
+        -------
+        float, array or expression
+            Coefficient, dimensionless.
+        """
         drop = self.static - self.minimum
         ratio = relative_speed / self.minimum_speed
         return -self.static * sign + drop / 2.0 * (3.0 * ratio - ratio * ratio * ratio)

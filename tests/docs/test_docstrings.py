@@ -1,0 +1,113 @@
+"""Docstrings: their examples run, and those of the public API document every parameter."""
+
+import ast
+import doctest
+import inspect
+import re
+import textwrap
+from collections.abc import Callable, Iterator
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+CHECKOUT = Path(__file__).parents[2]
+
+ROOMS = ("stickslip_ros.physics",)
+"""Packages and modules whose public names have NumPy-style docstrings."""
+
+_LISTED = re.compile(r"^::: (\S+)$|^`from (\S+) import (\w+)`$", re.MULTILINE)
+_SECTION = re.compile(r"^Parameters\n-+\n(.*?)(?=^\w+\n-+$|\Z)", re.MULTILINE | re.DOTALL)
+
+
+def modules_with_examples() -> list[str]:
+    files = sorted((CHECKOUT / "stickslip_ros").rglob("*.py"))
+    found = [file for file in files if ">>> " in file.read_text(encoding="utf-8")]
+    names = [".".join(file.relative_to(CHECKOUT).with_suffix("").parts) for file in found]
+    return [name.removesuffix(".__init__") for name in names]
+
+
+@pytest.mark.parametrize("module", modules_with_examples())
+def test_the_examples_print_what_they_show(module: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(CHECKOUT)
+    result = doctest.testmod(import_module(module), optionflags=doctest.ELLIPSIS)
+    assert result.attempted > 0
+    assert result.failed == 0
+
+
+def public_names() -> list[str]:
+    """The names in the reference that are of a room."""
+    pages = [*(CHECKOUT / "docs").glob("reference.md"), *(CHECKOUT / "docs/reference").glob("*.md")]
+    listed = (_LISTED.findall(page.read_text(encoding="utf-8")) for page in sorted(pages))
+    names = [full or f"{module}.{name}" for page in listed for full, module, name in page]
+    return [name for name in names if name.startswith(ROOMS)]
+
+
+def test_the_reference_lists_public_names_of_every_room() -> None:
+    for room in ROOMS:
+        assert any(name.startswith(room) for name in public_names())
+
+
+@pytest.mark.parametrize("name", public_names())
+def test_every_parameter_is_documented(name: str) -> None:
+    for label, given, documented in documented_parameters(name):
+        assert documented == given, label
+
+
+def documented_parameters(name: str) -> Iterator[tuple[str, list[str], list[str]]]:
+    """What has parameters below a public name: its name, those that it has, and the documented."""
+    module, _, own_name = name.rpartition(".")
+    found = getattr(import_module(module), own_name)
+    if inspect.isfunction(found):
+        yield name, parameters(found), section(found)
+    if not inspect.isclass(found):
+        return
+    if is_own_constructor(found):
+        documented = section(found) or section(found.__init__)
+        yield name, parameters(found), documented or attributes_of(found)
+    for member, value in vars(found).items():
+        method: Any = getattr(value, "__func__", value)
+        if inspect.isfunction(method) and not member.startswith("_"):
+            yield f"{name}.{member}", parameters(getattr(found, member)), section(method)
+
+
+def is_own_constructor(found: type) -> bool:
+    """Whether a class is constructed in a way that it defines itself."""
+    if issubclass(found, Enum):
+        return False
+    return is_dataclass(found) or hasattr(found, "_fields") or is_of_package(found.__init__)
+
+
+def is_of_package(found: Callable[..., Any]) -> bool:
+    return (getattr(found, "__module__", None) or "").startswith("stickslip_ros.")
+
+
+def parameters(found: Callable[..., Any]) -> list[str]:
+    if inspect.isclass(found) and is_dataclass(found):
+        return [field.name for field in fields(found) if field.init]
+    return [name for name in inspect.signature(found).parameters if name != "self"]
+
+
+def section(found: Any) -> list[str]:
+    """The names in the Parameters section of a docstring."""
+    matched = _SECTION.search(inspect.getdoc(found) or "")
+    lines = matched[1].splitlines() if matched else []
+    heads = [line.split(" : ")[0] for line in lines if line and not line.startswith(" ")]
+    return [name.strip("* ") for head in heads for name in head.split(",")]
+
+
+def attributes_of(found: type) -> list[str]:
+    """The fields of a class and its bases that a docstring follows."""
+    documented: list[str] = []
+    for each in reversed(found.__mro__):
+        if not is_of_package(each):
+            continue
+        (definition,) = ast.parse(textwrap.dedent(inspect.getsource(each))).body
+        assert isinstance(definition, ast.ClassDef)
+        for statement, after in zip(definition.body, definition.body[1:], strict=False):
+            if isinstance(statement, ast.AnnAssign) and isinstance(after, ast.Expr):
+                documented.append(ast.unparse(statement.target))
+    return [name for name in parameters(found) if name in documented]
