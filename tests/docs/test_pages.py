@@ -1,4 +1,4 @@
-"""Every block of README and docs does what it says: see page.py for how it is run."""
+"""Every block of README and docs does what it says: page.py describes how it is run."""
 
 import re
 from collections.abc import Generator
@@ -13,7 +13,7 @@ import yaml
 from stickslip_ros.nodes.base.network import this_machine_only
 from stickslip_ros.running.domain import own_domain
 from stickslip_ros.scenarios.files import load_scenario
-from tests.docs.page import CHECKOUT, Block, blocks, pages
+from tests.docs.page import CHECKOUT, DIRECTIVES, Block, blocks, directives_file, pages
 from tests.docs.shell import Shell
 
 BLOCKS = {page: blocks(page) for page in pages()}
@@ -21,7 +21,7 @@ BLOCKS = {page: blocks(page) for page in pages()}
 PATIENCE = 1200.0
 """What a block may take, s."""
 
-# What cannot be run here, by page and beginning: a longer list is a decision, not an accident.
+# What cannot be run here, by page and beginning. Each entry is a decision.
 NOT_RUN = [
     ("docs/dashboard.md", "ssh -L 8642:127.0.0.1:8642 machine-of-the-drive"),
     ("docs/security.md", "sudo apt install ros-jazzy-sros2"),
@@ -56,7 +56,11 @@ def test_the_blocks_of_a_page_run(page: str, shell: Shell) -> None:
     run(BLOCKS[page], shell)
 
 
-def test_the_blocks_that_nobody_runs_are_known() -> None:
+def test_every_file_of_directives_belongs_to_a_page() -> None:
+    assert {*DIRECTIVES.rglob("*.toml")} <= {directives_file(page) for page in BLOCKS}
+
+
+def test_the_blocks_that_are_not_run_are_known() -> None:
     found = [
         (page, block.text)
         for page, its_blocks in BLOCKS.items()
