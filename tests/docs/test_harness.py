@@ -21,7 +21,7 @@ from tests.docs.test_pages import check_output, in_a_row
         ("<!-- test: output -->\n```sh\nls\n```\n", "a directive outside docs/blocks"),
     ],
 )
-def test_a_page_with_what_would_not_be_run_is_refused(text: str, said: str) -> None:
+def test_a_page_with_a_block_that_would_not_be_run_is_refused(text: str, said: str) -> None:
     with pytest.raises(AssertionError, match=said):
         list(parse("page.md", text, {}))
 
