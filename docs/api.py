@@ -67,26 +67,6 @@ PUBLIC = {
 }  # fmt: skip
 """The public Python API: what a program may rely on, by section of reference.md and module."""
 
-EXAMPLES = {
-    "ClosedLoop": (
-        "after from stickslip_ros.testing import ClosedLoop",
-        "after import sys; sys.path.append('docs/examples')",
-        "after from velocity_feedback import VelocityFeedback as MyController",
-    ),
-    "Recording": (
-        "with bags/reference for bags/my_run",
-        "after from stickslip_ros.bags import Recording",
-    ),
-    "compute_columns": (
-        "after from stickslip_ros.physics.measures.cycle_measures import Regime",
-        "after from stickslip_ros.scenarios.files import load_scenario",
-        "after from stickslip_ros.studies.columns import compute_columns",
-        "after from stickslip_ros.studies.plan import Axis",
-        "after from stickslip_ros.studies.sweep import sweep_study",
-    ),
-}
-"""How the tests run the examples of docstrings (see tests/docs/page.py)."""
-
 
 def reference(section: str) -> Iterator[str]:
     """Yield the public API of a section."""
@@ -98,7 +78,7 @@ def reference(section: str) -> Iterator[str]:
             if isinstance(node, ast.FunctionDef):
                 yield f"**`{_signature(node)}`**\n"
             if isinstance(node, ast.ClassDef | ast.FunctionDef):
-                yield from _prose(name, ast.get_docstring(node) or "")
+                yield from _prose(ast.get_docstring(node) or "")
             else:
                 yield f"{_text(after)}\n"
             if isinstance(node, ast.ClassDef) and (members := "".join(_members(node))):
@@ -171,13 +151,12 @@ def _text(node: ast.stmt | None) -> str:
     return ""
 
 
-def _prose(name: str, docstring: str) -> Iterator[str]:
+def _prose(docstring: str) -> Iterator[str]:
     """Yield the paragraphs of a docstring, an example among them as a block that the tests run."""
     for paragraph in docstring.split("\n\n"):
         if paragraph.startswith("    "):
-            directives = "".join(f"<!-- test: {how} -->\n" for how in EXAMPLES[name])
             # The formatter looks at the page, too.
             code = re.sub(r"(?<=\S) +#", "  #", textwrap.dedent(paragraph))
-            yield f"{directives}```python\n{code}\n```\n"
+            yield f"```python\n{code}\n```\n"
         else:
             yield f"{paragraph}\n"

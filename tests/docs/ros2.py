@@ -1,8 +1,8 @@
-"""Stands in for `ros2`, which is not on PyPI: the verbs that the docs use, spoken over rclpy.
+"""Stand-in for `ros2`, which is not on PyPI: the verbs that the docs use, with rclpy.
 
-It takes what the command of ROS 2 Jazzy takes, or less, prints what that prints and ends with the
-same status, a refused parameter's 0 included. It knows no daemon: what the graph does not show yet
-is waited for. Anything that is not here is refused.
+It accepts the arguments of the command of ROS 2 Jazzy, or a part of them, prints the same and ends
+with the same status, also with 0 for a refused parameter. It has no daemon: it waits for what the
+graph does not show yet. It refuses every other argument.
 """
 
 import argparse
@@ -32,15 +32,15 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 _PATIENCE = 60.0
-"""How long to wait, s, for what the graph should hold."""
+"""How long to wait, s, for something in the graph."""
 
 _SETTLED = 1.0
-"""How long, s, the graph has to show the same to be taken as known."""
+"""How long, s, the graph must stay unchanged before it is treated as complete."""
 
 _FOUND_ITS_LIBRARIES = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
 
 _interrupted = Event()
-"""By Ctrl-C. An exception from within rclpy would leave half made things behind."""
+"""By Ctrl-C. An exception from within rclpy would leave unfinished objects behind."""
 
 _LABELS = {
     bool: "Boolean value is:",
@@ -50,7 +50,7 @@ _LABELS = {
 }
 
 Answer = str | int | None
-"""Of a verb: what went wrong, or the exit status."""
+"""Of a verb: the error, or the exit status."""
 
 
 def main() -> Answer:
@@ -104,7 +104,7 @@ def main() -> Answer:
 
 
 class _ConversationError(Exception):
-    """Nobody answers, or what is asked for does not exist."""
+    """No node answers, or the requested object does not exist."""
 
 
 def _arguments(
@@ -360,7 +360,7 @@ def _find_node(node: Node, name: str) -> None:
 
 
 def _settled(node: Node, query: Callable[[], Any]) -> Any:
-    """What the graph says once it has not changed for a while; that something is there."""
+    """The state of the graph after it has not changed for a while and has a node."""
     _wait(node, lambda: _nodes(node), "nodes")
     found, since = query(), time.monotonic()
     while time.monotonic() < since + _SETTLED:
@@ -383,7 +383,7 @@ def _type_of(node: Node, topic: str) -> str:
 def _subscribe(
     node: Node, topic: str, callback: Callable[[Any], None], kind: str | None = None
 ) -> None:
-    """Listen as `ros2 topic` does: reliably if all who publish do."""
+    """Subscribe as `ros2 topic` does: reliably if all publishers are reliable."""
     message = _type(kind or _type_of(node, topic), "msg")
     if kind is None:
         _wait(node, lambda: node.count_publishers(topic), f"a publisher of {topic}")

@@ -1,4 +1,4 @@
-"""A reader's shell in a copy of the checkout, and the other terminals beside it."""
+"""The shell of a reader in a copy of the checkout, and the other terminals."""
 
 import os
 import re
@@ -25,9 +25,9 @@ from stickslip_ros.nodes.base.network import this_machine_only
 from tests.docs.page import CHECKOUT
 from tests.nodes.graph import PATIENCE, Graph, wait_for
 
-# What ties a process to the installation that the tests themselves run in.
+# Variables that tie a process to the installation in which the tests run.
 _OURS = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH")
-# What the make, the pytest and the fixtures around a test hand on.
+# Variables that make, pytest and the fixtures of a test set.
 _CALLERS = (
     *this_machine_only(),
     "MAKEFLAGS",
@@ -40,27 +40,27 @@ _CALLERS = (
 
 _INTERRUPTED = {"stickslip": {INTERRUPTED}, "ros2 topic": {signal.SIGINT}}
 _OTHERS_INTERRUPTED = {0, -signal.SIGINT}
-"""With which status a program ends by Ctrl-C."""
+"""The status with which a program ends by Ctrl-C."""
 
 _SIGNS = {
     "ros2 topic": "\n",
     "dask scheduler": "Scheduler at:",
     "dask worker": "Registered to:",
 }
-"""What programs say when they are up, if that is not seen by their nodes."""
+"""What programs print when they are up, if their nodes do not show it."""
 
 _MANAGED = re.compile(r"_node\b|nodes\.|stickslip run")
-"""Commands that start nodes which have a life cycle."""
+"""Commands that start managed nodes."""
 
 _ROS_SETUP = f"""
 export AMENT_PREFIX_PATH={sys.prefix}
 export LD_LIBRARY_PATH={os.environ.get("LD_LIBRARY_PATH", "")}
 export PYTHONPATH={sysconfig.get_path("purelib")}
 """
-"""Of an installed ROS: makes that of the tests one that other environments see."""
+"""Set-up script of an installed ROS: makes the ROS of the tests visible to other environments."""
 
 _TO_END = 10.0
-"""How long, s, what a page has left running may take when its terminal is closed."""
+"""How long, s, the processes of a page may take to end when their terminal is closed."""
 
 _NEVER = Event()
 
@@ -68,7 +68,7 @@ _TRACEBACK = "Traceback (most recent call last)"
 
 
 def copy_checkout(to: Path) -> None:
-    """Copy what git has or would take, so that nothing touches the original."""
+    """Copy the files that git has or would add, so that the original does not change."""
     listing = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     names = subprocess.check_output(listing, cwd=CHECKOUT, text=True).split("\0")
     for name in filter(None, names):
@@ -84,7 +84,7 @@ def free_port() -> int:
 
 
 class Shell:
-    """Runs what a page says, in a directory and an environment that carry over."""
+    """Runs the commands of a page, in a directory and an environment that carry over."""
 
     def __init__(self, scratch: Path, domain: int) -> None:
         self.checkout = scratch / "stickslip_ros"
@@ -114,12 +114,12 @@ class Shell:
         self._environment = self._common | {
             "PATH": os.pathsep.join([str(Path(sys.executable).parent), *self._path]),
             "AMENT_PREFIX_PATH": sys.prefix,
-            "PYTHONPATH": str(self.checkout),  # what a page changes in its copy acts
+            "PYTHONPATH": str(self.checkout),  # changes of a page in its copy take effect
             "PIP_NO_INDEX": "1",  # `.venv` is not a copy
         }
 
     def _fill_environment(self) -> None:
-        """Make a `.venv` as `make` does: that of the tests, up to date."""
+        """Make a `.venv` as `make` does: the one of the tests, up to date."""
         environment = self.checkout / ".venv"
         environment.mkdir()
         for entry in Path(sys.prefix).iterdir():
@@ -128,7 +128,7 @@ class Shell:
         (environment / ".ready").touch()
 
     def renew(self) -> None:
-        """Forget the environment, as a shell does that has not heard of it."""
+        """Reset the environment to that of a new shell."""
         self._environment = {k: v for k, v in self._common.items() if k not in _OURS} | {
             "PATH": os.pathsep.join([f"{sys.base_prefix}/bin", *self._path])
         }
@@ -138,7 +138,7 @@ class Shell:
         self._directory = self.checkout
 
     def path(self, name: str) -> Path:
-        """The file of that name for those who are where the reader is."""
+        """The file of that name in the directory of the reader."""
         return self._directory / name
 
     def run(self, script: str, timeout: float) -> tuple[int, str]:
@@ -160,7 +160,7 @@ class Shell:
 
     @contextmanager
     def beside(self, command: str) -> Generator[None]:
-        """Run a command while others are run; it is up, and in the end takes Ctrl-C well."""
+        """Run a command while others are run; it must be up, and end by Ctrl-C without an error."""
         process, output = self._start(["-c", command])
 
         def said() -> str:
@@ -208,7 +208,7 @@ class Shell:
 
 
 class Watch:
-    """Sees which nodes of a domain are up; a new one each time knows none that are gone."""
+    """Finds the nodes of a domain that are up; a new instance lists no node that has ended."""
 
     def __init__(self, graph: Graph) -> None:
         self._graph = graph
@@ -221,9 +221,9 @@ class Watch:
         return frozenset(names - {self._graph.observer.get_fully_qualified_name()})
 
     def active(self, others: frozenset[str], *, managed: bool) -> bool:
-        """Whether there are nodes besides others, and the managed ones among them are active.
+        """Whether nodes other than `others` exist, and the managed ones of these are active.
 
-        A node is seen before the services of its life cycle: `managed` says that it will have some.
+        A node is visible before its lifecycle services are: `managed` tells to wait for them.
         """
         nodes = self.nodes() - others
         services = {name for name, _ in self._graph.observer.get_service_names_and_types()}
@@ -257,13 +257,13 @@ def watching(domain: int) -> Generator[Watch]:
 
 
 def _of(command: str, by_program: Mapping[str, Any], otherwise: Any) -> Any:
-    """What holds for the program of a command, variables of its environment before it or not."""
+    """The value for the program of a command, which may begin with environment variables."""
     bare = re.sub(r"^(\w+=\S* )+", "", command)
     return next((v for program, v in by_program.items() if bare.startswith(program)), otherwise)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a process and all that it has left behind in its session, as closing a terminal does."""
+    """End a process and all processes of its session, as closing a terminal does."""
     for number in (signal.SIGHUP, signal.SIGKILL):
         with suppress(ProcessLookupError):
             os.killpg(process.pid, number)

@@ -1,4 +1,4 @@
-"""Commands that the text of a page only names: they exist, with the options that are named."""
+"""Commands that the text of a page names exist, with the options that are named."""
 
 import re
 

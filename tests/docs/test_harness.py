@@ -1,4 +1,4 @@
-"""What nobody would run, or what does not come true, is noticed."""
+"""A block that would not be run, and an output that is not the expected one, are noticed."""
 
 import os
 import subprocess
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.docs import ros2
-from tests.docs.page import Block, parse
+from tests.docs.page import DIRECTIVES, Block, Directives, directives_file, parse
 from tests.docs.test_pages import check_output, in_a_row
 
 
@@ -18,27 +18,80 @@ from tests.docs.test_pages import check_output, in_a_row
         ("```bash\nls\n```\n", "'bash' is none of"),
         ("```\nls\n```\n", "'' is none of"),
         ("Text:\n\n    ls\n", "an indented block"),
-        ("<!-- test: lnog -->\n```sh\nls\n```\n", "no directive 'lnog'"),
-        ("<!-- test: file -->\n```sh\nls\n```\n", "'file' lacks something"),
-        ("<!-- test: not because -->\n```sh\nls\n```\n", "'not because' lacks something"),
-        ("<!-- test: output -->\nText.\n\n```sh\nls\n```\n", "a directive without a block"),
-        ("```sh\nls\n```\n\n<!-- test: output -->\n", "a directive without a block at the end"),
+        ("<!-- test: output -->\n```sh\nls\n```\n", "a directive outside docs/blocks"),
     ],
 )
-def test_what_nobody_would_run_is_refused(text: str, said: str) -> None:
+def test_a_page_with_a_block_that_would_not_be_run_is_refused(text: str, said: str) -> None:
     with pytest.raises(AssertionError, match=said):
-        list(parse("page.md", text))
+        list(parse("page.md", text, {}))
 
 
-def test_directives_go_with_the_block_below_them_in_a_list_too() -> None:
-    lines = ["<!-- test: with 1 for 2 -->", "<!-- test: output -->", "```sh", "echo 2", "```"]
-    (block,) = parse("page.md", "\n  ".join(["- Item:\n", *lines]))
-    assert block == Block("page.md", 5, "sh", "echo 2\n", {"with": ["1 for 2"], "output": [""]})
-    assert block.to_run == "echo 1\n"
+PAGE = """\
+# One
+
+```sh
+ls
+```
+
+# `Two`
+
+- Item:
+
+  ```sh
+  echo 2
+  ```
+
+# One
+
+```sh
+ls
+```
+"""
+
+
+@pytest.mark.parametrize(
+    ("directives", "said"),
+    [
+        ({"One": {"1": ["lnog"]}}, "'lnog' is none of the directives"),
+        ({"One": {"1": ["file"]}}, "'file' is incomplete"),
+        ({"One": {"1": ["not because"]}}, "'not because' is incomplete"),
+        ({"One": {"2": ["output"]}}, r"without a block: \[\('One', '2'\)\]"),
+        ({"One": {"first": ["output"]}}, r"without a block: \[\('One', 'first'\)\]"),
+        ({"Three": {"1": ["output"]}}, r"without a block: \[\('Three', '1'\)\]"),
+        ({"One (3)": {"1": ["output"]}}, r"without a block: \[\('One \(3\)', '1'\)\]"),
+    ],
+)
+def test_directives_that_would_have_no_effect_are_refused(
+    directives: Directives, said: str
+) -> None:
+    with pytest.raises(AssertionError, match=said):
+        list(parse("page.md", PAGE, directives))
+
+
+@pytest.mark.parametrize(
+    ("heading", "number", "line"), [("One", 0, 3), ("`Two`", 1, 11), ("One (2)", 2, 17)]
+)
+def test_directives_go_to_the_block_that_they_name(heading: str, number: int, line: int) -> None:
+    found = list(parse("page.md", PAGE, {heading: {"1": ["with 1 for 2", "output"]}}))
+    assert [block.directives for block in found if block.directives] == [
+        {"with": ["1 for 2"], "output": [""]}
+    ]
+    assert found[number].directives
+    assert found[number].line == line
+
+
+def test_a_replacement_changes_what_is_run() -> None:
+    assert Block("page.md", 1, "sh", "echo 2\n", {"with": ["1 for 2"]}).to_run == "echo 1\n"
+
+
+def test_the_readme_and_the_index_of_the_docs_have_files_of_their_own() -> None:
+    assert directives_file("README.md") == DIRECTIVES / "README.toml"
+    assert directives_file("docs/README.md") == DIRECTIVES / "docs" / "README.toml"
+    assert directives_file("docs/how-to/colcon.md") == DIRECTIVES / "how-to" / "colcon.toml"
 
 
 def test_a_replacement_for_what_is_not_there_is_refused() -> None:
-    (block,) = parse("page.md", "<!-- test: with 1 for 3 -->\n```sh\necho 2\n```\n")
+    block = Block("page.md", 2, "sh", "echo 2\n", {"with": ["1 for 3"]})
     with pytest.raises(AssertionError, match=r"page\.md:2: no '3' in it"):
         assert block.to_run
 

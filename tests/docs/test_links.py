@@ -1,4 +1,4 @@
-"""Every link from page to page leads to something."""
+"""Every link from page to page has a target."""
 
 import re
 
@@ -9,7 +9,7 @@ from tests.docs.page import CHECKOUT, pages
 
 
 def links(page: str) -> set[str]:
-    """The targets of a page's links and pictures that are not on the web."""
+    """The targets of a page's links and pictures within the checkout."""
     targets: set[str] = set()
     for token in MarkdownIt().enable("table").parse((CHECKOUT / page).read_text(encoding="utf-8")):
         for child in token.children or []:

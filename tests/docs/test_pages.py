@@ -1,4 +1,4 @@
-"""Every block of README and docs does what it says: see page.py for how it is run."""
+"""Every block of README and docs does what it says: page.py describes how it is run."""
 
 import re
 from collections.abc import Generator
@@ -13,15 +13,15 @@ import yaml
 from stickslip_ros.nodes.base.network import this_machine_only
 from stickslip_ros.running.domain import own_domain
 from stickslip_ros.scenarios.files import load_scenario
-from tests.docs.page import CHECKOUT, Block, blocks, pages
+from tests.docs.page import CHECKOUT, DIRECTIVES, Block, blocks, directives_file, pages
 from tests.docs.shell import Shell
 
 BLOCKS = {page: blocks(page) for page in pages()}
 
 PATIENCE = 1200.0
-"""What a block may take, s."""
+"""Time limit of a block, s."""
 
-# What cannot be run here, by page and beginning: a longer list is a decision, not an accident.
+# What cannot be run here, by page and beginning. Each entry is a decision.
 NOT_RUN = [
     ("docs/dashboard.md", "ssh -L 8642:127.0.0.1:8642 machine-of-the-drive"),
     ("docs/security.md", "sudo apt install ros-jazzy-sros2"),
@@ -33,7 +33,7 @@ NOT_RUN = [
     ("docs/tools.md", "sudo apt install ros-jazzy-robot-state-publisher"),
 ]
 
-# Said on standard error with status 0, by `ros2` as by its stand-in.
+# Printed on standard error with status 0, by `ros2` and by its stand-in.
 REFUSALS = ("Setting parameter failed", "Transitioning failed")
 
 
@@ -56,7 +56,11 @@ def test_the_blocks_of_a_page_run(page: str, shell: Shell) -> None:
     run(BLOCKS[page], shell)
 
 
-def test_the_blocks_that_nobody_runs_are_known() -> None:
+def test_every_file_of_directives_belongs_to_a_page() -> None:
+    assert {*DIRECTIVES.rglob("*.toml")} <= {directives_file(page) for page in BLOCKS}
+
+
+def test_the_blocks_that_are_not_run_are_known() -> None:
     found = [
         (page, block.text)
         for page, its_blocks in BLOCKS.items()
@@ -69,7 +73,7 @@ def test_the_blocks_that_nobody_runs_are_known() -> None:
 
 
 def run(page: list[Block], shell: Shell) -> None:
-    """Run blocks one after another, those in a row that need the same beside them together."""
+    """Run blocks in order; successive blocks beside the same commands share them."""
     said: list[str] = []
     for needed, group in in_a_row(page):
         with ExitStack() as terminals:
@@ -83,7 +87,7 @@ def run(page: list[Block], shell: Shell) -> None:
 
 
 def in_a_row(page: list[Block]) -> list[tuple[list[str], list[Block]]]:
-    """The blocks in groups that need the same beside them; a `text` needs what was there."""
+    """The blocks in groups beside the same commands; a `text` belongs to the group before it."""
     groups: list[tuple[list[str], list[Block]]] = []
     for block in page:
         needed = block.directives.get("beside", [])
@@ -95,7 +99,7 @@ def in_a_row(page: list[Block]) -> list[tuple[list[str], list[Block]]]:
 
 
 def run_block(block: Block, page: list[Block], shell: Shell, said: list[str]) -> None:
-    """Run one block; `said` is the output of the one before, and of this one afterwards."""
+    """Run one block; `said` holds the output of the block before, and then that of this block."""
     if "not because" in block.directives:
         return
     if "file" in block.directives:
@@ -123,7 +127,7 @@ def save(block: Block, page: list[Block], shell: Shell) -> None:
     used = is_test or any(
         stem in "\n".join([b.to_run, *b.directives.get("after", [])]) for b in later
     )
-    assert used, f"{block.place}: {name} is saved, and nobody uses it"
+    assert used, f"{block.place}: {name} is saved but not used"
     for kept in (CHECKOUT / name, CHECKOUT / "docs/examples" / name):
         if kept.is_file():
             assert kept.read_text(encoding="utf-8") == block.text, f"{block.place}: not {kept}"
