@@ -60,7 +60,7 @@ def test_a_damaged_bag_is_repaired(command, tmp_path):
     before = json.loads(command("report", tmp_path / "bag", "--json")[1])
     status, out, _ = command("repair", tmp_path / "bag", tmp_path / "sound")
     assert status == 0
-    assert "does not end as it should" in out
+    assert "is incomplete: " in out
     after = json.loads(command("report", tmp_path / "sound", "--json")[1])
     assert not before["complete"]
     assert after["complete"]

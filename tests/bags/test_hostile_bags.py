@@ -278,11 +278,11 @@ def test_a_packed_file_does_not_fill_the_disk(
 @pytest.mark.parametrize(
     ("description", "missing"),
     [
-        ("[" * 1_000, "metadata.yaml cannot be understood"),
+        ("[" * 1_000, "metadata.yaml cannot be read"),
         ("a: &a [x]\nrosbag2_bagfile_information: !!timestamp b", "metadata.yaml cannot be"),
         (
             "rosbag2_bagfile_information: {relative_file_paths: [/etc/passwd, ../../bag_1.mcap]}",
-            "../../bag_1.mcap, /etc/passwd is listed in metadata.yaml but not there",
+            "../../bag_1.mcap, /etc/passwd is listed in metadata.yaml but does not exist",
         ),
     ],
 )

@@ -66,7 +66,7 @@ def test_without_joint_states_the_forces_are_measured_and_it_is_said(tmp_path):
     report = report_of_bag(tmp_path / "bag")
     assert report["peak_force"] == pytest.approx(14.99)
     assert (report["amplitude"], report["samples"], report["complete"]) == (None, 0, False)
-    assert report["missing"] == ["the bag holds no joint states: nothing is known of the motion"]
+    assert report["missing"] == ["the bag holds no joint states: the motion is unknown"]
 
 
 def test_without_forces_the_motion_is_measured(tmp_path):
@@ -141,5 +141,5 @@ def test_a_growing_bag_is_measured_as_far_as_it_goes(tmp_path):
                 report = report_of_bag(tmp_path / "bag")
                 assert report["samples"] == count
                 assert not report["complete"]
-                assert any("still at work" in sentence for sentence in report["missing"])
+                assert any("still running" in sentence for sentence in report["missing"])
     assert report_of_bag(tmp_path / "bag")["complete"]
