@@ -64,9 +64,9 @@ def report_of_bag(
     --------
     >>> from pathlib import Path
     >>> from stickslip_ros.bags.report import report_of_bag
-    >>> report = report_of_bag(Path("bags/reference"), start=5.0)
-    >>> report["complete"], report["regime"]
-    (True, 'equilibrium')
+    >>> report = report_of_bag(Path("bags/reference"), start=1.0)
+    >>> report["complete"], report["samples"]
+    (True, 2001)
     """
     if not start < end:
         raise InvalidInputError(f"the part from {start} s to {end} s is empty")

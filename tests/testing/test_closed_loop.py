@@ -294,7 +294,7 @@ class _BestEffort(Node):
         (
             _Elsewhere,
             [
-                "nobody reads /feed_drive/joint_states and publishes /feed_drive/control_force",
+                "no node reads /feed_drive/joint_states and publishes /feed_drive/control_force",
                 "elsewhere reads /joint_states, the plant publishes /feed_drive/joint_states",
             ],
         ),
