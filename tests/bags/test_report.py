@@ -51,7 +51,7 @@ def test_what_is_lost_is_counted_by_the_stamps(tmp_path):
     assert (report["samples"], report["lost_samples"]) == (993, 7)
 
 
-def test_a_plant_that_was_started_anew_is_measured_from_wherever_its_stamps_begin(tmp_path):
+def test_a_restarted_plant_is_measured_from_its_first_stamp(tmp_path):
     with Recorder(tmp_path / "bag") as recorder:
         channel = recorder.add_topic(STATES, "sensor_msgs/msg/JointState", QosProfile(depth=10))
         for stamp in [*STAMPS, *(stamp - 4 * SECOND for stamp in STAMPS)]:

@@ -168,7 +168,7 @@ def test_what_is_no_message_is_refused(unpack, data):
         unpack(data)
 
 
-def test_who_catches_the_errors_of_bags_catches_those_of_messages():
+def test_message_errors_are_bag_errors():
     assert issubclass(MessageError, BagError)
 
 

@@ -1,4 +1,4 @@
-"""What the dashboard hears of a loop, and does to it."""
+"""The ROS node of the dashboard: data received from a loop, and requests to it."""
 
 import numpy as np
 import pytest
@@ -176,7 +176,7 @@ def test_a_node_that_was_started_again_at_once_is_asked_again(
     assert SILENT not in {what.split()[-1] for _, what in observer.events}
 
 
-def test_health_is_kept_of_few_whatever_somebody_publishes(
+def test_the_health_of_a_limited_number_of_nodes_is_kept(
     graph: Graph, observer: ListenerNode
 ) -> None:
     publisher = graph.observer.create_publisher(DiagnosticArray, DIAGNOSTICS.name, 100)
