@@ -1,4 +1,4 @@
-"""Every benchmark, each in a process of its own, as one table: ours, the peer's, and the ratio."""
+"""Run the benchmarks, each in its own process, and print one table: ours, the peer's, the ratio."""
 
 import argparse
 import json
@@ -26,26 +26,26 @@ TIMEOUT = 600.0
 
 
 def main() -> int:
-    """Run the benchmarks named, print their table or JSON; return the exit status.
+    """Run the named benchmarks, print their table or JSON; return the exit status.
 
-    0 done; 1 some failed; 77 none failed, but some lack what they need here.
+    0: all done; 1: some failed; 77: none failed, but some need something that is not installed.
     """
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks",
         description=__doc__,
-        epilog="`python -m benchmarks.NAME --help` says what is compared, and with what.",
+        epilog="`python -m benchmarks.NAME --help` describes what a benchmark compares.",
     )
     parser.add_argument(
-        "names", nargs="*", metavar="NAME", help=f"which (default: all of {', '.join(NAMES)})"
+        "names", nargs="*", metavar="NAME", help=f"benchmarks to run (default: {', '.join(NAMES)})"
     )
-    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the JSON to this file, too")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of a table")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="also write the JSON to this file")
     arguments = parser.parse_args()
     unknown = sorted(set(arguments.names) - set(NAMES))
     if unknown:
-        parser.error(f"no benchmark {', '.join(unknown)}; there are {', '.join(NAMES)}")
+        parser.error(f"no benchmark {', '.join(unknown)}; available are {', '.join(NAMES)}")
     if arguments.out is not None and not arguments.out.parent.is_dir():
-        parser.error(f"--out {arguments.out}: there is no directory {arguments.out.parent}")
+        parser.error(f"--out {arguments.out}: no directory {arguments.out.parent}")
     if arguments.out is not None and arguments.out.is_dir():
         parser.error(f"--out {arguments.out}: is a directory")
     report: dict[str, Any] = {
@@ -70,7 +70,7 @@ def main() -> int:
     for name, why in report["failed"].items():
         print(f"benchmarks.{name} failed: {why}", file=sys.stderr)
     for name in report["skipped"]:
-        print(f"benchmarks.{name} skipped: what it needs is not installed", file=sys.stderr)
+        print(f"benchmarks.{name} skipped: a requirement is not installed", file=sys.stderr)
     if arguments.out is not None:
         arguments.out.write_text(text + "\n", encoding="utf-8")
     if report["failed"]:
@@ -79,7 +79,7 @@ def main() -> int:
 
 
 def run(name: str, report: dict[str, Any]) -> None:
-    """Run one benchmark and enter its rows, or that there are none, in the report."""
+    """Run one benchmark and add its rows, its failure or that it was skipped to the report."""
     print(f"{name} ...", end=" ", flush=True, file=sys.stderr)
     started = time.monotonic()
     command = [sys.executable, "-m", f"benchmarks.{name}", "--json"]
@@ -91,7 +91,7 @@ def run(name: str, report: dict[str, Any]) -> None:
             return
         report["failed"][name] = f"exit status {error.returncode}"
     except subprocess.TimeoutExpired:
-        report["failed"][name] = f"not done within {TIMEOUT:g} s"
+        report["failed"][name] = f"not finished within {TIMEOUT:g} s"
     else:
         seconds = round(time.monotonic() - started, 1)
         rows = json.loads(done.stdout)["rows"]

@@ -1,14 +1,14 @@
 """How fast are bags written and read?
 
-Writing, ours: joint states and control forces, serialized already, into a bag as the analyzer
-writes it: definitions are repeated, splits looked out for, and what is flushed is handed to the
-disk. Peer: `mcap.writer.Writer` into a file, the same bytes in chunks of the same size and
-compression; its flushes end with the operating system. Messages per second of wall time.
+Writing, ours: serialized joint states and control forces are written to a bag as the analyzer
+writes it: definitions are repeated, the limits of splits are checked, and flushed data are synced
+to the disk. Peer: `mcap.writer.Writer` writes the same bytes to a file in chunks of the same size
+and compression; its flushes reach the operating system only. Messages per second of wall time.
 
 Reading, ours: `Recording.blocks()` over a minute at 1 kHz, lz4, in chunks of a second as in real
-time and in full ones as in lockstep: checksums are verified, and stamps, positions, velocities and
-forces become arrays. Peers on the same bag: `rosbags`, every message deserialized (and, for the
-limit, not), and the mcap library's reader, which does not deserialize. Messages per second of
+time and in full chunks as in lockstep: checksums are verified, and stamps, positions, velocities
+and forces become arrays. Peers on the same bag: `rosbags` with every message deserialized (and, as
+the limit, not), and the mcap library's reader, which does not deserialize. Messages per second of
 processor time.
 """
 
@@ -52,7 +52,7 @@ Message = tuple[int, int, bytes]
 
 
 class Run:
-    """Records a drive at 1 kHz without end; a slice is so many samples of it."""
+    """Records a drive at 1 kHz without end; a slice is a fixed number of its samples."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class Run:
         arguments: Callable[[Message], tuple[Any, ...]],
         flush: Callable[[], None] | None,
     ) -> None:
-        """Call `write` with its `arguments` for each message, and `flush` at times."""
+        """Call `write` with its `arguments` for each message, and `flush` from time to time."""
         self._write = write
         self._arguments = arguments
         self._flush = flush
@@ -83,7 +83,7 @@ class Run:
 
 
 def sample(stamp: int) -> tuple[Message, Message]:
-    """Return joint state and force of a vibration, no two of which are alike."""
+    """Return joint state and force of a vibration, different at each stamp."""
     angle = 1e-7 * stamp
     position, velocity = math.sin(angle), 100.0 * math.cos(angle)
     positions, velocities = (position, 4e-11 * stamp), (velocity, 0.04)

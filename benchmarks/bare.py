@@ -1,4 +1,4 @@
-"""heyoka by itself: integrators of slip and stick, and nothing but the loop over these phases."""
+"""Bare heyoka: integrators of slip and stick, and the loop over these phases."""
 
 from math import copysign, ulp
 from typing import Any
@@ -10,9 +10,9 @@ from stickslip_ros.physics.motion.integrator import UNBOUNDED_SPEED
 
 
 class BareMotion:
-    """From rest, for any drive with cubic Stribeck friction and m = N = 1, not scaled.
+    """Motion from rest for any drive with cubic Stribeck friction and m = N = 1, not scaled.
 
-    With `controlled` under the washout law without sampling, its filter at rest at first.
+    With `controlled`, the washout law acts without sampling; its filter starts at rest.
     """
 
     def __init__(self, *, controlled: bool = False) -> None:
@@ -45,7 +45,7 @@ class BareMotion:
                 hy.t_event(static + reaction, direction=falling),
             ],
         )
-        # Making the views of their arrays costs as much as a short step.
+        # Creating the views of their arrays costs as much as a short step.
         self.slip: tuple[Any, Any, Any] = (slip, slip.state, slip.pars)
         self.stick: tuple[Any, Any, Any] = (stick, stick.state, stick.pars)
 

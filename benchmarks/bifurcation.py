@@ -1,9 +1,9 @@
 """How much longer than bare heyoka does a bifurcation diagram of 1,000 points take?
 
-Ours: `bifurcation_diagram` for the drives of the paper's figures 2 and 3: compiling, transients,
-turning points and measures. Peer: the same motions from rest over as many periods by heyoka's
-integrators of slip and stick with their terminal events, compiled beforehand, and nothing but the
-loop over these phases.
+Ours: `bifurcation_diagram` for the drives of the paper's figures 2 and 3, including compilation,
+transients, turning points and measures. Peer: heyoka's integrators of slip and stick with their
+terminal events, compiled beforehand, and the loop over these phases, for the same motions from
+rest over the same number of periods.
 """
 
 import time

@@ -1,13 +1,13 @@
 """Does the dashboard slow the simulation down?
 
-Ours: plant, controller and analyzer as three processes, as `stickslip run` runs them, with a
-dashboard beside them whose page is open in a headless Chromium, which draws without a graphics
-processor. Peers: the same three with a dashboard that nobody looks at, and without one. Scenario
-`paper` in lockstep gives the steps per second, `feed_drive` in real time at 1 kHz the missed
-deadlines and the late forces; and the page how many frames it has drawn per second.
+Ours: plant, controller and analyzer as three processes, as in `stickslip run`, with a dashboard
+whose page is open in a headless Chromium, which draws without a graphics processor. Peers: the same
+processes with a dashboard without a page, and without a dashboard. Scenario `paper` in lockstep
+gives the steps per second, `feed_drive` in real time at 1 kHz the missed deadlines and the late
+forces, and the page the frames drawn per second.
 
-All run by turns, a slice at a time; meanwhile the other dashboards are stopped, the other pages
-empty.
+All run in turns, one slice at a time; meanwhile the other dashboards are stopped and the other
+pages empty.
 """
 
 import os
@@ -31,7 +31,7 @@ from stickslip_ros.nodes.base.child_process import start_child
 
 LOCKSTEP_ROUNDS = 9
 LOCKSTEP_TIME = 3.0
-"""About what a slice in lockstep takes, s."""
+"""Approximate duration of a slice in lockstep, s."""
 REALTIME_ROUNDS = 6
 REALTIME_SAMPLES = 10_000
 FIRST_SAMPLES = 1_000
@@ -41,7 +41,7 @@ NOBODY, UNSEEN, SEEN = "no dashboard", "a dashboard without a page", "a dashboar
 
 @dataclass(frozen=True)
 class Figures:
-    """What a slice gave."""
+    """The results of a slice."""
 
     steps_per_second: float
     missed_deadlines: int
@@ -50,7 +50,7 @@ class Figures:
 
 
 Frames = Callable[[], float]
-"""Tells how many frames were drawn so far."""
+"""Returns the number of frames drawn so far."""
 
 
 @contextmanager
@@ -79,7 +79,7 @@ def watched(scenario: str, by: str) -> Generator[Slice[Figures]]:
 
 @contextmanager
 def dashboard(*, with_page: bool) -> Generator[Callable[[], AbstractContextManager[Frames]]]:
-    """Start a dashboard, and a browser; yield what lets them work while it is entered."""
+    """Start a dashboard, and a browser; yield a context manager in which they are active."""
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     url = f"http://127.0.0.1:{port}"

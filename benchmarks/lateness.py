@@ -1,4 +1,4 @@
-"""Deadlines at a fixed rate: how late they are kept, and the bare loop that is the limit."""
+"""Lateness at a fixed rate, and the bare sleep loop that is its limit."""
 
 import time
 from array import array
@@ -22,12 +22,12 @@ FIGURES: dict[str, Callable[[NDArray[np.float64]], Any]] = {
 
 
 def times_of(samples: int) -> "array[float]":
-    """Return room for that many times, which to fill makes no garbage."""
+    """Return an array for `samples` times; filling it allocates no memory."""
     return array("d", bytes(8 * samples))
 
 
 def sleep_loop(samples: int, period: float) -> "array[float]":
-    """Sleep until each deadline, the first being now; return the times of waking up, s."""
+    """Sleep until each deadline, the first being now; return the wake-up times, s."""
     times = times_of(samples)
     times[0] = origin = time.monotonic()
     for number in range(1, samples):
@@ -39,7 +39,7 @@ def sleep_loop(samples: int, period: float) -> "array[float]":
 
 
 def lateness(times: ArrayLike, period: float) -> NDArray[np.float64]:
-    """Return how long after its deadline each but the first came, s; it does not add up."""
+    """Return how long after its deadline each time but the first was, s; not accumulated."""
     times = np.asarray(times, dtype=float)
     return (times - times[0] - period * np.arange(len(times)))[1:]
 

@@ -1,15 +1,15 @@
 """How much of the speed of bare ROS does the closed loop keep in lockstep?
 
-Ours: plant, controller and analyzer of the scenario `paper`, as `stickslip run` runs them with and
-without `--composed`: on one EventsExecutor, or as three processes. A round trip is one sample. For
-each, the plant unpacks a force, integrates to the next sample, packs and publishes the state; the
-controller unpacks the state, filters and answers; the analyzer gets both, writes them to a bag and
-measures the cycles; and it tells the plant now and then how far it has come, for the plant to wait
-if that is too far behind.
+Ours: plant, controller and analyzer of the scenario `paper`, as in `stickslip run` with and without
+`--composed`: on one EventsExecutor, or as three processes. A round trip is one sample. For each
+sample, the plant unpacks a force, integrates to the next sample, packs and publishes the state; the
+controller unpacks the state, filters and answers; the analyzer receives both, writes them to a bag
+and measures the cycles. From time to time the analyzer reports its progress to the plant, which
+waits if the analyzer is too far behind.
 
-Peers: two nodes that do nothing but play JointState and WrenchStamped back and forth, on one
-EventsExecutor, or each on its own in its own process. `typed`, with message objects, is what one
-writes by hand; `serialized`, with bytes that are never looked at, is the limit of what rclpy gives.
+Peers: two nodes that only send JointState and WrenchStamped back and forth, on one EventsExecutor,
+or each in its own process. `typed` uses message objects, as in common user code. `serialized`
+passes bytes without decoding them: this is the limit of rclpy.
 """
 
 import multiprocessing
@@ -42,7 +42,7 @@ from stickslip_ros.nodes.base.process import spin
 
 ROUNDS = 11
 SLICE_TIME = 0.7
-"""About what a slice takes, s."""
+"""Approximate duration of a slice, s."""
 FIRST_SLICE = 2000
 
 STATE, FORCE = "state", "force"
@@ -57,14 +57,14 @@ def ours(composed: bool) -> Generator[Slice[float]]:
             loop.run(samples)
             figures = loop.plant.diagnose()[2]
             if figures["late_forces"] > 0:
-                raise SystemExit(f"lockstep went on without a force: {figures}")
+                raise SystemExit(f"lockstep continued without a force: {figures}")
             return figures["steps_per_second"]
 
         yield run
 
 
 class Drive:
-    """Sends a state, and the next one when the force has come."""
+    """Sends a state, and the next one when the force has arrived."""
 
     def __init__(self, *, serialized: bool) -> None:
         self.node = Node("drive")
@@ -143,7 +143,7 @@ def ping_pong(serialized: bool, composed: bool) -> Generator[Slice[float]]:
 
 
 def pong(serialized: bool) -> None:
-    """Be the controller for as long as the process that started this one lives."""
+    """Run the controller until the parent process ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     with ros():

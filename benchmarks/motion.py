@@ -1,15 +1,15 @@
-"""How much faster than scipy is the stick-slip motion, at no less accuracy?
+"""How much faster than scipy is the stick-slip motion, at the same or better accuracy?
 
 Ours: `Motion.advance` over 190 natural periods from rest (drive with m = k = N = 1, damping 0.02,
-Stribeck friction 0.4/0.25/0.5), nothing recorded. Peer: scipy's solve_ivp (DOP853, rtol 1e-11,
-atol 1e-12) with the same stick and slip modes and its own event location, timed over 19 periods;
-times are per natural period.
+Stribeck friction 0.4/0.25/0.5), without recording. Peer: scipy's solve_ivp (DOP853, rtol 1e-11,
+atol 1e-12) with the same stick and slip modes and its own event location, timed over 19 periods.
+Times are per natural period.
 
-The errors are those of displacement and velocity after all 190 periods, the larger one, against the
-same motion by its Taylor series in decimal arithmetic of 40 digits.
+The error is the larger one of displacement and velocity after all 190 periods. The reference is the
+Taylor series of the same motion in decimal arithmetic with 40 digits.
 
-A tick is what the plant does per sample: a new force, then a step of 1 or 10 ms. Peer: a heyoka
-integrator by itself, of the same slipping motion with the same two terminal events.
+A tick is the work of the plant per sample: a new force, then a step of 1 or 10 ms. Peer: a bare
+heyoka integrator of the same slipping motion with the same two terminal events.
 """
 
 import time
@@ -32,7 +32,7 @@ SLOPE = 3.0 * (STATIC - MINIMUM) / (2.0 * MINIMUM_SPEED)
 CUBIC = (STATIC - MINIMUM) / (2.0 * MINIMUM_SPEED**3)
 BELT_SPEEDS = (0.2, 0.4)
 PURE_SLIP_SPEED = 1.0
-"""Belt speed at which the motion from rest does not stick: ticks of one kind."""
+"""Belt speed at which the motion from rest does not stick, so that all ticks are alike."""
 
 PERIODS, SCIPY_PERIODS = 190, 19
 ROUNDS, MOTIONS, TICKS = 9, 20, 2000
@@ -81,7 +81,7 @@ def by_scipy(belt_speed: float, end: float) -> State:
 
 
 def by_series(belt_speed: float, end: float) -> State:
-    """Return what `by_scipy` does, the numbers above taken for exactly what they are in binary."""
+    """Return the result of `by_scipy`, computed with the exact binary values of the constants."""
     damping, static, slope, cubic = (Decimal(c) for c in (DAMPING, STATIC, SLOPE, CUBIC))
     order, longest = 36, Decimal("0.25")
 
@@ -125,7 +125,7 @@ def _at(series: list[Decimal], step: Decimal) -> Decimal:
 
 
 def _crossing(series: list[Decimal], value: Decimal, end: Decimal) -> Decimal:
-    """Return the step, before `end` and near it, at which the series has the value."""
+    """Return the step shortly before `end` at which the series has the value."""
     slopes = [k * coefficient for k, coefficient in enumerate(series)][1:]
     for _ in range(12):
         end -= (_at(series, end) - value) / _at(slopes, end)
@@ -133,7 +133,7 @@ def _crossing(series: list[Decimal], value: Decimal, end: Decimal) -> Decimal:
 
 
 def bare_integrator() -> hy.taylor_adaptive:
-    """Return what `motion(PURE_SLIP_SPEED)` integrates, the force as parameter 0."""
+    """Return an integrator of `motion(PURE_SLIP_SPEED)`; parameter 0 is the force."""
     x, y = hy.make_vars("x", "y")
     r = y - PURE_SLIP_SPEED
     acceleration = STATIC + SLOPE * r - CUBIC * r * r * r - DAMPING * y - x + hy.par[0]
@@ -142,7 +142,7 @@ def bare_integrator() -> hy.taylor_adaptive:
 
 
 def timed(run: Callable[[], object], count: int) -> Callable[[], float]:
-    """Return what runs it and says how long it took, s, divided by `count`."""
+    """Return a function that runs `run` and returns its duration, s, divided by `count`."""
 
     def measure() -> float:
         start = time.perf_counter()

@@ -1,10 +1,10 @@
-"""Which changes to the physics does the suite not notice?
+"""Which changes to the physics does the test suite not detect?
 
 Each mutant is a copy of the checkout with one change below `stickslip_ros/physics`: another sign,
-operator, comparison, number or condition. Which ones is drawn by the seed. Against each the tests
-that start neither a process nor a node are run, those of the physics first, until one fails. What
-is printed is the mutant and the test that caught it; some of those that survive are equivalent, up
-to rounding, to what was there.
+operator, comparison, number or condition, chosen at random by the seed. The tests that start
+neither a process nor a node run against each mutant, those of the physics first, until one fails.
+The output lists each mutant and the test that caught it. Some mutants that survive are equivalent
+to the original up to rounding.
 """
 
 import argparse
@@ -34,7 +34,7 @@ OPERATORS |= {"is": "is not", "is not": "is", "==": "!=", "!=": "==", "and": "or
 
 
 class Mutant(NamedTuple):
-    """A change of one file: what stood from `start` to `end`, bytes, and what stands there now."""
+    """A change of one file: the text from byte `start` to `end`, before and after."""
 
     file: Path
     line: int
@@ -48,16 +48,16 @@ class Mutant(NamedTuple):
 
 
 def main() -> int:
-    """Try the mutants; return 0 whatever becomes of them."""
+    """Test the mutants; return 0 whether or not they are caught."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mutants", description=__doc__)
-    parser.add_argument("--count", type=int, default=44, help="how many (default: 44)")
-    parser.add_argument("--seed", type=int, default=0, help="which ones (default: 0)")
-    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="at a time")
+    parser.add_argument("--count", type=int, default=44, help="number of mutants (default: 44)")
+    parser.add_argument("--seed", type=int, default=0, help="seed that selects them (default: 0)")
+    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="parallel runs")
     arguments = parser.parse_args()
     everything = list(chain.from_iterable(map(mutants_of, sorted(PHYSICS.rglob("*.py")))))
     chosen = random.Random(arguments.seed).sample(everything, arguments.count)
     if failure := first_failure(Mutant(chosen[0].file, 0, 0, 0, "", "")):
-        parser.error(f"without a change {failure}: what the tests catch would say nothing")
+        parser.error(f"without a change {failure}: the tests must pass before mutants are tried")
     caught = 0
     with ThreadPoolExecutor(arguments.workers) as pool:
         for mutant, failure in zip(chosen, pool.map(first_failure, chosen), strict=True):
@@ -107,7 +107,7 @@ def mutants_of(file: Path) -> Generator[Mutant]:
 
 
 def first_failure(mutant: Mutant) -> str:
-    """Return which test fails for the mutant, and how; empty if none does."""
+    """Return the first test that fails for the mutant, and how; empty if none fails."""
     with tempfile.TemporaryDirectory() as directory:
         copy = Path(directory) / "checkout"
         listing = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
@@ -122,7 +122,7 @@ def first_failure(mutant: Mutant) -> str:
 
 
 def failure_of(copy: Path, tests: Sequence[str]) -> str:
-    """Return which of the tests of a copy fails first, or that they do not end."""
+    """Return the first test of a copy that fails, or that the tests do not finish."""
     pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-m", "not process and not long"]
     environment = os.environ | {"PYTHONPATH": str(copy), "CI": "true"}
     try:
@@ -130,7 +130,7 @@ def failure_of(copy: Path, tests: Sequence[str]) -> str:
             [*pytest, *tests], cwd=copy, env=environment, timeout=TIMEOUT, capture_output=True
         )
     except subprocess.TimeoutExpired:
-        return f"not done after {TIMEOUT:g} s"
+        return f"not finished after {TIMEOUT:g} s"
     if done.returncode == 0:
         return ""
     lines = done.stdout.decode().splitlines()

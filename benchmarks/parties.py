@@ -1,8 +1,8 @@
-"""Parties of a benchmark: processes of their own that run a slice when they are asked to.
+"""Parties of a benchmark: separate processes that run a slice on request.
 
-While one runs, the others wait; all of them talk by the same transport, that of `stickslip run`.
-Our closed loop is such a party. What its analyzer has not written at the end of a slice, at most
-20 ms of messages, is not counted.
+While one runs, the others wait. All of them use the transport of `stickslip run`. Our closed loop
+is such a party. Messages that its analyzer has not written at the end of a slice, at most 20 ms,
+are not counted.
 """
 
 import multiprocessing
@@ -42,14 +42,14 @@ READY_TIMEOUT = 30.0
 EXIT_TIMEOUT = 30.0
 
 Slice = Callable[[int], T]
-"""Runs so many samples or round trips and returns what was measured."""
+"""Runs a number of samples or round trips and returns the measurement."""
 
 
 @contextmanager
 def party(
     make: Callable[..., AbstractContextManager[Slice[T]]], *arguments: Any
 ) -> Generator[Slice[T]]:
-    """Yield what runs slices by `make(*arguments)` in a process, with a ROS domain of its own."""
+    """Yield a function that runs slices of `make(*arguments)` in a process with its own domain."""
     context = multiprocessing.get_context("spawn")
     with own_domain() as domain:
         connection, theirs = context.Pipe()
@@ -61,7 +61,7 @@ def party(
             try:
                 return connection.recv()
             except EOFError:
-                raise SystemExit("a party ended early, as told above") from None
+                raise SystemExit("a party ended early, see above") from None
 
         def run(count: int) -> T:
             connection.send(count)
@@ -76,7 +76,7 @@ def party(
             process.kill()
             process.join()
         if process.exitcode:
-            raise SystemExit("a party ended badly, as told above")
+            raise SystemExit("a party failed, see above")
 
 
 def _serve(
@@ -85,11 +85,11 @@ def _serve(
     make: Callable[..., AbstractContextManager[Slice[Any]]],
     arguments: tuple[Any, ...],
 ) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started it ends it
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends it
     os.environ.update(domain_variables(domain))
     with make(*arguments) as run:
         connection.send(None)
-        with suppress(EOFError, BrokenPipeError):  # whoever started it has no more to ask
+        with suppress(EOFError, BrokenPipeError):  # the parent process has no more requests
             while True:
                 connection.send(run(connection.recv()))
 
@@ -104,7 +104,7 @@ def ros() -> Generator[None]:
 
 
 class ObservedPlant(PlantNode):
-    """Says when it pauses."""
+    """Sets a future when it pauses."""
 
     def start(self) -> None:
         self.paused = Future()
@@ -119,7 +119,7 @@ PlantT = TypeVar("PlantT", bound=ObservedPlant)
 
 
 class OurLoop(Generic[PlantT]):
-    """Our plant, and on the same executor or in two processes our controller and our analyzer."""
+    """Our plant; our controller and analyzer on the same executor or in two other processes."""
 
     def __init__(
         self, make_plant: Callable[..., PlantT], scenario: str, bag: Path, *, composed: bool
@@ -155,7 +155,7 @@ class OurLoop(Generic[PlantT]):
         self.run(0)
 
     def run(self, samples: int) -> None:
-        """Let the plant take so many steps, as soon as it is connected."""
+        """Let the plant take `samples` steps as soon as it is connected."""
         duration = Parameter("duration", Parameter.Type.DOUBLE, samples / self._rate)
         self.plant.set_parameters([duration])
         deadline = time.monotonic() + READY_TIMEOUT
@@ -168,11 +168,11 @@ class OurLoop(Generic[PlantT]):
         spin(self._executor, self.plant.paused)
         figures = self.plant.diagnose()[2]
         if figures["samples"] != samples + 1:
-            raise SystemExit(f"the plant was to take {samples} steps: {figures}")
+            raise SystemExit(f"the plant did not take {samples} steps: {figures}")
         self._samples += samples + 1
 
     def close(self) -> None:
-        """Close the bag; raises SystemExit if a sample is missing in it."""
+        """Close the bag; raise SystemExit if a sample is missing in it."""
         for node in self._composed:
             node.trigger_deactivate()
         for process in self.processes:
@@ -188,9 +188,9 @@ class OurLoop(Generic[PlantT]):
 def closed_loop(
     make_plant: Callable[..., PlantT], scenario: str, *, composed: bool
 ) -> Generator[OurLoop[PlantT]]:
-    """Run a scenario in this process or, but for the plant, in two others; check what it records.
+    """Run a scenario in this process, or all but the plant in two others; check its recording.
 
-    A slice is one activation of the plant, everything else being active all the time.
+    A slice is one activation of the plant; the other nodes are active all the time.
     """
     with tempfile.TemporaryDirectory() as directory, ros():
         loop = OurLoop(make_plant, scenario, Path(directory) / "bag", composed=composed)
@@ -207,5 +207,5 @@ def wait_until_connected(executor: Executor, *publishers: Any) -> None:
     while not all(publisher.get_subscription_count() for publisher in publishers):
         if time.monotonic() > deadline:
             topics = ", ".join(publisher.topic_name for publisher in publishers)
-            raise SystemExit(f"nobody listened to {topics} within {READY_TIMEOUT} s")
+            raise SystemExit(f"no subscriber to {topics} within {READY_TIMEOUT} s")
         spin_for(executor, 0.05)

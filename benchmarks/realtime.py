@@ -1,16 +1,16 @@
-"""How well are deadlines kept at 1 kHz?
+"""How well are deadlines met at 1 kHz?
 
 Ours: the scenario `feed_drive` with plant, controller and analyzer, which records a bag, on one
-EventsExecutor as by `stickslip run --composed`, or as three processes. Lateness is the time at
-which sample n is about to be published, less its deadline, n periods after sample 0; it does not
-add up. A deadline is missed by more than a period. The force used for a step has the age 0 if it
-answers the sample from which the step starts.
+EventsExecutor as in `stickslip run --composed`, or as three processes. The deadline of sample n is
+n periods after sample 0. Lateness is the time just before the sample is published, minus its
+deadline; it is not accumulated. A deadline is missed if the lateness exceeds one period. The force
+used for a step has the age 0 if it answers the sample at the start of the step.
 
-Peers: a loop that does nothing but sleep until each deadline is the limit of what Python gives on
-this machine. A timer node is what people use: `create_timer`, a JointState built and published in
-its callback, on a SingleThreadedExecutor; its sample n is its n-th call.
+Peers: a loop that only sleeps until each deadline is the limit of Python on this machine. A timer
+node is the common solution: `create_timer`, a JointState built and published in its callback, on a
+SingleThreadedExecutor; its sample n is its n-th call.
 
-All run by turns, a slice at a time, while the others do nothing; the figures are over all slices.
+All run in turns, one slice at a time, while the others are idle. The values are over all slices.
 """
 
 import os
@@ -47,10 +47,10 @@ TIMER = "timer node"
 
 @dataclass(frozen=True)
 class Timings:
-    """What a slice gave."""
+    """The results of a slice."""
 
     times: "array[float]"
-    """When each sample was about to be published, s."""
+    """Time just before each sample was published, s."""
     plant_time: float
     """Processor time of the process that publishes, s."""
     whole_time: float
@@ -60,12 +60,12 @@ class Timings:
 
     @property
     def lateness(self) -> NDArray[np.float64]:
-        """How long after its deadline each came, but for the first, s."""
+        """Lateness of each sample but the first, s."""
         return lateness(self.times, PERIOD)
 
 
 class TimedPlant(ObservedPlant):
-    """Notes when it publishes each sample, and which forces it has by then."""
+    """Stores when it publishes each sample, and which forces it has received by then."""
 
     def start(self) -> None:
         samples = self.parameters.last_sample or 0
@@ -101,7 +101,7 @@ def ours(composed: bool) -> Generator[Slice[Timings]]:
 
 
 def processor_time(process: int) -> float:
-    """Return what a process has used so far, s."""
+    """Return the processor time that a process has used so far, s."""
     fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -118,7 +118,7 @@ def bare_loop() -> Generator[Slice[Timings]]:
 
 
 class TimerNode(Node):
-    """What people write to publish at a rate."""
+    """The common way to publish at a rate."""
 
     def __init__(self) -> None:
         super().__init__("timer_node")

@@ -1,11 +1,11 @@
-"""How late does a replayed message leave, at its recorded pace?
+"""How late is a message published in a replay at its recorded rate?
 
 Ours: half a minute of joint states and control forces at 1 kHz, replayed at rate 1 to an analyzer
-in a process of its own. Lateness is counted from the deadline that the time of the first message
-and the recorded spacing give; it does not add up.
+in another process. The deadline of a message follows from the time of the first message and the
+recorded spacing. Lateness is measured from the deadline; it is not accumulated.
 
-Peer: a loop in another process that does nothing but sleep until the same deadlines, at the same
-time, so that both suffer from whatever else this machine does.
+Peer: a loop in another process that only sleeps until the same deadlines, at the same time, so that
+other load on this machine affects both.
 """
 
 import multiprocessing
@@ -37,11 +37,11 @@ from stickslip_ros.stamps import NANOSECONDS
 SAMPLES = 30_000
 PERIOD = 0.001
 ALLOWED = 0.002
-"""What the last message may be later than that of the bare loop, s."""
+"""Allowed lateness of the last message beyond that of the bare loop, s."""
 
 
 class TimedReplay(ReplayNode):
-    """Notes when each joint state leaves."""
+    """Stores when each joint state is published."""
 
     def __init__(self, bag: Path, loop: Connection) -> None:
         self.times: list[float] = []
@@ -63,7 +63,7 @@ class TimedReplay(ReplayNode):
 
 
 def bare_loop(connection: Connection) -> None:
-    """Sleep until the deadlines, once started, and send the times back."""
+    """Sleep until each deadline, once started, and send the times back."""
     connection.recv()
     connection.send(sleep_loop(SAMPLES, PERIOD))
 
@@ -89,7 +89,7 @@ def record(bag: Path) -> None:
 
 
 def replay(bag: Path) -> tuple[Sequence[float], Sequence[float]]:
-    """Return when each joint state left, and when the bare loop woke up."""
+    """Return when each joint state was published, and when the bare loop woke up."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     loop = context.Process(target=bare_loop, args=(theirs,))
@@ -118,7 +118,7 @@ def measure() -> list[Row]:
         record(bag)
         our_times, bare_times = replay(bag)
     if len(our_times) != SAMPLES:
-        raise SystemExit(f"{len(our_times)} joint states left, not {SAMPLES}")
+        raise SystemExit(f"{len(our_times)} joint states were published, not {SAMPLES}")
     late, bare = (lateness(times, PERIOD) for times in (our_times, bare_times))
     last, last_bare = float(late[-1]), float(bare[-1])
     return [

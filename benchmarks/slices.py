@@ -1,4 +1,4 @@
-"""Ours against peers: slices of all by turns in one run, medians, one small table."""
+"""Compare ours with peers: slices of all run in turns, medians, one table."""
 
 import argparse
 import json
@@ -13,31 +13,31 @@ from stickslip_ros.versions import versions
 T = TypeVar("T")
 
 LACKING = 77
-"""Exit status of a benchmark that cannot run here, as of tests that are skipped elsewhere."""
+"""Exit status of a benchmark that cannot run here; the common status of skipped tests."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table: a figure of ours, and whose it is compared with."""
+    """One line of the table: our value, and the value of a peer."""
 
     what: str
     unit: str
     ours: float
     against: str = ""
-    """Whom the other figure belongs to; empty where there is nobody to compare with."""
+    """Name of the peer; empty if there is none."""
     peer: float | None = None
     ratio: float | None = None
-    """How many times better ours is; below 1 it is the peer that is better."""
+    """How many times better ours is; below 1, the peer is better."""
     required: float | None = None
-    """What the ratio has to be at least."""
+    """Lower limit of the ratio that must be met."""
     aim: float | None = None
-    """What the ratio should be at least."""
+    """Lower limit of the ratio that should be met."""
 
 
 def by_turns(rounds: int, *slices: Callable[[], T]) -> list[list[T]]:
-    """Run the slices by turns, every other round backwards; return what each gave, by slice.
+    """Run the slices in turns, every other round backwards; return the results by slice.
 
-    Noise that lasts longer than a slice thus falls on all of them alike.
+    Noise that lasts longer than a slice therefore affects all of them equally.
     """
     results: list[list[T]] = [[] for _ in slices]
     order = list(zip(slices, results, strict=True))
@@ -57,7 +57,7 @@ def compare_rates(
     required: float | None = None,
     aim: float | None = None,
 ) -> Row:
-    """Compare rates, 1/s, taken by turns: medians, and the median of the ratios of neighbours."""
+    """Compare rates, 1/s, measured in turns: medians, and the median ratio of neighbours."""
     ratio = median(a / b for a, b in zip(ours, peer, strict=True))
     return Row(what, "1/s", median(ours), against, median(peer), ratio, required, aim)
 
@@ -70,19 +70,19 @@ def compare_times(
     *,
     required: float | None = None,
 ) -> Row:
-    """Compare durations, s, taken by turns: medians, and the median of the ratios of neighbours."""
+    """Compare durations, s, measured in turns: medians, and the median ratio of neighbours."""
     ratio = median(b / a for a, b in zip(ours, peer, strict=True))
     return Row(what, "s", median(ours), against, median(peer), ratio, required)
 
 
 def lacks(what: str) -> NoReturn:
-    """End a benchmark for which something is not installed here."""
+    """End a benchmark because a requirement is not installed."""
     print(f"this needs {what}", file=sys.stderr)
     sys.exit(LACKING)
 
 
 def show(question: str | None, make_rows: Callable[[], list[Row]]) -> None:
-    """Parse the command line of a benchmark, run it, print its table, or with --json its rows."""
+    """Parse the command line of a benchmark, run it, and print its table, or its rows as JSON."""
     parser = argparse.ArgumentParser(
         description=question, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -98,7 +98,7 @@ def show(question: str | None, make_rows: Callable[[], list[Row]]) -> None:
 
 
 def table(sections: dict[str, list[Row]]) -> str:
-    """Return rows as text, each section below its title; what falls short is marked."""
+    """Return rows as text, each section below its title; ratios below their limit are marked."""
     lines = [("", "ours", "peer", "", "ratio", "at least")]
     for title, rows in sections.items():
         if title:

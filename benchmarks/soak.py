@@ -1,14 +1,14 @@
-"""Does the closed loop last? `stickslip run` in real time beside a busy processor, for minutes.
+"""Is the closed loop stable over a long time? Soak test of `stickslip run` on a busy machine.
 
-The slide of this drive slips all the time, so that every force shows in its motion. Watched from
-outside are:
+The run is in real time. The slide of this drive slips all the time, so that every force affects its
+motion. Another process observes:
 
 - the memory of each process, every second;
-- the samples: by the stamps in the bag;
-- the deadlines: each sample comes with the time at which the middleware sent it. If that is after
-  the deadline of the next, its deadline was missed. The plant looks at the clock once it has sent
-  the sample, and so may count some more, but none fewer;
-- the late forces: each step of the motion in the bag tells which force acted.
+- the samples, by the stamps in the bag;
+- the deadlines: the middleware provides the time at which it sent each sample. If this time is
+  after the deadline of the next sample, the deadline was missed. The plant reads the clock after it
+  has sent the sample, and therefore may count more missed deadlines, but not fewer;
+- the late forces: each step of the motion in the bag shows which force acted.
 """
 
 import argparse
@@ -49,11 +49,11 @@ OVERRIDES = (
 )
 
 WARM_UP = 30.0
-"""Time, s, of the run after which the memory of a process is to stay as it is."""
+"""Time of the run, s, after which the memory of a process must stay constant."""
 _LOOK_PERIOD = 0.02
 _MEMORY_PERIOD = 1.0
 _SAME_SPEED = 1e-14
-"""Difference, m/s, up to which speeds are equal; that of two forces makes a greater one."""
+"""Difference, m/s, up to which speeds are equal; different forces cause a greater one."""
 _PAGE = os.sysconf("SC_PAGE_SIZE")
 
 
@@ -63,7 +63,7 @@ class Sendings:
     def __init__(self, node: Node, topic: Topic) -> None:
         self.stamps, self.sent = array("q"), array("q")
         self.largest_delay = 0
-        """Until they were taken here, ns."""
+        """Largest time from sending to reception here, ns."""
         self._subscription = node.create_subscription(
             message_class(topic.type_name),
             f"{DEFAULT_NAMESPACE}/{topic.name}",
@@ -90,30 +90,30 @@ class Sendings:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a soak came to."""
+    """The result of a soak test."""
 
     run: dict[str, Any]
-    """What `stickslip run` said."""
+    """The report of `stickslip run`."""
     memory: dict[str, list[int]]
-    """Resident memory by process, bytes, from the end of the warm-up on."""
+    """Resident memory by process, bytes, after the warm-up."""
     seen: int
-    """Samples that the reader outside has seen, too."""
+    """Samples that the observer also received."""
     missing_stamps: int
     """Gaps between the stamps in the bag, in samples."""
     largest_backlog: int
-    """Samples that waited, at most, for being recorded."""
+    """Largest number of samples that waited to be recorded."""
     furthest_behind: int
-    """Samples by which analyzer, controller or the reader outside was behind, at most."""
+    """Largest number of samples by which analyzer, controller or observer were behind."""
     missed_deadlines: int
-    """That were missed for sure."""
+    """Deadlines that were certainly missed."""
     late_forces: int
-    """By the motion."""
+    """Late forces according to the motion."""
     unexplained_steps: int
-    """Of the motion: the next sample, or the force that leads to it, is missing in the bag."""
+    """Steps of the motion whose next sample, or the force that acted, is missing in the bag."""
 
 
 def soak(duration: float, *, composed: bool, burners: int, directory: Path) -> Outcome:
-    """Run the drive for a duration (s) beside so many busy processes; its bag goes to `directory`.
+    """Run the drive for a duration (s) with `burners` busy processes; write the bag to `directory`.
 
     Raises RuntimeError if the run fails.
     """
@@ -156,10 +156,10 @@ def soak(duration: float, *, composed: bool, burners: int, directory: Path) -> O
 
 
 def force_ages(recording: Recording, parameters: PlantParameters) -> NDArray[np.int64]:
-    """Return how old, in periods, the force was under which each sample led to the next.
+    """Return the age, in periods, of the force that acted from each sample to the next.
 
-    Where there was none, it is older than any; where no force in the bag leads there, or the next
-    sample is missing, it is -1.
+    Without a force, the age is larger than any other. It is -1 if no force in the bag explains the
+    step, or if the next sample is missing.
     """
     states, forces = recording.joint_states, recording.control_forces
     stamps, positions = states.stamp.tolist(), states.position.tolist()
@@ -171,7 +171,7 @@ def force_ages(recording: Recording, parameters: PlantParameters) -> NDArray[np.
     newest = 0
     for number in range(len(ages)):
         oldest = max(newest, number - longest_held)
-        # Its own or, most often, else, the one that was held before.
+        # Its own force or, most likely otherwise, the one that was held before.
         samples = dict.fromkeys([number, oldest, *range(number - 1, oldest, -1)])
         for sample in [*(n for n in samples if stamps[n] in force_of), -1]:
             motion.restart(positions[number], velocities[number])
@@ -187,13 +187,13 @@ def force_ages(recording: Recording, parameters: PlantParameters) -> NDArray[np.
 def _missed_deadlines(samples: Sendings, period: float) -> int:
     stamps, sent = np.array(samples.stamps), np.array(samples.sent)
     after_stamp = sent - stamps
-    # No sample is sent before its deadline: sample 0 was due so long after its stamp, at most.
+    # No sample is sent before its deadline: this bounds the deadline of sample 0 from above.
     longest_start = after_stamp.min()
     return int(np.sum(after_stamp - longest_start > period * NANOSECONDS))
 
 
 def _largest_backlog(samples: Sendings, recorded: Sendings, period: float) -> int:
-    """Return how many samples were sent, at most, from what was told as recorded to the next."""
+    """Return the largest number of samples sent between two reports of the recorded stamp."""
     newest = np.searchsorted(samples.sent, recorded.sent[1:], side="right") - 1
     behind = np.array(samples.stamps)[newest] - np.array(recorded.stamps[:-1])
     return round(float(behind.max()) / (period * NANOSECONDS))
@@ -212,7 +212,7 @@ def _run(
     try:
         yield process
     finally:
-        process.kill()  # its nodes end with it
+        process.kill()  # also ends its nodes
         process.wait()
 
 
@@ -237,7 +237,7 @@ def _look_at_memory(pid: int, memory: dict[str, list[int]]) -> None:
 
 
 def _processes(pid: int) -> Iterator[tuple[str, int]]:
-    """Yield a process and those that it has started, each by the name of its module."""
+    """Yield a process and its child processes, each with the name of its module."""
     for process in [pid, *_children(pid)]:
         try:
             arguments = Path(f"/proc/{process}/cmdline").read_text().split("\0")
@@ -258,11 +258,11 @@ def _children(pid: int) -> list[int]:
 
 
 def lines(outcome: Outcome) -> Iterator[str]:
-    """Yield what a soak came to, as text."""
+    """Yield the result of a soak test as lines of text."""
     run = outcome.run
-    yield f"samples          {run['samples']} recorded, {outcome.seen} seen from outside, too"
+    yield f"samples          {run['samples']} recorded, {outcome.seen} received by the observer"
     yield f"lost samples     {run['lost_samples']}; by the stamps {outcome.missing_stamps}"
-    yield f"largest backlog  {outcome.largest_backlog} samples that were not recorded yet"
+    yield f"largest backlog  {outcome.largest_backlog} samples waiting to be recorded"
     yield f"furthest behind  {outcome.furthest_behind} samples, of all readers"
     yield f"missed deadlines {run['missed_deadlines']}; for sure {outcome.missed_deadlines}"
     yield f"late forces      {run['late_forces']}; by the motion {outcome.late_forces}"
@@ -278,14 +278,14 @@ def lines(outcome: Outcome) -> Iterator[str]:
 
 
 def main() -> None:
-    """Run a soak as the command line asks for, and print what it came to."""
+    """Run a soak test with the options of the command line, and print the result."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--minutes", type=float, default=30.0, help="(default: %(default)g)")
     parser.add_argument("--composed", action="store_true", help="all nodes in one process")
     parser.add_argument(
-        "--burners", type=int, default=1, help="busy processes beside it (default: %(default)s)"
+        "--burners", type=int, default=1, help="number of busy processes (default: %(default)s)"
     )
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as directory:

@@ -1,15 +1,15 @@
-"""How much longer than bare heyoka does a sweep take, and what do two processes make of it?
+"""How much longer than bare heyoka does a sweep take, and how does it scale to two processes?
 
-Ours: a whole sweep of the paper's drive over the belt speed, 100 natural periods a point and four
-measured cycles: the points' parameters checked, their motions, measures and turning points, the
-journal, the table. Peer: heyoka's integrators of slip and stick over the same times, compiled
-beforehand. Without control, and with the paper's, which acts without sampling.
+Ours: a whole sweep of the paper's drive over the belt speed, with 100 natural periods and four
+measured cycles per point, including the check of the parameters, the motions, measures and turning
+points, the journal and the table. Peer: heyoka's integrators of slip and stick over the same times,
+compiled beforehand. Both without control, and with the paper's control without sampling.
 
-Sampled, at 100 Hz as the nodes do it, a point takes 67,000 steps. Peer: the slip integrator by
-itself from sample to sample, with the same terminal events, and the washout filter in a line.
+With control sampled at 100 Hz, as by the nodes, a point takes 67,000 steps. Peer: the bare slip
+integrator from sample to sample, with the same terminal events, and the washout filter in one line.
 
-Two processes: by how much a sweep of 20,000 points is faster with two workers, their start
-included, over how much faster two bare processes are with half of the motions each.
+Two processes: the speed-up of a sweep of 20,000 points with two workers, including their start,
+divided by the speed-up of two bare processes with half of the motions each.
 """
 
 import time
@@ -106,7 +106,7 @@ def half(number: int) -> float:
 
 
 def two_bare_processes() -> float:
-    """Return the time of the slower one, its start left out."""
+    """Return the time of the slower one, without its start."""
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:
         return max(pool.map(half, range(2)))
 

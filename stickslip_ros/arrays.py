@@ -1,4 +1,4 @@
-"""Array types, and tables of arrays."""
+"""Array types and tables of arrays."""
 
 from collections.abc import Callable
 from typing import Self
@@ -12,9 +12,20 @@ BoolArray = NDArray[np.bool_]
 
 
 class Table:
-    """Columns of equal length: a dataclass of arrays derives from it.
+    """Base class of dataclasses whose fields are arrays of equal length, the columns.
 
-    `len(table)` is the number of its rows, `table[rows]` has some of them.
+    `len(table)` is the number of rows. `table[rows]` is a table of the selected rows, where `rows`
+    is a slice, a boolean array or an array of indices.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from stickslip_ros.samples import ForceColumns
+    >>> forces = ForceColumns(np.array([0, 1_000_000]), np.array([0.5, -2.0]))  # ns, N
+    >>> len(forces)
+    2
+    >>> forces[forces.force > 0.0].stamp.tolist()
+    [0]
     """
 
     def __len__(self) -> int:
@@ -25,7 +36,18 @@ class Table:
         return table(*[column[rows] for column in vars(self).values()])
 
     def followed_by(self, *others: Self) -> Self:
-        """Return these rows and those of the others behind them."""
+        """Return a table of these rows followed by those of other tables.
+
+        Parameters
+        ----------
+        *others : Table
+            Tables of the same class, in order.
+
+        Returns
+        -------
+        Table
+            A table of the same class with all rows; without `others`, this table itself.
+        """
         if not others:
             return self
         table: Callable[..., Self] = type(self)

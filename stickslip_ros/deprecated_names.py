@@ -1,7 +1,7 @@
-"""Public names where they were in version 0.1: importable from there until 0.2, with a warning.
+"""Keep public names importable from their modules of version 0.1, with a warning, until 0.2.
 
-`MOVED` is the whole of it: by the old module, each name and where it is now. A module that is no
-more is found by the finder here; one that is still there takes its `__getattr__` from `moved_from`.
+`MOVED` lists them all: for each old module, each name and its new place. Modules that no longer
+exist are provided by the finder in this module; the others use `moved_from` as `__getattr__`.
 """
 
 import sys
@@ -61,7 +61,7 @@ MOVED: dict[str, dict[str, str]] = {
 
 
 def moved_from(module: str) -> Callable[[str], Any]:
-    """Return the `__getattr__` of a module that names of `MOVED` have left."""
+    """Return the `__getattr__` of a module from which names of `MOVED` were moved."""
 
     def get(name: str) -> Any:
         now = MOVED[module].get(name)
@@ -75,7 +75,7 @@ def moved_from(module: str) -> Callable[[str], Any]:
 
 
 class Renamed:
-    """What a member of a class was called in version 0.1."""
+    """The name of a class member in version 0.1; warn and return the new member."""
 
     def __init__(self, new_name: str) -> None:
         self._new_name = new_name
@@ -95,7 +95,7 @@ def _warn(old: str, new: str) -> None:
 
 
 class _MovedModules(MetaPathFinder, Loader):
-    """Finds the modules of `MOVED` that are no more."""
+    """Find the modules of `MOVED` that no longer exist."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -110,5 +110,5 @@ class _MovedModules(MetaPathFinder, Loader):
 
 
 def find_moved_modules() -> None:
-    """Let the modules of `MOVED` that are no more be imported."""
+    """Make the modules of `MOVED` that no longer exist importable."""
     sys.meta_path.append(_MovedModules())

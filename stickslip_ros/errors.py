@@ -1,26 +1,39 @@
-"""The exception family of the package: everything it raises on purpose derives from one class."""
+"""Exceptions of the package: all that it raises on purpose derive from one class."""
 
 from stickslip_ros.text import printable
 
 
 class StickslipError(Exception):
-    """Base of every error that stickslip_ros raises on purpose; its text is one clear sentence."""
+    """Base class of all errors that stickslip_ros raises on purpose.
+
+    The text is one sentence that names the thing, its value and what is allowed.
+
+    Examples
+    --------
+    >>> from stickslip_ros.errors import StickslipError
+    >>> from stickslip_ros.scenarios.files import load_scenario
+    >>> try:
+    ...     load_scenario("feed_drive", ["plant.mass=-1"])
+    ... except StickslipError as error:
+    ...     print(type(error).__name__)
+    InvalidInputError
+    """
 
     def __str__(self) -> str:
         return printable(super().__str__())
 
 
 class InvalidInputError(StickslipError):
-    """What came in is refused: it names the thing, its value and what is allowed."""
+    """An input is refused; the text names the thing, its value and what is allowed."""
 
 
 class BagError(InvalidInputError):
-    """A bag that cannot be written where asked, or cannot be read; it names the path."""
+    """A bag cannot be read or written; the text names its path."""
 
 
 class MessageError(BagError):
-    """A message that cannot be packed, or cannot be understood; it says why."""
+    """A message cannot be serialized or decoded; the text gives the reason."""
 
 
 class RunError(StickslipError):
-    """A run that was started properly but failed: a node died or never became ready."""
+    """A run started but failed, for example because a node died or never became ready."""

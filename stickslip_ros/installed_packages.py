@@ -1,4 +1,4 @@
-"""What is installed beside this package: prefixes, ROS packages and their executables."""
+"""Find installed ROS packages and their executables."""
 
 import os
 import sys
@@ -12,16 +12,17 @@ _MARKERS = "share/ament_index/resource_index/packages"
 
 
 def prefixes() -> list[Path]:
-    """Return the prefixes in which ROS packages are installed, the first to look in first.
+    """Return the prefixes in which ROS packages are installed, in search order.
 
-    The environment's own comes last: ROS wheels install there without any set-up script.
+    The prefix of the Python environment comes last: ROS wheels install there without a set-up
+    script.
     """
     given = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     return [Path(prefix) for prefix in [*filter(None, given), sys.prefix]]
 
 
 def find_executable(name: str) -> Path:
-    """Return the file of the executable PACKAGE/EXECUTABLE, found as `ros2 run` finds it.
+    """Return the file of the executable PACKAGE/EXECUTABLE, found as by `ros2 run`.
 
     A name that ends in .py may also be the path of a script. Raises InvalidInputError for one that
     is not installed, or does not exist.
@@ -41,7 +42,7 @@ def find_executable(name: str) -> Path:
     prefix = next((p for p in prefixes() if (p / _MARKERS / package).is_file()), None)
     if prefix is None:
         known = {marker.name for p in prefixes() for marker in (p / _MARKERS).glob("*")}
-        places = "the places are those of AMENT_PREFIX_PATH and the Python environment"
+        places = "searched are AMENT_PREFIX_PATH and the Python environment"
         raise InvalidInputError(
             f"{name}: no package {package} in {', '.join(map(str, prefixes()))}; "
             f"{did_you_mean(package, known, places)}"

@@ -1,11 +1,11 @@
-"""SIGINT while a process of ours still imports what it needs."""
+"""Handle SIGINT while a process of this package is still importing."""
 
 import os
 import signal
 import sys
 
 NODE_SCRIPTS = ("plant_node", "washout_controller_node", "analyzer_node", "replay_node")
-"""Installed scripts that run a node."""
+"""Installed scripts that start a node."""
 
 
 def is_run(package: str, *scripts: str) -> bool:
@@ -16,12 +16,12 @@ def is_run(package: str, *scripts: str) -> bool:
 
 
 def end_quietly_if_interrupted() -> None:
-    """Let SIGINT end this process without a traceback, until what it runs handles it."""
+    """Let SIGINT end this process without a traceback until the program handles it."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def raise_interrupts() -> None:
-    """Let SIGINT raise KeyboardInterrupt again where it ends this process quietly."""
+    """Let SIGINT raise KeyboardInterrupt again instead of ending this process quietly."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
         signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -1,6 +1,6 @@
-"""How a long computation tells how far it is."""
+"""The callback by which a long computation reports its progress."""
 
 from collections.abc import Callable
 
 Progress = Callable[[float], None]
-"""Takes the share that is done, from 0 to 1."""
+"""Receives the completed fraction, from 0 to 1."""

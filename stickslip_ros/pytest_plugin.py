@@ -1,4 +1,4 @@
-"""The pytest fixture `closed_loop`. ROS is not imported before a test asks for it."""
+"""The pytest fixture `closed_loop`; ROS is imported only when a test uses it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @pytest.fixture
 def closed_loop() -> Iterator[Callable[..., ClosedLoop]]:
-    """Open a `stickslip_ros.testing.ClosedLoop` with its arguments; it is closed after the test."""
+    """Open a `stickslip_ros.testing.ClosedLoop` with its arguments; close it after the test."""
     from stickslip_ros.testing import ClosedLoop
 
     with ExitStack() as opened:

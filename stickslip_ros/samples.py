@@ -1,4 +1,4 @@
-"""Samples of the motion and control forces, one at a time and as columns; SI units."""
+"""Samples of the motion and of forces, one by one and as columns; SI units."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -9,20 +9,28 @@ from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, Table
 from stickslip_ros.deprecated_names import Renamed
 
 LARGEST = 1e100
-"""Magnitude up to which positions (m) and speeds (m/s) are believed, and nothing overflows."""
+"""Magnitude up to which positions (m) and speeds (m/s) are measured without overflow."""
 
 
 class Sample(NamedTuple):
-    """State of slide and belt at one instant."""
+    """State of slide and belt at one instant.
+
+    Examples
+    --------
+    >>> from stickslip_ros.samples import Sample
+    >>> sample = Sample(1_000_000, 1e-4, 0.0, 398.5, 4e-5, 0.04)
+    >>> sample.belt_velocity
+    0.04
+    """
 
     stamp: int
-    """ns"""
+    """Stamp, ns."""
     position: float
     """Displacement of the slide, m."""
     velocity: float
     """Velocity of the slide, m/s."""
     friction_force: float
-    """Friction force on the slide, N, under the force held up to then; NaN where not known."""
+    """Friction force on the slide, N, under the force held up to this sample; NaN if unknown."""
     belt_position: float
     """Displacement of the belt, m."""
     belt_velocity: float
@@ -31,20 +39,36 @@ class Sample(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SampleColumns(Table):
-    """Samples that follow each other: the fields of `Sample` as arrays of shape (samples,)."""
+    """Consecutive samples: the fields of `Sample` as arrays of shape (samples,).
+
+    Examples
+    --------
+    >>> from stickslip_ros.bags import Recording
+    >>> with Recording("bags/reference") as recording:
+    ...     states = recording.joint_states
+    >>> time = (states.stamp - states.stamp[0]) * 1e-9  # s
+    >>> len(states[time < 0.01])
+    10
+    """
 
     effort = Renamed("friction_force")
 
     stamp: IntArray
+    """Stamps, ns."""
     position: FloatArray
+    """Displacement of the slide, m."""
     velocity: FloatArray
+    """Velocity of the slide, m/s."""
     friction_force: FloatArray
+    """Friction force on the slide, N, under the force held up to each sample; NaN if unknown."""
     belt_position: FloatArray
+    """Displacement of the belt, m."""
     belt_velocity: FloatArray
+    """Velocity of the belt, m/s."""
 
     @property
     def believed(self) -> BoolArray:
-        """Which of them are measured: those that are finite, up to 1e100 m and m/s."""
+        """Boolean mask of the samples that are measured: finite, up to 1e100 m and m/s."""
         believed = np.abs(self.position) <= LARGEST
         for column in (self.velocity, self.belt_velocity):
             believed &= np.abs(column) <= LARGEST
@@ -53,9 +77,18 @@ class SampleColumns(Table):
 
 @dataclass(frozen=True, eq=False)
 class ForceColumns(Table):
-    """Control or disturbance forces that follow each other: arrays of shape (forces,)."""
+    """Consecutive control or disturbance forces, as arrays of shape (forces,).
+
+    Examples
+    --------
+    >>> from stickslip_ros.bags import Recording
+    >>> with Recording("bags/reference") as recording:
+    ...     forces = recording.control_forces
+    >>> len(forces) == len(forces.force)
+    True
+    """
 
     stamp: IntArray
-    """ns"""
+    """Stamps, ns."""
     force: FloatArray
-    """N"""
+    """Force on the slide, N."""

@@ -1,4 +1,4 @@
-"""Text as messages, tables and pictures show it."""
+"""Format text for messages, tables and figures."""
 
 from collections.abc import Iterable
 from difflib import SequenceMatcher
@@ -7,14 +7,14 @@ from typing import Any
 _PREFIXES = {1e9: "G", 1e6: "M", 1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
 _LONGEST, _MOST = 80, 3
 _ALIKE = 0.6
-"""Ratio of `SequenceMatcher` from which on two names are close."""
+"""Ratio of `SequenceMatcher` above which two names are close."""
 
 
 def printable(text: str) -> str:
-    """Return a text on one line, with what would steer a terminal shown as its escape sequence.
+    """Return a text on one line, with control characters shown as escape sequences.
 
-    So a name in somebody's bag or scenario cannot move the cursor, set the window's title, or
-    pretend to be a line of ours.
+    A name in a foreign bag or scenario file can then not control the terminal, or imitate a line
+    of this program.
     """
     if text.isprintable():
         return text
@@ -24,21 +24,21 @@ def printable(text: str) -> str:
 
 
 def shown(value: Any) -> str:
-    """Return a value as messages show it, a long one cut."""
+    """Return a value as messages show it; a long one is shortened."""
     text = repr(value)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
 def quantity(value: float, unit: str) -> str:
-    """Return a value, rounded, with the prefix that suits it and its unit."""
+    """Return a rounded value with a suitable prefix and its unit."""
     scale, prefix = prefix_for(value)
     return f"{value / scale:.4g} {prefix}{unit}"
 
 
 def prefix_for(largest: float) -> tuple[float, str]:
-    """Return what to divide by, and the prefix, so that a value of that magnitude is 1 or more.
+    """Return the divisor and the prefix with which a value of this magnitude is 1 or more.
 
-    What is smaller than the smallest prefix, zero included, gets none.
+    Values below the smallest prefix, including zero, get no prefix.
     """
     magnitude = abs(largest)
     return next(((scale, p) for scale, p in _PREFIXES.items() if magnitude >= scale), (1.0, ""))
@@ -47,9 +47,9 @@ def prefix_for(largest: float) -> tuple[float, str]:
 def did_you_mean(name: str, known: Iterable[str], otherwise: str | None = None) -> str:
     """Return the end of a message about an unknown name: the known names that are close to it.
 
-    Where none is close it is `otherwise`, by default all that are known. Names
-    are close whose last part is the same, as plant.friction.static to plant.static, or has the
-    same words and more, as linear_gain to gain; or else the one that is most alike.
+    If none is close, return `otherwise`, by default all known names. Names are close if they have
+    the same last part (plant.friction.static and plant.static), or if its words include those of
+    the unknown name (linear_gain and gain); otherwise, the most similar name is close.
     """
     names, name = sorted(known), name[:_LONGEST]
     last = name.rpartition(".")[2]
@@ -69,7 +69,7 @@ def _words(name: str) -> set[str]:
 
 
 def _likeness(name: str, known: str) -> float:
-    """Return how alike two names are, from 0 to 1; a first part that they share says nothing."""
+    """Return the similarity of two names, from 0 to 1; a common first part does not count."""
     group = name[: name.find(".") + 1]
     if known.startswith(group):
         name, known = name.removeprefix(group), known.removeprefix(group)

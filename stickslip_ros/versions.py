@@ -1,11 +1,11 @@
-"""What a result was made with."""
+"""Versions of the software that computed a result."""
 
 import platform
 from importlib import metadata
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of Python, of this package and of what its figures depend on."""
+    """Return the versions of Python, this package and the packages that its results depend on."""
     found = {"python": platform.python_version()}
     for package in ("stickslip_ros", "heyoka", "numpy", "mcap", "rclpy"):
         try:

@@ -1,4 +1,4 @@
-"""How many examples hypothesis tries, in which tier a test is, and which worker begins with it.
+"""Number of hypothesis examples, the tier of each test, and its order on the workers.
 
 A test that takes a fixture which starts a process is marked `process` by that; one that starts a
 process in another way has to say so, and fails where it does not.

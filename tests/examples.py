@@ -1,4 +1,4 @@
-"""How many examples a test of properties tries, where the profile's number does not suit it."""
+"""Number of examples of a property test, where the profile's number does not suit it."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Names that a program of version 0.1 imports: all of docs/reference.md of then."""
+"""Names that a program for version 0.1 imports: all of its docs/reference.md."""
 
 import warnings
 from importlib import import_module
@@ -103,7 +103,7 @@ def test_values_have_their_old_names_too() -> None:
         assert columns.effort is columns.friction_force
 
 
-def test_a_law_that_was_written_for_the_old_name_is_heeded() -> None:
+def test_a_law_with_the_old_name_still_works() -> None:
     class OldLaw(Linear):
         @property
         def sudden_speed(self) -> float:

@@ -1,4 +1,4 @@
-"""Which processes end quietly on SIGINT while they import."""
+"""Processes that end quietly on SIGINT while they import."""
 
 from importlib import metadata
 

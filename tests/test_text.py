@@ -1,4 +1,4 @@
-"""What may have been meant by a name."""
+"""Suggestions for unknown names."""
 
 import pytest
 
@@ -27,7 +27,7 @@ def test_several_may_be_meant() -> None:
 
 
 @pytest.mark.parametrize("name", ["", "plant.", "plant.colour", "x" * 1_000_000])
-def test_without_a_close_one_all_are_told(name: str) -> None:
+def test_without_a_close_name_all_known_names_are_listed(name: str) -> None:
     assert did_you_mean(name, KNOWN) == (
         "known are plant.friction.static, plant.mass, plant.rate, washout_controller.linear_gain"
     )

@@ -1,4 +1,4 @@
-"""MCAP bags in rosbag2's layout, written and read without a ROS graph."""
+"""Read and write MCAP bags in rosbag2's layout, without a ROS graph."""
 
 from stickslip_ros.bags.reader import Recording, RunBlock
 

@@ -1,4 +1,4 @@
-"""What is in a chunk of an MCAP file: messages, as columns, and definitions among them."""
+"""The content of a chunk of an MCAP file: messages, as columns, and definitions."""
 
 from array import array
 from collections import deque
@@ -18,26 +18,26 @@ from stickslip_ros.messages.cdr import joined
 
 _MESSAGE = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")
 _MESSAGE.names = "opcode", "length", "channel", "sequence", "log_time", "publish_time"
-"""A message record, up to the message."""
+"""The fields of a message record before the message itself."""
 MESSAGE_SIZE = _MESSAGE.itemsize
 MESSAGE_LENGTH = MESSAGE_SIZE - HEAD.size
-"""Of a message record's content, without the message."""
+"""Bytes of the content of a message record, without the message."""
 WINDOW = 1 << 20
-"""Bytes of a block of messages that are read, or unpacked, one by one."""
+"""Bytes after which a block of messages that are read, or unpacked, one by one is yielded."""
 DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
-"""Records that tell what messages are."""
+"""Records that define the messages."""
 LARGEST_TABLE = 16 << 20
-"""Bytes of the largest record of texts that is taken apart: that takes many times its size."""
+"""Bytes of the largest record of texts that is parsed: parsing takes many times its size."""
 
 
 class MessageBlock:
-    """Messages that stand together in a file, such as those of one chunk: arrays of shape (n,).
+    """Adjacent messages of a file, such as those of one chunk: arrays of shape (n,).
 
     The serialized message i is `data[begin[i] : end[i]]`.
     """
 
     def __init__(self, data: bytes, starts: IntArray) -> None:
-        """Take the message records that start there; raises DamageError where there is none."""
+        """Take the message records at `starts`; raise DamageError if one of them is no message."""
         if len(starts) > 0 and not 0 <= starts.min() <= starts.max() <= len(data) - MESSAGE_SIZE:
             raise DamageError
         self.data = data
@@ -53,26 +53,26 @@ class MessageBlock:
 
     @property
     def channel(self) -> NDArray[np.uint16]:
-        """Ids of the channels."""
+        """Channel ids."""
         return self._field("channel")
 
     @property
     def sequence(self) -> NDArray[np.uint32]:
-        """Numbers given by the recorder; zero where it gave none."""
+        """Sequence numbers of the recorder; zero if it assigned none."""
         return self._field("sequence")
 
     @property
     def log_time(self) -> IntArray:
-        """In ns."""
+        """Log times, ns."""
         return self._field("log_time").astype(np.int64)
 
     @property
     def publish_time(self) -> IntArray:
-        """In ns."""
+        """Publish times, ns."""
         return self._field("publish_time").astype(np.int64)
 
     def on(self, channels: Collection[int]) -> "MessageBlock":
-        """Return those on these channels."""
+        """Return the messages on these channels."""
         chosen = np.zeros(1 << 16, bool)
         chosen[list(channels)] = True
         wanted = chosen[self.channel]
@@ -83,7 +83,7 @@ class MessageBlock:
         return part
 
     def unpacked(self) -> Iterator["MessageBlock"]:
-        """Yield them, unpacked and in smaller blocks if rosbag2 packed each message by itself."""
+        """Yield the messages; if rosbag2 compressed each one, unpacked and in smaller blocks."""
         if len(self) == 0 or not self.data.startswith(ZSTD_MAGIC, int(self.begin[0])):
             yield self
             return
@@ -107,15 +107,15 @@ class MessageBlock:
 
 
 class OpenChunk(NamedTuple):
-    """What is in a chunk."""
+    """The content of a chunk."""
 
     messages: MessageBlock
     others_end: int
-    """Up to there the data of the messages may hold other records."""
+    """The data of the messages may hold other records up to this byte."""
 
     @property
     def definitions(self) -> Iterator[tuple[int, bytes]]:
-        """Opcode and content of each definition in it."""
+        """Opcode and content of each definition in the chunk."""
         data = self.messages.data
         for opcode, begin, end in records_in(data[: self.others_end]):
             if opcode in DEFINITIONS:
@@ -129,14 +129,15 @@ def as_block(records: list[bytes]) -> MessageBlock:
 
 
 def open_chunk(data: bytes, starts: IntArray) -> OpenChunk:
-    """Return what is in a chunk whose messages start there, by its indexes.
+    """Return the content of a chunk; `starts` is where its messages start, from its indexes.
 
-    Where these are not right it goes from record to record; DamageError where there are none.
+    If the indexes are wrong, the records are read one after another. Raises DamageError if the
+    data do not consist of records.
     """
     if len(starts) > 0:
         with suppress(DamageError):
             chunk = OpenChunk(MessageBlock(data, starts), int(starts[0]))
-            deque(chunk.definitions, maxlen=0)  # each of them has to be sound
+            deque(chunk.definitions, maxlen=0)  # raises if one of them is damaged
             end = chunk.messages.end
             if np.array_equal(end[:-1], starts[1:]) and end[-1] == len(data):
                 return chunk

@@ -1,4 +1,4 @@
-"""Unpacking what recorders pack, never into more memory than it is said to need."""
+"""Decompress chunks, messages and files, never into more memory than their stated size."""
 
 import errno
 import shutil
@@ -10,15 +10,15 @@ from lz4.frame import LZ4FrameDecompressor
 from zstandard import ZstdDecompressor, ZstdError, frame_content_size
 
 LARGEST = 1 << 28
-"""Bytes of the largest chunk, or message, that is taken for one."""
+"""Bytes of the largest chunk or message that is accepted."""
 _PIECE = 4 << 20
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-"""What a zstd frame begins with, and no serialized message."""
+"""First bytes of a zstd frame; no serialized message starts with them."""
 
 
 def unpack(compression: str, data: bytes, size: int) -> bytes | None:
-    """Return what was packed as `lz4`, `zstd` or not at all; None if that is not `size` bytes."""
+    """Decompress `lz4`, `zstd` or uncompressed data; return None if the result has another size."""
     if size > LARGEST:
         return None
     match compression:
@@ -34,7 +34,7 @@ def unpack(compression: str, data: bytes, size: int) -> bytes | None:
 
 
 def unpack_message(data: bytes) -> bytes:
-    """Return a message that rosbag2 packed by itself as zstd; any other as it is."""
+    """Return a message that rosbag2 compressed by itself (zstd) unpacked; any other unchanged."""
     try:
         return unpack("zstd", data, frame_content_size(data)) or data
     except ZstdError:
@@ -42,9 +42,9 @@ def unpack_message(data: bytes) -> bytes:
 
 
 def unpack_file(packed: Path, unpacked: Path) -> None:
-    """Write what a file packed as zstd holds to another, as far as it is sound.
+    """Decompress a zstd file into another one, up to the first damage.
 
-    Raises OSError, too, before that takes more than half of the free disk.
+    Raises OSError, also before the result takes more than half of the free disk space.
     """
     room = shutil.disk_usage(unpacked.parent).free // 2
     with packed.open("rb") as source, unpacked.open("wb") as target, suppress(ZstdError):
@@ -53,25 +53,25 @@ def unpack_file(packed: Path, unpacked: Path) -> None:
             if room < 0:
                 raise OSError(
                     errno.ENOSPC,
-                    f"it would take more than half of what is free in {unpacked.parent}",
+                    f"it would take more than half of the free space in {unpacked.parent}",
                 )
             target.write(piece)
 
 
 def _unpack_lz4(data: bytes, size: int) -> bytes:
     decompressor = LZ4FrameDecompressor()
-    rest = iter((data,))
+    input_once = iter((data,))
 
     def read(length: int) -> bytes:
         if decompressor.eof:
             return b""
-        return decompressor.decompress(next(rest, b""), length)
+        return decompressor.decompress(next(input_once, b""), length)
 
     return _gathered(read, size)
 
 
 def _gathered(read: Callable[[int], bytes], size: int) -> bytes:
-    """Read in pieces, so that a false size costs nothing, until it is passed or nothing comes."""
+    """Read in pieces, so that a false size costs nothing, until `size` is exceeded or the end."""
     pieces: list[bytes] = []
     missing = size + 1
     try:

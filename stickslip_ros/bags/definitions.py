@@ -12,11 +12,10 @@ _BUILT_IN_TYPES = re.compile(r"bool|byte|char|float(32|64)|u?int(8|16|32|64)|w?s
 
 
 def message_definition(type_name: str) -> str:
-    """Return the text of a message type such as `sensor_msgs/msg/JointState` and of all it holds.
+    """Return the definition of a message type such as `sensor_msgs/msg/JointState`.
 
-    This is the encoding `ros2msg`: the .msg file, followed by those of the types of its fields,
-    depth first and sorted, each once under its name. Raises BagError for a type that is not
-    installed.
+    The encoding is `ros2msg`: the .msg file, followed by those of the types of its fields, depth
+    first and sorted, each once under its name. Raises BagError for a type that is not installed.
     """
     included: set[str] = set()
 
@@ -42,7 +41,7 @@ def type_hash(type_name: str) -> str:
 
 
 def _nested_types(definition: str, package: str) -> list[str]:
-    """Return the sorted full names of the types of a definition's fields, but for built-in ones."""
+    """Return the sorted full names of the types of a definition's fields, without built-in ones."""
     nested: set[str] = set()
     for line in definition.splitlines():
         field = _FIELD_TYPE.match(line)
@@ -57,7 +56,8 @@ def _read(type_name: str, suffix: str) -> str:
     parts = _TYPE_NAME.fullmatch(type_name)
     if parts is None:
         raise BagError(
-            f"'{type_name}' does not name a message type; sensor_msgs/msg/JointState does"
+            f"'{type_name}' is not the name of a message type; a valid name is "
+            "sensor_msgs/msg/JointState"
         )
     package, name = parts.groups()
     for prefix in prefixes():
@@ -65,7 +65,6 @@ def _read(type_name: str, suffix: str) -> str:
         if path.is_file():
             return path.read_text(encoding="utf-8")
     raise BagError(
-        f"the message type '{type_name}' is not installed: there is no "
-        f"share/{package}/msg/{name}{suffix} in {' or '.join(map(str, prefixes()))} "
-        "(AMENT_PREFIX_PATH and the Python environment)"
+        f"the message type '{type_name}' is not installed: no share/{package}/msg/{name}{suffix} "
+        f"in {' or '.join(map(str, prefixes()))} (AMENT_PREFIX_PATH and the Python environment)"
     )

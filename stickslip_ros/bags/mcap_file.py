@@ -1,9 +1,9 @@
-"""One MCAP file, read as far as it goes: what a killed recorder leaves, or a disk has damaged.
+"""Read one MCAP file, also one that is incomplete (recorder killed) or damaged.
 
-The mcap library parses the records. Going from record to record is done here: the library fails
-where a file is cut off or damaged, and takes messages apart one by one. A record counts as sound
-if its fields fill it exactly, and a chunk if its checksum is right as well; behind anything else
-the reading goes on at the next sound chunk.
+The mcap library parses the records. This module steps from record to record, because the library
+fails on a truncated or damaged file and parses messages one by one. A record is sound if its
+fields fill it exactly; a chunk must also have the right checksum. After any damage, reading
+continues at the next sound chunk.
 """
 
 import re
@@ -52,12 +52,12 @@ _INDEX_ENTRY = 16
 _DATA_END = HEAD.pack(Opcode.DATA_END, 4)
 _OPCODES = frozenset((*FIELDS, Opcode.MESSAGE))
 _PRIVATE = 0x80
-"""Opcodes from here on mean what a program likes."""
+"""Opcodes from this one on are private to an application."""
 _INVENTORY = frozenset((*DEFINITIONS, Opcode.METADATA, Opcode.ATTACHMENT))
-"""What stands between the messages and tells what they are or how they came about."""
+"""Records between the messages that define or describe them."""
 _LARGEST_DEFINITIONS = 32 << 20
 """Bytes of all definitions that are kept."""
-_MOST_GAPS_TOLD = 20
+_MOST_GAPS_LISTED = 20
 
 _CHUNK_HEAD = re.compile(
     rb"\x06.{5}\0\0\0.{28}(?:\0\0\0\0|\x03\0\0\0lz4|\x04\0\0\0zstd)", re.DOTALL
@@ -66,12 +66,12 @@ _CHUNK_HEAD_SIZE = 9 + 28 + 8
 
 
 class _Record(NamedTuple):
-    """A sound record of the file."""
+    """A sound record of a file."""
 
     start: int
     opcode: int
     length: int
-    """Of its content."""
+    """Bytes of the content."""
 
     @property
     def content(self) -> int:
@@ -86,14 +86,14 @@ class McapFile:
     """An MCAP file that is open for reading."""
 
     def __init__(self, path: Path) -> None:
-        """Open the file; raises BagError if that is impossible or it is not MCAP."""
+        """Open the file; raise BagError if it cannot be opened or is not MCAP."""
         self.path = path
         self.schemas: dict[int, Schema] = {}
         """By id."""
         self.channels: dict[int, Channel] = {}
         """By id."""
         self.statistics: Statistics | None = None
-        """The file's own account of its messages, if it has one."""
+        """The statistics record of the file, if it has one."""
         self._tables: dict[int, str] = {}
         self._attachments: dict[int, str] = {}
         self._definitions_size = 0
@@ -101,7 +101,7 @@ class McapFile:
         self._gaps: dict[int, int] = {}
         self._lost: dict[int, int] = {}
         if path.exists() and not path.is_file():
-            raise BagError(f"the file {path} cannot be opened: it is no regular file")
+            raise BagError(f"the file {path} cannot be opened: it is not a regular file")
         try:
             self._stream = path.open("rb")
         except OSError as error:
@@ -119,7 +119,7 @@ class McapFile:
 
     @property
     def damage(self) -> list[str]:
-        """What is known to be missing from the file, in sentences; reading may find more."""
+        """Sentences on what is missing from the file; reading may find more."""
         name = self.path.name
         gaps: list[tuple[int, int]] = []
         for start, end in sorted(self._gaps.items()):
@@ -129,34 +129,35 @@ class McapFile:
                 gaps.append((start, end))
         found = [
             f"{name}: bytes {start} to {end - 1} of {self._size} cannot be read"
-            for start, end in gaps[:_MOST_GAPS_TOLD]
+            for start, end in gaps[:_MOST_GAPS_LISTED]
         ]
-        if len(gaps) > _MOST_GAPS_TOLD:
-            found.append(f"{name}: nor can {len(gaps) - _MOST_GAPS_TOLD} further stretches of it")
+        if len(gaps) > _MOST_GAPS_LISTED:
+            more = len(gaps) - _MOST_GAPS_LISTED
+            found.append(f"{name}: {more} further ranges of bytes cannot be read")
         if not self._whole:
             found.append(
-                f"{name} does not end as it should: its recorder is still at work or was killed, "
-                "or the file was cut off or damaged"
+                f"{name} is incomplete: its recorder is still running or was killed, "
+                "or the file was truncated or damaged"
             )
         for channel, lost in self._lost.items():
             topic = self.channels[channel].topic
-            found.append(f"{name}: {lost} messages that were recorded on {topic} are gone")
-        found += [f"{name}: of what type {topic} is, is not told" for topic in self._undefined]
+            found.append(f"{name}: {lost} messages recorded on {topic} are missing")
+        found += [f"{name}: the type of {topic} is missing" for topic in self._undefined]
         return found
 
     def tables(self, name: str | None = None) -> Iterator[Metadata]:
-        """Yield the readable metadata records, of that name or all, in file order."""
+        """Yield the readable metadata records, of this name or all, in file order."""
         return self._named(self._tables, name, Opcode.METADATA, Metadata.read)
 
     def attachments(self, name: str | None = None) -> Iterator[Attachment]:
-        """Yield the readable attachments, of that name or all, in file order."""
+        """Yield the readable attachments, of this name or all, in file order."""
         return self._named(self._attachments, name, Opcode.ATTACHMENT, Attachment.read)
 
     def blocks(self, channels: Collection[int]) -> Iterator[MessageBlock]:
-        """Yield the messages on those channels in file order, those of a chunk at a time.
+        """Yield the messages on these channels in file order, one chunk at a time.
 
-        One chunk is in memory; damaged ones are left out, and `damage` then tells of them. Raises
-        BagError where the operating system fails to read the file.
+        Only one chunk is in memory. Damaged chunks are skipped and listed in `damage`. Raises
+        BagError if the operating system fails to read the file.
         """
         counts: Counter[int] = Counter()
         for block in self._blocks():
@@ -172,7 +173,7 @@ class McapFile:
                 self._lost[channel] = lost
 
     def _blocks(self) -> Iterator[MessageBlock]:
-        """Yield the messages of each chunk, and each run of messages that are in none."""
+        """Yield the messages of each chunk, and each sequence of messages outside chunks."""
         loose: list[bytes] = []
         size = 0
         for record, chunk in self._records(len(MCAP0_MAGIC)):
@@ -190,11 +191,11 @@ class McapFile:
             yield as_block(loose)
 
     def _read_inventory(self) -> bool:
-        """Find what the file holds; return whether it begins and ends as it should."""
+        """Find the content of the file; return whether its beginning and end are sound."""
         data_start = len(MCAP0_MAGIC)
         begins_well = self._read(0, data_start) == MCAP0_MAGIC
         if not begins_well and self._next_chunk(0) == self._size:
-            raise BagError(f"the file {self.path} is not an MCAP file: it does not begin like one")
+            raise BagError(f"the file {self.path} is not an MCAP file: it does not start like one")
         ends_well = self._read_summary()
         # A summary need not repeat the definitions.
         if not (ends_well and self.channels and not self._undefined):
@@ -210,12 +211,12 @@ class McapFile:
 
     @property
     def _undefined(self) -> list[str]:
-        """The topics of which no type is known, although they have one."""
+        """The topics whose type is unknown although they have one."""
         known = (0, *self.schemas)
         return [c.topic for c in self.channels.values() if c.schema_id not in known]
 
     def _read_summary(self) -> bool:
-        """Note what the summary tells; return whether the file ends as its writer leaves it."""
+        """Read the summary; return whether the end of the file is sound."""
         end = self._size - len(MCAP0_MAGIC) - FIELDS[Opcode.FOOTER][0] - HEAD.size
         if end < 0 or self._read(self._size - len(MCAP0_MAGIC), 8) != MCAP0_MAGIC:
             return False
@@ -225,7 +226,7 @@ class McapFile:
         start = footer.summary_start
         if start == 0:
             return True
-        # Looked at first: what a wrong place would have us read may be all the file.
+        # Checked first: with a wrong position the summary might be the whole file.
         before = max(0, start - len(_DATA_END) - 4)
         if not 0 <= end - start <= LARGEST or self._read(before, len(_DATA_END)) != _DATA_END:
             return False
@@ -242,9 +243,9 @@ class McapFile:
         return True
 
     def _note(self, opcode: int, start: int, content: bytes, *, checked: bool) -> None:
-        """Note what a record, or the one with it in it that starts there, tells of the file.
+        """Keep what a record describes; `start` is its place, or that of the chunk around it.
 
-        Of one that is too large the content is cut short: the name of an attachment still is there.
+        The content of a record that is too large is cut off; the name of an attachment remains.
         """
         try:
             match opcode:
@@ -271,13 +272,13 @@ class McapFile:
             self._add_gap(start, start + HEAD.size + len(content))
 
     def _add_gap(self, start: int, end: int) -> None:
-        """Note that this cannot be read."""
+        """Note that these bytes cannot be read."""
         self._gaps[start] = max(end, self._gaps.get(start, end))
 
     def _define(
         self, known: dict[int, DefinitionT], found: DefinitionT, size: int, checked: bool
     ) -> None:
-        """Keep a definition; of one id, one with a checksum, or else the first."""
+        """Keep a definition; for each id the one with a checksum, or else the first."""
         if found.id not in known or (checked and known[found.id] != found):
             self._definitions_size += size
             if self._definitions_size > _LARGEST_DEFINITIONS:
@@ -285,7 +286,7 @@ class McapFile:
             known[found.id] = found
 
     def _records(self, position: int) -> Iterator[tuple[_Record, OpenChunk | None]]:
-        """Yield the sound records from a position on; behind damage go on at the next chunk."""
+        """Yield the sound records from a position on; after damage continue at the next chunk."""
         before = checked = position
         while position < self._size:
             record, chunk = self._record(position), None
@@ -304,7 +305,7 @@ class McapFile:
             before, position = position, record.end
 
     def _record(self, position: int) -> _Record | None:
-        """Return the record at a position if its fields fill it, and it lies within the file."""
+        """Return the record at a position if its fields fill it and it lies within the file."""
         head = self._read(position, HEAD.size)
         if len(head) < HEAD.size:
             return None
@@ -313,11 +314,11 @@ class McapFile:
             return None
         if record.opcode == Opcode.MESSAGE:
             channel = int.from_bytes(self._read(record.content, 2), "little")
-            # Where there are chunks all messages are in them; this is something else, damaged.
+            # If a file has chunks, all messages are in them; this is damaged data.
             sound = channel in self.channels and MESSAGE_LENGTH <= record.length <= LARGEST
             return record if sound and not self._chunked else None
         if record.opcode not in FIELDS:
-            # Another program's own kind, if another record follows.
+            # A private record of an application, if another record follows.
             following = self._read(record.end, 1)
             followed = bool(following) and (following[0] in _OPCODES or following[0] >= _PRIVATE)
             return record if record.opcode >= _PRIVATE and followed else None
@@ -332,7 +333,7 @@ class McapFile:
         return record if place == record.end else None
 
     def _opened(self, record: _Record) -> OpenChunk | None:
-        """Return what is in a chunk, None if that is not what was written."""
+        """Return the content of a chunk, None if it is damaged."""
         if record.length > LARGEST + _CHUNK_HEAD_SIZE:
             return None
         try:
@@ -345,7 +346,7 @@ class McapFile:
             return None
 
     def _indexed_starts(self, data: bytes, position: int) -> IntArray:
-        """Return where messages of a chunk start, by its indexes; none if these are damaged."""
+        """Return where the messages of a chunk start, by its indexes; none if these are damaged."""
         offsets = [np.empty(0, np.int64)]
         room = len(data) // MESSAGE_SIZE * _INDEX_ENTRY
         while (record := self._record(position)) and record.opcode == Opcode.MESSAGE_INDEX:
@@ -359,7 +360,7 @@ class McapFile:
         return np.sort(np.concatenate(offsets), kind="stable")
 
     def _next_chunk(self, position: int) -> int:
-        """Return where the next chunk from a position on seems to start, or the file's size."""
+        """Return where the next chunk from a position on probably starts, or the file's size."""
         while position < self._size:
             window = self._read(position, WINDOW + _CHUNK_HEAD_SIZE)
             match = _CHUNK_HEAD.search(window)
@@ -405,5 +406,5 @@ class McapFile:
 
 
 def _text_at(place: int, content: bytes) -> str:
-    """Return the text at a place of a record; raises DamageError where there is none."""
+    """Return the text at a place of a record; raise DamageError if there is none."""
     return parse(lambda stream: stream.read_prefixed_string(), content[place:])

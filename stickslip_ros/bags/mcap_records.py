@@ -1,4 +1,4 @@
-"""Records of MCAP: a head of opcode and length, then the fields that the opcode tells."""
+"""Records of MCAP: a head of opcode and length, then the fields that belong to the opcode."""
 
 import struct
 from collections.abc import Callable, Iterator
@@ -29,17 +29,17 @@ FIELDS: dict[int, tuple[int, ...]] = {
     Opcode.SUMMARY_OFFSET: (17,),
     Opcode.DATA_END: (4,),
 }
-"""The fields of a record: so many bytes or, if negative, what its size, of so many, precedes."""
+"""The fields of a record: a size in bytes or, if negative, the bytes of a size prefix."""
 
 
 class DamageError(Exception):
-    """A record is not what it says; for the modules of bags only."""
+    """A record is damaged; used by the modules of bags only."""
 
 
 def records_in(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield opcode, and begin and end of the content, of the records that data are made of.
+    """Yield opcode, and begin and end of the content, of each record in the data.
 
-    Raises DamageError where they are not made of records.
+    Raises DamageError where the data are not a record.
     """
     position = 0
     while position < len(data):
@@ -55,7 +55,7 @@ def records_in(data: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def parse(read: Callable[[ReadDataStream], ParsedT], content: bytes) -> ParsedT:
-    """Return what the mcap library reads of a content; raises DamageError where it cannot."""
+    """Parse a content with the mcap library; raise DamageError if it fails."""
     try:
         return read(ReadDataStream(BytesIO(content)))
     except (EndOfFile, struct.error, UnicodeDecodeError, OverflowError, ValueError) as error:

@@ -1,7 +1,7 @@
-"""The `metadata.yaml` of a bag, version 9, by which rosbag2 knows it.
+"""The `metadata.yaml` of a bag (version 9), which rosbag2 needs to open it.
 
-It describes the files that are finished. While a bag is recorded there is one file more than that,
-and after a recorder was killed, too: so a bag that was closed properly can be told from others.
+It describes the finished files. While a bag is recorded, and after a recorder was killed, there is
+one file more. This distinguishes a bag that was closed properly from others.
 """
 
 import os
@@ -18,26 +18,26 @@ from stickslip_ros.bags.mcap_file import McapFile
 METADATA_FILE = "metadata.yaml"
 
 _LARGEST = 4_000_000
-"""Characters of a `metadata.yaml` that is read: that of a bag of some ten thousand files."""
+"""Characters of the largest `metadata.yaml` that is read: a bag of about ten thousand files."""
 _LARGEST_QOS = 100_000
-"""Characters of the YAML of a topic's profiles that is read: that of some hundred publishers."""
+"""Characters of the longest YAML of QoS profiles that is read: about a hundred publishers."""
 
-# Those of libyaml are five and ten times as fast, which counts with thousands of files.
+# libyaml's are five and ten times as fast, which matters with thousands of files.
 _LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
 _DUMPER: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
-# What rosbag2 writes where there is no message yet.
+# rosbag2 writes this if there is no message yet.
 _NO_STARTING_TIME = 2**63 - 1
 
 
 def opening_information(file_name: str) -> str:
-    """Return as YAML what there is to say of a bag's file when it is opened for writing."""
+    """Return the metadata, as YAML, of a bag's file that is opened for writing."""
     file = _file_entry(file_name, 0, _NO_STARTING_TIME, 0)
     return _as_yaml(_information([], _NO_STARTING_TIME, 0, [file]))
 
 
 class BagDescription:
-    """What there is to say of the finished files of a bag."""
+    """The metadata of the finished files of a bag."""
 
     def __init__(self) -> None:
         self._topics: dict[str, dict[str, Any]] = {}
@@ -46,7 +46,7 @@ class BagDescription:
         self._files: list[dict[str, Any]] = []
 
     def add(self, file: McapFile) -> None:
-        """Take in the next file of the bag, which is complete."""
+        """Add the next file of the bag, which is complete."""
         statistics = file.statistics
         assert statistics is not None
         for channel_id, channel in sorted(file.channels.items()):
@@ -64,9 +64,9 @@ class BagDescription:
         self._files.append(entry)
 
     def write(self, directory: Path) -> None:
-        """Write `metadata.yaml` into a bag directory and hand it to the disk.
+        """Write `metadata.yaml` into a bag directory and sync it to the disk.
 
-        All of it is written, or OSError is raised and the one that was there remains.
+        If this fails, OSError is raised and the previous file remains.
         """
         information = _information(
             list(self._topics.values()), self._start, max(0, self._end - self._start), self._files
@@ -85,16 +85,16 @@ class BagDescription:
 
 
 def metadata_faults(directory: Path, files: Sequence[Path]) -> list[str]:
-    """Return in what the `metadata.yaml` of a bag fails to list its files."""
+    """Return the differences, in sentences, between a bag's `metadata.yaml` and its files."""
     try:
         listed = _listed(directory / METADATA_FILE)
     except FileNotFoundError:
-        return [f"{METADATA_FILE} is missing: the recorder is still at work or was killed"]
+        return [f"{METADATA_FILE} is missing: the recorder is still running or was killed"]
     except (OSError, ValueError, yaml.YAMLError):
-        return [f"{METADATA_FILE} cannot be understood"]
+        return [f"{METADATA_FILE} cannot be read"]
     present = {file.name for file in files}
     if gone := sorted(listed - present):
-        return [f"{', '.join(gone)} is listed in {METADATA_FILE} but not there"]
+        return [f"{', '.join(gone)} is listed in {METADATA_FILE} but does not exist"]
     if new := sorted(present - listed):
         return [f"{METADATA_FILE} does not list {', '.join(new)}: the recorder did not finish"]
     return []
@@ -120,15 +120,15 @@ def _topic_entry(channel: Channel, type_name: str) -> dict[str, Any]:
 
 
 def offered_profiles(qos: str) -> list[Any]:
-    """Return the profiles of rosbag2's YAML, which others may have left out or written otherwise.
+    """Return the QoS profiles in rosbag2's YAML; empty if other recorders wrote something else.
 
-    None are taken from what is far too long, or repeats itself by aliases.
+    A text that is far too long or uses aliases is not read.
     """
     if len(qos) > _LARGEST_QOS or "*" in qos:
         return []
     try:
         profiles = yaml.safe_load(qos)
-    except Exception:  # there is no end to what may stand in a file of others
+    except Exception:  # a file of another recorder may hold anything
         return []
     return profiles if isinstance(profiles, list) else []
 
@@ -152,7 +152,7 @@ def _information(
         "starting_time": {"nanoseconds_since_epoch": start},
         "message_count": sum(file["message_count"] for file in files),
         "topics_with_message_count": topics,
-        # Of whole messages or files; compressed chunks are MCAP's own affair.
+        # Of whole messages or files; the compression of chunks belongs to MCAP.
         "compression_format": "",
         "compression_mode": "",
         "relative_file_paths": [file["path"] for file in files],
@@ -170,7 +170,7 @@ def _listed(metadata: Path) -> set[str]:
         text = file.read(_LARGEST + 1)
     if len(text) > _LARGEST:
         raise ValueError
-    # Only this list is made, and of texts only, whatever the file asks for.
+    # Only this list of strings is built, whatever the file contains.
     events: Iterator[Any] = yaml.parse(text, _LOADER)
     for key, value in pairwise(events):
         named = isinstance(key, yaml.ScalarEvent) and key.value == "relative_file_paths"

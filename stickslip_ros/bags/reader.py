@@ -1,4 +1,4 @@
-"""Reading a bag: a directory of MCAP files as rosbag2 lays it out, or one such file."""
+"""Read a bag: a directory of MCAP files in rosbag2's layout, or one such file."""
 
 import os
 import re
@@ -32,7 +32,7 @@ from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.text import printable
 
 _PACKED = ".mcap.zstd"
-"""Ending of the files that rosbag2 packs as a whole."""
+"""Suffix of the files that rosbag2 compressed as a whole."""
 
 
 ColumnsT = TypeVar("ColumnsT", SampleColumns, ForceColumns)
@@ -40,34 +40,58 @@ _Decode = Callable[[bytes, IntArray, IntArray], tuple[ColumnsT, Refused]]
 
 
 class RunBlock(NamedTuple):
-    """A stretch of a recorded run, of one chunk of its bag; each part may be empty."""
+    """A part of a recorded run, from one chunk of its bag; each column set may be empty.
+
+    Examples
+    --------
+    >>> from stickslip_ros.bags import Recording
+    >>> with Recording("bags/reference") as recording:
+    ...     block = next(recording.blocks())
+    >>> len(block.joint_states) > 0
+    True
+    """
 
     joint_states: SampleColumns
+    """Joint states in the order of the file."""
     control_forces: ForceColumns
+    """Control forces that were sent."""
     dropped_forces: ForceColumns
+    """Control forces that did not act."""
 
 
 class Recording:
     """A bag that is open for reading; a context manager that closes it.
 
-    Columns are read when they are asked for, `blocks` gives them a chunk at a time:
+    Columns are read on first access. `blocks` yields them chunk by chunk, in the memory of one
+    chunk. Incomplete or damaged bags, such as those of a killed recorder, are read as far as
+    possible; `missing` lists what they lack.
 
-        with Recording("bags/my_run") as recording:
-            recording.topics                       # {'/feed_drive/joint_states': …}
-            states = recording.joint_states        # all of them: numpy arrays
-            states.stamp, states.position          # ns, m
-            for block in recording.blocks():       # in the memory of one chunk
-                block.control_forces.force         # N
-            recording.missing                      # [] if nothing is
+    Parameters
+    ----------
+    path : Path or str
+        A bag directory, or one MCAP file.
+    namespace : str or None
+        ROS namespace of the drive whose columns are read, such as `/feed_drive`; None if the bag
+        holds only one drive.
+
+    Raises
+    ------
+    BagError
+        If `path` is not a bag, or a bag that is not stored as MCAP.
+
+    Examples
+    --------
+    >>> from stickslip_ros.bags import Recording
+    >>> with Recording("bags/reference") as recording:
+    ...     states = recording.joint_states
+    ...     missing = recording.missing
+    >>> states.stamp.dtype, states.position.dtype  # ns, m
+    (dtype('int64'), dtype('float64'))
+    >>> missing
+    []
     """
 
     def __init__(self, path: Path | str, namespace: str | None = None) -> None:
-        """Open a bag directory or one MCAP file, also such as a killed recorder leaves behind.
-
-        The columns are those of the drive in the ROS `namespace`, such as `/feed_drive`; None will
-        do where the bag holds one drive. Raises BagError if there is no bag, or one that is not
-        stored as MCAP.
-        """
         self.path = Path(path)
         self._namespace = namespace
         self._unreadable: list[str] = []
@@ -77,7 +101,7 @@ class Recording:
         with ExitStack() as opened:
             files = self._readable_files([_unpacked(path, opened) for path in paths])
             self.files = [opened.enter_context(closing(file)) for file in files]
-            """The MCAP files in their order; those that cannot be read are left out."""
+            """The MCAP files in order, without those that cannot be read."""
             self._opened = opened.pop_all()
         self._metadata_faults = metadata_faults(self.path, paths) if self.path.is_dir() else []
         self.topics = {
@@ -86,18 +110,18 @@ class Recording:
             for channel in file.channels.values()
             if channel.schema_id in file.schemas
         }
-        """Name and type of each, as `/feed_drive/joint_states` and `sensor_msgs/msg/JointState`."""
+        """Types by name, such as `sensor_msgs/msg/JointState` by `/feed_drive/joint_states`."""
 
     @property
     def complete(self) -> bool:
-        """Whether nothing is `missing`."""
+        """Whether `missing` is empty."""
         return not self.missing
 
     @property
     def missing(self) -> list[str]:
-        """What the bag lacks, in sentences; reading on may find more.
+        """Sentences on what the bag lacks; further reading may find more.
 
-        That is an end that no recorder wrote, damage, and messages that could not be understood.
+        They name an incomplete end, damage, and messages that could not be decoded.
         """
         sentences = [
             *self._metadata_faults,
@@ -112,39 +136,56 @@ class Recording:
 
     @cached_property
     def joint_states(self) -> SampleColumns:
-        """All joint states; BagError as for `blocks`."""
+        """All joint states; raises BagError as `blocks` does."""
         return self._whole(JOINT_STATES, joint_states_in)
 
     @cached_property
     def control_forces(self) -> ForceColumns:
-        """All control forces; BagError as for `blocks`."""
+        """All control forces that were sent; raises BagError as `blocks` does."""
         return self._whole(CONTROL_FORCE, wrenches_in)
 
     @cached_property
     def applied_disturbances(self) -> ForceColumns:
-        """All disturbance forces at the samples from which they act; BagError as for `blocks`."""
+        """All changes of the disturbance force, stamped with the first sample they act on.
+
+        Raises BagError as `blocks` does.
+        """
         return self._whole(APPLIED_DISTURBANCE, wrenches_in)
 
     @cached_property
     def dropped_forces(self) -> ForceColumns:
-        """All control forces that did not act, as they were sent; BagError as for `blocks`."""
+        """All control forces that did not act, as sent; raises BagError as `blocks` does."""
         return self._whole(DROPPED_FORCE, wrenches_in)
 
     @property
     def dropped_known(self) -> bool:
-        """Whether the bag tells which control forces did not act; BagError as for `blocks`.
+        """Whether the bag records which control forces did not act.
 
-        Bags of older versions do not, nor those of other plants.
+        Bags of older versions and of other plants do not. Raises BagError as `blocks` does.
         """
         return self._topic(DROPPED_FORCE) != ""
 
     def blocks(self, least: int = 1) -> Iterator[RunBlock]:
-        """Yield joint states, control forces sent and dropped, a chunk at a time, in file order.
+        """Yield joint states, control forces and dropped forces in file order, chunk by chunk.
 
-        Chunks with fewer than `least` of all are joined to ones with more, the last ones excepted.
-        Messages that cannot be understood are left out, and `missing` then tells of them. Raises
-        BagError where the bag holds several drives and no namespace was given, and where the
-        operating system fails to read it.
+        Messages that cannot be decoded are skipped and listed in `missing`.
+
+        Parameters
+        ----------
+        least : int
+            Smallest number of messages in a block; smaller chunks are joined. The last block may
+            have fewer.
+
+        Yields
+        ------
+        RunBlock
+            The messages of one chunk, or of several joined ones.
+
+        Raises
+        ------
+        BagError
+            If the bag holds several drives and no namespace was given, or if the operating system
+            fails to read it.
         """
         states, forces, dropped = map(self._topic, (JOINT_STATES, CONTROL_FORCE, DROPPED_FORCE))
         gathered: list[RunBlock] = []
@@ -164,9 +205,26 @@ class Recording:
             yield _joined_blocks(gathered)
 
     def messages(self, *topics: str) -> Iterator[tuple[str, int, bytes]]:
-        """Yield topic, log time in ns and serialized message of these topics, as recorded in turn.
+        """Yield the serialized messages of some topics in file order.
 
-        Raises BagError where the operating system fails to read the bag.
+        Parameters
+        ----------
+        *topics : str
+            Full names, such as `/feed_drive/joint_states`.
+
+        Yields
+        ------
+        topic : str
+            Full name of the topic.
+        log_time : int
+            ns.
+        data : bytes
+            The message, serialized as CDR.
+
+        Raises
+        ------
+        BagError
+            If the operating system fails to read the bag.
         """
         for block, channels in self._blocks(*topics):
             names = {channel: topic for topic, ids in channels.items() for channel in ids}
@@ -175,9 +233,17 @@ class Recording:
                 yield names[channel], stamp, block.data[begin:end]
 
     def offered_qos(self, topic: str) -> str:
-        """Return what the recorded publishers of a topic offered, as rosbag2's YAML; "" if unknown.
+        """Return the QoS profiles that the recorded publishers of a topic offered.
 
-        It is a list with an item for each publisher.
+        Parameters
+        ----------
+        topic : str
+            Full name, such as `/feed_drive/joint_states`.
+
+        Returns
+        -------
+        str
+            rosbag2's YAML, a list with one profile for each publisher; empty if unknown.
         """
         found = [
             channel.metadata.get("offered_qos_profiles", "")
@@ -188,12 +254,34 @@ class Recording:
         return next(filter(None, found), "")
 
     def metadata(self, name: str) -> dict[str, str] | None:
-        """Return the last table of texts of that name in the bag, None if there is none."""
+        """Return the last metadata table of a name in the bag.
+
+        Parameters
+        ----------
+        name : str
+            Name of the MCAP metadata record, such as `stickslip_ros/analyzer`.
+
+        Returns
+        -------
+        dict or None
+            The table, strings by strings; None if the bag has none of this name.
+        """
         last = deque((table for file in self.files for table in file.tables(name)), maxlen=1)
         return last[0].metadata if last else None
 
     def attachment(self, name: str) -> bytes | None:
-        """Return the last file of that name attached to the bag, None if there is none."""
+        """Return the last attached file of a name in the bag.
+
+        Parameters
+        ----------
+        name : str
+            Name of the attachment.
+
+        Returns
+        -------
+        bytes or None
+            The content of the file; None if the bag has none of this name.
+        """
         attachments = (found for file in self.files for found in file.attachments(name))
         last = deque(attachments, maxlen=1)
         return last[0].data if last else None
@@ -209,7 +297,7 @@ class Recording:
         self.close()
 
     def _readable_files(self, paths: Sequence[Path]) -> Iterator[McapFile]:
-        """Open the files; raise BagError if none can be read, otherwise note those that cannot."""
+        """Open the files; raise BagError if none can be read, otherwise list those that cannot."""
         errors: list[BagError] = []
         for path in paths:
             try:
@@ -222,7 +310,7 @@ class Recording:
 
     @cached_property
     def _prefix(self) -> str:
-        """What the names of the drive's topics begin with; BagError if there are several drives."""
+        """Prefix of the names of the drive's topics; BagError if there are several drives."""
         if self._namespace is not None:
             return f"/{self._namespace.strip('/')}/".replace("//", "/")
         for topic in RECORDED_TOPICS:
@@ -234,8 +322,8 @@ class Recording:
             if len(prefixes) > 1:
                 namespaces = ", ".join(sorted(prefix.rstrip("/") or "/" for prefix in prefixes))
                 raise BagError(
-                    f"the bag {self.path} holds {len(prefixes)} drives; name the namespace of one "
-                    f"of them: {namespaces}"
+                    f"the bag {self.path} holds {len(prefixes)} drives; choose one by its "
+                    f"namespace: {namespaces}"
                 )
             if prefixes:
                 return prefixes[0]
@@ -296,7 +384,7 @@ def _mcap_files(path: Path) -> list[Path]:
     if sqlite:
         raise BagError(
             f"the bag {path} is stored as sqlite3, and only MCAP can be read; "
-            "`ros2 bag convert` makes one of the other"
+            "convert it with `ros2 bag convert`"
         )
     if not files:
         raise BagError(f"the directory {path} is not a bag: it holds no .mcap file")
@@ -304,7 +392,7 @@ def _mcap_files(path: Path) -> list[Path]:
 
 
 def _unpacked(path: Path, opened: ExitStack) -> Path:
-    """Return a file as MCAP: what rosbag2 packed as a whole is unpacked until the bag closes."""
+    """Return a file as MCAP; unpack one that rosbag2 compressed as a whole until the bag closes."""
     if not path.name.endswith(_PACKED):
         return path
     directory = opened.enter_context(tempfile.TemporaryDirectory(prefix="stickslip_ros_"))

@@ -1,8 +1,8 @@
-"""Writing a bag: a directory of MCAP files and, when one is finished, `metadata.yaml`.
+"""Write a bag: a directory of MCAP files and, once a file is finished, `metadata.yaml`.
 
-At each flush the chunk at hand goes to the operating system, and so outlives this process. To hand
-it on to the disk, so that it outlives the machine's power, may take a second: a thread of the
-recorder's own does that, and all else that must not hold up the one who writes.
+Each flush passes the current chunk to the operating system, so that it survives this process.
+Syncing it to the disk, so that it survives a power loss, may take a second: a background thread
+does this and everything else that must not block the caller.
 """
 
 import os
@@ -37,7 +37,7 @@ _LAST_STAMP = 2**63 - 1
 
 @dataclass(frozen=True)
 class QosProfile:
-    """What the publisher of a recorded topic offers, and offers again when it is played back."""
+    """QoS that the publisher of a recorded topic offers, also when the bag is played back."""
 
     depth: int
     history: Literal["keep_last", "keep_all"] = "keep_last"
@@ -45,7 +45,7 @@ class QosProfile:
     durability: Literal["volatile", "transient_local"] = "volatile"
 
     def to_yaml(self) -> str:
-        """Return the profile as rosbag2 keeps it with a channel: a YAML list of one profile."""
+        """Return the profile as rosbag2 stores it with a channel: a YAML list of one profile."""
         unlimited = {"sec": 9223372036, "nsec": 854775807}
         profile = {
             "history": self.history,
@@ -62,14 +62,14 @@ class QosProfile:
 
 
 def check_new_bag(path: Path) -> None:
-    """Raise BagError for a path at which no bag can be created; leaves nothing behind."""
+    """Raise BagError if no bag can be created at a path; leave nothing behind."""
     if os.path.lexists(path):
-        raise BagError(f"the bag {path} exists already, and nothing is ever overwritten")
+        raise BagError(f"the bag {path} exists already and is not overwritten")
     parent = next(parent for parent in _absolute(path).parents if os.path.lexists(parent))
     if not parent.is_dir():
         raise BagError(f"the bag {path} cannot be created: {parent} is not a directory")
     try:
-        with tempfile.TemporaryFile(dir=parent) as file:  # what permissions alone do not tell
+        with tempfile.TemporaryFile(dir=parent) as file:  # permissions alone are not enough
             file.write(bytes(4096))
     except OSError as error:
         raise BagError(
@@ -78,13 +78,13 @@ def check_new_bag(path: Path) -> None:
 
 
 class _RecordStream(BufferedWriter):
-    """A new file that is written whole records at a time, and can be cut behind the last one."""
+    """A new file that is written in whole records and can be truncated after the last one."""
 
     def __init__(self, path: Path, on_full: Callable[[], None]) -> None:
         super().__init__(FileIO(path, "xb"))
         self.path = path
         self.size = 0
-        """Bytes of the whole records that the operating system has."""
+        """Bytes of the whole records that were passed to the operating system."""
         self.limit = inf
         """Size from which on the file is full."""
         self._on_full = on_full
@@ -98,24 +98,24 @@ class _RecordStream(BufferedWriter):
         return written
 
     def sync(self) -> None:
-        """Hand what was written to the disk."""
+        """Sync the written data to the disk."""
         os.fdatasync(self.fileno())
 
     def cut(self) -> None:
-        """Close the file, on a disk that may fail, behind its last whole record."""
+        """Truncate the file after its last whole record and close it, even if the disk fails."""
         if self.closed:
             return
         with suppress(OSError):
             os.ftruncate(self.fileno(), self.size)
             self.sync()
         with suppress(OSError):
-            self.raw.close()  # not to try the rest of half a record again
+            self.raw.close()  # does not write the buffered half of a record
 
 
 class Recorder:
-    """Writes a bag, message by message as they arrive; a context manager that closes it.
+    """Write a bag message by message; a context manager that closes it.
 
-    To be used by one thread at a time.
+    Not thread-safe: use it in one thread at a time.
     """
 
     def __init__(
@@ -126,12 +126,12 @@ class Recorder:
         max_bag_size: int = 0,
         max_bag_duration: float = 0.0,
     ) -> None:
-        """Create the bag directory, with parents if need be, and open `<its name>_0.mcap` in it.
+        """Create the bag directory, with missing parents, and open `<its name>_0.mcap` in it.
 
-        `compression` is that of the files' chunks. A file that has reached `max_bag_size` bytes, or
-        whose messages would span more than `max_bag_duration` seconds by their stamps, is followed
-        by another (0: no limit). Raises BagError if the directory exists or cannot be created, and
-        then leaves nothing behind.
+        `compression` applies to the chunks. A new file is started when the current one has reached
+        `max_bag_size` bytes, or before its messages span more than `max_bag_duration` seconds by
+        their stamps (0: no limit). Raises BagError if the directory exists or cannot be created;
+        then nothing is left behind.
         """
         check_new_bag(directory)
         self.directory = _absolute(directory)
@@ -165,11 +165,11 @@ class Recorder:
     def add_topic(self, name: str, type_name: str, qos: QosProfile) -> int:
         """Add a topic, such as `/feed_drive/joint_states`, and return its channel for `write`.
 
-        The type is one such as `sensor_msgs/msg/JointState`. Raises BagError if the topic is in the
-        bag already, its type is not installed, or the bag is closed or fails.
+        An example of a type is `sensor_msgs/msg/JointState`. Raises BagError if the topic is
+        already in the bag, its type is not installed, or the bag is closed or fails.
         """
         if name in self._topics:
-            raise BagError(f"the topic {name} is in the bag {self.directory} already")
+            raise BagError(f"the topic {name} is already in the bag {self.directory}")
         definition = message_definition(type_name).encode()
         metadata = {"offered_qos_profiles": qos.to_yaml(), "topic_type_hash": type_hash(type_name)}
         return self.add_channel(
@@ -177,9 +177,9 @@ class Recorder:
         )
 
     def add_channel(self, channel: Channel, schema: Schema) -> int:
-        """Add a channel as another file has it, and return this bag's number of it for `write`.
+        """Add a channel of another file, and return its number in this bag for `write`.
 
-        The numbers in `channel` and `schema` do not matter. Raises BagError if the bag is closed or
+        The ids in `channel` and `schema` are ignored. Raises BagError if the bag is closed or
         fails.
         """
         new: list[Schema | Channel] = []
@@ -209,10 +209,10 @@ class Recorder:
         publish_time: int | None = None,
         sequence: int = 0,
     ) -> None:
-        """Append a serialized message; the stamp in ns is its log time.
+        """Append a serialized message; its log time is the stamp, in ns.
 
-        It is the publish time, too, if that is not given. Raises BagError for a time that is
-        negative or beyond 63 bits, and if the bag is closed or fails.
+        The publish time defaults to the stamp. Raises BagError for a time that is negative or
+        needs more than 63 bits, and if the bag is closed or fails.
         """
         if publish_time is None:
             publish_time = stamp
@@ -226,31 +226,31 @@ class Recorder:
             self._fail(error)
 
     def flush(self) -> None:
-        """Hand all that was written to the operating system, so that it outlives this process.
+        """Pass all written data to the operating system, so that it survives this process.
 
-        The disk has it soon after, or soon after the next flush if they follow each other at once.
-        Raises BagError if the bag is closed or fails; what the disk refuses is told at the next
-        flush.
+        The data are synced to the disk soon after, or soon after the next flush if the flushes
+        follow each other closely. Raises BagError if the bag is closed or fails; an error of the
+        disk is raised at the next flush.
         """
         with self._writing():
             self._writer.flush()
             grown = self._stream.size - self._defined_size
-            # Repeated outside the chunks, as damage may be to the first: at most 2 % of a file.
+            # Repeated outside the chunks, in case the first are damaged: at most 2 % of a file.
             if 0.02 * grown > len(self._definition_records):
                 self._stream.write(self._definition_records)
                 self._defined_size = self._stream.size
             now = time.monotonic()
             if self._stream.size > self._synced_size and now >= self._next_sync:
                 self._synced_size = self._stream.size
-                self._next_sync = now + 0.1  # s: what it costs slows down who writes
-                # One that has not begun yet sees to this flush, too.
+                self._next_sync = now + 0.1  # s: a sync slows down the caller
+                # A sync that has not started yet includes this flush.
                 if self._sync is None or self._sync.running() or self._sync.done():
                     self._sync = self._in_background(self._stream.sync)
 
     def attach(
         self, name: str, data: bytes, media_type: str, log_time: int = 0, create_time: int = 0
     ) -> None:
-        """Put a whole file of a media type such as `text/yaml` into the bag; times are in ns.
+        """Attach a file of a media type such as `text/yaml` to the bag; times are in ns.
 
         Raises BagError if the bag is closed or fails.
         """
@@ -258,7 +258,7 @@ class Recorder:
             self._writer.add_attachment(create_time, log_time, name, media_type, data)
 
     def add_metadata(self, name: str, data: Mapping[str, str]) -> None:
-        """Put a table of texts into the bag: into the file at hand and those that follow.
+        """Add a metadata table to the bag: to the current file and the following ones.
 
         Raises BagError if the bag is closed or fails.
         """
@@ -267,7 +267,7 @@ class Recorder:
             self._writer.add_metadata(name, self._tables[name])
 
     def close(self) -> None:
-        """Finish the bag, all of it on the disk; does nothing when done already.
+        """Finish the bag and sync it to the disk; do nothing if it is already closed.
 
         Raises BagError if the bag fails.
         """
@@ -285,7 +285,7 @@ class Recorder:
         self.close()
 
     def _open_file(self) -> None:
-        """Begin the next file with all that is known by now; where that fails, there is none."""
+        """Start the next file with all known definitions and tables; leave none if this fails."""
         path = self.directory / f"{self.directory.name}_{self._files}.mcap"
         stream = _RecordStream(path, self._on_full)
         try:
@@ -309,12 +309,12 @@ class Recorder:
         self._earliest = self._latest = _LAST_STAMP
 
     def _make_room(self, stamp: int) -> None:
-        """Begin a further file if a message of that stamp is not to be in the one at hand."""
+        """Start another file if a message with this stamp does not belong in the current one."""
         if not 0 <= stamp <= _LAST_STAMP:
             self._refuse_stamp(stamp)
         if stamp > self._latest:
             with self._writing():
-                self._wait_for_tasks(at_most=3)  # of a disk that is slower than who splits
+                self._wait_for_tasks(at_most=3)  # in case the disk is slower than the caller
                 self._writer.flush()
                 finished = self._writer, self._stream
                 self._stream.limit = inf
@@ -322,18 +322,18 @@ class Recorder:
                 self._in_background(self._finish, *finished)
                 self._sync = None
         if self._max_size and self._earliest == _LAST_STAMP:
-            # A file grows with chunks only: what a limit below its beginning lets in is one.
+            # A file grows by whole chunks: a limit below its start still admits one chunk.
             self._stream.limit = max(self._max_size, self._stream.size + 1)
         self._earliest = min(stamp, self._earliest)
         if self._max_duration:
             self._latest = min(self._earliest + self._max_duration, _LAST_STAMP)
 
     def _on_full(self) -> None:
-        """Let no further message into the file at hand."""
+        """Put the next message into a new file."""
         self._latest = -1
 
     def _finish(self, writer: Writer, stream: _RecordStream) -> None:
-        """Complete a file and describe it; when it is to be followed by another, that is there."""
+        """Complete a file and describe it; the following file, if any, already exists."""
         try:
             writer.finish()
             stream.sync()
@@ -347,12 +347,12 @@ class Recorder:
         _sync_directories([self.directory])
 
     def _in_background(self, task: Callable[..., None], *arguments: Any) -> Future[None]:
-        """Have something done in the background, behind what is to be done there already."""
+        """Queue a task for the background thread."""
         self._tasks.append(self._background.submit(task, *arguments))
         return self._tasks[-1]
 
     def _wait_for_tasks(self, at_most: int) -> None:
-        """Wait until no more than that are to be done; raise what one of those done has raised."""
+        """Wait until at most `at_most` tasks are pending; raise the error of a finished one."""
         while self._tasks and (len(self._tasks) > at_most or self._tasks[0].done()):
             self._tasks.popleft().result()
 
@@ -367,15 +367,15 @@ class Recorder:
             self._fail(error)
 
     def _fail(self, error: Exception) -> NoReturn:
-        """Close the file as it is: after half a record nothing more can be appended."""
+        """Close the file as it is: nothing can be appended after half a record."""
         self._end()
         self._stream.cut()
-        left = "it holds no message"  # the first ones may have been too many for the disk
+        left = "it holds no message"  # the disk may have had no room for the first ones
         with suppress(BagError), Recording(self.directory) as recording:
             if next(recording.messages(*self._topics), None) is not None:
-                left = "what it holds so far can be read"
+                left = "what was written so far can be read"
         raise BagError(
-            f"the bag {self.directory} cannot be written any more ({error}); {left}"
+            f"the bag {self.directory} can no longer be written ({error}); {left}"
         ) from error
 
     def _end(self) -> None:
@@ -384,10 +384,10 @@ class Recorder:
         self._background.shutdown()
 
     def _refuse_stamp(self, stamp: int) -> NoReturn:
-        """Refuse it before the library comes upon it and leaves half a record behind."""
+        """Refuse a stamp before the library fails on it and leaves half a record behind."""
         raise BagError(
-            f"a message of the stamp {stamp} ns cannot be written to the bag {self.directory}; "
-            "stamps are from 0 to 2^63 - 1 ns"
+            f"a message with the stamp {stamp} ns cannot be written to the bag {self.directory}; "
+            "stamps must be from 0 to 2^63 - 1 ns"
         )
 
     def _refuse(self, *_: object) -> NoReturn:
@@ -395,7 +395,7 @@ class Recorder:
 
 
 def _register(writer: Writer, definitions: Sequence[Schema | Channel]) -> None:
-    """Let a writer know of definitions: in the same order it gives them the same numbers."""
+    """Register definitions with a writer: the same order gives the same ids."""
     for new in definitions:
         if isinstance(new, Schema):
             writer.register_schema(new.name, new.encoding, new.data)
@@ -404,7 +404,7 @@ def _register(writer: Writer, definitions: Sequence[Schema | Channel]) -> None:
 
 
 def _sync_directories(directories: Collection[Path]) -> None:
-    """Hand the names in directories to the disk, where file system and permissions allow that."""
+    """Sync directories to the disk, if the file system and the permissions allow it."""
     for directory in directories:
         with suppress(OSError):
             descriptor = os.open(directory, os.O_RDONLY)

@@ -1,4 +1,4 @@
-"""Saving what is left of a damaged bag into a sound one."""
+"""Copy the readable part of a damaged bag into a new, sound one."""
 
 import shutil
 from collections import Counter
@@ -18,31 +18,31 @@ _Definition = tuple[object, ...]
 
 @dataclass
 class Repaired:
-    """What was saved."""
+    """The result of a repair."""
 
     messages: Counter[str] = field(default_factory=Counter[str])
-    """How many, by topic."""
+    """Number of copied messages by topic."""
     missing: list[str] = field(default_factory=list[str])
-    """What the original lacks, in sentences; empty if it was sound."""
+    """Sentences on what the original lacks; empty if it was sound."""
 
 
 def repair(path: Path, out: Path, progress: Callable[[int], None] = lambda _: None) -> Repaired:
-    """Write all that can be read of the bag at `path` into a new bag directory `out`.
+    """Write all readable data of the bag at `path` into a new bag directory `out`.
 
-    Messages of every topic come over with their times, as do tables and attached files. `progress`
-    is told now and then how many messages are done. The original is only read. Raises BagError for
-    what is no bag or has nothing to be saved, and if `out` exists, lies within the original or
-    cannot be written; then there is no `out`.
+    The messages of every topic are copied with their times, as are metadata tables and attached
+    files. `progress` is called from time to time with the number of copied messages. The original
+    is not changed. Raises BagError if `path` is not a bag or holds nothing readable, and if `out`
+    exists, lies within the original or cannot be written; `out` is then not left behind.
     """
     check_new_bag(out)
     original = path.parent if (path.parent / METADATA_FILE).exists() else path
     if out.resolve().is_relative_to(original.resolve()):
-        raise BagError(f"the bag {out} would lie within {original}, which is only to be read")
+        raise BagError(f"the bag {out} would lie within {original}, which must not be changed")
     repaired = Repaired()
     with Recording(path) as recording:
         if not recording.topics:
             why = "; ".join(recording.missing) or "it holds no topics"
-            raise BagError(f"nothing of the bag {path} can be saved: {why}")
+            raise BagError(f"nothing in the bag {path} can be repaired: {why}")
         try:
             with Recorder(out) as recorder:
                 channels: dict[_Definition, int] = {}
@@ -50,7 +50,7 @@ def repair(path: Path, out: Path, progress: Callable[[int], None] = lambda _: No
                     _copy_tables(file, recorder)
                     _copy_messages(file, recorder, channels, repaired, progress)
         except BaseException:
-            shutil.rmtree(out, ignore_errors=True)  # it would look like a sound bag of everything
+            shutil.rmtree(out, ignore_errors=True)  # it would look like a complete bag
             raise
         repaired.missing[:0] = recording.missing
     return repaired
@@ -58,7 +58,7 @@ def repair(path: Path, out: Path, progress: Callable[[int], None] = lambda _: No
 
 def _copy_tables(file: McapFile, recorder: Recorder) -> None:
     for table in file.tables():
-        if table.name != "rosbag2":  # of which the new bag has one of its own
+        if table.name != "rosbag2":  # the new bag has its own
             recorder.add_metadata(table.name, table.metadata)
     for attachment in file.attachments():
         times = attachment.log_time, attachment.create_time
@@ -72,7 +72,7 @@ def _copy_messages(
     repaired: Repaired,
     progress: Callable[[int], None],
 ) -> None:
-    """Copy the messages of a file; `channels` are those of the new bag by their definition."""
+    """Copy the messages of a file; `channels` maps definitions to channels of the new bag."""
     topics: dict[int, str] = {}
     targets: dict[int, int] = {}
     for number, channel in file.channels.items():
@@ -80,7 +80,7 @@ def _copy_messages(
         if schema is None:
             name = file.path.name
             topic = printable(channel.topic)
-            repaired.missing.append(f"{name}: {topic} is left out: it has no known type")
+            repaired.missing.append(f"{name}: {topic} is omitted: its type is unknown")
             continue
         details = (channel.message_encoding, *sorted(channel.metadata.items()))
         definition = (channel.topic, schema.name, schema.encoding, schema.data, details)
@@ -94,7 +94,7 @@ def _copy_messages(
         for channel, begin, end, log_time, publish_time, sequence in zip(
             *(column.tolist() for column in columns), strict=True
         ):
-            if log_time < 0 or publish_time < 0:  # beyond 63 bits, which rosbag2 cannot read
+            if log_time < 0 or publish_time < 0:  # more than 63 bits, which rosbag2 cannot read
                 untimely += 1
                 continue
             message = block.data[begin:end]
@@ -103,5 +103,5 @@ def _copy_messages(
         progress(repaired.messages.total())
     if untimely:
         repaired.missing.append(
-            f"{file.path.name}: {untimely} messages are left out: their times exceed 2^63 - 1 ns"
+            f"{file.path.name}: {untimely} messages are omitted: their times exceed 2^63 - 1 ns"
         )

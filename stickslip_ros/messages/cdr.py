@@ -1,9 +1,9 @@
-"""CDR, the byte layout of ROS messages: single messages field by field, blocks of them as tables.
+"""Decode CDR, the byte layout of ROS messages: single messages by field, blocks as tables.
 
-CDR aligns every number to its own size, counted from behind a four-byte encapsulation header.
-Where one message has its values, all have them that are equal but for the values, so that a block
-of messages is a table. Padding is never looked at: Fast DDS leaves in it, and behind the last
-field, whatever was in memory.
+CDR aligns every number to its own size, counted from the end of a four-byte encapsulation header.
+Messages that differ only in their values have them at the same places, so that a block of such
+messages is a table. Padding is ignored: Fast DDS leaves arbitrary memory in it and after the last
+field.
 """
 
 import itertools
@@ -25,7 +25,7 @@ LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 _ENCAPSULATION = len(LITTLE_ENDIAN)
 
 _STRUCTURES = 8
-"""Different structures that are looked for in a block of messages."""
+"""Number of different structures that a block of messages is searched for."""
 
 
 class Refused(NamedTuple):
@@ -33,40 +33,40 @@ class Refused(NamedTuple):
 
     number: int
     reason: str
-    """Why the first could not; empty where there is none."""
+    """Why the first one could not be read; empty if there is none."""
 
 
 def joined(messages: Sequence[bytes]) -> tuple[bytes, IntArray, IntArray]:
-    """Return messages as one, and where each of them begins and ends in it."""
+    """Return the messages joined together, and where each one begins and ends in the result."""
     size = np.array([len(message) for message in messages], np.int64)
     end = np.cumsum(size)
     return b"".join(messages), end - size, end
 
 
 class Decoder:
-    """Finds the fields of one CDR message; bytes behind the last field are left alone."""
+    """Find the fields of one CDR message; bytes after the last field are ignored."""
 
     def __init__(self, data: bytes, kind: str) -> None:
         if data[:2] not in (b"\x00\x00", b"\x00\x01"):
             raise MessageError(
-                f"a {kind} message begins with the bytes '{data[:2].hex()}'; "
-                "CDR begins with 0000 (big endian) or 0001 (little endian)"
+                f"a {kind} message starts with the bytes '{data[:2].hex()}'; "
+                "CDR starts with 0000 (big endian) or 0001 (little endian)"
             )
         self.data = data
         self.byte_order = "<" if data[1] else ">"
         self.structure = [slice(0, 2)]
-        """What is no value and no padding so far."""
+        """The parts found so far that are neither values nor padding."""
         self._place = _ENCAPSULATION
         self._kind = kind
 
     def header_stamp(self) -> int:
-        """Step over a std_msgs/msg/Header and return where its stamp is."""
+        """Skip a std_msgs/msg/Header and return where its stamp is."""
         stamp = self._advance(alignment=4, size=8)
         self.string()
         return stamp
 
     def count(self) -> int:
-        """Read an unsigned 32-bit number, the length of what follows."""
+        """Read an unsigned 32-bit number, the length of the next field."""
         start = self._advance(alignment=4, size=4)
         self.structure.append(slice(start, start + 4))
         (count,) = struct.unpack_from(f"{self.byte_order}I", self.data, start)
@@ -80,13 +80,13 @@ class Decoder:
         return self.data[start : start + length].rstrip(b"\x00").decode(errors="replace")
 
     def doubles(self, count: int) -> tuple[int, int]:
-        """Step over so many numbers; return where they are, and how many."""
+        """Skip `count` numbers; return where they are, and their count."""
         if count == 0:
-            return 0, 0  # nothing follows an empty sequence, not even the padding
+            return 0, 0  # an empty sequence has no padding either
         return self._advance(alignment=8, size=8 * count), count
 
     def _advance(self, alignment: int, size: int) -> int:
-        """Step over the next field and return where it starts."""
+        """Skip the next field and return where it starts."""
         offset = -(-(self._place - _ENCAPSULATION) // alignment) * alignment
         start = _ENCAPSULATION + offset
         if start + size > len(self.data):
@@ -99,10 +99,10 @@ class Decoder:
 
 
 class Layout:
-    """Where the values of one message stand, and of all that have its structure."""
+    """The places of the values in one message, and in all messages of the same structure."""
 
     def __init__(self, message: Decoder, stamp: int, values: Sequence[int | None]) -> None:
-        """Take the places of the stamp and of the values, None for one that is not there."""
+        """Take the places of the stamp and of the values, None for a missing value."""
         order = message.byte_order
         places = {str(name): place for name, place in enumerate(values) if place is not None}
         self._table = np.dtype(
@@ -121,7 +121,7 @@ class Layout:
 
     @property
     def size(self) -> int:
-        """Of a message, in bytes."""
+        """Size of a message, bytes."""
         return len(self._mask)
 
     def fits(self, messages: NDArray[np.void]) -> BoolArray:
@@ -140,7 +140,7 @@ class Layout:
         return table["sec"].astype(np.int64) * NANOSECONDS + table["nanosec"], values
 
     def read(self, message: bytes) -> tuple[int, list[float]]:
-        """Return stamp (ns) and values of the message that the layout was taken from."""
+        """Return stamp (ns) and values of the message from which the layout was taken."""
         stamp, values = self.table(np.frombuffer(message, self._table))
         return int(stamp[0]), values[:, 0].tolist()
 
@@ -152,7 +152,7 @@ def decode(
     layout_of: Callable[[bytes], Layout],
     value_count: int,
 ) -> tuple[IntArray, FloatArray, Refused]:
-    """Return stamps and values of the messages that can be read, in their order, and the rest."""
+    """Return stamps and values of the readable messages, in order, and the refused ones."""
     parts = [(np.empty(0, np.intp), np.empty(0, np.int64), np.empty((value_count, 0)))]
     refused = Refused(0, "")
     left = np.arange(len(begin))
@@ -165,7 +165,7 @@ def decode(
             refused = Refused(refused.number + 1, refused.reason or str(error))
             left = left[1:]
             continue
-        # Where every message has a structure of its own, to compare them all would take for ever.
+        # If every message has its own structure, comparing all of them would take too long.
         compared = left if attempt < _STRUCTURES else left[:1]
         taken = end[compared] - begin[compared] == layout.size
         shape, item = (max(0, len(data) - layout.size + 1),), np.dtype((np.void, layout.size))

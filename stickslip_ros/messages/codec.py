@@ -1,8 +1,8 @@
-"""The messages that go round the control loop and into the bag, packed and unpacked.
+"""Pack and unpack the messages of the control loop and of the bag.
 
-With fixed joints and a fixed frame all messages have one length, so that each is packed and
-unpacked in one step. Messages laid out otherwise, as other publishers may send them, are decoded
-field by field.
+With fixed joints and a fixed frame all messages have the same length, so that each one is packed
+and unpacked in one step. Messages with another layout, from other publishers, are decoded field by
+field.
 """
 
 import reprlib
@@ -19,7 +19,7 @@ SLIDE = "slide"
 BELT = "belt"
 
 _MOST_JOINTS = 1000
-"""More are not looked through: that might take longer than the message stands for."""
+"""Messages with more joints are refused: decoding might take longer than a sample."""
 
 
 def _name(name: str) -> bytes:
@@ -57,7 +57,7 @@ def pack_joint_state(
     """Serialize a sensor_msgs/msg/JointState of slide and belt, in this order, with no frame.
 
     Stamp in ns, positions in m, velocities in m/s, efforts in N. Raises MessageError for a stamp
-    that ROS time (32-bit seconds) does not hold.
+    outside ROS time (32-bit seconds).
     """
     try:
         return _JOINT_STATE.pack(
@@ -81,7 +81,7 @@ def pack_joint_state(
 def pack_wrench(stamp: int, force_x: float) -> bytes:
     """Serialize a geometry_msgs/msg/WrenchStamped of a force along x (N) in the frame `slide`.
 
-    Stamp in ns. Raises MessageError for a stamp that ROS time (32-bit seconds) does not hold.
+    Stamp in ns. Raises MessageError for a stamp outside ROS time (32-bit seconds).
     """
     try:
         return _WRENCH.pack(
@@ -94,7 +94,7 @@ def pack_wrench(stamp: int, force_x: float) -> bytes:
 def pack_header(stamp: int) -> bytes:
     """Serialize a std_msgs/msg/Header of a stamp in ns, with no frame.
 
-    Raises MessageError for a stamp that ROS time (32-bit seconds) does not hold.
+    Raises MessageError for a stamp outside ROS time (32-bit seconds).
     """
     try:
         return _HEADER.pack(LITTLE_ENDIAN, *divmod(stamp, NANOSECONDS), _name(""))
@@ -103,10 +103,10 @@ def pack_header(stamp: int) -> bytes:
 
 
 def unpack_joint_state(data: bytes) -> Sample:
-    """Read slide and belt out of a serialized sensor_msgs/msg/JointState.
+    """Read slide and belt from a serialized sensor_msgs/msg/JointState.
 
-    Any frame, byte order and order of the joints will do, and further joints may be there. Raises
-    MessageError for other bytes, and where a joint, its position or its velocity is missing.
+    Any frame, byte order and order of the joints is accepted, and so are further joints. Raises
+    MessageError for other bytes, and if a joint, its position or its velocity is missing.
     """
     if len(data) == _JOINT_STATE.size:
         (
@@ -135,9 +135,9 @@ def unpack_joint_state(data: bytes) -> Sample:
 
 
 def unpack_wrench(data: bytes) -> tuple[int, float]:
-    """Read the stamp (ns) and `force.x` (N) out of a serialized geometry_msgs/msg/WrenchStamped.
+    """Read the stamp (ns) and `force.x` (N) from a serialized geometry_msgs/msg/WrenchStamped.
 
-    Any frame and byte order will do. Raises MessageError for other bytes.
+    Any frame and byte order is accepted. Raises MessageError for other bytes.
     """
     if len(data) == _WRENCH.size:
         encapsulation, sec, nanosec, frame, force = _WRENCH.unpack(data)
@@ -148,7 +148,7 @@ def unpack_wrench(data: bytes) -> tuple[int, float]:
 
 
 def unpack_header(data: bytes) -> int:
-    """Read the stamp (ns) out of a serialized std_msgs/msg/Header, or a message that begins so.
+    """Read the stamp (ns) from a serialized std_msgs/msg/Header, or a message starting with one.
 
     Raises MessageError for other bytes.
     """
@@ -159,7 +159,7 @@ def unpack_header(data: bytes) -> int:
 
 
 def joint_state_columns(messages: Sequence[bytes]) -> tuple[SampleColumns, Refused]:
-    """Decode serialized joint states; say which `unpack_joint_state` would refuse."""
+    """Decode serialized joint states; also return what `unpack_joint_state` would refuse."""
     return joint_states_in(*joined(messages))
 
 
@@ -170,7 +170,7 @@ def joint_states_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[Sample
 
 
 def wrench_columns(messages: Sequence[bytes]) -> tuple[ForceColumns, Refused]:
-    """Decode serialized wrenches; say which `unpack_wrench` would refuse."""
+    """Decode serialized wrenches; also return what `unpack_wrench` would refuse."""
     return wrenches_in(*joined(messages))
 
 
@@ -183,7 +183,7 @@ def wrenches_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[ForceColum
 def _unpackable(kind: str, stamp: int, error: struct.error) -> MessageError:
     return MessageError(
         f"a {kind} with the stamp {stamp} ns cannot be serialized ({error}); "
-        "stamps are 32-bit seconds, values are numbers"
+        "stamps must be within 32-bit seconds, values must be numbers"
     )
 
 
@@ -192,7 +192,7 @@ def _joint_state_layout(data: bytes) -> Layout:
     stamp = message.header_stamp()
     joints = message.count()
     if joints > _MOST_JOINTS:
-        raise MessageError(f"a joint state of {joints} joints; at most {_MOST_JOINTS} are taken")
+        raise MessageError(f"a joint state has {joints} joints; must be at most {_MOST_JOINTS}")
     names = [message.string() for _ in range(joints)]
     shown = reprlib.repr(names)
     (position, positions), (velocity, velocities), (effort, efforts) = (
@@ -206,7 +206,7 @@ def _joint_state_layout(data: bytes) -> Layout:
     if (positions, velocities, efforts or len(names)) != (len(names),) * 3:
         raise MessageError(
             f"a joint state of the joints {shown} has {positions} positions, {velocities} "
-            f"velocities and {efforts} efforts; one each is needed, of efforts one each or none"
+            f"velocities and {efforts} efforts; must be one for each joint, or no efforts"
         )
     slide, belt = 8 * names.index(SLIDE), 8 * names.index(BELT)
     return Layout(

@@ -1,4 +1,4 @@
-"""The topics: name, type, depth of history, meaning and decoder, each once; no ROS.
+"""The topics: name, type, history depth, meaning and decoder of each; no ROS.
 
 Names are relative to the namespace.
 """
@@ -12,7 +12,7 @@ from stickslip_ros.messages.codec import unpack_header, unpack_joint_state, unpa
 MessageT = TypeVar("MessageT")
 
 DEEP = 4_900
-"""Messages that wait for a reader that falls behind; above 5,000, Fast DDS delays the writer."""
+"""Messages queued for a reader that falls behind; above 5,000, Fast DDS delays the writer."""
 
 _WRENCH = "geometry_msgs/msg/WrenchStamped"
 _NUMBER = "std_msgs/msg/Float64"
@@ -20,14 +20,14 @@ _NUMBER = "std_msgs/msg/Float64"
 
 @dataclass(frozen=True)
 class Topic(Generic[MessageT]):
-    """A topic that nodes of this package write or read; reliable, with bounded history."""
+    """A topic that the nodes of this package publish or subscribe; reliable, bounded history."""
 
     name: str
     type_name: str
     depth: int = 10
     meaning: str = ""
     decode: Callable[[bytes], MessageT] | None = None
-    """Reads a serialized message, or raises BagError; None: as ROS does, into an object."""
+    """Decodes a serialized message or raises BagError; None: ROS deserializes it to an object."""
 
 
 JOINT_STATES = Topic(
@@ -35,55 +35,57 @@ JOINT_STATES = Topic(
     "sensor_msgs/msg/JointState",
     DEEP,
     meaning="State at each sample: `name` slide and belt, `position` m, `velocity` m/s, `effort` N "
-    "(friction on the slide, its reaction on the belt, under the force held up to then).",
+    "(friction on the slide and its reaction on the belt, under the force held up to this sample).",
     decode=unpack_joint_state,
 )
 CONTROL_FORCE = Topic(
     "control_force",
     _WRENCH,
     DEEP,
-    meaning="Force on the slide, `wrench.force.x` N, with the stamp of the state that it answers.",
+    meaning="Control force on the slide, `wrench.force.x` N, with the stamp of the state that it "
+    "answers.",
     decode=unpack_wrench,
 )
 DISTURBANCE_FORCE = Topic(
     "disturbance_force",
     _WRENCH,
-    meaning="A force of yours on the slide, `wrench.force.x` N, from the next sample on until the "
-    "next message; its stamp does not matter.",
+    meaning="External force on the slide, `wrench.force.x` N, from the next sample until the next "
+    "message; the stamp is ignored.",
     decode=unpack_wrench,
 )
 APPLIED_DISTURBANCE = Topic(
     "applied_disturbance",
     _WRENCH,
     DEEP,
-    meaning="All the disturbance that acts, `wrench.force.x` N, at each change, with the stamp of "
-    "the sample from which it acts.",
+    meaning="Total disturbance force that acts, `wrench.force.x` N, published at each change, with "
+    "the stamp of the first sample it acts on.",
     decode=unpack_wrench,
 )
 DROPPED_FORCE = Topic(
     "dropped_force",
     _WRENCH,
     DEEP,
-    meaning="Each `control_force` that did not act, as it was sent: refused, overtaken by a newer "
-    "one, or come while the plant was not active.",
+    meaning="Each `control_force` that did not act, as sent: refused, replaced by a newer one, or "
+    "received while the plant was not active.",
     decode=unpack_wrench,
 )
 RECORDED = Topic(
     "recorded",
     "std_msgs/msg/Header",
     100,
-    meaning="Stamp of the newest sample that the analyzer has taken in.",
+    meaning="Stamp of the newest sample that the analyzer has processed.",
     decode=unpack_header,
 )
 AMPLITUDE: Topic[Any] = Topic(
     "limit_cycle/amplitude",
     _NUMBER,
-    meaning="Half the peak-to-peak displacement of each cycle, m; none while the slide rests.",
+    meaning="Half the peak-to-peak displacement of each cycle, m; no message while the slide is "
+    "at rest.",
 )
 STICK_FRACTION: Topic[Any] = Topic(
     "limit_cycle/stick_fraction",
     _NUMBER,
-    meaning="Share of that cycle during which the slide stuck.",
+    meaning="Fraction of that cycle during which the slide stuck.",
 )
 FREQUENCY: Topic[Any] = Topic(
     "limit_cycle/frequency", _NUMBER, meaning="One over the period of that cycle, Hz."
@@ -92,12 +94,12 @@ DIAGNOSTICS: Topic[Any] = Topic(
     "/diagnostics",
     "diagnostic_msgs/msg/DiagnosticArray",
     100,
-    meaning="Health of the node, once a second of wall time, and when it is deactivated.",
+    meaning="Health of the node, once per second of wall time and on deactivation.",
 )
 CLOCK: Topic[Any] = Topic(
     "/clock",
     "rosgraph_msgs/msg/Clock",
-    meaning="Simulated time, of a plant with `publish_clock`; recorded time, of a replay with "
+    meaning="Simulated time from a plant with `publish_clock`; recorded time from a replay with "
     "`clock`.",
 )
 
@@ -115,4 +117,4 @@ TOPICS = (
     CLOCK,
 )
 RECORDED_TOPICS = (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE, DROPPED_FORCE)
-"""What the analyzer writes to its bag."""
+"""Topics that the analyzer records."""

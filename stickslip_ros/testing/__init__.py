@@ -1,4 +1,4 @@
-"""The closed loop as a test harness, for controllers of one's own."""
+"""Test harness that runs the closed loop with your own controller."""
 
 from stickslip_ros.running.domain import own_domain
 from stickslip_ros.testing.closed_loop import ClosedLoop, Controller

@@ -1,4 +1,4 @@
-"""The closed loop as a context manager: a scenario, a controller, and so much simulated time."""
+"""The closed loop as a context manager: run a scenario and a controller for a simulated time."""
 
 import os
 import tempfile
@@ -34,39 +34,68 @@ from stickslip_ros.testing.result import Diagnostics, RunResult, result_of
 from stickslip_ros.text import shown
 
 Controller = Callable[..., Node] | Sequence[str] | Literal["washout", "external"] | None
-"""What is to control: a class or function that makes an rclpy node, a command that starts one,
-ours (washout), whatever the test starts by itself (external), or nothing."""
+"""The controller of a loop: a class or function that makes an rclpy node, a command that starts
+one, the washout controller of this package ("washout"), a node that the test starts itself
+("external"), or none (None)."""
 
 _OF_A_TEST = ("plant.pace=lockstep", "plant.reply_timeout=5.0")
-"""Where the caller asks for nothing else. A busy machine does not stand still for so long."""
+"""Defaults that the caller may override; a busy machine is never delayed for this timeout."""
 
 _EXPECTS_CONTROL, _BAG = "plant.expects_control", "analyzer.bag"
 
 _NODE_TIMEOUT, _PROCESS_TIMEOUT = 5.0, 30.0
-"""Wall time, s, in which a controller has to be found, in this process or in one of its own."""
+"""Wall time, s, in which a controller must be found: in this process, in another process."""
 _ANSWER_TIMEOUT = 2.0
 
 
 class ClosedLoop:
-    """A plant and a controller in a ROS domain of their own, run for so much simulated time.
+    """A plant and a controller in a ROS domain of their own; a context manager.
 
-        with ClosedLoop("feed_drive", "plant.belt_speed=0.03", controller=MyController) as loop:
-            result = loop.run(5.0)
-        assert result.measures.regime == "equilibrium"
+    The loop is loopback only and leaves nothing behind. The plant runs in lockstep: it waits for
+    the answer to each sample, up to `plant.reply_timeout` (5 s unless overridden), and continues
+    without a force if none arrives. The plant runs only during `run`, the controller as long as the
+    loop is open.
 
-    All is kept on this machine, and nothing is left behind. The plant runs in lockstep: it waits
-    for the answer to each sample, up to `plant.reply_timeout` (5 s unless overridden), and goes on
-    without if none comes. The plant only runs within `run`; the controller while the loop is open.
+    A class or function is called without arguments and makes an rclpy node, which runs in its own
+    thread. A managed (lifecycle) node is configured and activated. Relative topic names resolve in
+    `namespace`. A node without an explicit context uses that of the loop, unless rclpy's default
+    context is already in use (the test has called rclpy.init, or another loop is open): then the
+    class or function must take the argument `context`.
 
-    A controller that is a class or a function is called without arguments and makes an rclpy
-    node, which runs in a thread of its own; if it is a managed (lifecycle) node, it is configured
-    and activated. Relative topic names are taken in `namespace`. Nodes that name no context are in
-    that of the loop, unless rclpy's default context is in use already (the test has called
-    rclpy.init, or another loop is open): then the controller must take `context`.
+    A command is started with `environment` and `ros_arguments`, and is ended with all processes
+    that it has started. Parameters in its own --ros-args take precedence. With "external", start
+    the controller yourself with the same environment and arguments.
 
-    A controller that is a command is started with `environment` and `ros_arguments`, and ended
-    with all that it has started; of its own --ros-args the parameters go first. With "external"
-    the test starts one, with the same. A scenario that expects no control has none of ours.
+    Parameters
+    ----------
+    scenario : str or os.PathLike
+        Name of a shipped scenario, or path of a scenario file.
+    *overrides : str
+        Parameters as NODE.PARAMETER=VALUE.
+    controller : Controller
+        A class or function that makes an rclpy node, a command as a list of strings, "washout",
+        "external", or None. "washout" starts no controller if the scenario sets
+        `plant.expects_control` to false.
+    namespace : str
+        ROS namespace of the drive.
+    bag : str or os.PathLike or None
+        Directory to which the first run is recorded; `_2`, `_3`, ... are appended for further
+        runs. None: recordings are not kept.
+
+    Raises
+    ------
+    InvalidInputError
+        If the scenario, an override, the controller or the namespace is invalid.
+    BagError
+        If no bag can be created at `bag`.
+
+    Examples
+    --------
+    >>> from stickslip_ros.testing import ClosedLoop
+    >>> with ClosedLoop("feed_drive", "washout_controller.start_after=0.0") as loop:
+    ...     result = loop.run(5.0)
+    >>> str(result.measures.regime), result.late_forces
+    ('equilibrium', 0)
     """
 
     def __init__(
@@ -77,14 +106,9 @@ class ClosedLoop:
         namespace: str = DEFAULT_NAMESPACE,
         bag: str | PathLike[str] | None = None,
     ) -> None:
-        """Prepare a scenario, by name or path, with overrides NODE.PARAMETER=VALUE.
-
-        The first run is recorded to the directory `bag`, further ones to `bag` with _2, _3 …
-        appended; None: nothing is kept. Raises InvalidInputError for what cannot be.
-        """
         self.namespace = _checked_namespace(namespace)
         self.controller: Node | None = None
-        """The controller's node, if it runs in this process, while the loop is open."""
+        """The controller's node while the loop is open, if it runs in this process."""
         _check_controller(controller)
         self._to_control = controller
         self._name_or_path = fspath(scenario)
@@ -92,7 +116,7 @@ class ClosedLoop:
         if controller is None:
             self._overrides.setdefault(_EXPECTS_CONTROL, f"{_EXPECTS_CONTROL}=false")
         self.scenario = self._load(self._overrides)
-        """The scenario as it is at present."""
+        """The current scenario, including changes by `set` and `disturb`."""
         if controller == "washout" and not self.scenario.plant.expects_control:
             self._to_control = None
         self._bag = None if bag is None else Path(bag)
@@ -104,15 +128,16 @@ class ClosedLoop:
 
     @property
     def environment(self) -> dict[str, str]:
-        """Environment of a process that is to meet this loop; RunError unless that is open."""
+        """Environment of a process that joins this loop; raises RunError if it is not open."""
         self._open_nodes()
         return {**os.environ, **domain_variables(self._domain)}
 
     @property
     def ros_arguments(self) -> list[str]:
-        """Arguments of a process that is to have its relative names in this loop's namespace.
+        """ROS arguments of a process whose relative names are in this loop's namespace.
 
-        Parameters of its nodes are in the scenario file, if that has sections for others than ours.
+        They name the scenario file as parameter file if it has sections for nodes of other
+        packages.
         """
         files = ["--params-file", str(self.scenario.path)] if self.scenario.other_sections else []
         return ["--ros-args", "-r", f"__ns:={self.namespace}", *files]
@@ -126,7 +151,7 @@ class ClosedLoop:
                 tempfile.TemporaryDirectory(prefix="stickslip_ros_")
             )
             self.context = opened.enter_context(ros_context(self._domain, self.ros_arguments))
-            opened.callback(self._forget)  # before ROS ends: then nothing of it is left
+            opened.callback(self._forget)  # while ROS still runs
             parameters = node_parameters(self.scenario, self._bag_of_run)
             if self._to_control != "washout":
                 parameters.pop("washout_controller", None)
@@ -143,12 +168,30 @@ class ClosedLoop:
                 running.check()
 
     def run(self, duration: float, *, timeout: float = 300.0) -> RunResult:
-        """Run the loop for `duration` (s) of simulated time and return what it gave.
+        """Run the loop for some simulated time and return the result.
 
-        Run again, the motion goes on from where it was, in a new segment of samples, the first of
-        which stands a period after the last one. Raises RunError if the controller raises or ends,
-        if it is not found on the topics, if the run takes more than `timeout` of wall time (s), or
-        if it could not be recorded in whole.
+        A further call continues the motion in a new segment of samples; the first of them is one
+        sampling period after the last sample before.
+
+        Parameters
+        ----------
+        duration : float
+            Simulated time, s.
+        timeout : float
+            Largest wall time of the run, s.
+
+        Returns
+        -------
+        RunResult
+            Recorded columns, measures and diagnostics of this run.
+
+        Raises
+        ------
+        InvalidInputError
+            If the duration is not positive and finite.
+        RunError
+            If the loop is not open, the controller raises or ends, or is not found on the topics,
+            the run takes longer than `timeout`, or its recording is incomplete.
         """
         nodes = self._open_nodes()
         if not 0.0 < duration < float("inf"):
@@ -176,9 +219,19 @@ class ClosedLoop:
         return result
 
     def set(self, *overrides: str) -> None:
-        """Change parameters, NODE.PARAMETER=VALUE each, from the next sample or run on.
+        """Change parameters from the next sample or run on.
 
-        Raises InvalidInputError for what is refused; then nothing is changed.
+        Parameters
+        ----------
+        *overrides : str
+            Parameters as NODE.PARAMETER=VALUE.
+
+        Raises
+        ------
+        InvalidInputError
+            If a parameter is refused; then nothing is changed.
+        RunError
+            If the loop is not open.
         """
         nodes = self._open_nodes()
         changed = self._overrides | {_target(text): text for text in overrides}
@@ -190,16 +243,28 @@ class ClosedLoop:
                     f"{node} is not part of this loop, whose nodes are {', '.join(nodes.nodes)}"
                 )
             values.setdefault(node, {})[parameter] = scenario.as_dict()[node][parameter]
-        # Only an active node may still refuse, and no more than one is active between runs.
+        # Only an active node may still refuse, and at most one is active between runs.
         for node in sorted(values, key=lambda name: not nodes.nodes[name].active):
             nodes.set_parameters(nodes.nodes[node], values[node])
         self.scenario, self._overrides = scenario, changed
 
     def disturb(self, force: float) -> None:
-        """Let a constant `force` (N) act on the slide from the next sample or run on.
+        """Apply a constant force to the slide from the next sample or run on.
 
-        It takes the place of the disturbance of the scenario; that of the topic disturbance_force
-        is added to it. Raises InvalidInputError unless it is finite.
+        It replaces the disturbance of the scenario. A force on the topic disturbance_force is added
+        to it.
+
+        Parameters
+        ----------
+        force : float
+            N.
+
+        Raises
+        ------
+        InvalidInputError
+            If the force is not finite.
+        RunError
+            If the loop is not open.
         """
         self.set(
             "plant.disturbance.kind=step",
@@ -216,7 +281,7 @@ class ClosedLoop:
     def _load(self, overrides: Mapping[str, str]) -> Scenario:
         if _BAG in overrides:
             raise InvalidInputError(
-                f"{overrides[_BAG]} is refused: where to is said by `bag` of ClosedLoop"
+                f"{overrides[_BAG]} is refused: use the argument `bag` of ClosedLoop"
             )
         scenario = load_scenario(
             self._name_or_path,
@@ -246,7 +311,7 @@ class ClosedLoop:
             self._running.start()
         elif self._to_control not in ("washout", "external", None):
             command = list(self._to_control)
-            # rcl lets later parameters win: those of the command are to.
+            # In rcl, later parameters take precedence: those of the command must.
             at = command.index("--ros-args") if "--ros-args" in command else len(command)
             command[at : at + 1] = self.ros_arguments
             self._running = ControllerProcess(command, domain_variables(self._domain))
@@ -270,7 +335,7 @@ class ClosedLoop:
         return node
 
     def _close_the_loop(self, nodes: Composition) -> None:
-        """Activate the plant as soon as plant and controller have found each other."""
+        """Activate the plant as soon as plant and controller have discovered each other."""
         listeners = ["analyzer"]
         if self._to_control == "washout":
             listeners.append("washout_controller")
@@ -283,7 +348,7 @@ class ClosedLoop:
         nodes.activate(nodes.plant, _NODE_TIMEOUT)
 
     def _find_controller(self, nodes: Composition) -> list[str]:
-        """Wait for a controller, get it ready, and return its full name; RunError if none comes."""
+        """Wait for a controller, bring it up and return its full name; RunError if none appears."""
         search = ControllerSearch(nodes.plant, self.namespace, nodes.nodes)
         elsewhere = self.controller is None
         timeout = _PROCESS_TIMEOUT if elsewhere else _NODE_TIMEOUT
@@ -301,10 +366,10 @@ class ClosedLoop:
             self._wait(nodes, lambda: bool(search.controllers()), timeout)
         found = search.controllers()
         if not found:
-            reasons = "; ".join([f"nobody {search.task}", *search.near_misses()])
+            reasons = "; ".join([f"no node {search.task}", *search.near_misses()])
             raise RunError(f"no controller was found within {timeout:g} s: {reasons}")
-        # The middleware tells a process of our topics in the order in which we have made them: once
-        # it has found what its answer is to go to, it has found plant and analyzer, too.
+        # The middleware announces our topics to a process in the order of their creation: once the
+        # process has discovered where its answer goes, it has also discovered plant and analyzer.
         for name in found if elsewhere else []:
             call = parameters_call(nodes.plant, name, [], lambda _: None)
             nodes.spinner.spin_until(call.pursue, 2.0 * _ANSWER_TIMEOUT)
@@ -325,7 +390,7 @@ class ClosedLoop:
             self._running.check()
 
     def _end_run(self, nodes: Composition) -> dict[str, Diagnostics]:
-        """Let the analyzer take in what is under way and close its bag; return all diagnostics."""
+        """Let the analyzer process pending messages and close its bag; return all diagnostics."""
         if isinstance(self._running, ControllerThread):
             self._running.settle()
             self._running.check()

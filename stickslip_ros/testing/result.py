@@ -1,4 +1,4 @@
-"""What a run of the closed loop gave: columns, measures, diagnostics."""
+"""The result of a run of the closed loop: columns, measures, diagnostics."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,59 +13,80 @@ from stickslip_ros.samples import ForceColumns, SampleColumns
 
 
 class Diagnostics(NamedTuple):
-    """What a node said of itself at the end of a run."""
+    """Diagnostics of a node at the end of a run, as on /diagnostics.
+
+    Examples
+    --------
+    >>> from stickslip_ros.testing import ClosedLoop
+    >>> with ClosedLoop("feed_drive") as loop:
+    ...     plant = loop.run(0.1).diagnostics["plant"]
+    >>> plant.message, plant.figures["samples"]
+    ('', 101)
+    """
 
     level: bytes
-    """As in diagnostic_msgs/DiagnosticStatus: OK, WARN or ERROR."""
+    """OK, WARN or ERROR of diagnostic_msgs/msg/DiagnosticStatus."""
     message: str
-    """What is wrong, in words; empty: nothing."""
+    """The problem; empty if there is none."""
     figures: dict[str, Any]
+    """Values by key, as in the table of diagnostics."""
 
 
 @dataclass(frozen=True, eq=False)
 class RunResult:
-    """One run: what was recorded in it, and what that comes to; SI units, stamps in ns."""
+    """The recording and the measures of one run; SI units, stamps in ns.
+
+    Examples
+    --------
+    >>> from stickslip_ros.testing import ClosedLoop
+    >>> with ClosedLoop("feed_drive", controller=None) as loop:
+    ...     result = loop.run(2.0)
+    >>> str(result.measures.regime), result.peak_force
+    ('stick_slip', None)
+    >>> len(result.time) == len(result.states)
+    True
+    """
 
     states: SampleColumns
-    """Every sample."""
+    """All samples."""
     forces: ForceColumns
-    """Every control force that was published; its stamp is that of the sample it answers."""
+    """All published control forces, each with the stamp of the sample that it answers."""
     dropped_forces: ForceColumns
-    """Those of them that did not act."""
+    """The control forces that did not act."""
     disturbances: ForceColumns
     """The disturbance force at each sample at which it changed."""
     measures: Measures
-    """Of the last whole cycles of this run, `analyzer.window` at most."""
+    """Measures over the last whole cycles of this run, at most `analyzer.window` of them."""
     peak_force: float | None
-    """Largest magnitude of the control force, N, as it was published; None without forces."""
+    """Largest magnitude of the published control force, N; None without forces."""
     resting_force: float | None
-    """The same over the last tenth of the run."""
+    """Final force: the same over the last tenth of the run."""
     peak_applied_force: float | None
     """Largest magnitude of the control force that acted, N; None without forces."""
     resting_applied_force: float | None
-    """The same over the last tenth of the run."""
+    """Final applied force: the same over the last tenth of the run."""
     late_forces: int
-    """Samples whose force had not come when it was due."""
+    """Number of samples whose force had not arrived when it was due."""
     lost_samples: int
-    """Samples that are missing in `states`; in lockstep none ever is."""
+    """Number of samples missing in `states`; always 0 in lockstep."""
     diagnostics: dict[str, Diagnostics]
-    """By the name of the node: plant and, if it ran, washout_controller."""
+    """Diagnostics by node name: plant and, if it ran, washout_controller."""
 
     @property
     def time(self) -> FloatArray:
-        """Time of each sample from the first one of this run, s."""
+        """Time of each sample since the first one of this run, s."""
         return (self.states.stamp - self.states.stamp[0]) * 1e-9
 
     @property
     def force_time(self) -> FloatArray:
-        """Time of the sample that each force answers, from the first sample of this run, s."""
+        """Time of the sample that each force answers, since the first sample of this run, s."""
         return (self.forces.stamp - self.states.stamp[0]) * 1e-9
 
 
 def result_of(bag: Path, window: int, diagnostics: dict[str, Diagnostics]) -> RunResult:
-    """Read and measure a run, over the last `window` cycles.
+    """Read a run and measure it over the last `window` cycles.
 
-    Raises RunError if the recording is not complete, BagError if it cannot be read.
+    Raises RunError if the recording is incomplete, BagError if it cannot be read.
     """
     with Recording(bag) as recording:
         states, forces = recording.joint_states, recording.control_forces

@@ -1,4 +1,4 @@
-"""The picture of the dashboard for README.md: `python -m tests.app.screenshot FILE`."""
+"""Take the screenshot of the dashboard for README.md: `python -m tests.app.screenshot FILE`."""
 
 import re
 import subprocess

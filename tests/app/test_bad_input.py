@@ -1,4 +1,4 @@
-"""What came in is refused in one clear line, with status 2, and leaves nothing behind."""
+"""Invalid input is refused in one line, with status 2, and leaves nothing behind."""
 
 import socket
 from collections.abc import Sequence
@@ -184,7 +184,7 @@ def test_a_domain_whose_ports_are_taken_is_refused(
     assert named.format(ports[0], ports[-1], domain=domain) in done.stderr.splitlines()[-1]
 
 
-def test_shared_memory_that_is_full_is_told(
+def test_full_shared_memory_is_reported(
     stickslip: Run, process_environment: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("stickslip_ros.nodes.base.machine_check.free_shared_memory", lambda: 4096)

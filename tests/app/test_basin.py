@@ -1,4 +1,4 @@
-"""`stickslip basin`: shares, tables, pictures, and what is refused."""
+"""`stickslip basin`: shares, tables, figures, and refusals."""
 
 import csv
 import json
@@ -84,7 +84,7 @@ def test_without_ranges_the_starts_are_around_the_equilibrium(stickslip: Run) ->
         (["--plot", "basin.txt"], "--plot basin.txt: must end in one of"),
     ],
 )
-def test_what_cannot_be_is_refused(stickslip: Run, arguments: list[str], message: str) -> None:
+def test_invalid_input_is_refused(stickslip: Run, arguments: list[str], message: str) -> None:
     done = stickslip("basin", "paper", "--no-control", *arguments)
     assert done.returncode == 2
     assert message in " ".join(done.stderr.split())

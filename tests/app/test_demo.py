@@ -1,4 +1,4 @@
-"""`make demo` from the set-up on."""
+"""`make demo`, including the set-up."""
 
 import subprocess
 import sys

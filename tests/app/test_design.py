@@ -1,4 +1,4 @@
-"""`stickslip design`: the proposal as a table, as JSON, as a parameter file and as a picture."""
+"""`stickslip design`: the proposal as a table, as JSON, as a parameter file and as a figure."""
 
 import json
 from functools import cache

@@ -97,7 +97,7 @@ def test_a_table_without_rows_is_its_headings(capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().out == "empty\ntopic  messages\n"
 
 
-def test_what_would_steer_a_terminal_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+def test_control_characters_are_shown_as_escapes(capsys: pytest.CaptureFixture[str]) -> None:
     print_table("a\x1b[2J", ["", ""], [["b\n", "\x07"]])
     assert capsys.readouterr().out == "a\\x1b[2J\nb\\n  \\x07\n"
 

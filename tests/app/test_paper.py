@@ -1,4 +1,4 @@
-"""`stickslip paper`: the report and the pictures, from the command line."""
+"""`stickslip paper`: the report and the figures, from the command line."""
 
 import json
 from pathlib import Path

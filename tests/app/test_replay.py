@@ -80,7 +80,7 @@ def test_a_call_whose_bag_is_taken_for_a_topic_says_where_it_stands(stickslip: R
         (("--topics", "/x", "--topics", "/y", "--", "bag"), ("topics = ['/x', '/y']",)),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(
+def test_invalid_input_is_refused_in_one_line(
     stickslip: Run, tmp_path: Path, arguments: tuple[str, ...], named: tuple[str, ...]
 ) -> None:
     record_states(tmp_path / "bag", 2)

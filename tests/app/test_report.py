@@ -60,7 +60,7 @@ def test_a_damaged_bag_is_repaired(command, tmp_path):
     before = json.loads(command("report", tmp_path / "bag", "--json")[1])
     status, out, _ = command("repair", tmp_path / "bag", tmp_path / "sound")
     assert status == 0
-    assert "does not end as it should" in out
+    assert "is incomplete: " in out
     after = json.loads(command("report", tmp_path / "sound", "--json")[1])
     assert not before["complete"]
     assert after["complete"]
@@ -155,7 +155,7 @@ def test_parameters_that_are_none_are_no_drive(command, tmp_path, parameters):
         (["repair", "bag", "text/out"], "not a directory"),
     ],
 )
-def test_what_cannot_be_is_refused_in_a_line(command, tmp_path, monkeypatch, arguments, complaint):
+def test_invalid_input_is_refused_in_a_line(command, tmp_path, monkeypatch, arguments, complaint):
     monkeypatch.chdir(tmp_path)
     record(tmp_path / "bag")
     (tmp_path / "text").write_text("these are not the bytes of a bag")
@@ -225,7 +225,7 @@ def test_of_forces_that_are_not_finite_none_acted(command, tmp_path):
     assert (report["peak_force"], report["peak_applied_force"]) == (None, 0.0)
 
 
-def test_forces_that_all_acted_are_told_once(command, tmp_path):
+def test_forces_that_all_acted_are_reported_once(command, tmp_path):
     recorded(tmp_path / "bag", "washout")
     report = json.loads(command("report", tmp_path / "bag", "--json")[1])
     assert report["peak_applied_force"] == report["peak_force"] is not None

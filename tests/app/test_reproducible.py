@@ -1,4 +1,4 @@
-"""The same scenario gives the same bag, bit for bit, however and beside whatever it is run."""
+"""The same scenario gives the same bag, bit for bit, in every way of running it and under load."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`stickslip run` with a controller of the user's: a node that knows nothing of this package."""
+"""`stickslip run` with a user's controller: a node that does not depend on this package."""
 
 import json
 import signal
@@ -341,7 +341,7 @@ def test_an_external_controller_is_waited_for(
 
 
 @pytest.mark.long
-def test_nobody_else_is_taken_for_the_controller_and_ctrl_c_ends_waiting(
+def test_other_nodes_are_not_treated_as_the_controller_and_ctrl_c_ends_waiting(
     start_stickslip: Start,
     start_damper: Callable[..., subprocess.Popen[bytes]],
     tmp_path: Path,

@@ -1,4 +1,4 @@
-"""`stickslip run` whose nodes, or which itself, are killed, stopped, or left without a terminal."""
+"""`stickslip run` and its nodes are killed, stopped, or lose their terminal."""
 
 import json
 import os
@@ -32,7 +32,7 @@ def nodes_of(process: subprocess.Popen[str]) -> dict[str, int]:
 
 
 @pytest.mark.long
-def test_what_a_killed_analyzer_leaves_is_told_and_can_be_repaired(
+def test_the_bag_of_a_killed_analyzer_is_reported_and_can_be_repaired(
     start_stickslip: Start, stickslip: Run, tmp_path: Path
 ) -> None:
     process = start_stickslip(*RUN)
@@ -47,7 +47,7 @@ def test_what_a_killed_analyzer_leaves_is_told_and_can_be_repaired(
         assert len(recording.joint_states.stamp) > 0
 
 
-def test_a_plant_that_gives_up_is_told_and_its_bag_is_closed(
+def test_a_plant_that_gives_up_is_reported_and_its_bag_is_closed(
     stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("stickslip_ros.physics.motion.motion._SPARE_STEPS", 10_000)
@@ -212,7 +212,7 @@ def test_what_killed_nodes_leave_in_shared_memory_harms_no_run(
 
 
 @pytest.mark.process
-def test_who_reads_no_further_is_no_failure() -> None:
+def test_a_reader_that_closes_the_pipe_is_no_failure() -> None:
     reading, writing = os.pipe()
     os.close(reading)
     reference = str(Path(__file__).parents[2] / "bags/reference")

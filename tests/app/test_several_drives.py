@@ -1,4 +1,4 @@
-"""Several drives on one machine at once, each `stickslip run` as a user of its own starts it."""
+"""Several drives on one machine at the same time, each started by its own `stickslip run`."""
 
 import json
 import os

@@ -154,7 +154,7 @@ def test_the_dimensionless_drive_has_no_units(stickslip: Run) -> None:
     assert all(len(re.split("  +", line)[1].split()) == 1 for line in lines[1:])
 
 
-def test_what_is_left_to_defaults_is_told_once(stickslip: Run, tmp_path: Path) -> None:
+def test_defaults_are_reported_once(stickslip: Run, tmp_path: Path) -> None:
     text = "/**/plant:\n  ros__parameters: {mass: 80.0, stiffness: 1.2e+6}\n"
     (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
     call = ("simulate", "mine.yaml", "--duration", "1", "--json")

@@ -1,4 +1,4 @@
-"""`stickslip stability`: the paper's numbers, and what does not exist with the reason why."""
+"""`stickslip stability`: the paper's values, and the reasons for missing values."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`stickslip sweep`: tables, pictures, what is refused, and what an interrupted one leaves."""
+"""`stickslip sweep`: tables, figures, refusals, and interrupted sweeps."""
 
 import csv
 import json
@@ -60,7 +60,7 @@ def test_json_on_standard_output_and_in_a_file_are_the_same(stickslip: Run, tmp_
     assert len(found["regime"]) == len(found["turning_points"]) == 6
 
 
-def test_the_ends_of_every_range_that_sticks_are_told(stickslip: Run, tmp_path: Path) -> None:
+def test_the_ends_of_every_sticking_range_are_reported(stickslip: Run, tmp_path: Path) -> None:
     stiff = ("-p", "plant.stiffness=1000", "--over", "plant.belt_speed=0.1:0.6:3")
     done = stickslip(*FREE, *stiff, "--out", "table.json")
     assert "limit of sticking: 188.9 mm/s, 392.4 mm/s, 437.2 mm/s" in done.stdout
@@ -145,7 +145,7 @@ def test_a_point_that_cannot_be_is_a_row_with_its_reason(stickslip: Run) -> None
         ([*SPEEDS, "--dask", "nowhere"], "--dask nowhere: no scheduler found"),
     ],
 )
-def test_what_cannot_be_is_refused(stickslip: Run, arguments: list[str], message: str) -> None:
+def test_invalid_input_is_refused(stickslip: Run, arguments: list[str], message: str) -> None:
     done = stickslip(*FREE, *arguments)
     assert done.returncode == 2
     assert message in " ".join(done.stderr.split())
@@ -191,7 +191,7 @@ def test_interrupted_it_keeps_what_is_done_and_goes_on_from_there(
     assert not part.exists()
 
 
-def test_of_what_it_varies_no_default_is_told(stickslip: Run, tmp_path: Path) -> None:
+def test_no_default_is_reported_for_a_varied_parameter(stickslip: Run, tmp_path: Path) -> None:
     text = "/**/plant:\n  ros__parameters: {mass: 2.0}\n"
     (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
     over = ("--over", "plant.belt_speed=0.6:0.7:2", "--no-control")

@@ -1,4 +1,4 @@
-"""What needs no ROS works where there is none; what needs what is missing says so."""
+"""Commands without ROS work where it is not installed; others name the missing package."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Bags of a run that is known exactly."""
+"""Bags of a run with exactly known content."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Bags cut, flipped and lengthened anywhere: no traceback, nothing wrong, no sound chunk lost."""
+"""Bags with bytes cut, flipped or inserted: no traceback, no wrong data, no sound chunk lost."""
 
 import random
 import resource

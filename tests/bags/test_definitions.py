@@ -110,7 +110,7 @@ def test_a_type_that_is_not_installed_is_refused(look_up, name):
 
 @pytest.mark.parametrize("name", ["", "Empty", "std_msgs/Empty", "../../etc/msg/passwd", "a/srv/B"])
 def test_what_does_not_name_a_message_type_is_refused(name):
-    with pytest.raises(BagError, match="does not name a message type"):
+    with pytest.raises(BagError, match="is not the name of a message type"):
         message_definition(name)
 
 

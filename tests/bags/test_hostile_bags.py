@@ -1,4 +1,4 @@
-"""Bags made to do harm: read in bounded memory, or refused in one line, and nothing written."""
+"""Malicious bags: read in bounded memory or refused in one line; nothing is written."""
 
 import errno
 import json
@@ -278,11 +278,11 @@ def test_a_packed_file_does_not_fill_the_disk(
 @pytest.mark.parametrize(
     ("description", "missing"),
     [
-        ("[" * 1_000, "metadata.yaml cannot be understood"),
+        ("[" * 1_000, "metadata.yaml cannot be read"),
         ("a: &a [x]\nrosbag2_bagfile_information: !!timestamp b", "metadata.yaml cannot be"),
         (
             "rosbag2_bagfile_information: {relative_file_paths: [/etc/passwd, ../../bag_1.mcap]}",
-            "../../bag_1.mcap, /etc/passwd is listed in metadata.yaml but not there",
+            "../../bag_1.mcap, /etc/passwd is listed in metadata.yaml but does not exist",
         ),
     ],
 )
@@ -304,7 +304,7 @@ def test_what_shrinks_much_is_sound(tmp_path: Path) -> None:
     assert repaired.messages["/camera/image"] == 1
 
 
-def test_a_table_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+def test_an_unreadable_table_is_reported(tmp_path: Path) -> None:
     damaged = record(Opcode.METADATA, text("stickslip_ros/analyzer") + text(bytes([9, 0, 0, 0, 1])))
     report = report_of_bag(bag_of(tmp_path / "bag", SOUND, damaged))
     assert report["samples"] == 499

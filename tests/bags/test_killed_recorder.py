@@ -1,4 +1,4 @@
-"""A recorder that is killed at any moment leaves all that it had flushed, as it was."""
+"""A recorder that is killed at any moment leaves all flushed data intact."""
 
 import random
 import subprocess

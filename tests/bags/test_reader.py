@@ -100,7 +100,7 @@ def test_columns_are_those_of_the_messages_chunk_by_chunk_and_as_a_whole(tmp_pat
         assert recording.missing == []
 
 
-def test_messages_that_are_none_are_left_out_and_told(tmp_path):
+def test_invalid_messages_are_skipped_and_reported(tmp_path):
     with Recorder(tmp_path / "bag") as recorder:
         channel = recorder.add_topic(JOINT_STATES, "sensor_msgs/msg/JointState", QOS)
         for number in range(9):
@@ -169,7 +169,7 @@ def test_a_damaged_file_gives_nothing_wrong(bag, scratch, data):
         recording.attachment("scenario.yaml")
 
 
-def test_a_damaged_chunk_is_left_out_and_told(bag, scratch):
+def test_a_damaged_chunk_is_skipped_and_reported(bag, scratch):
     content = bytearray((bag / "bag_0.mcap").read_bytes())
     content[content.index(b"lz4", len(content) // 2) + 100] ^= 0xFF
     scratch.write_bytes(content)
@@ -178,7 +178,7 @@ def test_a_damaged_chunk_is_left_out_and_told(bag, scratch):
         stamps = [stamp for _, stamp, _ in recording.messages(JOINT_STATES)]
         damage, gone = recording.missing
         assert "cannot be read" in damage
-        assert f"100 messages that were recorded on {JOINT_STATES} are gone" in gone
+        assert f"100 messages recorded on {JOINT_STATES} are missing" in gone
     assert len(stamps) == COUNT - 100
     assert set(stamps) < set(range(COUNT))
 
@@ -257,11 +257,11 @@ def test_a_chunk_that_unpacks_to_masses_of_nothing_costs_nothing(bag, scratch):
 
 
 @pytest.mark.parametrize("text", ["a: 2001-99-99", "[" * 5000, "- 1", "\xff", ""])
-def test_a_metadata_yaml_that_makes_no_sense_is_told(bag, tmp_path, text):
+def test_an_unreadable_metadata_yaml_is_reported(bag, tmp_path, text):
     shutil.copytree(bag, tmp_path / "bag")
     (tmp_path / "bag" / "metadata.yaml").write_text(text, encoding="latin-1")
     with Recording(tmp_path / "bag") as recording:
-        assert recording.missing == ["metadata.yaml cannot be understood"]
+        assert recording.missing == ["metadata.yaml cannot be read"]
 
 
 def test_a_split_bag_is_read_in_order(tmp_path):
@@ -320,7 +320,7 @@ def test_one_of_several_drives_is_chosen_by_its_namespace(tmp_path):
         assert len(recording.joint_states.stamp) == 0
     with Recording(tmp_path / "bag") as recording:
         assert len(list(recording.messages(*recording.topics))) == 20
-        with pytest.raises(BagError, match=r"2 drives; name the namespace .*: /one, /two/deep"):
+        with pytest.raises(BagError, match=r"2 drives; choose one .*: /one, /two/deep"):
             list(recording.blocks())
 
 
@@ -338,7 +338,7 @@ def test_forces_of_strangers_do_not_get_in_the_way(tmp_path):
         assert recording.control_forces.force.tolist() == [4.0]
 
 
-def test_what_the_publishers_offered_is_told(tmp_path):
+def test_the_qos_of_the_publishers_is_returned(tmp_path):
     record(tmp_path / "bag", range(3))
     with Recording(tmp_path / "bag") as recording:
         (profile,) = yaml.safe_load(recording.offered_qos(JOINT_STATES))
@@ -360,7 +360,7 @@ def test_what_the_publishers_offered_is_told(tmp_path):
         ("nul\0nul", "does not exist"),
         ("long" * 100, "does not exist"),
         ("directory", "cannot be opened"),
-        ("pipe", "no regular file"),
+        ("pipe", "not a regular file"),
     ],
 )
 def test_what_is_no_bag_is_refused(tmp_path, name, complaint):

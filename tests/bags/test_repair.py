@@ -87,8 +87,8 @@ def test_messages_that_no_bag_can_hold_are_left_out_and_counted(tmp_path):
     repaired = repair(path, tmp_path / "sound")
     assert repaired.messages == {STATES: 2}
     assert repaired.missing == [
-        "foreign.mcap: /typeless is left out: it has no known type",
-        "foreign.mcap: 2 messages are left out: their times exceed 2^63 - 1 ns",
+        "foreign.mcap: /typeless is omitted: its type is unknown",
+        "foreign.mcap: 2 messages are omitted: their times exceed 2^63 - 1 ns",
     ]
     with Recording(tmp_path / "sound") as recording:
         assert recording.joint_states.stamp.tolist() == [0, 3]

@@ -1,4 +1,4 @@
-"""The model of the drive for robot_state_publisher, and what moves in it."""
+"""The model of the drive for robot_state_publisher, and its moving parts."""
 
 from collections.abc import Iterator
 from math import pi

@@ -16,7 +16,7 @@ import pytest
 
 CHECKOUT = Path(__file__).parents[2]
 
-ROOMS = ("stickslip_ros.physics",)
+ROOMS = ("stickslip_ros",)
 """Packages and modules whose public names have NumPy-style docstrings."""
 
 _LISTED = re.compile(r"^::: (\S+)$|^`from (\S+) import (\w+)`$", re.MULTILINE)

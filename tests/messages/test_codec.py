@@ -151,7 +151,7 @@ def test_big_endian_messages_are_read(stamp, position, velocity, frame):
         (joint_state(1, [1.0, 2.0], [], []), "0 velocities"),
         (joint_state(1, [1.0, 2.0], [1.0], []), "1 velocities"),
         (joint_state(1, [1.0, 2.0], [1.0, 2.0], [1.0]), "1 efforts"),
-        (joint_state(1, [], [], [], ["slide", "belt"] * 501), "1002 joints; at most 1000"),
+        (joint_state(1, [], [], [], ["slide", "belt"] * 501), "1002 joints; must be at most 1000"),
         (joint_state(1, [], [], [], ["slide" * 10_000] * 900), "slide and belt|belt must be"),
     ],
 )
@@ -168,7 +168,7 @@ def test_what_is_no_message_is_refused(unpack, data):
         unpack(data)
 
 
-def test_who_catches_the_errors_of_bags_catches_those_of_messages():
+def test_message_errors_are_bag_errors():
     assert issubclass(MessageError, BagError)
 
 

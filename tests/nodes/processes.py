@@ -1,4 +1,4 @@
-"""Processes of a test: nodes of ours, a stranger that listens, and a load on the machine."""
+"""Processes of a test: our nodes, an unknown listener, and load on the machine."""
 
 import signal
 import subprocess

@@ -1,4 +1,4 @@
-"""What the nodes do with messages that are wrong, too many, or from somebody too many."""
+"""Reaction of the nodes to wrong messages, too many messages, and additional publishers."""
 
 import random
 import resource

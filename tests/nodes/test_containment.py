@@ -1,4 +1,4 @@
-"""What others on the network see of a run that is kept on this machine: nothing.
+"""A loopback-only run is invisible on the network.
 
 The run is in a network namespace of its own. A stranger is in another, at the other end of a cable,
 and knows the host of the run as its peer. Beside the run there are ordinary tools, and a witness
@@ -322,7 +322,7 @@ def test_a_run_that_is_open_to_the_network_is_seen_by_strangers(
         (["-c", LOOP], {}),
     ],
 )
-def test_a_loopback_interface_that_is_down_is_told(
+def test_a_loopback_interface_that_is_down_is_reported(
     start: Start, namespaces: Namespaces, arguments: list[str], environment: dict[str, str]
 ) -> None:
     namespaces.set_loopback("down")
@@ -351,7 +351,7 @@ def test_a_loopback_interface_that_is_down_is_told(
         ),
     ],
 )
-def test_what_is_said_to_be_kept_here_listens_here_only(
+def test_loopback_only_nodes_listen_on_the_loopback_only(
     process_environment: dict[str, str], tmp_path: Path, call: str, environment: dict[str, str]
 ) -> None:
     directory = tmp_path / "of_a_stranger"

@@ -1,4 +1,4 @@
-"""Deadlines are counted truly: by a clock of the test's own, on which sending takes time."""
+"""Missed deadlines are counted correctly, by a clock of the test on which sending takes time."""
 
 from threading import Event, Lock
 

@@ -1,4 +1,4 @@
-"""Nodes started singly that are killed, stopped, continued and started again."""
+"""Nodes that were started one by one are killed, stopped, continued and restarted."""
 
 import random
 import signal
@@ -135,7 +135,7 @@ def gaps(stamp: IntArray) -> int:
 
 
 @pytest.mark.long
-def test_whoever_is_killed_is_replaced(trio: Trio, processes: Processes) -> None:
+def test_a_killed_node_is_replaced(trio: Trio, processes: Processes) -> None:
     trio.plant["reply_timeout"] = 1.0
     for node in NODES:
         trio.start(node)

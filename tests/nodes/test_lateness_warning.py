@@ -1,4 +1,4 @@
-"""When a plant complains of late forces and of samples that miss their deadlines."""
+"""When a plant warns about late forces and missed deadlines."""
 
 from itertools import count
 

@@ -1,4 +1,4 @@
-"""The life cycle gone through again and again, from outside, while the loop runs."""
+"""Repeated external life cycle transitions while the loop runs."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -67,7 +67,7 @@ def bring(request: pytest.FixtureRequest, graph: Graph) -> Callable[..., None]:
 
 @pytest.mark.parametrize("rounds", [2, pytest.param(10, marks=pytest.mark.long)])
 @pytest.mark.parametrize("pace", ["lockstep", "realtime"])
-def test_rounds_of_the_life_cycle_leave_one_of_each_and_time_goes_on(
+def test_repeated_life_cycles_leave_one_of_each_and_time_continues(
     graph: Graph, tmp_path: Path, bring: Callable[..., None], pace: str, rounds: int
 ) -> None:
     bring("analyzer", bag=str(tmp_path / "bag"))

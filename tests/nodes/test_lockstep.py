@@ -1,4 +1,4 @@
-"""Lockstep when who is waited for is slow, is stopped, dies, or falls silent and comes back."""
+"""Lockstep with a node that is slow, stopped, killed, or silent for some time."""
 
 import signal
 import time

@@ -1,4 +1,4 @@
-"""Parameters set from outside while the nodes live: refused by name, or taken exactly."""
+"""Parameters set over the network while the nodes run: refused by name or applied exactly."""
 
 import random
 import struct
@@ -240,7 +240,7 @@ def test_ranges_tell_the_bounds_wherever_a_slider_can_show_them(graph: Graph, na
     }
 
 
-def test_what_is_not_all_good_is_not_taken_at_all(graph: Graph) -> None:
+def test_one_bad_value_refuses_all(graph: Graph) -> None:
     node = graph.add(PlantNode, autostart=False)
     for _ in in_turn(node):
         before = told(graph, "plant")

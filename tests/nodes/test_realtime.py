@@ -1,4 +1,4 @@
-"""Real time when the plant, or who listens to it, is stopped or dies."""
+"""Real time when the plant or a subscriber is stopped or killed."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""Topics under other names: the nodes find each other, and hold each other up, as before."""
+"""Remapped topics: the nodes find each other and wait for each other as usual."""
 
 from pathlib import Path
 

@@ -100,7 +100,7 @@ def test_paused_it_is_silent_until_it_is_resumed(graph: Graph, tmp_path: Path) -
     assert "not active" in refused.message
 
 
-def test_a_loop_begins_anew_with_the_stamps_of_the_recording(graph: Graph, tmp_path: Path) -> None:
+def test_a_loop_restarts_with_the_stamps_of_the_recording(graph: Graph, tmp_path: Path) -> None:
     bag = record_states(tmp_path / "bag", 5)
     heard = graph.listen(JOINT_STATES, raw=True)
     node = graph.add(ReplayNode, bag=bag, rate=10.0, loop=True)
@@ -132,7 +132,7 @@ def test_the_clock_shows_recorded_time_before_each_message(graph: Graph, tmp_pat
     assert heard == stamps(states)
 
 
-def test_a_latched_message_reaches_who_comes_after_it(graph: Graph, tmp_path: Path) -> None:
+def test_a_latched_message_reaches_a_late_subscriber(graph: Graph, tmp_path: Path) -> None:
     with Recorder(tmp_path / "bag") as recorder:
         qos = QosProfile(depth=1, durability="transient_local")
         latched = recorder.add_topic("/latched", "std_msgs/msg/Header", qos)

@@ -1,4 +1,4 @@
-"""Run, record, report, replay into a second analyzer, record again: nothing may be different."""
+"""Run, record, report, replay into a second analyzer, record again: no differences."""
 
 import json
 from pathlib import Path

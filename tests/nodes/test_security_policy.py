@@ -1,4 +1,4 @@
-"""The policy for SROS2 against what the nodes of a run really use."""
+"""The SROS2 policy against the topics and services that the nodes of a run use."""
 
 import signal
 import subprocess

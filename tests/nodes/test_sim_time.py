@@ -1,4 +1,4 @@
-"""Nodes on simulated time, which the plant gives."""
+"""Nodes on simulated time from the plant."""
 
 from collections.abc import Iterator
 from threading import Thread

@@ -1,4 +1,4 @@
-"""Benchmarks where something that one of them needs is not installed."""
+"""Benchmarks with a missing requirement."""
 
 import json
 import os

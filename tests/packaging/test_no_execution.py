@@ -1,4 +1,4 @@
-"""Nothing in the package executes, unpickles or unfolds what it reads."""
+"""The package does not execute, unpickle or expand the data that it reads."""
 
 import ast
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The data of the paper's figures: parameters, and what they show."""
+"""The data of the paper's figures: parameters and results."""
 
 import pickle
 from math import sqrt

@@ -1,4 +1,4 @@
-"""The pictures of the paper's figures."""
+"""The plots of the paper's figures."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -73,7 +73,7 @@ def test_what_still_changes_has_no_settling_time() -> None:
     assert portrait(PortraitCase("", replace(PAPER, belt_speed=0.3), duration=600.0)).settling_time
 
 
-def test_what_runs_away_ends_there_and_leaves_the_others_alone() -> None:
+def test_a_diverging_motion_ends_and_does_not_affect_the_others() -> None:
     calm = PortraitCase("", replace(PAPER, belt_speed=0.3), duration=100.0)
     before, away, after = portraits([calm, RUNS_AWAY, calm])
     assert away.runs_away

@@ -1,4 +1,4 @@
-"""The report that is kept in docs/: what it holds is what the code computes today."""
+"""The report in docs/ is what the code computes."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The drives of the two shipped scenarios, and what is known of the first one's limit cycles."""
+"""The drives of the two shipped scenarios, and reference values of the first one's limit cycles."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""The picture of which motion a start leads to."""
+"""The plot of basins of attraction."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""The picture of a run in which the control comes on."""
+"""The plot of a run in which the control is switched on."""
 
 from pathlib import Path
 

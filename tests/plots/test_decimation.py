@@ -1,4 +1,4 @@
-"""Fewer points, and no peak lost."""
+"""Decimation without loss of peaks."""
 
 import numpy as np
 import numpy.typing as npt

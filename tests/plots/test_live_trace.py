@@ -1,4 +1,4 @@
-"""The last of a motion, in few points: no peak is lost, and memory is bounded."""
+"""The latest part of a motion in few points, without loss of peaks and in bounded memory."""
 
 from itertools import pairwise
 
@@ -94,7 +94,7 @@ def test_memory_stays_bounded_however_long_it_is_fed() -> None:
     assert frame.position.x[0] == pytest.approx(-frame.end)
 
 
-def test_stamps_that_do_not_go_on_begin_it_anew() -> None:
+def test_stamps_that_do_not_continue_restart_the_trace() -> None:
     trace = LiveTrace(1e3)
     trace.feed(states(range(10 * SECOND, 11 * SECOND, 1_000_000), np.ones(1000)), NO_FORCES)
     trace.feed(states(range(SECOND, SECOND + 10_000_000, 1_000_000), np.zeros(10)), NO_FORCES)
@@ -130,7 +130,7 @@ def test_a_line_is_broken_where_samples_are_missing() -> None:
         assert line.x[gap] == line.x[gap + 1] == pytest.approx(-0.999)
 
 
-def test_stamps_that_descend_within_a_block_begin_it_anew() -> None:
+def test_descending_stamps_within_a_block_restart_the_trace() -> None:
     trace = LiveTrace(1e3)
     block = states(range(SECOND, 2 * SECOND, 1_000_000), np.ones(1000))
     block.stamp[500:] -= SECOND

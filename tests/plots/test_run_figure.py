@@ -1,4 +1,4 @@
-"""The picture of a run, and what is kept of one to draw it."""
+"""The plot of a run, and the history kept for it."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -310,7 +310,7 @@ def test_rounding_is_no_wave() -> None:
         assert top - bottom >= 0.9e-6 * max(abs(bottom), abs(top))
 
 
-def test_what_goes_back_in_time_is_left_out_and_said() -> None:
+def test_stamps_going_back_are_omitted_and_reported() -> None:
     history = RunHistory()
     time = np.arange(0.0, 3.0, 0.01)
     ones = np.ones(len(time))
@@ -345,7 +345,7 @@ def test_very_little_makes_a_picture_too(
     save(figure, tmp_path / "picture.png")
 
 
-def test_what_is_not_to_be_believed_is_left_out() -> None:
+def test_implausible_values_are_omitted() -> None:
     history = RunHistory()
     time = np.arange(0.0, 1.0, 0.01)
     position = np.where(np.arange(100) % 10 == 3, np.nan, 1e99)

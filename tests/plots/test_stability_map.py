@@ -1,4 +1,4 @@
-"""The map of decay rates, and the picture of it."""
+"""The map of decay rates and its plot."""
 
 from dataclasses import replace
 from math import inf

@@ -1,4 +1,4 @@
-"""How pictures are written."""
+"""How figures are written to files."""
 
 from pathlib import Path
 from xml.etree import ElementTree
@@ -23,7 +23,7 @@ def small_figure(label: str = "displacement (µm)") -> Figure:
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_the_ending_says_what_it_is(tmp_path: Path, ending: str) -> None:
+def test_the_suffix_gives_the_format(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"picture{ending}"
     save(small_figure(), path)
     match ending.lower():

@@ -1,4 +1,4 @@
-"""The pictures of sweeps: diagrams over one parameter, maps over two."""
+"""The plots of sweeps: diagrams over one parameter, maps over two."""
 
 from pathlib import Path
 

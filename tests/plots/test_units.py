@@ -1,4 +1,4 @@
-"""What axes are labelled with."""
+"""Labels and units of axes."""
 
 from dataclasses import replace
 

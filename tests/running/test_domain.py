@@ -50,7 +50,7 @@ def test_a_loop_meets_its_controller_whatever_ros_was_used_for_before(
 
 
 @pytest.mark.process
-def test_nobody_else_gets_the_same_domain() -> None:
+def test_a_domain_has_one_holder() -> None:
     with own_domain() as first, own_domain() as second:
         assert first != second
     with subprocess.Popen([sys.executable, "-c", HOLDER], stdout=subprocess.PIPE) as process:

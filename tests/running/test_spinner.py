@@ -61,7 +61,7 @@ def test_a_service_is_asked_again_and_again_by_one_call(node: Node, spinner: Spi
     assert answers[0] is not answers[1]
 
 
-def test_who_does_not_answer_in_time_is_given_up(node: Node, spinner: Spinner) -> None:
+def test_a_service_that_does_not_answer_in_time_is_given_up(node: Node, spinner: Spinner) -> None:
     silent = node.create_service(Trigger, "ring", answer_once)
     call = ServiceCall(node, Trigger, "ring")
     assert spinner.ask(call, Trigger.Request(), 10.0).message == "here"

@@ -1,4 +1,4 @@
-"""Every parameter of every node refuses every bad value, and takes every good one as it is."""
+"""Every parameter of every node refuses bad values and accepts good ones unchanged."""
 
 import struct
 from typing import Any

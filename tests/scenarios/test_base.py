@@ -1,4 +1,4 @@
-"""What a scenario leaves out: taken from its base, or else left to the defaults."""
+"""Values that a scenario omits come from its base, or else from the defaults."""
 
 from pathlib import Path
 

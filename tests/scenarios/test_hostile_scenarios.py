@@ -1,4 +1,4 @@
-"""Scenarios made to do harm: refused in one line, and nothing executed or written."""
+"""Malicious scenarios: refused in one line; nothing is executed or written."""
 
 from pathlib import Path
 

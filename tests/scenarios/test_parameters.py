@@ -1,4 +1,4 @@
-"""The models of the nodes' parameters, and what is derived from them."""
+"""The models of the nodes' parameters, and the values derived from them."""
 
 from typing import Any
 

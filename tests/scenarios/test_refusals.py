@@ -1,4 +1,4 @@
-"""What a scenario file must not say, and what the message must."""
+"""Invalid scenario files, and the messages about them."""
 
 from pathlib import Path
 

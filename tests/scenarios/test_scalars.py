@@ -1,4 +1,4 @@
-"""Scalars are read as rcl reads them, which is neither YAML 1.1 nor what PyYAML makes of it."""
+"""Scalars are read as by rcl, which differs from YAML 1.1 and from PyYAML."""
 
 from math import isfinite, isnan
 from pathlib import Path

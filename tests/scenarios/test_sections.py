@@ -1,4 +1,4 @@
-"""To which nodes the sections of a file apply: as ROS has it."""
+"""The nodes to which the sections of a file apply, as in ROS."""
 
 from pathlib import Path
 

@@ -91,7 +91,7 @@ def test_numbers_in_yaml_are_numbers_to_pyyaml_which_ros2_param_load_reads_them_
     assert {leaf for leaf in found if isinstance(leaf, float)} >= set(extremes.values())
 
 
-def test_there_are_no_others() -> None:
+def test_no_other_scenarios_are_shipped() -> None:
     assert {path.stem for path in CONFIG.glob("*.yaml")} == set(SHIPPED)
 
 

@@ -1,4 +1,4 @@
-"""Values for any parameter, good and bad, derived from what its model says of it."""
+"""Good and bad values for any parameter, derived from its model."""
 
 import re
 from math import inf, nan

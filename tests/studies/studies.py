@@ -1,4 +1,4 @@
-"""Scenarios and studies of the tests: short ones, in which everything happens that can."""
+"""Short scenarios and studies for the tests, with every kind of result."""
 
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario, load_scenario

@@ -58,7 +58,7 @@ def test_a_reversed_belt_mirrors_the_diagram() -> None:
     assert points(diagram, 1) == pytest.approx(-points(diagram, 0), abs=1e-9)
 
 
-def test_what_runs_away_has_no_points_and_leaves_the_other_rows_alone() -> None:
+def test_a_diverging_motion_has_no_points_and_does_not_affect_other_rows() -> None:
     drives = [*at_speeds(0.3), RUNS_AWAY, *at_speeds(0.3), RUNS_AWAY]
     diagram = bifurcation_diagram(drives)
     assert [measures.regime for measures in diagram.measures[1::2]] == [Regime.UNBOUNDED] * 2

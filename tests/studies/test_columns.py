@@ -1,4 +1,4 @@
-"""Columns and tables: what is read back is what was found, to the last bit."""
+"""Columns and tables are read back bit for bit."""
 
 import csv
 import json

@@ -1,4 +1,4 @@
-"""Gains for a drive, and whether they do what they are said to."""
+"""Gains for a drive, and whether they meet the stated requirements."""
 
 import re
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Whatever the parameters take, `simulate` ends, with numbers for figures or with a refusal."""
+"""With any parameters, `simulate` ends with finite results or with a refusal."""
 
 from collections.abc import Iterator
 from dataclasses import replace

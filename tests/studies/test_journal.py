@@ -1,4 +1,4 @@
-"""Journals: whatever interrupts a study, what it finds is what it finds undisturbed."""
+"""Journals: an interrupted study gives the same result as an undisturbed one."""
 
 import json
 import os

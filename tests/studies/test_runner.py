@@ -1,4 +1,4 @@
-"""The runner: wherever the tasks are computed, and whoever dies, the points are the same."""
+"""The runner: the points do not depend on where tasks are computed or which worker dies."""
 
 import os
 import random

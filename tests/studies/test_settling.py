@@ -1,4 +1,4 @@
-"""What a motion settles on: against reference cycles, and whatever was followed before."""
+"""What a motion settles on: against reference cycles, and independent of earlier motions."""
 
 from dataclasses import replace
 from typing import Any

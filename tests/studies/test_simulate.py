@@ -1,4 +1,4 @@
-"""What an observer sees of a simulation is what is measured of it."""
+"""An observer receives exactly the simulation that is measured."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Studies: every point is a row, whatever becomes of it, and is what it would be alone."""
+"""Studies: every point is a row, even a failed one, and does not depend on other points."""
 
 import json
 from dataclasses import asdict, replace
@@ -47,7 +47,7 @@ def points(study: Study) -> list[Point]:
     return compute(study, range(study.plan.size), None).points
 
 
-def test_what_cannot_be_runs_away_or_is_too_stiff_is_a_row_with_the_reason() -> None:
+def test_a_refused_diverging_or_too_stiff_point_is_a_row_with_the_reason() -> None:
     minimum, slope, damping = (points(study) for study in MIXED)
     reasons = [point.reason for point in minimum]
     assert reasons[:4] == [None] * 4
@@ -88,7 +88,7 @@ CHAINS = [
     CHAINS,
     ids=["out of bounds", "downwards", "too stiff", "runs away"],
 )
-def test_a_chain_begins_anew_after_a_point_that_failed(
+def test_a_chain_restarts_after_a_failed_point(
     axis: Axis, carry: Carry, scenario: Scenario, failing: int
 ) -> None:
     alone = Study(scenario, Grid((axis,)), SettlingCourse(40.0, 2))
@@ -118,7 +118,7 @@ def test_a_chain_in_pieces_is_the_chain_at_once() -> None:
         assert start == at_once.end
 
 
-def test_the_filter_is_carried_on_and_the_control_does_not_begin_anew() -> None:
+def test_the_filter_is_carried_on_and_the_control_does_not_restart() -> None:
     scenario = paper("plant.rate=20.0", "washout_controller.start_after=100.0")
     gain = Axis("washout_controller.linear_gain", -2.0, -1.9, 2)
     study = Study(scenario, Grid((gain,), Carry.UP), SettlingCourse(5.0, 1))

@@ -1,4 +1,4 @@
-"""Sweeps: which ones there are."""
+"""The kinds of sweeps."""
 
 from collections.abc import Sequence
 

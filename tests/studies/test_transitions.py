@@ -1,4 +1,4 @@
-"""Where theory has the transitions, against closed forms and against the theory of one drive."""
+"""Transitions from theory against closed forms and against the theory of one drive."""
 
 from dataclasses import replace
 from math import log, sqrt

@@ -1,4 +1,4 @@
-"""Controllers as a user writes them: plain rclpy nodes that know nothing of this package."""
+"""Controllers as a user writes them: plain rclpy nodes that do not use this package."""
 
 import sys
 import time

@@ -109,7 +109,7 @@ def test_parameters_of_a_command_are_those_of_the_scenario_unless_it_has_its_own
 
 
 @pytest.mark.long
-def test_a_managed_controller_that_does_not_start_is_told() -> None:
+def test_a_managed_controller_that_does_not_start_is_reported() -> None:
     with (
         pytest.raises(RunError, match="/feed_drive/managed_feedback could not be activated"),
         ClosedLoop("paper", controller=process(controllers.RefusingToStart)) as loop,
@@ -294,14 +294,14 @@ class _BestEffort(Node):
         (
             _Elsewhere,
             [
-                "nobody reads /feed_drive/joint_states and publishes /feed_drive/control_force",
+                "no node reads /feed_drive/joint_states and publishes /feed_drive/control_force",
                 "elsewhere reads /joint_states, the plant publishes /feed_drive/joint_states",
             ],
         ),
         (_BestEffort, ["/feed_drive/best_effort", "Best effort publisher"]),
     ],
 )
-def test_a_controller_that_cannot_be_heard_is_told_why(
+def test_a_controller_that_is_not_found_is_explained(
     controller: type[Node], sentences: list[str]
 ) -> None:
     with (
@@ -325,7 +325,7 @@ def test_a_controller_that_cannot_be_heard_is_told_why(
         ({"namespace": "/" + 230 * "n"}, "must have at most 200 characters"),
     ],
 )
-def test_what_cannot_be_is_refused(options: dict[str, Any], sentence: str) -> None:
+def test_invalid_input_is_refused(options: dict[str, Any], sentence: str) -> None:
     with pytest.raises((InvalidInputError, RunError), match=sentence):
         ClosedLoop("paper", **options).__enter__()
 
@@ -345,7 +345,7 @@ def test_a_loop_has_to_be_open_and_to_run_for_some_time(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_a_controller_process_that_ends_is_told() -> None:
+def test_a_controller_process_that_ends_is_reported() -> None:
     command = [sys.executable, "-c", "raise SystemExit(3)"]
     with (
         pytest.raises(RunError, match=r"SystemExit\(3\).* has ended \(exit status 3\)"),

@@ -31,7 +31,7 @@ def test_is_closed_after_the_test():
 
 @pytest.mark.process
 @pytest.mark.parametrize("capture", ["fd", pytest.param("sys", marks=pytest.mark.long)])
-def test_the_fixture_in_a_test_of_somebody_elses(tmp_path: Path, capture: str) -> None:
+def test_the_fixture_in_a_user_test(tmp_path: Path, capture: str) -> None:
     (tmp_path / "test_it.py").write_text(IN_A_TEST, encoding="utf-8")
     command = [sys.executable, "-m", "pytest", "-q", "-p", "stickslip_ros.pytest_plugin"]
     command.append(f"--capture={capture}")

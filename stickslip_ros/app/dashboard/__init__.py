@@ -1,4 +1,4 @@
-"""`stickslip dashboard`: a web page that shows a running loop, and acts on it."""
+"""`stickslip dashboard`: a live web page that shows and controls a running loop."""
 
 import argparse
 import os
@@ -8,10 +8,10 @@ from stickslip_ros.app.arguments import add_namespace, add_network, namespace_of
 from stickslip_ros.app.optional_dependencies import check_dashboard, loading_ros
 from stickslip_ros.nodes.base.child_process import die_with_parent
 
-HELP = "show a running loop on a web page, live, and act on it"
+HELP = "show and control a running loop on a live web page"
 
 DEFAULT_PORT = 8642
-"""The first that is tried where none is asked for."""
+"""First port that is tried by default."""
 
 LARGEST_PORT = 65_535
 
@@ -23,9 +23,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--port",
         type=_port,
         metavar="PORT",
-        help=f"port of the page on this machine (default: {DEFAULT_PORT}, or the next free one)",
+        help=f"port of the page, loopback only (default: {DEFAULT_PORT}, or the next free one)",
     )
-    add_network(parser, "listen to nodes on other machines, too; the page stays on this one")
+    add_network(parser, "also listen to nodes on other machines; the page stays loopback only")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -37,8 +37,8 @@ def run(arguments: argparse.Namespace) -> int:
     reach = keep_on_this_machine(arguments.network)
     die_with_parent()
     with suppress(OSError):
-        os.nice(10)  # the simulation goes first
-    from stickslip_ros.app.dashboard.server import serve  # it needs NiceGUI, and takes seconds
+        os.nice(10)  # the simulation has priority
+    from stickslip_ros.app.dashboard.server import serve  # needs NiceGUI and takes seconds
 
     serve(namespace, arguments.port, reach)
     return 0

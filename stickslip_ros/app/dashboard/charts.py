@@ -1,4 +1,4 @@
-"""How the charts of the page look; what they show comes with each frame, and page.js draws it."""
+"""Options of the charts of the page; page.js draws the data of each frame into them."""
 
 from typing import Any
 
@@ -38,7 +38,7 @@ TRACE: dict[str, Any] = {
     "yAxis": [_AXIS | {"gridIndex": index} for index in range(3)],
     "series": [{"type": "line", "xAxisIndex": index, "yAxisIndex": index} for index in range(3)],
 }
-"""Axes for displacement, velocity with the belt's, and control force over time."""
+"""Axes for displacement, velocity of slide and belt, and control force over time."""
 
 PORTRAIT: dict[str, Any] = {
     "animation": False,
@@ -68,7 +68,7 @@ PORTRAIT: dict[str, Any] = {
         },
     ],
 }
-"""The plane of velocity over displacement, with belt speed and equilibrium."""
+"""Phase portrait: velocity over displacement, with belt speed and equilibrium."""
 
 CYCLES: dict[str, Any] = {
     "animation": False,

@@ -1,4 +1,4 @@
-"""What the charts of the page show at a moment, in the units of their axes."""
+"""The data of the charts at one instant, in the units of their axes."""
 
 import struct
 from collections.abc import Mapping
@@ -18,14 +18,14 @@ from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.parameters import PlantParameters
 
 PERIODS = (10, 50, 200)
-"""Natural periods that the traces may show."""
+"""Selectable lengths of the traces, in natural periods."""
 
 _QUANTITIES = (("displacement", "m"), ("velocity", "m/s"), ("control force", "N"))
 _UNKNOWN_PERIOD = 1.0
 
 
 class Frames:
-    """Makes frames of what a listener has heard."""
+    """Build frames from the data of a listener."""
 
     def __init__(self, listener: ListenerNode) -> None:
         self._listener = listener
@@ -34,7 +34,7 @@ class Frames:
 
     @property
     def drive(self) -> Drive | None:
-        """The drive as it is at present; None while the plant has not told of it."""
+        """The drive with its current parameters; None while they are unknown."""
         values = self._listener.parameters["plant"]
         if values is not self._drive_of[0]:
             try:
@@ -46,23 +46,23 @@ class Frames:
 
     @property
     def period(self) -> float:
-        """Natural period, s, or that of the last cycle where the drive is not known."""
+        """Natural period, s, or the period of the last cycle if the drive is unknown."""
         if self.drive is not None:
             return self.drive.natural_period
         frequencies = list(self._listener.cycles[FREQUENCY])[-1:]
         return next((1.0 / f for f in frequencies if 1e-9 < f < 1e9), _UNKNOWN_PERIOD)
 
     def feed(self, states: SampleColumns, forces: ForceColumns, dropped: ForceColumns) -> None:
-        """Take in what was heard: states, forces sent, and those of them that were dropped."""
+        """Add received states, forces sent, and forces that were dropped."""
         self._trace.longest = PERIODS[-1] * self.period
         self._trace.feed(states, forces, dropped)
 
     def frame(self, periods: int) -> bytes:
-        """Return what to draw: the last `periods` natural periods, and the last cycles.
+        """Return a frame with the last `periods` natural periods and the last cycles.
 
-        It is the length of some JSON (4 bytes, little-endian), the JSON, padded with spaces to
-        a multiple of 4 bytes, and x and y of each line in turn (32-bit floats); how many points
-        each has stands in the JSON.
+        A frame consists of the length of the JSON (4 bytes, little-endian), the JSON, padded with
+        spaces to a multiple of 4 bytes, and x and y of each line in turn (32-bit floats). The JSON
+        contains the number of points of each line.
         """
         period, drive = self.period, self.drive
         frame = self._trace.frame(periods * period, 5.0 * period, buckets=400)
@@ -98,7 +98,7 @@ class Frames:
         text = orjson.dumps(body)
         text += b" " * (-len(text) % 4)
         columns = [column for line in lines.values() for column in line]
-        with np.errstate(over="ignore"):  # what is too large for the page is off it
+        with np.errstate(over="ignore"):  # values that overflow are outside the page
             floats = [column.astype("<f4").tobytes() for column in columns]
         return b"".join([struct.pack("<I", len(text)), text, *floats])
 
@@ -106,7 +106,7 @@ class Frames:
 def _axes(drive: Drive | None) -> list[tuple[float, str]]:
     """Return scale and label of displacement, speed and force.
 
-    They follow from the drive, not from the motion: so a vibration that dies away is seen to.
+    They depend on the drive, not on the motion, so that a decaying vibration is visible.
     """
     largest = (1.0, 1.0, 1.0)
     if drive is not None:

@@ -1,4 +1,4 @@
-"""What a dashboard needs of ROS: listens to a running loop like any other node, and acts on it."""
+"""The ROS node of the dashboard: listens to a running loop and calls services of its nodes."""
 
 import re
 import time
@@ -48,42 +48,42 @@ from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.stamps import NANOSECONDS
 
 SILENCE = 2.5
-"""Time, s, without diagnostics, which come each second, after which a node counts as silent."""
+"""Time, s, without diagnostics (sent once per second) after which a node counts as silent."""
 
 SILENT = "silent"
-"""State of a node that was heard of before."""
-ABSENT = "not there"
-"""State of one that was not."""
+"""State of a node that has sent diagnostics before."""
+ABSENT = "not found"
+"""State of a node that has never sent diagnostics."""
 
 LONGEST_TAP = 1e6
-"""Simulated time, s, that a push may last."""
+"""Longest duration of an impulse in simulated time, s."""
 
 _ANSWER_TIMEOUT = 10.0
 _CYCLES_KEPT = 200
 
 Answer = Future[str]
-"""What a request comes to: nothing where it was done, else why not, in a sentence."""
+"""Result of a request: empty if it succeeded, otherwise a sentence with the reason."""
 
 
 @dataclass(frozen=True)
 class Health:
-    """What a node's diagnostics said last."""
+    """The last diagnostics of a node."""
 
     state: str = ABSENT
-    """State of its life cycle, or `SILENT` or `ABSENT`."""
+    """Life cycle state, or `SILENT` or `ABSENT`."""
     level: int = 0
-    """0 well, 1 warning, 2 error, as in DiagnosticStatus."""
+    """0 OK, 1 warning, 2 error, as in DiagnosticStatus."""
     message: str = ""
     figures: Mapping[str, str] = field(default_factory=dict)
     heard_at: float = 0.0
-    """When, on the monotonic clock, s."""
+    """Time of the diagnostics on the monotonic clock, s."""
 
 
 class ListenerNode(PollingNode):
-    """Listens to states, forces sent and dropped, cycles and /diagnostics of a namespace.
+    """Listen to states, forces sent and dropped, cycles and /diagnostics of a namespace.
 
-    What it has heard may be read from any thread: mappings are replaced as a whole, deques to be
-    copied. So may the requests be made.
+    The received data may be read from any thread: mappings are replaced as a whole, deques must be
+    copied. Requests may be made from any thread, too.
     """
 
     def __init__(
@@ -93,19 +93,19 @@ class ListenerNode(PollingNode):
         *,
         context: Context | None = None,
     ) -> None:
-        """Listen in a namespace; states, forces, dropped forces go to `show`, in blocks."""
+        """Listen in a namespace; pass states, forces and dropped forces to `show`, in blocks."""
         super().__init__(DASHBOARD, namespace=namespace, context=context)
         self._show = show
         self.health: Mapping[str, Health] = {node: Health() for node in NODE_PARAMETERS}
         """Health by the node's name relative to the namespace."""
         self.parameters: Mapping[str, Mapping[str, Any]] = {node: {} for node in NODE_PARAMETERS}
-        """Parameters in force by node and flat name, as far as they are known."""
+        """Current parameters by node and flat name, as far as they are known."""
         self.cycles: dict[Topic[Any], deque[float]] = {}
-        """The measures of the last cycles, each by its topic."""
+        """The measures of the last cycles by topic."""
         self.cycle_count = 0
-        """How many cycles were heard of in all."""
+        """Number of all cycles received."""
         self.events: deque[tuple[float, str]] = deque(maxlen=200)
-        """When, in s since the epoch, and what happened to the nodes, the newest last."""
+        """Time (s since the epoch) and text of the events of the nodes, the newest last."""
         self._steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._calls: list[tuple[ServiceCall, float, Callable[[], None]]] = []
         self._asked_parameters: dict[str, ServiceCall] = {}
@@ -161,7 +161,7 @@ class ListenerNode(PollingNode):
         )
 
     def reset(self) -> Answer:
-        """Put the motion back to its initial state."""
+        """Reset the motion to its initial state."""
         return self._request(
             "plant",
             Trigger,
@@ -171,22 +171,22 @@ class ListenerNode(PollingNode):
         )
 
     def tap(self, force: float, duration: float) -> Answer:
-        """Push the slide with a force (N) for a simulated time (s), then no more."""
+        """Apply an impulse to the slide: a force (N) for a simulated time (s)."""
         answer = Answer()
         if not (isfinite(force) and 0.0 < duration <= LONGEST_TAP):
             answer.set_result(
-                f"a tap needs a finite force and a time above 0, at most {LONGEST_TAP:g} s"
+                f"an impulse needs a finite force and a duration above 0, at most {LONGEST_TAP:g} s"
             )
             return answer
 
         def push() -> None:
             if not self._disturbance.get_subscription_count():
-                _settle(answer, f"nobody listens to {self._disturbance.topic_name}")
+                _settle(answer, f"no node subscribes to {self._disturbance.topic_name}")
                 return
             self._take()
             self._disturbance.publish(pack_wrench(self._newest, force))
             self._tap_end = self._newest + round(duration * NANOSECONDS)
-            self.events.append((time.time(), f"pushed with {force:g} N for {duration:g} s"))
+            self.events.append((time.time(), f"impulse of {force:g} N for {duration:g} s"))
             if self._tap_timer is None:
                 self._tap_timer = self._every(0.002, self._take)
             _settle(answer, "")
@@ -195,7 +195,7 @@ class ListenerNode(PollingNode):
         return answer
 
     def close(self) -> None:
-        """End what is under way: a push, and questions that were not answered."""
+        """End a running impulse, and give up pending requests."""
         if self._tap_timer is not None:
             self._end_tap()
             self._disturbance.wait_for_all_acked(Duration(seconds=1.0))
@@ -205,7 +205,7 @@ class ListenerNode(PollingNode):
         self._calls.clear()
 
     def _listen_loosely(self, topic: Topic[Any]) -> Any:
-        """Let messages wait, without acknowledging any: the writer has no work with that."""
+        """Queue messages without acknowledging them, so that the writer has no extra work."""
         qos = qos_profile(topic)
         qos.reliability = ReliabilityPolicy.BEST_EFFORT
         return self.create_polled_subscription(topic, qos)
@@ -217,7 +217,7 @@ class ListenerNode(PollingNode):
         def call() -> None:
             try:
                 callback()
-            except Exception as error:  # the executor would end the process without a word
+            except Exception as error:  # the executor would end the process silently
                 self.get_logger().error(f"{type(error).__name__}: {error}")
 
         if self.executor is not None:
@@ -232,7 +232,7 @@ class ListenerNode(PollingNode):
         outcome: Callable[[Any], str],
         answer_time: float = ANSWER_TIME,
     ) -> Answer:
-        """Call a service of a node; `outcome` says of its response what came of it."""
+        """Call a service of a node; `outcome` turns its response into the answer."""
         answer = Answer()
 
         def ask() -> None:
@@ -246,7 +246,7 @@ class ListenerNode(PollingNode):
         return answer
 
     def _take(self) -> None:
-        """Pass on what has come."""
+        """Pass on the messages received."""
         states, _ = joint_state_columns(list(waiting_messages(self._states)))
         forces, _ = wrench_columns(list(waiting_messages(self._forces)))
         dropped, _ = wrench_columns(list(waiting_messages(self._dropped_forces)))
@@ -259,13 +259,13 @@ class ListenerNode(PollingNode):
 
     def _end_tap(self) -> None:
         self._disturbance.publish(pack_wrench(self._newest, 0.0))
-        self.events.append((time.time(), "the push has ended"))
+        self.events.append((time.time(), "the impulse has ended"))
         if self._tap_timer is not None:
             self.destroy_timer(self._tap_timer)
             self._tap_timer = None
 
     def _watch(self) -> None:
-        """Pursue what was asked; notice who has fallen silent."""
+        """Continue pending requests; mark nodes that have become silent."""
         now = time.monotonic()
         for entry in list(self._calls):
             call, deadline, give_up = entry
@@ -278,7 +278,7 @@ class ListenerNode(PollingNode):
         matched = self._parameter_events.get_publisher_count()
         if matched != self._parameter_writers:
             self._parameter_writers = matched
-            for node in self._asked_parameters:  # what changed before was not told
+            for node in self._asked_parameters:  # earlier changes were not received
                 self._ask_parameters(node)
         for node, health in self.health.items():
             if health.heard_at and health.state != SILENT and now - health.heard_at > SILENCE:
@@ -295,15 +295,15 @@ class ListenerNode(PollingNode):
         state = figures.pop(STATE, "")
         message = status.message if status.message != state else ""
         before = self.health.get(node)
-        if before is None and len(self.health) >= 50:  # anybody may publish any name
+        if before is None and len(self.health) >= 50:  # any participant may publish any name
             return
         before = before or Health()
         restarted = state == before.state and _has_restarted(before.figures, figures)
         if restarted:
-            self.events.append((time.time(), f"{node} was started again"))
+            self.events.append((time.time(), f"{node} restarted"))
         self._update(node, Health(state, status.level[0], message, figures, time.monotonic()))
         if node in NODE_PARAMETERS and (restarted or state != before.state):
-            self._ask_parameters(node)  # it may be another one of the same name
+            self._ask_parameters(node)  # it may be another node of the same name
 
     def _update(self, node: str, health: Health) -> None:
         before = self.health.get(node, Health())
@@ -332,7 +332,7 @@ class ListenerNode(PollingNode):
             values = {p.name: parameter_value_to_python(p.value) for p in changed}
             self._know(node, {name: value for name, value in values.items() if name in known})
             asked = self._asked_parameters.get(node)
-            if asked is not None and asked.answer is None:  # its answer may be from before
+            if asked is not None and asked.answer is None:  # its answer may be outdated
                 self._ask_parameters(node)
 
     def _on_cycle(self, topic: Topic[Any], message: Float64) -> None:
@@ -342,18 +342,18 @@ class ListenerNode(PollingNode):
 
 
 def _settle(answer: Answer, result: str) -> None:
-    """Give the answer, unless it was given or nobody waits for it any more."""
+    """Set the answer unless it is already set or cancelled."""
     if not answer.done():
         answer.set_result(result)
 
 
 def _wording(message: str) -> str:
-    """Return a message without its figures, which change all the time."""
+    """Return a message without its numbers, which change all the time."""
     return re.sub(r"[\d.]+", "", message)
 
 
 def _has_restarted(before: Mapping[str, str], figures: Mapping[str, str]) -> bool:
-    """Return whether a node that counts counts from 0 again."""
+    """Return whether a counter of a node has started again from 0."""
     return any(
         figures.get(count, "").isdecimal()
         and before.get(count, "").isdecimal()

@@ -1,13 +1,13 @@
-// Draws thirty frames a second of the motion, or as many as it can. The page asks for each of them:
-// one that is hidden asks for none, and none queue up. The charts draw axes and marks, when these
-// change; lines go onto a canvas above them, since a simulation on the same machine comes first.
+// Draws up to thirty frames a second of the motion. The page requests each frame, so that none queue
+// up; a hidden page requests none. The charts draw axes and marks only when these change. Lines are
+// drawn on a canvas above them: this leaves more processor time for a simulation on this machine.
 
 const INTERVAL = 1000 / 30;
 const CYCLES_INTERVAL = 500;
 const MARGIN = 1.08;
-const LEAST_SPAN = 1e-4; // of an axis, in its units: less is rounding
-const HELD = "dotted: none came, the last one";
-const DROPPED = "dots: sent, did not act";
+const LEAST_SPAN = 1e-4; // of an axis, in its units: smaller spans are rounding
+const HELD = "dotted: held, no new force";
+const DROPPED = "dots: sent, not applied";
 const page = window.stickslip;
 const limits = {};
 const shown = {};
@@ -15,7 +15,7 @@ let cyclesDrawn = { at: -Infinity };
 
 const chartOf = (name) => window.getElement(page[name])?.chart;
 
-// An axis only grows: what dies away must be seen to. `fit` starts it anew.
+// An axis only grows, so that a decaying vibration is visible. `fit` resets it.
 function range(name, lines) {
   let [low, high] = limits[name] ?? [Infinity, -Infinity];
   for (const { y } of lines) {
@@ -35,7 +35,7 @@ function setChanged(name, option) {
   shown[name] = text;
 }
 
-// Returns the context of an empty canvas that lies upon a chart.
+// Returns the context of an empty canvas on top of a chart.
 function canvasOn(chart) {
   const [width, height] = [chart.getWidth(), chart.getHeight()];
   const ratio = window.devicePixelRatio;
@@ -58,7 +58,7 @@ function canvasOn(chart) {
   return context;
 }
 
-// Returns what turns values into pixels: both axes are linear.
+// Returns the linear scales from values to pixels.
 function scaleOf(chart, gridIndex) {
   const [x0, y0] = chart.convertToPixel({ gridIndex }, [0, 0]);
   const [x1, y1] = chart.convertToPixel({ gridIndex }, [1, 1]);
@@ -86,7 +86,7 @@ function drawLine(context, scale, { x, y }, colour, { dashed = false, stepped = 
   context.stroke();
 }
 
-// Two NaN stand where forces came and did not act: what acted there is not known.
+// Two NaN mark forces that arrived and did not act: the force that acted is unknown.
 const isHeld = (y, i) => Number.isNaN(y[i]) && !Number.isNaN(y[i - 1]) && !Number.isNaN(y[i + 1]);
 
 function drawDots(context, scale, { x, y }, colour) {
@@ -96,7 +96,7 @@ function drawDots(context, scale, { x, y }, colour) {
   }
 }
 
-// Where no force came the last one is dotted: late ones leave no gap.
+// Draws the last force dotted where no new one arrived, so that late forces leave no gap.
 function drawHeld(context, scale, { x, y }, colour) {
   context.strokeStyle = colour;
   context.setLineDash([1.5, 3]);
@@ -169,7 +169,7 @@ function drawCycles({ count, amplitude, stick_fraction, label }) {
   });
 }
 
-// A frame is the length of some JSON, that JSON, and behind it the x and y of the lines it names.
+// A frame is the length of the JSON, the JSON, then x and y of the lines that it names.
 function read(bytes) {
   const [size] = new Uint32Array(bytes, 0, 1);
   const frame = JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, size)));

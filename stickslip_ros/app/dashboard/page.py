@@ -1,4 +1,4 @@
-"""The page: charts, measures, health and events of the nodes, and what a person may do."""
+"""The page: charts, measures, health and events of the nodes, and the controls for the user."""
 
 import asyncio
 import json
@@ -30,19 +30,19 @@ _FIRST = (
     f"{_CONTROLLER}.cubic_gain",
     f"{_CONTROLLER}.corner_frequency",
 )
-"""Parameters with a field of their own; the others are chosen from a list."""
+"""Parameters with their own field; the others are selected from a list."""
 _REFRESH = 0.25
 
 
 def add_page(app: FastAPI, listener: ListenerNode, frames: Frames) -> None:
-    """Add the page, and the frames of its charts."""
+    """Add the page and the frames of its charts."""
     script = Path(__file__).with_name("page.js").read_text(encoding="utf-8")
 
     @app.websocket("/frames")
     async def send_frames(socket: WebSocket) -> None:
-        """Answer each request, for so many periods, with a frame."""
+        """Answer each request, a number of periods, with a frame."""
         if socket.headers.get("origin") != f"http://{socket.headers.get('host')}":
-            await socket.close()  # a page of somebody else's
+            await socket.close()  # a page of another site
             return
         await socket.accept()
         with suppress(WebSocketDisconnect):
@@ -56,7 +56,7 @@ def add_page(app: FastAPI, listener: ListenerNode, frames: Frames) -> None:
 
 
 class _Page:
-    """One page that is open; it keeps nothing, so that closing it changes nothing."""
+    """One open page; it keeps no state of the loop, so that closing it changes nothing."""
 
     def __init__(self, listener: ListenerNode, frames: Frames, script: str) -> None:
         self._listener = listener
@@ -88,7 +88,7 @@ class _Page:
                 self._add_parameters()
                 with _card("Events"):
                     self._events = ui.log(max_lines=100).classes("w-full h-40")
-        # The area that scrolls within is as wide as its longest line unless it is told not to.
+        # Otherwise the scroll area is as wide as its longest line.
         ui.add_css(
             ".nicegui-log .q-scrollarea__content"
             "{white-space: pre-wrap !important; overflow-wrap: anywhere; width: 100%}"
@@ -121,14 +121,14 @@ class _Page:
                     self._measures[topic] = ui.label("-")
 
     def _add_control(self) -> None:
-        with _card("Act"):
+        with _card("Control"):
             self._switch = ui.switch("washout controller")
-            self._switch.on("update:model-value", self._switch_control, [None])  # by a person only
+            self._switch.on("update:model-value", self._switch_control, [None])  # by the user only
             self._switch_refusal = _refusal()
             with ui.row().classes("items-end"):
                 self._tap_force = ui.number("force (N)", value=None, format="%g").classes("w-24")
-                self._tap_time = ui.number("for (s)", value=None, format="%g").classes("w-24")
-                ui.button("Tap", on_click=self._tap)
+                self._tap_time = ui.number("duration (s)", value=None, format="%g").classes("w-24")
+                ui.button("Impulse", on_click=self._tap)
                 ui.button("Reset", on_click=self._reset)
             self._act_refusal = _refusal()
 
@@ -152,7 +152,7 @@ class _Page:
     def _add_health(self) -> None:
         columns = [
             {"name": name, "label": name, "field": name, "align": "left"}
-            for name in ("node", "state", "health", "figures")
+            for name in ("node", "state", "health", "values")
         ]
         with _card("Nodes"):
             self._health = ui.table(columns=columns, rows=[], row_key="node")
@@ -173,7 +173,7 @@ class _Page:
             self._tap_scales = scales
             for field, scale, label in (
                 (self._tap_force, scales[0], units.label("force", "N")),
-                (self._tap_time, scales[1], units.label("for", "s")),
+                (self._tap_time, scales[1], units.label("duration", "s")),
             ):
                 field.value = float(f"{scale / 4.0:.2g}")
                 field.props["label"] = label
@@ -203,7 +203,7 @@ class _Page:
         known = regime in list(Regime)
         look = REGIMES[Regime(regime) if known else None]
         trend = analyzer.figures.get("trend") if known else None
-        if trend:  # what the regime was some cycles ago is not what is seen
+        if trend:  # the motion differs from the cycles that the regime is taken from
             self._regime.set_text(f"not steady: {trend}")
         else:
             self._regime.set_text(look.label if known else "not measured")
@@ -214,7 +214,7 @@ class _Page:
         return self._listener.health[_CONTROLLER].state == "active"
 
     def _switch_control(self, event: GenericEventArguments) -> Awaitable[None] | None:
-        """Take what the person asked for from the event: a refresh may set the switch back."""
+        """Read the request from the event, since a refresh may set the switch back."""
         active = bool(event.args)
         if self._busy or active == self._is_active():
             return None
@@ -234,7 +234,7 @@ class _Page:
     async def _tap(self) -> None:
         force, duration = self._tap_force.value, self._tap_time.value
         if force is None or duration is None:
-            self._act_refusal.set_text("a tap needs a force and a time")
+            self._act_refusal.set_text("an impulse needs a force and a duration")
             return
         await _report(self._listener.tap(force, duration), self._act_refusal)
 
@@ -246,12 +246,12 @@ class _Page:
 
 
 class _ParameterField:
-    """A field for the value of a parameter, with the one in force, and why another was refused."""
+    """An input field for a parameter, with its current value and the reason of a refusal."""
 
     def __init__(
         self, listener: ListenerNode, label: str, name_of: Callable[[], str | None]
     ) -> None:
-        """Add the field; `name_of` returns which parameter it is for, as NODE.PARAMETER."""
+        """Add the field; `name_of` returns the parameter that it sets, as NODE.PARAMETER."""
         self._listener = listener
         self._name_of = name_of
         self._hint = ""
@@ -262,8 +262,8 @@ class _ParameterField:
         self._refusal = _refusal()
 
     def refresh(self, units: Units) -> None:
-        """Show the value in force."""
-        hint = self._in_force(units)
+        """Show the current value."""
+        hint = self._current_value(units)
         if hint != self._hint:
             self._hint = hint
             self._field.props["hint"] = hint
@@ -282,7 +282,7 @@ class _ParameterField:
         node, _, name = full_name.partition(".")
         await _report(self._listener.set_parameter(node, name, value), self._refusal)
 
-    def _in_force(self, units: Units) -> str:
+    def _current_value(self, units: Units) -> str:
         full_name = self._name_of()
         if full_name is None:
             return ""
@@ -290,11 +290,11 @@ class _ParameterField:
         value = self._listener.parameters[node].get(name)
         unit = units.of_unit(known_parameters(NODE_PARAMETERS[node])[name].unit or "")
         number = f"{value:g}" if isinstance(value, float) else value
-        return "not known" if value is None else f"now {number} {unit}".rstrip()
+        return "unknown" if value is None else f"now {number} {unit}".rstrip()
 
 
 async def _report(answer: Answer, refusal: ui.label) -> None:
-    """Wait for an answer, and show it where it is a refusal."""
+    """Wait for an answer and show it if it is a refusal."""
     refusal.set_text(await asyncio.wrap_future(answer))
 
 
@@ -311,13 +311,13 @@ def _refusal() -> ui.label:
 
 
 def _row(node: str, health: Health) -> dict[str, str]:
-    levels = "well", "warning", "error", "stale"
+    levels = "OK", "warning", "error", "stale"
     level = levels[min(health.level, 3)] if health.heard_at else ""
     return {
         "node": node,
         "state": health.state,
         "health": f"{level}: {health.message}" if health.message else level,
-        "figures": ", ".join(
+        "values": ", ".join(
             f"{name} {value}" for name, value in health.figures.items() if value not in ("", "none")
         ),
     }

@@ -1,4 +1,4 @@
-"""Serves the page on this machine, beside a ROS node that listens for it."""
+"""Serve the page, loopback only, next to the ROS node that listens for it."""
 
 import signal
 import socket
@@ -28,10 +28,10 @@ _HOST = "127.0.0.1"
 def serve(namespace: str, port: int | None, reach: str) -> None:
     """Serve the page of a namespace until SIGINT or SIGTERM.
 
-    `reach` says which nodes are heard. Raises InvalidInputError for a port that is taken.
+    `reach` describes which nodes can be heard. Raises InvalidInputError for a port in use.
     """
     listening = _listen(port)
-    signal.signal(signal.SIGTERM, _exit)  # uvicorn passes it on at its end
+    signal.signal(signal.SIGTERM, _exit)  # uvicorn passes it on when it ends
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
         signal.signal(signal.SIGHUP, _exit)
     initialise()
@@ -51,7 +51,7 @@ def serve(namespace: str, port: int | None, reach: str) -> None:
                 app,
                 log_level="warning",
                 timeout_graceful_shutdown=1,
-                ws_per_message_deflate=False,  # it would take longer than the loopback
+                ws_per_message_deflate=False,  # slower than the loopback
             )
             uvicorn.Server(config).run(sockets=[listening])
     finally:
@@ -59,9 +59,9 @@ def serve(namespace: str, port: int | None, reach: str) -> None:
 
 
 def _keep_others_out(app: FastAPI) -> None:
-    """Let no page of somebody else's act on the drive: by its name, from within, or in a frame."""
+    """Keep other web sites from controlling the drive: by host name, script or frame."""
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[_HOST, "localhost"])
-    core.sio.eio.cors_allowed_origins = None  # none but the page's own
+    core.sio.eio.cors_allowed_origins = None  # the page's own origin only
 
     @app.middleware("http")
     async def refuse_frames(  # pyright: ignore[reportUnusedFunction]
@@ -77,7 +77,7 @@ def _exit(*_: object) -> None:
 
 
 def _listen(port: int | None) -> socket.socket:
-    """Return a socket that listens at the port, or the first one from the default on."""
+    """Return a socket that listens at the port, or at the first free one from the default on."""
     ports = range(DEFAULT_PORT, LARGEST_PORT + 1) if port is None else [port]
     reason = ""
     for number in ports:

@@ -1,4 +1,4 @@
-"""What the dashboard hears of a loop, and does to it."""
+"""The ROS node of the dashboard: data received from a loop, and requests to it."""
 
 import numpy as np
 import pytest
@@ -146,8 +146,8 @@ def test_a_tap_lasts_for_its_simulated_time_and_ends(
     assert end - begin > 0.15  # at most what was under way when it began
 
 
-def test_a_tap_that_nobody_feels_is_said(graph: Graph, observer: ListenerNode) -> None:
-    assert outcome(graph, observer.tap(1.0, 0.1)) == "nobody listens to /test/disturbance_force"
+def test_an_impulse_without_a_subscriber_is_refused(graph: Graph, observer: ListenerNode) -> None:
+    assert outcome(graph, observer.tap(1.0, 0.1)) == "no node subscribes to /test/disturbance_force"
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_an_impossible_tap_is_refused(
     graph: Graph, observer: ListenerNode, force: float, duration: float
 ) -> None:
     refusal = outcome(graph, observer.tap(force, duration))
-    assert refusal.startswith("a tap needs a finite force and a time above 0, at most")
+    assert refusal.startswith("an impulse needs a finite force and a duration above 0, at most")
 
 
 def test_a_node_that_was_started_again_at_once_is_asked_again(
@@ -176,7 +176,7 @@ def test_a_node_that_was_started_again_at_once_is_asked_again(
     assert SILENT not in {what.split()[-1] for _, what in observer.events}
 
 
-def test_health_is_kept_of_few_whatever_somebody_publishes(
+def test_the_health_of_a_limited_number_of_nodes_is_kept(
     graph: Graph, observer: ListenerNode
 ) -> None:
     publisher = graph.observer.create_publisher(DiagnosticArray, DIAGNOSTICS.name, 100)

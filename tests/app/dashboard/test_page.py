@@ -140,10 +140,10 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
     value.press("Enter")
     expect(page.get_by_text("now 250 N s/m")).to_be_visible()
 
-    page.get_by_role("button", name="Tap").click()
-    expect(page.get_by_text("pushed with 250 N for 0.016 s")).to_be_visible()
-    expect(page.get_by_text("the push has ended")).to_be_visible()
-    wait_for(lambda: swing(page) > 50.0, "the tap is drawn")
+    page.get_by_role("button", name="Impulse").click()
+    expect(page.get_by_text("impulse of 250 N for 0.016 s")).to_be_visible()
+    expect(page.get_by_text("the impulse has ended")).to_be_visible()
+    wait_for(lambda: swing(page) > 50.0, "the impulse is drawn")
     page.close()
     assert served.end() == 130
     assert "Traceback" not in "".join(served.said)

@@ -1,4 +1,4 @@
-"""What a node of a user's gets from its base: topics decoded, dropped messages, clean-up."""
+"""What a user's node inherits from its base: decoded topics, dropped messages, clean-up."""
 
 from typing import Any
 
@@ -82,7 +82,7 @@ def test_what_cannot_be_decoded_is_told_until_the_next_activation(graph: Graph) 
     assert node.diagnose()[2] == {"dropped_messages": 0, "last_dropped": "none"}
 
 
-def test_what_is_kept_goes_at_clean_up(graph: Graph) -> None:
+def test_kept_resources_are_destroyed_at_clean_up(graph: Graph) -> None:
     node = graph.add(Listener, autostart=False)
     node.trigger_configure()
     assert not node.thing.destroyed

@@ -1,4 +1,4 @@
-"""Which network ROS uses: what the environment of nodes says after it was prepared."""
+"""The network that ROS uses: the environment of nodes after its preparation."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Asking another node for its parameters, where the middleware does not do its part at once."""
+"""Requesting parameters of another node while the middleware responds late."""
 
 from typing import Any
 

@@ -105,7 +105,7 @@ def test_it_stops_while_it_waits_for_what_is_due_in_years() -> None:
 @pytest.mark.parametrize(
     ("error", "kept"), [(BagError("gone"), BagError), (ZeroDivisionError("odd"), RunError)]
 )
-def test_what_keeps_it_from_going_on_is_kept(error: Exception, kept: type[Exception]) -> None:
+def test_the_error_that_stops_the_player_is_kept(error: Exception, kept: type[Exception]) -> None:
     def broken() -> Iterator[Message]:
         yield from states(3)()
         raise error

@@ -1,4 +1,4 @@
-"""What of a bag is to be replayed, and what is refused."""
+"""The part of a bag that is replayed, and refusals."""
 
 from math import inf
 from pathlib import Path
@@ -61,7 +61,7 @@ def test_a_part_begins_and_ends_at_recorded_times(tmp_path: Path) -> None:
     assert selection(bag, start=2.0, duration=3.0).length == 3.0
 
 
-def test_what_comes_late_still_belongs_to_the_part(tmp_path: Path) -> None:
+def test_late_messages_still_belong_to_the_part(tmp_path: Path) -> None:
     end = 7.0 + JITTER / SECOND
     run = [(STATES, 5.0), (STATES, 7.5), (FORCES, 6.9), (STATES, end), (FORCES, 6.8)]
     bag = record(tmp_path / "bag", *run)
@@ -89,7 +89,7 @@ def test_a_segment_of_earlier_log_times_follows_the_one_before(tmp_path: Path) -
         selection(bag, start=6.0)
 
 
-def test_what_only_the_living_say_is_left_out_unless_asked_for(tmp_path: Path) -> None:
+def test_topics_of_live_nodes_only_are_omitted_unless_requested(tmp_path: Path) -> None:
     bag = record(tmp_path / "bag", (STATES, 1.0), (RECORDED, 1.0))
     assert set(selection(bag).topics) == set(TYPES) - {RECORDED}
     assert set(selection(bag, clock=True).topics) == set(TYPES) - {RECORDED, "/clock"}
@@ -142,7 +142,7 @@ def test_what_the_bag_lacks_is_known_when_it_was_read(tmp_path: Path) -> None:
         ({"topics": ["joint_states"]}, ("topics = ['joint_states']", STATES)),
     ],
 )
-def test_what_cannot_be_is_refused(
+def test_invalid_input_is_refused(
     tmp_path: Path, parameters: dict[str, object], named: tuple[str, ...]
 ) -> None:
     bag = record(tmp_path / "bag", (STATES, 1.0), (STATES, 2.0), (STATES, 5.0))

@@ -47,7 +47,7 @@ def test_a_segment_of_earlier_stamps_follows_after_one_interval() -> None:
     assert timeline.now == 4 * SECOND
 
 
-def test_begun_anew_the_first_message_follows_after_one_interval() -> None:
+def test_after_a_restart_the_first_message_follows_after_one_interval() -> None:
     step = SECOND // 100
     timeline = timeline_at(SECOND, SECOND + step, SECOND + 2 * step)
     for _ in range(3):

@@ -132,7 +132,7 @@ def test_drive_and_position_may_change_at_once() -> None:
     assert (sample.position, sample.velocity) == (0.3, -0.1)
 
 
-def test_a_motion_that_runs_away_is_told() -> None:
+def test_a_diverging_motion_is_reported() -> None:
     drive = replace(PAPER, friction=Linear(static=0.4, slope=0.9))
     loop = SampledLoop(Motion(drive, 0.0, 0.0), 10.0, SECOND)
     for _ in range(100):

@@ -1,4 +1,4 @@
-"""Which forces a loop takes, and what acts where none has come."""
+"""Which forces a loop accepts, and which force acts if none has arrived."""
 
 from math import inf, isfinite, nan
 from typing import Any

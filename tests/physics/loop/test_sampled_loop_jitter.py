@@ -1,4 +1,4 @@
-"""Forces with a jitter: each arrives when it likes, and the newest that has arrived acts."""
+"""Forces with jitter: arrival times vary, and the newest arrived force acts."""
 
 from collections.abc import Callable, Collection
 from itertools import pairwise
@@ -128,7 +128,7 @@ def test_the_newest_force_that_has_arrived_acts(delay: int, jitter: int, seed: i
 
 @pytest.mark.parametrize("realtime", [False, True])
 @given(jitter=thousandths, missing=st.sets(st.integers(0, SAMPLES - 1)))
-def test_what_stands_in_for_a_missing_force_arrives_in_its_place(
+def test_the_substitute_for_a_missing_force_arrives_in_its_place(
     realtime: bool, jitter: int, missing: set[int]
 ) -> None:
     """In lockstep no force does, in real time the newest one before."""

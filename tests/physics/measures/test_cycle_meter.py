@@ -163,7 +163,7 @@ def test_sticking_now_and_then_on_a_belt_at_rest_is_not_stuck() -> None:
     assert 0.2 < measures.stick_fraction < 0.8
 
 
-def test_what_was_reported_to_run_away_is_unbounded() -> None:
+def test_a_motion_reported_as_diverging_is_unbounded() -> None:
     meter = CycleMeter(window=20)
     meter.feed(vibration(5.25), 1.0)
     meter.report_run_away()
@@ -322,7 +322,7 @@ def test_a_cycle_that_only_touches_the_belts_speed_slips_all_the_time() -> None:
         assert measures.stick_fraction == pytest.approx(stick if stick > 1e-8 else 0.0, rel=1e-6)
 
 
-def test_what_rides_a_slow_belt_is_not_at_rest() -> None:
+def test_a_slide_riding_a_slow_belt_is_not_at_rest() -> None:
     riding = Breakpoints(
         np.linspace(0.0, 5.0, 50),
         np.linspace(0.0, 0.5, 50),

@@ -1,4 +1,4 @@
-"""A coefficient of zero is allowed: the belt then does nothing, and the slide vibrates freely."""
+"""A friction coefficient of zero is allowed: the belt has no effect, the slide vibrates freely."""
 
 from dataclasses import replace
 from math import cos, sin

@@ -1,4 +1,4 @@
-"""What may be changed while a drive is in motion."""
+"""Changes during the motion of a drive."""
 
 from dataclasses import replace
 

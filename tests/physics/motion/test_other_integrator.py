@@ -1,4 +1,4 @@
-"""The motion against scipy's DOP853, with the equations and the rules of sticking written anew."""
+"""The motion against scipy's DOP853, with independently written equations and sticking rules."""
 
 from collections.abc import Callable
 from dataclasses import replace

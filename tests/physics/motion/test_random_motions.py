@@ -1,4 +1,4 @@
-"""What holds of every motion, whatever the drive, the law, the belt's direction and the forces."""
+"""Properties of every motion, for any drive, law, belt direction and forces."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Friction that falls faster than the damping rises drives the slide beyond all bounds."""
+"""The motion diverges if friction falls faster than the damping rises."""
 
 from dataclasses import replace
 from math import inf, isfinite

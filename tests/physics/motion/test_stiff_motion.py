@@ -1,4 +1,4 @@
-"""A motion that would take for ever is refused within bounded work."""
+"""A motion that would take too long is refused after bounded work."""
 
 from dataclasses import replace
 
@@ -76,7 +76,7 @@ def test_a_law_that_was_used_before_is_as_it_was() -> None:
     assert changed.position == pytest.approx(steady.position, rel=1e-11)
 
 
-def test_begun_anew_it_records_nothing_of_what_was_refused(
+def test_after_a_restart_nothing_of_a_refused_motion_is_recorded(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     motion = Motion(PAPER, 0.0, 0.0, record=True)

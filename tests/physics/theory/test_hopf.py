@@ -1,4 +1,4 @@
-"""Hopf points: the paper's, those of the closed forms, and what the motion shows of them."""
+"""Hopf points against the paper, closed forms and the motion."""
 
 from dataclasses import replace
 from math import sqrt

@@ -295,7 +295,7 @@ def test_a_coarser_loop_decays_nearly_alike(force_delay: float) -> None:
         assert coarse.decay_rate(gains) == pytest.approx(loop.decay_rate(gains), abs=0.02)
 
 
-def test_what_it_does_not_go_into_it_says() -> None:
+def test_the_reason_for_no_linear_loop_is_given() -> None:
     assert LinearSampledLoop.from_drive(replace(PAPER, belt_speed=0.0), 100.0) is None
     assert "belt rests" in (why_no_linear_loop(replace(PAPER, belt_speed=0.0), 100.0, 0.0) or "")
     assert LinearSampledLoop.from_drive(PAPER, 100.0, 1e4) is None

@@ -1,4 +1,4 @@
-"""The onset of sticking, by averaging and on the motion itself."""
+"""The onset of sticking, by averaging and in the motion."""
 
 from dataclasses import replace
 from math import sqrt
