@@ -1,4 +1,4 @@
-"""Keep public names importable from their modules of version 0.1, with a warning, until 0.2.
+"""Keep public names importable from their modules of version 0.1, with a warning, until 0.3.
 
 `MOVED` lists them all: for each old module, each name and its new place. Modules that no longer
 exist are provided by the finder in this module; the others use `moved_from` as `__getattr__`.
@@ -90,7 +90,7 @@ class Renamed:
 
 def _warn(old: str, new: str) -> None:
     warnings.warn(
-        f"{old} is now {new}; the old name goes in version 0.2", DeprecationWarning, stacklevel=3
+        f"{old} is now {new}; the old name will be removed in 0.3", DeprecationWarning, stacklevel=3
     )
 
 

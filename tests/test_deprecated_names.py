@@ -65,7 +65,7 @@ def test_what_was_public_is_importable_from_where_it_was(module: str, name: str)
     if now is None:
         assert told == []
     else:
-        assert told == [f"{module}.{name} is now {now}; the old name goes in version 0.2"]
+        assert told == [f"{module}.{name} is now {now}; the old name will be removed in 0.3"]
         home, _, new_name = now.rpartition(".")
         assert getattr(import_module(home), new_name) is found
 
