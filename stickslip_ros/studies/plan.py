@@ -40,7 +40,7 @@ class Carry(StrEnum):
 
 @dataclass(frozen=True)
 class Axis:
-    """Equally spaced values of one parameter.
+    """Values of one parameter, equally spaced on a linear or logarithmic scale.
 
     Raises
     ------
