@@ -1,1 +1,1 @@
-"""The paper, reproduced: its figures as data, its claims and the report of what holds."""
+"""Reproduction of the paper: its figures as data, its claims, and the report on them."""

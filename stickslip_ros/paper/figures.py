@@ -1,7 +1,8 @@
 """The paper's figures 2 to 13 as data, computed from the equations.
 
-All is dimensionless: the drives have mass and normal force 1, so that their SI numbers are those of
-the paper. Where the paper does not print its parameter values, these show what its text is about.
+Everything is dimensionless: the drives have mass and normal force 1, so that their SI values are
+those of the paper. Parameter values that the paper does not print are chosen to show the behaviour
+that its text describes.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,13 +24,13 @@ STRIBECK = Stribeck(static=0.4, minimum=0.25, minimum_speed=0.5)
 """The paper's friction law with the paper's constants."""
 
 PRINTED_SLOPE = 3.0 * (STRIBECK.static - STRIBECK.minimum) / STRIBECK.minimum_speed
-"""Slope of the linear law as section 3.3 prints it."""
+"""Slope of the linear law as printed in section 3.3."""
 
 TANGENT_SLOPE = PRINTED_SLOPE / 2.0
 """Slope of the cubic law, eq. 3, at zero relative speed."""
 
 POINTS = 1000
-"""Drives in a bifurcation diagram."""
+"""Number of drives in a bifurcation diagram."""
 
 
 def unit_drive(
@@ -39,7 +40,7 @@ def unit_drive(
     stiffness: float = 1.0,
     friction: FrictionLaw = STRIBECK,
 ) -> Drive:
-    """Return a drive whose SI numbers are the paper's: `damping` 2 beta, `stiffness` gamma."""
+    """Return a drive whose SI values are the paper's: `damping` 2 beta, `stiffness` gamma."""
     return Drive(1.0, damping, stiffness, 1.0, belt_speed, friction)
 
 
@@ -50,7 +51,7 @@ class BifurcationFigure:
     number: int
     title: str
     parameter: str
-    """Name and symbol of the parameter that is varied."""
+    """Name and symbol of the varied parameter."""
     values: FloatArray
     """Its value for each row of the diagram."""
     diagram: BifurcationDiagram
@@ -58,10 +59,10 @@ class BifurcationFigure:
 
 @dataclass(frozen=True)
 class Panel:
-    """Phase portraits that belong together."""
+    """A group of phase portraits."""
 
     title: str
-    """What they have in common."""
+    """The parameters that they share."""
     portraits: tuple[Portrait, ...]
 
 
@@ -98,14 +99,14 @@ def compute_figure(
 
 
 def bifurcation_drives(number: int, points: int = POINTS) -> tuple[FloatArray, list[Drive]]:
-    """Return the parameter's values in bifurcation diagram `number`, and a drive for each."""
+    """Return the parameter values of bifurcation diagram `number`, and a drive for each."""
     plan = _BIFURCATIONS[number]
     values = np.linspace(plan.start, plan.end, points)
     return values, [bifurcation_drive(number, value) for value in values.tolist()]
 
 
 def bifurcation_drive(number: int, value: float) -> Drive:
-    """Return the drive of bifurcation diagram `number` with that value of its parameter."""
+    """Return the drive of bifurcation diagram `number` for one value of its parameter."""
     return _BIFURCATIONS[number].drive(value)
 
 
@@ -174,7 +175,7 @@ def _gains(corner_frequency: float, gains: Sequence[tuple[float, float]]) -> lis
 
 
 _LONG = 3000.0
-"""Time after which a motion has settled that is slow to do so."""
+"""Duration in which a slow motion settles too."""
 
 _SETTLED_ON = f"What the motion from rest is after {COURSE.transient:g} natural periods"
 
@@ -277,4 +278,4 @@ _PORTRAITS = {
 }
 
 NUMBERS = tuple(sorted([*_BIFURCATIONS, *_PORTRAITS]))
-"""The figures there are; figure 1 is a drawing of the model."""
+"""The numbers of the figures; figure 1 is a drawing of the model."""

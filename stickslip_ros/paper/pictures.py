@@ -1,4 +1,4 @@
-"""The pictures of the paper's figures: bifurcation diagrams and phase portraits."""
+"""Drawing the paper's figures: bifurcation diagrams and phase portraits."""
 
 from collections.abc import Mapping
 from itertools import cycle
@@ -21,10 +21,10 @@ from stickslip_ros.plots.style import BLUE, DASHES, GREEN, ORANGE, save, styled
 _FIRST, _LATER, _BELT = "#888888", "#DDDDDD", "black"
 
 _FIRST_PERIODS = 20
-"""Natural periods from rest that stand out: the cycles of many more run into one another."""
+"""Natural periods from rest that are emphasized; more of them would merge."""
 
 _FRAME = 10.0
-"""Speed, in belt speeds, at which a motion that runs away leaves the frame."""
+"""Speed, in belt speeds, at which a diverging motion leaves the frame."""
 
 
 def draw_paper_figure(
@@ -32,14 +32,14 @@ def draw_paper_figure(
 ) -> None:
     """Write the figure to `path`; the format follows the ending.
 
-    `marks` gives a bifurcation diagram vertical lines: by their name, such as that of a Hopf point,
-    the values of the parameter.
+    `marks` are vertical lines in a bifurcation diagram: the values of the parameter, by a name such
+    as that of a Hopf point.
     """
     if isinstance(figure, BifurcationFigure):
         drawn = _bifurcation(figure, marks or {})
     else:
         drawn = _portraits(figure)
-    save(drawn, path, colours=128)  # these pictures are kept with the sources
+    save(drawn, path, colours=128)  # these figures are kept with the sources
 
 
 @styled
@@ -100,7 +100,7 @@ def _portraits(figure: PortraitFigure) -> Figure:
 def _panel(subfigure: SubFigure, panel: Panel, rows: int, columns: int) -> None:
     subfigure.suptitle(panel.title, fontsize=10, fontweight="bold")
     bounded = [portrait for portrait in panel.portraits if not portrait.runs_away]
-    # One that runs away takes a frame of its own, and would leave the others no room in it.
+    # A diverging motion gets a frame of its own: in a common one the others would be too small.
     share = len(bounded) == len(panel.portraits)
     grid = subfigure.subplots(rows, columns, sharex=share, sharey=share, squeeze=False)
     belt_speeds = np.array([portrait.drive.belt_speed for portrait in panel.portraits])
@@ -135,7 +135,7 @@ def _portrait(axes: Axes, portrait: Portrait) -> None:
 
 
 def _framed(portrait: Portrait) -> Breakpoints:
-    """Return the trajectory, of a motion that runs away up to where it leaves the frame."""
+    """Return the trajectory; that of a diverging motion ends where it leaves the frame."""
     trajectory = portrait.trajectory
     if not portrait.runs_away:
         return trajectory
@@ -159,7 +159,7 @@ def _outcome(portrait: Portrait) -> str:
 
 
 def _range(*columns: FloatArray) -> tuple[float, float]:
-    """Return limits with some room around all values."""
+    """Return limits with a margin around all values."""
     lowest = min(float(column.min()) for column in columns)
     highest = max(float(column.max()) for column in columns)
     room = 0.06 * (highest - lowest)

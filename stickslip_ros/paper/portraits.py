@@ -1,4 +1,4 @@
-"""Phase portraits: motions from rest as finely sampled trajectories, and what they settle on."""
+"""Phase portraits: finely sampled trajectories of motions from rest, and their settled motions."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,28 +13,28 @@ from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.motion.motion import Motion
 
 PERIODS = 300.0
-"""Natural periods that a trajectory covers, unless its case says otherwise."""
+"""Default duration of a trajectory, in natural periods."""
 
 SAMPLES_PER_PERIOD = 64
 """Samples in a natural period."""
 
 LAST_CYCLES = 5
-"""Cycles at the end of a trajectory that are measured."""
+"""Number of cycles at the end of a trajectory that are measured."""
 
 SETTLED = 0.01
-"""Share of the belt speed by which the speed amplitude of a settled cycle may still differ."""
+"""Largest deviation of the speed amplitude of a settled cycle, as a share of the belt speed."""
 
 
 class PortraitCase(NamedTuple):
     """A motion from rest at X = 0."""
 
     label: str
-    """What sets it apart from the other cases of its panel."""
+    """The parameters that distinguish it from the other cases of its panel."""
     drive: Drive
     gains: WashoutGains | None = None
-    """Of a washout controller that acts from the start, without sampling, eq. 19; SI units."""
+    """Gains of a washout controller, active from the start without sampling (eq. 19); SI units."""
     duration: float | None = None
-    """s; None for `PERIODS` natural periods."""
+    """Duration, s; None for `PERIODS` natural periods."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +43,13 @@ class Portrait:
 
     case: PortraitCase
     trajectory: Breakpoints
-    """The motion from rest, finely sampled, to its end or to where it runs away."""
+    """The motion from rest, finely sampled, to its end or until it diverges."""
     measures: Measures
     """Means of the last cycles, `LAST_CYCLES` at most."""
     settling_time: float | None
-    """Start (s) of the first cycle from which on all have the speed amplitude of the last cycles,
-    but for `SETTLED` belt speeds. None where the motion may still be on its way: outside
-    equilibrium that has to have lasted for half of the trajectory."""
+    """Start (s) of the first cycle from which on all have the speed amplitude of the last ones,
+    within `SETTLED` belt speeds. None if the motion may not have settled: except in equilibrium,
+    half of the trajectory must be settled."""
 
     @property
     def drive(self) -> Drive:
@@ -58,25 +58,25 @@ class Portrait:
 
     @property
     def runs_away(self) -> bool:
-        """Whether the motion leaves all bounds."""
+        """Whether the motion diverges."""
         return self.measures.regime is Regime.UNBOUNDED
 
     @property
     def last_cycles(self) -> Breakpoints:
-        """The end of the trajectory: `LAST_CYCLES` cycles, or natural periods where none are."""
+        """The end of the trajectory: `LAST_CYCLES` cycles, or natural periods if there are none."""
         time = self.trajectory.time
         period = self.measures.period or self.drive.natural_period
         return self.trajectory[time >= time[-1] - LAST_CYCLES * period]
 
     @property
     def least_relative_speed(self) -> float | None:
-        """Smallest |X' - v0| in the last cycles, m/s: 0 where it sticks, None if it runs away."""
+        """Smallest |X' - v0| in the last cycles, m/s: 0 if it sticks, None if it diverges."""
         if self.runs_away:
             return None
         return float(np.abs(self.last_cycles.velocity - self.drive.belt_speed).min())
 
     def time_beyond(self, speed: float) -> float | None:
-        """Return when (s) |X'| first exceeds `speed` (m/s), None if it does not."""
+        """Return the time (s) when |X'| first exceeds `speed` (m/s); None if it does not."""
         speeds = np.abs(self.trajectory.velocity)
         beyond = np.flatnonzero(speeds > speed)
         if len(beyond) == 0:
@@ -86,9 +86,9 @@ class Portrait:
 
 
 def portraits(cases: Iterable[PortraitCase]) -> Iterator[Portrait]:
-    """Yield the portraits of the cases, one after the other.
+    """Yield the portraits of the cases in order.
 
-    Integrators are compiled anew only where the friction law becomes another one.
+    Integrators are compiled again only if the friction law changes.
     """
     motions: dict[bool, Motion] = {}
     for case in cases:
@@ -141,7 +141,7 @@ def _settling_time(
 
 
 def _first_rise(trajectory: Breakpoints) -> float:
-    """Return when the velocity first rises through zero: where the first cycle starts."""
+    """Return the time when the velocity first rises through zero, the start of the first cycle."""
     falling = int(np.argmax(trajectory.velocity < 0.0))
     rise = falling + int(np.argmax(trajectory.velocity[falling:] >= 0.0))
     return float(trajectory.time[rise])

@@ -10,31 +10,32 @@ from stickslip_ros.paper.claims import CHAPTERS, Finding, Verdict
 from stickslip_ros.paper.figures import BifurcationFigure, PaperFigure
 
 Report = Mapping[str, Any]
-"""The report as JSON has it: `claims` and `figures`, a list of objects each."""
+"""The report as in JSON: `claims` and `figures`, each a list of objects."""
 
 _HEAD = """\
 # The paper, reproduced
 
 "Dynamics of mass-spring-belt friction self-excited vibration system" models a mass on a moving belt
-with Stribeck friction, finds the feed speed below which it vibrates by itself, and takes the
-vibration away with a washout filter. This page holds every number, formula and statement of that
-paper against what its own equations give. `stickslip paper --out docs` computed and wrote it, the
-pictures, and `reproduction.json`, which has the same findings in full precision.
+with Stribeck friction, finds the feed speed below which self-excited vibration occurs, and
+suppresses the vibration with a washout filter. This page compares every number, formula and
+statement of that paper with the results of its own equations. `stickslip paper --out docs`
+computes and writes this page, the figures, and `reproduction.json`, which has the same findings in
+full precision.
 
-Nothing in the column *computed* comes from the paper. It is about the drive with mass, stiffness
-and normal force of one, for which SI and dimensionless numbers are the same, with mu_s = 0.4,
-mu_m = 0.25, v_m = 0.5 and beta = 0.01 in eq. 5 (a damping coefficient 2 beta of 0.02), unless a
-line says otherwise. A number holds if the computed one is it
-when rounded to the last digit that is printed. A correction is another calculation, stated, that
-does give what is printed or that makes a formula right.
+Nothing in the column *computed* comes from the paper. The values are for a drive with mass,
+stiffness and normal force of one, for which SI and dimensionless values are the same, with
+mu_s = 0.4, mu_m = 0.25, v_m = 0.5 and beta = 0.01 in eq. 5 (a damping coefficient 2 beta of 0.02),
+unless a line gives others. A number holds if the computed value, rounded to the last printed digit,
+is equal to it. A correction is a stated change of the calculation that gives the printed number or
+makes a formula correct.
 """
 
 _FIGURES = """\
 ## The figures
 
-The paper's figures 2 to 13 again, from the equations. Where the paper does not print the parameter
-values, these are ours, chosen to show what its text is about: those that stand in the pictures,
-and else beta = 0.01, stiffness 1, mu_s = 0.4, mu_m = 0.25 and v_m = 0.5. Everything is
+These are the paper's figures 2 to 13, computed from the equations. Parameter values that the paper
+does not print are chosen to show the behaviour that its text describes. The figures show them; all
+others are beta = 0.01, stiffness 1, mu_s = 0.4, mu_m = 0.25 and v_m = 0.5. Everything is
 dimensionless and starts from rest at X = 0. Figure 1 is a drawing of the model.
 """
 
@@ -44,8 +45,8 @@ _COLUMNS = ("", "claim", "printed", "computed", "difference", "verdict")
 def report(findings: Mapping[str, Finding], figures: Mapping[str, PaperFigure]) -> Report:
     """Return the report, ready for JSON.
 
-    `findings` are by the identifier of the claim, `figures` by the path of the picture, seen from
-    the report.
+    `findings` are given by the identifier of the claim, `figures` by the path of the image relative
+    to the report.
     """
     return {
         "claims": [
@@ -68,7 +69,7 @@ def report(findings: Mapping[str, Finding], figures: Mapping[str, PaperFigure]) 
 
 
 def verdict_counts(report: Report) -> dict[str, int]:
-    """Return how many claims of a report got each verdict."""
+    """Return the number of claims of a report by verdict."""
     counts = Counter(claim["verdict"] for claim in report["claims"])
     return {str(verdict): counts[verdict] for verdict in Verdict}
 
@@ -79,7 +80,8 @@ def as_markdown(report: Report) -> str:
     parts = [_HEAD, _table([("verdict", "claims"), ("---", "---:"), *counts])]
     failing = (claim for claim in report["claims"] if claim["verdict"] == Verdict.FAILS)
     parts.append(
-        f"What does not hold; the evidence stands below:\n\n{''.join(map(_line, failing))}"
+        "These claims do not hold; the tables below give the evidence:\n\n"
+        + "".join(map(_line, failing))
     )
     for title, claims in groupby(report["claims"], key=lambda claim: claim["chapter"]):
         rows = [_COLUMNS, ["---"] * len(_COLUMNS), *map(_cells, claims)]

@@ -1,4 +1,4 @@
-"""Where theory has the transitions in the paper's bifurcation diagrams."""
+"""The transitions by theory in the paper's bifurcation diagrams."""
 
 from collections.abc import Callable
 

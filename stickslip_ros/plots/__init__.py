@@ -1,1 +1,1 @@
-"""Pictures of what the others compute."""
+"""Figures of the computed results."""

@@ -1,4 +1,4 @@
-"""The picture of basins of attraction: which motion a start leads to."""
+"""Figure of basins of attraction: the motion that each start leads to."""
 
 from collections.abc import Iterator, Sequence
 from itertools import cycle
@@ -30,20 +30,20 @@ def basin_figure(
     units: Units = SI,
     title: str = "",
 ) -> Figure:
-    """Return the picture of which attractor each of n starts leads to.
+    """Return the figure of the attractor that each of n starts leads to.
 
-    `position` (m) and `velocity` (m/s) are those of the starts, `attractor` says for each which of
-    the `regimes` and `labels` it has; arrays of n. The starts are a row-major grid of `grid_shape`,
-    or anywhere if that is None. Marked are the `belt_speed` (m/s) and the equilibrium at
-    `equilibrium_position` (m). The `title` is that of what was computed.
+    `position` (m) and `velocity` (m/s) are those of the starts, and `attractor` is the index of
+    each one's attractor in `regimes` and `labels`; arrays of shape (n,). The starts are a row-major
+    grid of `grid_shape`, or scattered if that is None. Lines mark the `belt_speed` (m/s) and a
+    circle the equilibrium at `equilibrium_position` (m). `title` names the computed study.
     """
     figure = Figure(figsize=(7.5, 6.8))
-    what = f"Which motion each of {len(attractor)} starts leads to"
+    what = f"Motion that each of {len(attractor)} starts leads to"
     set_title(figure, f"{what}: {title}" if title else what)
     axes = figure.subplots()
     axes.grid(visible=False)
-    length, x_label = units.axis("displacement at the start", "m", position)
-    speed, y_label = units.axis("velocity at the start", "m/s", velocity, belt_speed)
+    length, x_label = units.axis("initial displacement", "m", position)
+    speed, y_label = units.axis("initial velocity", "m/s", velocity, belt_speed)
     x, y = position / length, velocity / speed
     handles: list[Any] = []
     rasterized = len(attractor) > MANY
@@ -58,7 +58,7 @@ def basin_figure(
             points: Any = {"color": look.colour, "marker": look.marker, "label": label}
             axes.scatter(x[of_it], y[of_it], s=area, lw=0.0, rasterized=rasterized, **points)
             handles.append(Line2D([], [], ls="", **points))
-    if grid_shape is not None:  # white below black is to be seen on any colour
+    if grid_shape is not None:  # white below black is visible on any colour
         axes.axhline(belt_speed / speed, color="white", lw=3.0)
     axes.axhline(belt_speed / speed, color="black", lw=1.2, ls="--")
     axes.plot(equilibrium_position / length, 0.0, "o", color="white", mec="black", mew=1.5, ms=8.0)
@@ -73,7 +73,7 @@ def basin_figure(
 
 
 def _looks(regimes: Sequence[Regime | None]) -> Iterator[Look]:
-    """Yield the look of each attractor: that of its regime, or another if that is taken."""
+    """Yield the look of each attractor: that of its regime, or another one if that is in use."""
     colours = cycle((SKY_BLUE, YELLOW, PURPLE, AMBER))
     # Together they repeat after twenty.
     more = zip(colours, cycle("v*P<>"), cycle(("+++", "", "ooo", "|||", "---")), strict=False)

@@ -1,4 +1,4 @@
-"""The picture of a run in which the control comes on: what it was like before, and after."""
+"""Figure of a run before and after the controller activation."""
 
 from matplotlib.figure import Figure
 
@@ -13,9 +13,9 @@ from stickslip_ros.stamps import NANOSECONDS
 def control_coming_on_figure(
     states: SampleColumns, forces: ForceColumns, switched_on: float, around: tuple[float, float]
 ) -> Figure:
-    """Return displacement and force around `switched_on`, and both phase portraits.
+    """Return the figure of displacement and force around `switched_on`, and of both portraits.
 
-    It is in s from the first sample; `around` is how long before and after it is shown, s.
+    `switched_on` is in s from the first sample; `around` are the times shown before and after, s.
     """
     time, force_time = ((each.stamp - states.stamp[0]) / NANOSECONDS for each in (states, forces))
     figure = Figure(figsize=(10.0, 8.5))

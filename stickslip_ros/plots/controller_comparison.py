@@ -1,4 +1,4 @@
-"""The picture of what several controllers do at several belt speeds, side by side."""
+"""Figure that compares several controllers at several belt speeds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ class ControlledRun:
 
 @styled
 def comparison_figure(runs: Sequence[ControlledRun], shown: float = 0.6) -> Figure:
-    """Return displacement and force of the first `shown` s, a column per belt speed.
+    """Return the figure of displacement and force over the first `shown` s, a column per speed.
 
-    Three controllers can be told apart.
+    There are looks for three controllers.
     """
     length, length_label = SI.axis("displacement", "m", *(run.states.position for run in runs))
     newton, force_label = SI.axis("control force", "N", *(run.forces.force for run in runs))

@@ -1,4 +1,4 @@
-"""Fewer points to draw, with every peak kept."""
+"""Decimation of points to draw that keeps every peak."""
 
 from typing import Any
 
@@ -11,9 +11,8 @@ from stickslip_ros.arrays import FloatArray, IntArray
 def peaks(bucket: IntArray, *columns: FloatArray) -> IntArray:
     """Return the rows to draw: of each bucket the first, the last, and each column's extremes.
 
-    `bucket` tells, in ascending order, which one each row belongs to; as long as the buckets are
-    the columns of pixels of a picture, it looks the same as one of all rows. Rows ascend. What is
-    not a number is no extreme.
+    `bucket` is the ascending bucket number of each row. If the buckets are the pixel columns of a
+    figure, it looks the same as with all rows. The returned rows ascend. NaN is not an extreme.
     """
     if not len(bucket):
         return np.empty(0, dtype=np.int64)
@@ -33,11 +32,10 @@ def peaks(bucket: IntArray, *columns: FloatArray) -> IntArray:
 
 
 class Trace:
-    """Columns over time that come in blocks, however many, kept in as many rows as can be drawn.
+    """Columns over time that arrive in blocks, kept in a bounded number of rows to draw.
 
-    Of rows that are too many, those of short intervals are thinned to their peaks; the intervals
-    are a small part of what a column of pixels will show. The last rows are kept as they are.
-    Times are in s, or stamps in ns.
+    Excess rows are thinned to the peaks of short intervals, each a small part of a pixel column.
+    The last rows are kept unchanged. Times are in s, or stamps in ns.
     """
 
     _MOST_THINNED = 150_000
@@ -45,15 +43,15 @@ class Trace:
     _LAST_ROWS = 50_000
 
     def __init__(self, columns: int, time: type[np.float64 | np.int64] = np.float64) -> None:
-        """Take blocks of a time, of that type, and so many columns."""
+        """Prepare for blocks of a time of that type and `columns` columns."""
         self._kept: list[NDArray[Any]] = [np.empty(0, time), *[np.empty(0)] * columns]
         self._size = self._thinned = 0
-        """Rows that are filled, and how many of them may be thinned."""
+        """Number of filled rows, and how many of them may be thinned."""
         self.interval = 0.0
-        """Longest time from row to row that is due to rows having been thinned out."""
+        """Longest time between rows that results from thinning."""
 
     def add(self, time: NDArray[Any], *columns: FloatArray) -> None:
-        """Take the rows that follow, in ascending order of time."""
+        """Append rows, in ascending order of time."""
         size = self._size + len(time)
         if size > len(self._kept[0]):
             self._keep(slice(0, self._size), 2 * size)
@@ -66,18 +64,18 @@ class Trace:
                 self._thin()
 
     def forget(self, end: float) -> None:
-        """Let go of the rows before a time, once they are half of all."""
+        """Remove the rows before a time once they are half of all rows."""
         first = int(np.searchsorted(self._kept[0][: self._size], end))
         if 2 * first > self._size:
             self._thinned = max(self._thinned - first, 0)
             self._keep(slice(first, self._size), 2 * (self._size - first))
 
     def columns(self) -> list[NDArray[Any]]:
-        """Return time and columns of all that is left, as long as nothing is added."""
+        """Return time and columns of all rows; valid until rows are added."""
         return [kept[: self._size] for kept in self._kept]
 
     def since(self, start: float) -> list[NDArray[Any]]:
-        """Return the same from `start` on, not thinned; some 50,000 rows of it."""
+        """Return the same from `start` on without thinning, of the last 50,000 rows or more."""
         first = int(np.searchsorted(self._kept[0][: self._size], start))
         return [kept[max(first, self._thinned) : self._size] for kept in self._kept]
 
@@ -86,7 +84,7 @@ class Trace:
         interval = self.interval or float(time[-1] - time[0]) / self._LEAST_INTERVALS or 1.0
         rows = np.arange(self._thinned)
         while len(rows) > self._MOST_THINNED // 2:
-            # Doubled, an interval holds whole ones of those before, and of their peaks the higher.
+            # A doubled interval contains whole earlier ones, and the larger of their peaks.
             kept = peaks(intervals(time[rows], interval), *(column[rows] for column in columns))
             rows, self.interval = rows[kept], interval
             interval *= 2.0
@@ -95,12 +93,12 @@ class Trace:
         self._keep(rows, 2 * len(rows))
 
     def _keep(self, rows: slice | IntArray, room: int) -> None:
-        """Keep only these rows, with room for so many."""
+        """Keep these rows only, with space for `room` rows."""
         kept = [column[rows] for column in self._kept]
         self._size = len(kept[0])
         self._kept = [np.resize(column, room) for column in kept]
 
 
 def intervals(time: NDArray[Any], length: float) -> IntArray:
-    """Return the number of the interval of that length in which each time lies."""
+    """Return the number of the interval of that length that contains each time."""
     return np.floor(time / length).astype(np.int64)

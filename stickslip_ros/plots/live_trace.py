@@ -1,4 +1,4 @@
-"""The last of a motion that is still going on, as few points as a picture of it needs."""
+"""The most recent part of a running motion, in as few points as a figure needs."""
 
 from threading import Lock
 from typing import Any, NamedTuple
@@ -24,12 +24,12 @@ class Line(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """What a picture shows; times in s before the newest sample, so none is positive; SI units."""
+    """The contents of a figure; SI units, times (0 or below) from the newest sample."""
 
     end: float
     """Stamp of the newest sample, s from the first of all."""
     position: Line
-    """Over time, as the next three."""
+    """Over time, like the next three."""
     velocity: Line
     belt_velocity: Line
     force: Line
@@ -40,23 +40,23 @@ class Frame(NamedTuple):
 
 
 class LiveTrace:
-    """Takes in blocks of samples and forces as they come, and gives frames; from any threads.
+    """Collects blocks of samples and forces as they arrive, and returns frames; thread-safe.
 
-    However long it is fed, its memory is bounded: what becomes too much is thinned out, all peaks
-    kept. Stamps that do not go on, as those of a plant that was started again, begin it anew.
+    Its memory is bounded: excess rows are thinned, with all peaks kept. Stamps that do not
+    increase, as after a restart of the plant, restart it too.
     """
 
     def __init__(self, longest: float) -> None:
         """Keep the last `longest` seconds of simulated time."""
         self._lock = Lock()
         self.longest = longest
-        """How much is kept, s; a frame shows no more."""
+        """Duration that is kept, s; a frame shows no more."""
         self._begin()
 
     def feed(
         self, states: SampleColumns, forces: ForceColumns, dropped: ForceColumns = _NONE
     ) -> None:
-        """Take in what has come, `dropped` forces in any order; empty blocks are welcome."""
+        """Add new samples and forces, `dropped` forces in any order; blocks may be empty."""
         with self._lock:
             descents = np.flatnonzero(np.diff(states.stamp) <= 0)
             if len(descents):
@@ -71,9 +71,9 @@ class LiveTrace:
                 self._states.add(
                     states.stamp, states.position, states.velocity, states.belt_velocity
                 )
-            # A controller started again may answer for the past: the picture goes by stamps.
+            # A restarted controller may answer old samples: the figure follows the stamps.
             later = forces.stamp > self._newest_force
-            # One for the far future would hide all others.
+            # A force stamped far in the future would hide all others.
             later &= forces.stamp < max(self._newest, 0) + NANOSECONDS
             sent = forces[later]
             self._forces.add(sent.stamp, sent.force, np.full(len(sent), np.nan))
@@ -87,16 +87,16 @@ class LiveTrace:
             self._forces.forget(self._newest_force - longest)
 
     def frame(self, window: float, orbit: float, buckets: int) -> Frame | None:
-        """Return the last `window` s for `buckets` columns of pixels, and the last `orbit` s.
+        """Return the last `window` s for `buckets` pixel columns, and an orbit of `orbit` s.
 
-        None before the first sample.
+        Return None before the first sample.
         """
         with self._lock:
             if self._first is None:
                 return None
             end = self._newest
             begin = end - round(min(window, self.longest) * NANOSECONDS)
-            # On a fixed grid of times the points of a moving picture keep their places.
+            # With a fixed grid of times the points of a moving figure keep their places.
             width = max((end - begin) // buckets, 1)
             stamp, *columns = _since(self._states, begin)
             force_stamp, force, lost = _since(self._forces, begin)
@@ -125,12 +125,12 @@ class LiveTrace:
         self._newest = self._newest_force = -1
         self._states = Trace(3, np.int64)
         self._forces = Trace(2, np.int64)
-        """Those that acted, those that did not; one of them is NaN."""
+        """Columns of forces that acted and that did not; one of the two is NaN in each row."""
         self._dropped = DroppedForces()
 
 
 def _since(trace: Trace, begin: int) -> list[NDArray[Any]]:
-    """Return stamps and columns from a stamp on."""
+    """Return the stamps from `begin` on, and the columns."""
     stamp, *columns = trace.columns()
     first = int(np.searchsorted(stamp, begin))
     return [stamp[first:], *(column[first:] for column in columns)]
@@ -144,10 +144,10 @@ def _line(
     step: float,
     others: IntArray = _NONE.stamp,
 ) -> Line:
-    """Return the points of a line that is broken, by NaN, where samples are missing.
+    """Return the points of a line, with NaN where samples are missing.
 
-    Steps of up to `step` (ns) are not for that reason. Where there were `others` (ns) instead, it
-    is two NaN.
+    A step of up to `step` (ns) does not count as missing. Two NaN mark a gap that contains `others`
+    (ns).
     """
     rows = peaks(stamp // width, column)
     x, y = (stamp[rows] - end) / NANOSECONDS, column[rows]

@@ -1,4 +1,4 @@
-"""What each regime looks like in every picture."""
+"""Look of each regime in all figures."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -14,17 +14,17 @@ from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.style import BLUE, GREEN, GREY, LIGHT_GREY, MANY, ORANGE
 
 INK = "#333333"
-"""Of hatches, to be seen on every colour but black."""
+"""Colour of hatches, visible on every colour except black."""
 
 
 class Look(NamedTuple):
-    """Colour, name, and what tells a regime apart without colour."""
+    """Colour and label of a regime, with marker and hatch to distinguish it without colour."""
 
     colour: str
     label: str
     marker: str
     hatch: str
-    """In `INK`."""
+    """Hatch pattern, drawn in `INK`."""
 
 
 REGIMES: Mapping[Regime | None, Look] = {
@@ -38,7 +38,7 @@ REGIMES: Mapping[Regime | None, Look] = {
         (None, LIGHT_GREY, "P", "\\\\\\"),
     )
 }
-"""Of each regime; None is for a motion that has none."""
+"""Look by regime; None is for a motion without one."""
 
 
 def draw_cells(
@@ -53,7 +53,7 @@ def draw_cells(
     mesh: Any = axes.pcolormesh(x, y, cells, cmap=filling, rasterized=rasterized, **more)
     if not look.hatch:
         return
-    # One outline of all: to hatch cell after cell would take a hundred times as long.
+    # One outline of all cells: hatching each cell takes a hundred times as long.
     corners = mesh.get_coordinates()
     around = corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]
     outlines = np.stack([corner[shown] for corner in (*around, around[0])], axis=1)
@@ -65,5 +65,5 @@ def draw_cells(
 
 
 def patch(look: Look, label: str) -> Patch:
-    """Return what stands for such cells in a legend."""
+    """Return the legend entry of such cells."""
     return Patch(facecolor=look.colour, hatch=look.hatch, edgecolor=INK, lw=0.0, label=label)

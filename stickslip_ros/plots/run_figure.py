@@ -1,4 +1,4 @@
-"""The picture of a run: motion, force, phase portrait, cycles and friction law."""
+"""Figure of a run: motion, force, phase portrait, cycles and friction law."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -32,13 +32,13 @@ from stickslip_ros.plots.style import (
 from stickslip_ros.plots.units import Units
 
 LAST_CYCLES = 5
-"""Cycles that are enlarged, and are in the phase portrait."""
+"""Number of cycles that are enlarged, and in the phase portrait."""
 
 _PIXELS = 1000
-"""Intervals of time in the width of a panel, of about a pixel each."""
+"""Intervals of time across a panel, of about one pixel each."""
 
 _LEAST_SPAN = 1e-6
-"""Of an axis, in the largest magnitude that is drawn on it: less is rounding."""
+"""Smallest span of an axis, as a share of the largest value on it: less is rounding."""
 
 _MOTION: Any = {"color": BLUE, "lw": 1.0}
 _BELT: Any = {"color": "black", "lw": 1.0, "ls": "--", "zorder": 2.5}
@@ -54,7 +54,7 @@ _SHADE = LinearSegmentedColormap.from_list("stick", [to_rgba(GREY, 0.0), to_rgba
 
 
 class _Pane(NamedTuple):
-    """A part of the run over time."""
+    """A section of the run over time."""
 
     title: str
     rows: DrawnMotion
@@ -63,7 +63,7 @@ class _Pane(NamedTuple):
 
     @classmethod
     def covering(cls, title: str, rows: DrawnMotion, *other: FloatArray) -> Self:
-        """Return one as long as the rows and other times last."""
+        """Return a pane that covers the rows and the other times."""
         times = [time for time in (rows.time, *other) if len(time)]
         if not times:
             return cls(title, rows, 0.0, 1.0)
@@ -81,62 +81,62 @@ def run_figure(
     notes: Sequence[str] = (),
     force: str = "control force",
 ) -> Figure:
-    """Return the picture of a run.
+    """Return the figure of a run.
 
-    The whole run and its last `LAST_CYCLES` cycles over time, shaded by the share of time that the
-    slide sticks; the phase portrait of these cycles and of the beginning; amplitude and stick
-    fraction of each cycle; the friction law with the relative speeds that there were. Without a
-    `drive` there is no equilibrium and no friction law, with a belt at rest no one equilibrium; the
-    belt speed is that at the end of the run. `notes` stand below the title, `force` is what the
-    force is called.
+    It shows the whole run and its last `LAST_CYCLES` cycles over time, shaded by the share of time
+    in which the slide sticks; the phase portrait of these cycles and of the start; amplitude and
+    stick fraction of each cycle; and the friction law with the range of relative speeds. The
+    equilibrium and the friction law need a `drive`, the equilibrium also a moving belt. The belt
+    speed is that at the end of the run. `notes` are shown below the title, and `force` is the label
+    of the force.
     """
     motion = history.motion
     if drive is not None and len(motion.time):
         drive = replace(drive, belt_speed=float(motion.belt_velocity[-1]))
     last = history.end(_shown(motion, measures, drive))
-    picture = _Picture(history, drive, last if len(last.time) > 1 else history.end(float("inf")))
+    panels = _Panels(history, drive, last if len(last.time) > 1 else history.end(float("inf")))
     figure = Figure(figsize=(12.0, 10.0))
     if history.left_out:
-        notes = [*notes, f"not drawn: {history.left_out} samples that are no later than one before"]
-    set_title(figure, title, _found(measures, picture.units), *notes)
+        notes = [*notes, f"not drawn: {history.left_out} samples without an increasing time"]
+    set_title(figure, title, _found(measures, panels.units), *notes)
     above, below = figure.add_gridspec(2, 1, height_ratios=(3.0, 1.9))
-    picture.over_time(figure, above.subgridspec(3, 2, width_ratios=(2.0, 1.0)))
+    panels.over_time(figure, above.subgridspec(3, 2, width_ratios=(2.0, 1.0)))
     left, middle, right = below.subgridspec(1, 3)
-    picture.portrait(figure.add_subplot(left))
+    panels.portrait(figure.add_subplot(left))
     upper, lower = middle.subgridspec(2, 1)
     amplitude = figure.add_subplot(upper)
-    picture.cycles(amplitude, figure.add_subplot(lower, sharex=amplitude))
-    picture.law(figure.add_subplot(right))
+    panels.cycles(amplitude, figure.add_subplot(lower, sharex=amplitude))
+    panels.law(figure.add_subplot(right))
     handles: list[Any] = [
         Line2D([], [], **_MOTION, label="slide"),
         Line2D([], [], **_BELT, label="belt speed"),
         Patch(color=GREY, alpha=0.6, lw=0.0, label="sticks (paler: part of the time)"),
         Line2D([], [], **_CONTROL, label=force),
         Line2D([], [], **_FRICTION, label="friction force"),
-        Line2D([], [], **_EARLIER | {"lw": 4.0}, label="beginning"),
+        Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"),
     ]
     if drive is not None:
         handles.insert(2, Line2D([], [], **_POINT | _REST, label="equilibrium"))
-    if picture.holds:
-        handles.append(Line2D([], [], **_HELD, label="none came: the last one"))
-    if picture.drops:
+    if panels.holds:
+        handles.append(Line2D([], [], **_HELD, label="no new force: last one"))
+    if panels.drops:
         handles.append(Line2D([], [], **_DROPPED | {"ms": 6.0}, label="sent, did not act"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
 
 
-class _Picture:
-    """What the panels have in common, and each of them."""
+class _Panels:
+    """The panels of the figure, with their common units and data."""
 
     def __init__(self, history: RunHistory, drive: Drive | None, last: DrawnMotion) -> None:
         self.units = units = Units.for_drive(drive)
         self._history, self._drive, self._last = history, drive, last
         motion = history.motion
-        self._run = _Pane.covering("the whole run", motion, *self._force_times)
+        self._run = _Pane.covering("whole run", motion, *self._force_times)
         self._length = units.axis("displacement", "m", motion.position)
         self._speed = units.axis("velocity", "m/s", motion.velocity, motion.belt_velocity)
         self.holds = False
-        """Whether no force came for a while, and what is drawn is the last one."""
+        """Whether forces are missing for a while, so that the last one is drawn on."""
         self.drops = len(history.dropped.columns()[0]) > 0
         """Whether forces were sent that did not act."""
 
@@ -145,10 +145,10 @@ class _Picture:
         return [trace.columns()[0] for trace in (self._history.control, self._history.dropped)]
 
     def over_time(self, figure: Figure, parts: GridSpecFromSubplotSpec) -> None:
-        """Draw displacement, velocity and force, the whole run to the left and its end enlarged."""
+        """Draw displacement, velocity and force: the whole run, and its end enlarged."""
         history = self._history
         others = [] if len(self._last.time) else self._force_times
-        end = _Pane.covering("its end, enlarged", self._last, *others)
+        end = _Pane.covering("end of the run, enlarged", self._last, *others)
         traces = history.friction, history.control, history.dropped
         whole = [trace.columns() for trace in traces]
         ending = [trace.since(end.start) for trace in traces]
@@ -183,7 +183,7 @@ class _Picture:
         rows, gap = pane.rows, self._history.gap
         length, speed = self._length[0], self._speed[0]
         if self._drive is not None:
-            # On a belt at rest any place within the static friction is one.
+            # On a belt at rest any position within the static friction is an equilibrium.
             belt = np.where(rows.belt_velocity == 0.0, np.nan, rows.belt_velocity)
             rest = self._drive.friction.at_rest(belt) * self._drive.length_scale
             _draw_line(position, pane, (rows.time, rest), length, gap, **_REST)
@@ -192,13 +192,13 @@ class _Picture:
         _draw_line(velocity, pane, (rows.time, rows.velocity), speed, gap, **_MOTION)
 
     def portrait(self, axes: Axes) -> None:
-        """Draw the phase portrait of the last cycles, above that of the beginning."""
+        """Draw the phase portrait of the last cycles, above that of the start."""
         (length, label), (speed, speed_label) = self._length, self._speed
         axes.set_title("phase portrait")
         axes.set_xlabel(label)
         axes.set_ylabel(speed_label)
         if not len(self._last.time):
-            _say(axes, "no motion is known")
+            _say(axes, "no motion recorded")
             return
         for rows, look in ((self._history.beginning, _EARLIER), (self._last, _MOTION)):
             time, position, velocity, belt, stick_time = _broken(
@@ -239,7 +239,7 @@ class _Picture:
         self._label_time(stick_fraction, self._run)
 
     def law(self, axes: Axes) -> None:
-        """Draw the friction law, and which relative speeds there were."""
+        """Draw the friction law, and the range of relative speeds."""
         axes.set_title("friction law, with the range of this run")
         drive, reached = self._drive, self._history.relative_speeds
         if drive is None:
@@ -267,9 +267,9 @@ class _Picture:
         axes.set_xlim(ends[0] / scale, ends[1] / scale)
         handles = [
             Line2D([], [], color="black", lw=0.8, ls="-.", label="friction law"),
-            Line2D([], [], **_MOTION | {"lw": 3.0}, label="range of the end"),
+            Line2D([], [], **_MOTION | {"lw": 3.0}, label="range of the last cycles"),
             Patch(color=LIGHT_GREY, alpha=0.4, lw=0.0, label="range of the whole run"),
-            Line2D([], [], **_BELT, label="a slide at rest"),
+            Line2D([], [], **_BELT, label="slide at rest"),
         ]
         axes.legend(handles=handles, loc="best")
 
@@ -280,7 +280,7 @@ class _Picture:
         law = self._drive.friction
         for sign, start, end in ((-1.0, least, min(largest, 0.0)), (1.0, max(least, 0.0), largest)):
             if start < end:
-                # Close together where the law may be steep.
+                # Closely spaced where the law may be steep.
                 steps = np.r_[0.0, np.geomspace(1e-6, 1.0, 400)]
                 speeds = start + (end - start) * steps
                 if sign < 0.0:
@@ -304,7 +304,7 @@ def _found(measures: Measures, units: Units) -> str:
 
 
 def _shown(motion: DrawnMotion, measures: Measures, drive: Drive | None) -> float:
-    """Return how much of the end is enlarged, s: a part where nothing is known of a period."""
+    """Return the duration of the enlarged end, s; a fixed share of the run without a period."""
     span = float(motion.time[-1] - motion.time[0]) if len(motion.time) else 0.0
     period = measures.period or (drive.natural_period if drive is not None else 0.0)
     return min(LAST_CYCLES * period, span) or 0.05 * span
@@ -313,14 +313,14 @@ def _shown(motion: DrawnMotion, measures: Measures, drive: Drive | None) -> floa
 def _draw_line(
     axes: Axes, pane: _Pane, trace: Sequence[FloatArray], scale: float, gap: float, **look: Any
 ) -> None:
-    """Draw a trace, of time and values, within a pane and a little beyond, with every peak."""
+    """Draw a trace of time and values across a pane and slightly beyond, with every peak."""
     time, values = trace
     first, end = np.searchsorted(time, (pane.start, pane.end), "right")
     rows = slice(max(int(first) - 1, 0), int(end) + 1)
     time, values = time[rows], values[rows]
     length = (pane.end - pane.start) / _PIXELS
     drawn = peaks(intervals(time, length), values)
-    # Between rows of neighbouring intervals nothing is missing.
+    # No rows are missing between neighbouring intervals.
     time, values = _broken(max(gap, 2.0 * length), time[drawn], values[drawn])
     axes.plot(time, values / scale, **look)
 
@@ -333,9 +333,9 @@ def _draw_held(
     gap: float,
     dropped: FloatArray,
 ) -> bool:
-    """Draw the forces behind which none came for a while, up to the next; return if there are.
+    """Extend forces up to the next one after a gap; return whether there are any.
 
-    Where some came and were `dropped` (s), it is not known what acted.
+    If forces were `dropped` (times in s) in the gap, the acting force is unknown and not drawn.
     """
     time, force = control
     behind = np.flatnonzero(np.diff(time) > max(gap, 2.0 * (pane.end - pane.start) / _PIXELS))
@@ -352,20 +352,20 @@ def _draw_held(
 
 
 def _widened(low: float, high: float) -> tuple[float, float]:
-    """Return limits of an axis that span more than the rounding of what it shows."""
+    """Return limits of an axis that span more than the rounding of its values."""
     middle = (low + high) / 2.0
     half = max(high - low, _LEAST_SPAN * max(abs(low), abs(high))) / 2.0
     return (low, high) if half == (high - low) / 2.0 else (middle - half, middle + half)
 
 
 def _broken(gap: float, time: FloatArray, *columns: FloatArray) -> list[FloatArray]:
-    """Return the columns with a row that is no number where times are further apart than `gap`."""
+    """Return the columns with a row of NaN between times further apart than `gap`."""
     behind = np.flatnonzero(np.diff(time) > gap) + 1
     return [np.insert(column, behind, np.nan) for column in (time, *columns)]
 
 
 def _shade(axes: Axes, pane: _Pane) -> None:
-    """Shade each pixel's width of a pane by the share of it in which the slide sticks."""
+    """Shade each pixel column of a pane by the share of time in which the slide sticks."""
     bottom, top = axes.get_ylim()
     if len(pane.rows.time):
         edges = np.linspace(pane.start, pane.end, _PIXELS + 1)

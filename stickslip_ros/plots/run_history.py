@@ -1,4 +1,4 @@
-"""A run as it goes by, kept in as little as it takes to draw it."""
+"""History of a run, reduced to the data that its figure needs."""
 
 from typing import NamedTuple
 
@@ -11,41 +11,41 @@ from stickslip_ros.plots.decimation import Trace
 from stickslip_ros.samples import LARGEST
 
 _FIRST_ROWS = 20_000
-"""Rows of the beginning that are kept as they are, for a phase portrait."""
+"""Rows of the start that are kept unchanged, for a phase portrait."""
 
 
 class DrawnMotion(NamedTuple):
-    """Breakpoints, all or some, as columns; SI units."""
+    """Breakpoints, all or a part, as columns; SI units."""
 
     time: FloatArray
     position: FloatArray
     velocity: FloatArray
     belt_velocity: FloatArray
     stick_time: FloatArray
-    """Time that the slide has stuck to the belt up to then, s."""
+    """Total stick time of the slide until then, s."""
 
 
 class RunHistory:
-    """What was seen of a run, as an observer of it: kept in constant memory.
+    """Observer of a run that keeps its history in constant memory.
 
-    Times in s, all else in SI units. What is not later than all before is left out.
+    All values are in SI units. Data whose time does not increase are omitted.
     """
 
     def __init__(self) -> None:
         self.left_out = 0
-        """Samples whose time was not later than that of one before."""
+        """Number of samples whose time did not increase."""
         self.gap = float("inf")
-        """Time, s, beyond which nothing is known of what was between two rows of the motion."""
+        """Time between two rows, s, above which the motion between them is unknown."""
         self.control_gap = float("inf")
-        """The same between two control forces."""
+        """The same for two control forces, s."""
         self.relative_speeds: tuple[float, float] | None = None
-        """Least and largest velocity relative to the belt, m/s; None without a motion."""
+        """Smallest and largest velocity relative to the belt, m/s; None without a motion."""
         self.friction = Trace(1)
         """Friction force on the slide, N."""
         self.control = Trace(1)
-        """Force (N) by the time from which on it acts or is asked for."""
+        """Force (N) over the time from which it acts or is requested."""
         self.dropped = Trace(1)
-        """Force (N) that was asked for and did not act, as far as that is known."""
+        """Force (N) that was requested and did not act, as far as known."""
         self._motion, self._cycles = Trace(4), Trace(2)
         self._first: list[DrawnMotion] = []
         self._first_rows = 0
@@ -55,35 +55,35 @@ class RunHistory:
 
     @property
     def motion(self) -> DrawnMotion:
-        """The whole motion, thinned to its peaks where it is long."""
+        """The whole motion; a long one is thinned to its peaks."""
         return DrawnMotion(*self._motion.columns())
 
     @property
     def beginning(self) -> DrawnMotion:
-        """The beginning of the motion, not thinned; some 20,000 rows of it."""
+        """The start of the motion without thinning, about 20,000 rows."""
         if not self._first:
             return DrawnMotion(*[np.empty(0)] * 5)
         return DrawnMotion(*map(np.concatenate, zip(*self._first, strict=True)))
 
     def end(self, duration: float) -> DrawnMotion:
-        """Return the last `duration` (s) of the motion, not thinned; some 50,000 rows of it."""
+        """Return the last `duration` (s) of the motion, of the 50,000 last rows or more."""
         return DrawnMotion(*self._motion.since(self._motion_end - duration))
 
     @property
     def cycles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Time at which each cycle was complete, its amplitude (m) and stick fraction."""
+        """End time (s) of each cycle, its amplitude (m) and its stick fraction."""
         time, amplitude, stick_fraction = self._cycles.columns()
         return time, amplitude, stick_fraction
 
     def take_motion(self, motion: MeasuredMotion) -> None:
-        """Take the motion that follows."""
+        """Add the next part of the motion."""
         self._take_cycles(motion)
         time = motion.breakpoints.time
         if len(time) == 0:
             return
         if self.gap == float("inf"):
             self.gap = motion.longest_step
-        # Breakpoints may be of one instant; what goes back in time goes back by more.
+        # Breakpoints may share an instant; a step back in time is larger.
         rows = (time > self._motion_end) | (time[0] >= self._motion_end)
         breakpoints, belt_velocity = motion.breakpoints[rows], motion.belt_velocity[rows]
         if len(breakpoints) == 0:
@@ -112,7 +112,7 @@ class RunHistory:
         self._cycles.add(time[later], *columns.reshape(-1, 2)[later].T)
 
     def take_friction(self, time: FloatArray, force: FloatArray) -> None:
-        """Take the friction force at the samples that follow; what is not known is left out."""
+        """Add the friction force at the next samples; unknown values are omitted."""
         later = _later(time, self._friction_end)
         self.left_out += int((~later).sum())
         self._friction_end = float(time.max(initial=self._friction_end))
@@ -120,7 +120,7 @@ class RunHistory:
         self.friction.add(time[rows], force[rows])
 
     def take_control(self, time: FloatArray, force: FloatArray, acted: BoolArray) -> None:
-        """Take control forces that follow, by the time from which each acts or is asked for."""
+        """Add the next control forces, with the time from which each acts or is requested."""
         rows = _later(time, self._control_end) & np.isfinite(force)
         self._control_end = float(time.max(initial=self._control_end))
         if self.control_gap == float("inf") and rows.sum() > 1:
@@ -130,5 +130,5 @@ class RunHistory:
 
 
 def _later(time: FloatArray, end: float) -> BoolArray:
-    """Return which times are later than all before, and than `end`."""
+    """Return which times are later than all earlier ones and than `end`."""
     return time > np.maximum.accumulate(np.append(end, time))[:-1]

@@ -1,4 +1,4 @@
-"""The picture of where a sampled loop is stable, and how fast it comes to rest there."""
+"""Figure of the stability and the decay rates of a sampled loop."""
 
 from typing import Any
 
@@ -21,12 +21,12 @@ _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": SKY_BLUE, "ls": ":"},
     {"color": "black", "ls": (0, (5, 1, 1, 1, 1, 1))},
 )
-"""Of the curves, one for each rate."""
+"""Looks of the curves, one for each rate."""
 
 
 @styled
 def stability_figure(found: StabilityMap, critical: CriticalGainCurves | None) -> Figure:
-    """Return the map, and beside it the critical gain over the delay if given."""
+    """Return the figure of the map and, if given, of the critical gains over the delay."""
     figure = Figure(figsize=(6.4 if critical is None else 12.0, 5.2))
     axes = figure.subplots(1, 1 if critical is None else 2, squeeze=False)[0]
     _draw_map(figure, axes[0], found)
@@ -52,17 +52,17 @@ def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> None:
     axes.set_xscale("log")
     axes.set_xlim(corners[0], corners[-1])
     axes.set_ylim(gains[0], gains[-1])
-    axes.set_xlabel(units.label("corner frequency d", "rad/s"))
+    axes.set_xlabel(units.label("cutoff frequency d", "rad/s"))
     axes.set_ylabel(units.label("linear gain k1", "N s/m"))
     loop = found.loop
     late = units.text(loop.force_delay, "s")
-    delay = f", force {late} late" if loop.force_delay > 0.0 else ""
+    delay = f", force delay {late}" if loop.force_delay > 0.0 else ""
     belt, rate = units.text(loop.drive.belt_speed, "m/s"), units.text(loop.rate, "Hz")
     axes.set_title(f"belt speed {belt}, sample rate {rate}{delay}")
     axes.legend(
         handles=[
             Line2D([], [], color=ORANGE, lw=2.0, label="limit of stability, sampled"),
-            Line2D([], [], color="black", ls="--", lw=1.2, label="the same, continuous"),
+            Line2D([], [], color="black", ls="--", lw=1.2, label="limit of stability, continuous"),
             Line2D([], [], **_GAINS, ms=12, label="gains"),
             Patch(facecolor=_UNSTABLE, edgecolor=GREY, label="unstable"),
         ],
@@ -72,11 +72,11 @@ def _draw_map(figure: Figure, axes: Axes, found: StabilityMap) -> None:
 
 def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, found: StabilityMap) -> None:
     units = Units.for_drive(found.loop.drive)
-    late, label = units.axis("delay of the force", "s", critical.force_delays)
+    late, label = units.axis("force delay", "s", critical.force_delays)
     axes.set_xlabel(label)
     for index, (rate, gains) in enumerate(zip(critical.rates, critical.linear_gains, strict=True)):
         look = _LOOKS[index % len(_LOOKS)]
-        # Where it changes sign it jumps from one interval of gains to another.
+        # At a change of sign the curve jumps from one interval of gains to another.
         jumps = np.flatnonzero(gains[:-1] * gains[1:] < 0.0) + 1
         delays = np.insert(critical.force_delays, jumps, np.nan)
         label = units.text(float(rate), "Hz")
@@ -85,5 +85,5 @@ def _draw_critical_gains(axes: Axes, critical: CriticalGainCurves, found: Stabil
     axes.plot(found.loop.force_delay / late, found.gains.linear, **_GAINS, ms=14)
     axes.set_ylabel(units.label("critical linear gain k1", "N s/m"))
     corner = found.gains.corner_frequency
-    axes.set_title(f"corner frequency {corner:.3g}{'' if units.dimensionless else ' rad/s'}")
+    axes.set_title(f"cutoff frequency {corner:.3g}{'' if units.dimensionless else ' rad/s'}")
     axes.legend(title="sample rate")

@@ -1,4 +1,4 @@
-"""The pictures of a sweep: a bifurcation diagram over one parameter, a map over two."""
+"""Figures of a sweep: a bifurcation diagram over one parameter, a map over two."""
 
 from collections.abc import Iterator, Sequence
 from itertools import chain, cycle
@@ -26,30 +26,30 @@ from stickslip_ros.studies.transitions import TransitionMap, transition_map, tra
 
 _FULL: Any = {"mew": 0.0}
 _HOLLOW: Any = {"mfc": "white", "mew": 0.8}
-"""Markers of motions that are steady, and of those that are not yet."""
+"""Markers of steady motions, and of motions that are not steady yet."""
 
 _MOST_SHOWN = 4
-"""Values of one transition in the legend."""
+"""Largest number of values of one transition in the legend."""
 
 _HYSTERESIS = "#FBF6C9"
 
 _HATCH: Any = {"facecolor": "white", "edgecolor": GREY, "hatch": "////"}
-"""Of where there is no result."""
+"""Look of cells without a result."""
 
 _AWAY = REGIMES[Regime.UNBOUNDED]._replace(colour=LIGHT_GREY, hatch="...")
-"""Look of what runs away, next to a colour bar, which begins with what is nearly black."""
+"""Look of diverging motions next to a colour bar, which starts with a near black."""
 
 _MEASURES = {"amplitude": ("amplitude", "m"), "stick_fraction": ("stick fraction", "")}
-"""What is drawn beside the regimes: name and unit."""
+"""Measures that are drawn in addition to the regimes: name and unit."""
 
 
 @styled
 def diagram_figure(columns: Columns, study: Study) -> Figure:
     """Return the bifurcation diagram of a sweep over one parameter.
 
-    Turning points by regime, amplitude and stick fraction, and where theory has the transitions.
-    Hollow are the turning points of motions that are not steady yet.
-    Carried both ways, what was found upward is narrow and dark, downward wide and pale.
+    It shows turning points by regime, amplitude, stick fraction, and the transitions by theory.
+    Markers of motions that are not steady yet are hollow. If the sweep is carried both ways,
+    upward results are narrow and dark, downward results wide and pale.
     """
     grid = _grid(study)
     (axis,) = grid.axes
@@ -66,7 +66,7 @@ def diagram_figure(columns: Columns, study: Study) -> Figure:
         name: units.axis(title, unit, getattr(columns, name))
         for name, (title, unit) in _MEASURES.items()
     }
-    # The wide ones below the narrow ones.
+    # Wide markers are drawn below the narrow ones.
     for rows, direction in reversed(list(_passes(grid))):
         wide = both and direction is Carry.DOWN
         _draw_section(section, columns, axis, rows, length, wide=wide)
@@ -105,10 +105,10 @@ def map_figure(
     study: Study,
     colour: Literal["regime", "amplitude", "stick_fraction"] = "regime",
 ) -> Figure:
-    """Return the map of a sweep over two parameters, the first one from left to right.
+    """Return the map of a sweep over two parameters, the first one on the horizontal axis.
 
-    Coloured by regime, amplitude or stick fraction, with the curves on which theory has the
-    transitions; hatched where there is no result. Carried both ways, there are two panels.
+    Cells are coloured by regime, amplitude or stick fraction, and hatched without a result. Curves
+    show the transitions by theory. If the sweep is carried both ways, there are two panels.
     """
     grid = _grid(study)
     first, second = grid.axes
@@ -132,7 +132,7 @@ def map_figure(
         else:
             mesh = _draw_values(axes, columns, grid, rows, getattr(columns, colour) / scale)
         for _, margins, dashes in _curves(found):
-            # White below black is to be seen on any colour.
+            # White below black is visible on any colour.
             for black, width, style in ((False, 3.5, "-"), (True, 1.5, dashes)):
                 axes.contour(
                     found.first, found.second, margins, levels=[0.0],
@@ -165,7 +165,7 @@ def _grid(study: Study) -> Grid:
 
 
 def _passes(grid: Grid) -> Iterator[tuple[slice, Carry | None]]:
-    """Yield which points are of each direction."""
+    """Yield the points of each direction."""
     count = prod(grid.shape)
     for number, direction in enumerate(grid.directions):
         yield slice(number * count, (number + 1) * count), direction
@@ -180,7 +180,7 @@ def _present(columns: Columns) -> Iterator[tuple[Regime | None, Look]]:
 def _draw_section(
     axes: Axes, columns: Columns, axis: Axis, rows: slice, length: float, *, wide: bool
 ) -> None:
-    """Draw turning points, and strokes at the lower edge for points that have none."""
+    """Draw turning points, and strokes at the lower edge for points without any."""
     values, regimes = columns.values[axis.parameter][rows], columns.regime[rows]
     points = columns.turning_points[rows]
     counts = np.array([len(found) for found in points])
@@ -202,7 +202,7 @@ def _draw_section(
 
 
 def _shade_hysteresis(panels: Sequence[Axes], columns: Columns, axis: Axis) -> list[Artist]:
-    """Shade where up and down differ; return what the legend has of it."""
+    """Shade the ranges where up and down differ; return their legend entry."""
     up, down = columns.amplitude.reshape(2, -1)
     largest = float(np.nanmax(columns.amplitude, initial=0.0))
     differs = np.abs(up - down) > 0.02 * largest  # less is not hysteresis
@@ -221,7 +221,7 @@ def _shade_hysteresis(panels: Sequence[Axes], columns: Columns, axis: Axis) -> l
 def _mark_transitions(
     panels: Sequence[Axes], study: Study, axis: Axis, units: Units
 ) -> list[Artist]:
-    """Draw lines at the transitions; return what the legend has of them."""
+    """Draw lines at the transitions; return their legend entries."""
     handles: list[Artist] = []
     for (name, values), dashes in zip(transitions(study, axis).items(), cycle(DASHES)):
         look: Any = {"color": "black", "lw": 1.2, "ls": dashes}
@@ -244,7 +244,7 @@ def _draw_regimes(axes: Axes, columns: Columns, grid: Grid, rows: slice) -> None
 
 
 def _draw_values(axes: Axes, columns: Columns, grid: Grid, rows: slice, values: FloatArray) -> Any:
-    """Draw the cells of a map by a measure; return what a colour bar is made of."""
+    """Draw the cells of a map by a measure; return the mesh for a colour bar."""
     x, y = (_edges(axis) for axis in grid.axes)
     away = _are(columns.regime[rows], Regime.UNBOUNDED).reshape(grid.shape).T
     draw_cells(axes, x, y, away, _AWAY)
@@ -257,7 +257,7 @@ def _draw_values(axes: Axes, columns: Columns, grid: Grid, rows: slice, values: 
 
 
 def _curves(found: TransitionMap) -> Iterator[tuple[str, npt.NDArray[Any], str]]:
-    """Yield the transitions that are within the map: name, margins by row, and dashes."""
+    """Yield the transitions within the map: name, margins by row, and dashes."""
     for (name, margins), dashes in zip(found.margins.items(), cycle(DASHES)):
         if np.nanmin(margins) < 0.0 < np.nanmax(margins):
             yield name, np.ma.masked_invalid(margins.T), dashes
@@ -268,9 +268,9 @@ def _are(regimes: npt.NDArray[np.object_], regime: Regime | None) -> npt.NDArray
 
 
 def _edges(axis: Axis) -> FloatArray:
-    """Return where the cells around the values of an axis end, one more than these.
+    """Return the edges of the cells around the values of an axis, one more than these.
 
-    Nothing is known beyond the first and the last value: their cells are half as wide.
+    The first and the last cell are half as wide, since there is no result beyond their values.
     """
     values = axis.values()
     if axis.logarithmic:
@@ -281,7 +281,7 @@ def _edges(axis: Axis) -> FloatArray:
 
 
 def _scale(axis: Axis) -> dict[str, Any]:
-    """Return the scale of a picture's axis; a logarithmic one may be of values below zero."""
+    """Return the scale of a figure's axis; a logarithmic one may have negative values."""
     if not axis.logarithmic:
         return {"value": "linear"}
     if axis.first > 0.0:
@@ -292,4 +292,4 @@ def _scale(axis: Axis) -> dict[str, Any]:
 def _title(study: Study) -> str:
     scenario = study.scenario
     changed = f", {' '.join(scenario.overrides)}" if scenario.overrides else ""
-    return f"What {scenario.name} settles on{changed}"
+    return f"Settled motions of {scenario.name}{changed}"

@@ -1,4 +1,4 @@
-"""How quantities are shown: in SI units with a suitable prefix, or without for the unit drive."""
+"""Display of quantities: in SI units with a prefix, or without units for a unit drive."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -11,33 +11,33 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.text import prefix_for
 
 NOISE = 1e-9
-"""Share of the largest value below which a value is rounding, and is shown as 0."""
+"""Share of the largest value below which a value is rounding error and shown as 0."""
 
 _SCALES = {"plant.mass", "plant.stiffness", "plant.normal_force"}
 
 
 @dataclass(frozen=True)
 class Units:
-    """Whether quantities are in SI units or dimensionless, and how that is written."""
+    """Units of quantities, SI or none, and their labels."""
 
     dimensionless: bool = False
 
     @classmethod
     def for_drive(cls, drive: Drive | None, varied: Iterable[str] = ()) -> Self:
-        """Return those of a drive; SI where one of its scales is among the parameters `varied`."""
+        """Return the units of a drive; SI if one of its scales is among the parameters `varied`."""
         unit = drive is not None and drive.is_dimensionless
         return cls(dimensionless=unit and _SCALES.isdisjoint(varied))
 
     def label(self, name: str, unit: str) -> str:
-        """Return the label of an axis, as "velocity (mm/s)"; of a number its name alone."""
+        """Return the label of an axis, such as "velocity (mm/s)"; without a unit the name alone."""
         if not unit:
             return name
         return f"{name} ({'dimensionless' if self.dimensionless else unit})"
 
     def axis(self, name: str, unit: str, *values: npt.ArrayLike) -> tuple[float, str]:
-        """Return what to divide values (SI) by that an axis shows, and its label.
+        """Return the divisor of the values (SI) on an axis, and its label.
 
-        Times have no prefix beyond the second, and numbers none at all.
+        Times of a second or more have no prefix, and numbers without unit have none.
         """
         arrays = [np.asarray(value, dtype=float) for value in values]
         largest = max((float(np.nanmax(np.abs(a), initial=0.0)) for a in arrays), default=0.0)
@@ -47,7 +47,7 @@ class Units:
         return scale, self.label(name, prefix + unit)
 
     def of_unit(self, unit: str) -> str:
-        """Return the unit as it is shown: none where all is dimensionless."""
+        """Return the unit to show; empty if all is dimensionless."""
         return "" if self.dimensionless else unit
 
     def text(self, value: float | None, unit: str, *, largest: float = 0.0) -> str:
@@ -57,10 +57,10 @@ class Units:
     def texts(
         self, values: Sequence[Any], unit: str, digits: int = 4, *, largest: float = 0.0
     ) -> list[str]:
-        """Return values as texts with their unit, all with the prefix that suits the largest.
+        """Return values as texts with their unit, all with the prefix of the largest.
 
-        A unit that begins with a number, such as 1/s, gets no prefix; None is "-". What is below a
-        billionth of the largest, or of a `largest` that is not among them, is shown as 0.
+        A unit that starts with a number, such as 1/s, gets no prefix; None is "-". A value below
+        1e-9 of the largest, or of a given `largest`, is shown as 0.
         """
         unit = self.of_unit(unit)
         found = max((abs(value) for value in values if isinstance(value, float)), default=0.0)

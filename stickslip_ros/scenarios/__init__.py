@@ -1,1 +1,1 @@
-"""Parameters of the nodes and the files they come in."""
+"""Parameters of the nodes, and the files that set them."""

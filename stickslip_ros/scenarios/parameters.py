@@ -1,7 +1,7 @@
-"""The parameters of each node: name, unit, bounds, default and meaning stand here once.
+"""The parameters of each node, with unit, bounds, default and meaning.
 
 ROS declarations, scenario files, overrides, messages and the documentation derive from these
-models. A nested field `friction.static` is the ROS parameter of that name.
+models. The nested field `friction.static` is the ROS parameter of that name.
 """
 
 import re
@@ -24,15 +24,15 @@ from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import shown
 
 _SHORTEST = 1e-3
-"""Shortest time, s, that a node looks at the clock for."""
+"""Shortest time-out or period of a node, s."""
 _OF_DRIVE = [each.name for each in fields(Drive) if each.name != "friction"]
-"""Parameters of the plant that are those of the drive as they stand."""
+"""Parameters of the plant that the drive takes unchanged."""
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
 
 
 class Pace(StrEnum):
-    """What the plant waits for between samples: the clock, or the answer to the last one."""
+    """What the plant waits for between samples: the clock, or the answer to the last sample."""
 
     REALTIME = "realtime"
     LOCKSTEP = "lockstep"
@@ -45,7 +45,7 @@ def _known_law(name: str) -> str:
 
 
 class Friction(ParameterGroup):
-    """Friction law and its coefficients; a law uses those that its formula names."""
+    """Friction law and its coefficients; each law uses those of its formula."""
 
     law: Annotated[str, AfterValidator(_known_law)] = field(
         "stribeck", "Friction law.", choices=LAWS
@@ -53,18 +53,21 @@ class Friction(ParameterGroup):
     static: float = field(0.4, "Static (break-away) coefficient mu_s.", ge=0.0)
     minimum: float = field(0.25, "Smallest kinetic coefficient mu_m (stribeck).", ge=0.0)
     minimum_speed: float = field(
-        0.5, "Relative speed v_m of the smallest coefficient (stribeck).", "m/s", ge=SMALLEST
+        0.5,
+        "Relative speed v_m at which the coefficient is smallest (stribeck).",
+        "m/s",
+        ge=SMALLEST,
     )
-    slope: float = field(0.45, "Fall of the coefficient with relative speed (linear).", "s/m")
+    slope: float = field(0.45, "Decrease of the coefficient with relative speed (linear).", "s/m")
     kinetic: float = field(0.25, "Kinetic coefficient mu_k (exponential).", ge=0.0)
     decay_speed: float = field(
-        0.5, "Speed v_s over which the static coefficient decays (exponential).", "m/s", ge=SMALLEST
+        0.5, "Speed v_s of the decay from mu_s to mu_k (exponential).", "m/s", ge=SMALLEST
     )
-    viscous: float = field(0.0, "Rise of the coefficient with speed (exponential).", "s/m")
+    viscous: float = field(0.0, "Increase of the coefficient with speed (exponential).", "s/m")
 
     @model_validator(mode="after")
     def _static_is_largest(self) -> Self:
-        """Refuse a kinetic coefficient of the law in use that is above the static one."""
+        """Refuse a kinetic coefficient above the static one, if the law uses it."""
         for lower in ("minimum", "kinetic"):
             if lower in LAWS[self.law].constants() and getattr(self, lower) > self.static:
                 raise ValueError(
@@ -82,12 +85,12 @@ class Friction(ParameterGroup):
 class Initial(ParameterGroup):
     """State of the slide at the first sample."""
 
-    position: float = field(0.0, "Displacement of the slide at the start.", "m")
-    velocity: float = field(0.0, "Velocity of the slide at the start.", "m/s")
+    position: float = field(0.0, "Initial displacement of the slide.", "m")
+    velocity: float = field(0.0, "Initial velocity of the slide.", "m/s")
 
 
 class DisturbanceParameters(ParameterGroup):
-    """A disturbance force on the slide that is part of the scenario."""
+    """Disturbance force on the slide that is part of the scenario."""
 
     kind: DisturbanceKind = field(
         DisturbanceKind.NONE,
@@ -96,29 +99,33 @@ class DisturbanceParameters(ParameterGroup):
         strict=False,
     )
     amplitude: float = field(0.0, "Amplitude of the disturbance.", "N")
-    start: float = field(0.0, "Simulated time at which it starts.", "s", ge=0.0, le=1e9)
-    duration: float = field(float("inf"), "How long it lasts.", "s", ge=0.0, allow_inf_nan=True)
+    start: float = field(
+        0.0, "Simulated time at which the disturbance starts.", "s", ge=0.0, le=1e9
+    )
+    duration: float = field(
+        float("inf"), "Duration of the disturbance.", "s", ge=0.0, allow_inf_nan=True
+    )
     frequency: float = field(1.0, "Frequency of the sine.", "Hz", ge=SMALLEST, le=1e9)
 
 
 class NodeParameters(ParameterGroup):
     """Parameters that every node has."""
 
-    autostart: bool = field(True, "Configure and activate at start.", fixed=Fixed.ACTIVE)
+    autostart: bool = field(True, "Configure and activate the node at start.", fixed=Fixed.ACTIVE)
     wait_for: list[str] = field(
         [],
-        "Nodes that must be there to read what this one writes before it is activated.",
+        "Nodes that must subscribe to this node's topics before it activates.",
         fixed=Fixed.ACTIVE,
     )
-    use_sim_time: bool = field(False, "Let ROS time follow /clock.")
+    use_sim_time: bool = field(False, "Take ROS time from /clock.")
 
     @model_validator(mode="after")
     def _names_are_possible(self) -> Self:
-        """Refuse to wait for a node of a name that none can have."""
+        """Refuse to wait for an invalid node name."""
         if not all(_NODE_NAME.fullmatch(name) for name in self.wait_for):
             raise ValueError(
                 f"wait_for = {shown(self.wait_for)} is refused: must be names of nodes, "
-                "of letters, digits and _, not beginning with a digit"
+                "of letters, digits and _, not starting with a digit"
             )
         return self
 
@@ -129,44 +136,48 @@ class PlantParameters(NodeParameters):
     mass: float = field(1.0, "Mass of the slide.", "kg", ge=SMALLEST)
     damping: float = field(0.02, "Viscous damping of the transmission.", "N s/m", ge=0.0)
     stiffness: float = field(1.0, "Stiffness of the transmission.", "N/m", ge=SMALLEST)
-    normal_force: float = field(1.0, "Force pressing slide and belt together.", "N", ge=SMALLEST)
-    belt_speed: float = field(0.4, "Speed of the belt (feed speed), of either sign.", "m/s")
+    normal_force: float = field(
+        1.0, "Force that presses the slide onto the belt.", "N", ge=SMALLEST
+    )
+    belt_speed: float = field(0.4, "Speed of the belt (feed speed), positive or negative.", "m/s")
     friction: Friction = Friction()
     initial: Initial = Initial()
     rate: float = field(100.0, "Samples per second.", "Hz", fixed=Fixed.ACTIVE, ge=1e-6, le=1e9)
     pace: Pace = field(
         Pace.LOCKSTEP,
-        "Whether the plant keeps to the clock or waits for the answer to each sample.",
+        "Pace of the samples: by the clock (realtime), or after each answer (lockstep).",
         choices=Pace,
         strict=False,
         fixed=Fixed.ACTIVE,
     )
     real_time_factor: float = field(
-        1.0, "Simulated over wall time in pace realtime.", fixed=Fixed.ACTIVE, ge=SMALLEST
+        1.0, "Simulated time divided by wall time (realtime).", fixed=Fixed.ACTIVE, ge=SMALLEST
     )
     force_delay: float = field(
         0.0, "Delay from a sample to the start of its force.", "s", fixed=Fixed.ACTIVE, ge=0.0
     )
     force_jitter: float = field(
-        0.0, "Largest random addition to the delay of each force.", "s", fixed=Fixed.ACTIVE, ge=0.0
+        0.0, "Largest random addition to the delay of a force.", "s", fixed=Fixed.ACTIVE, ge=0.0
     )
     force_jitter_seed: int = field(
-        0, "What the random additions follow from.", fixed=Fixed.ACTIVE, ge=0, le=1_000_000_000
+        0, "Seed of the random delays.", fixed=Fixed.ACTIVE, ge=0, le=1_000_000_000
     )
     force_timeout: float = field(
-        0.1, "Age up to which a force is held on in pace realtime.", "s", fixed=Fixed.ACTIVE, ge=0.0
+        0.1, "Age up to which the last force is held (realtime).", "s", fixed=Fixed.ACTIVE, ge=0.0
     )
     reply_timeout: float = field(
         10.0,
-        "Wall time that lockstep waits for a force or a reader.",
+        "Longest wall time to wait for a force or the recorder (lockstep).",
         "s",
         fixed=Fixed.ACTIVE,
         ge=_SHORTEST,
     )
-    expects_control: bool = field(True, "Whether a controller is to answer.", fixed=Fixed.ACTIVE)
+    expects_control: bool = field(
+        True, "Whether the plant expects forces from a controller.", fixed=Fixed.ACTIVE
+    )
     flow_window: int = field(
         1000,
-        "Samples by which lockstep may run ahead of the recorder.",
+        "Largest lead of the plant over the recorder (lockstep).",
         "samples",
         fixed=Fixed.ACTIVE,
         ge=200,
@@ -174,7 +185,7 @@ class PlantParameters(NodeParameters):
     )
     duration: float = field(
         float("inf"),
-        "Simulated time after which the plant pauses by itself.",
+        "Simulated time after which the plant pauses.",
         "s",
         fixed=Fixed.ACTIVE,
         ge=0.0,
@@ -185,7 +196,7 @@ class PlantParameters(NodeParameters):
 
     @model_validator(mode="after")
     def _delay_is_bounded(self) -> Self:
-        """Refuse a delay that would keep more than a million forces waiting."""
+        """Refuse a delay of more than a million samples."""
         if (self.force_delay + self.force_jitter) * self.rate > 1e6:
             raise ValueError(
                 f"force_delay = {self.force_delay} s and force_jitter = {self.force_jitter} s "
@@ -195,7 +206,7 @@ class PlantParameters(NodeParameters):
 
     @model_validator(mode="after")
     def _samples_are_short(self) -> Self:
-        """Refuse a period of samples that holds more than a thousand natural ones."""
+        """Refuse a sampling period of more than a thousand natural periods."""
         natural = sqrt(self.stiffness / self.mass) / (2.0 * pi)
         if self.rate < natural / 1000.0:
             raise ValueError(
@@ -206,7 +217,7 @@ class PlantParameters(NodeParameters):
 
     @property
     def last_sample(self) -> int | None:
-        """Number of the sample with which the plant pauses by itself, if it does."""
+        """Number of the sample at which the plant pauses; None without `duration`."""
         samples = self.duration * self.rate
         return None if isinf(samples) else round(samples)
 
@@ -216,7 +227,7 @@ class PlantParameters(NodeParameters):
         return Drive(**values, friction=self.friction.as_law())
 
     def drive_names(self) -> list[str]:
-        """Return the flat names of what makes the drive: those that its friction law uses, too."""
+        """Return the flat names of the drive's parameters, with those of its friction law."""
         constants = LAWS[self.friction.law].constants()
         return [*_OF_DRIVE, "friction.law", *(f"friction.{name}" for name in constants)]
 
@@ -233,7 +244,7 @@ class PlantParameters(NodeParameters):
         overtaken: Callable[[int, float], None] = lambda stamp, force: None,
         advance: Callable[[float], None] | None = None,
     ) -> SampledLoop:
-        """Return the sampled loop over `motion`; see there for `start` (ns) and the others."""
+        """Return the sampled loop over `motion`; see `SampledLoop` for the arguments."""
         return SampledLoop(
             motion,
             self.rate,
@@ -253,14 +264,14 @@ class PlantParameters(NodeParameters):
 class WashoutControllerParameters(NodeParameters):
     """Parameters of the washout controller node."""
 
-    corner_frequency: float = field(2.0, "Corner frequency d of the filter.", "rad/s", ge=SMALLEST)
-    linear_gain: float = field(-1.0, "Linear gain k1; negative takes energy out.", "N s/m")
+    corner_frequency: float = field(2.0, "Cutoff frequency d of the filter.", "rad/s", ge=SMALLEST)
+    linear_gain: float = field(-1.0, "Linear gain k1; a negative gain removes energy.", "N s/m")
     cubic_gain: float = field(-1.0, "Cubic gain k2.", "N s^3/m^3")
     force_limit: float = field(
         float("inf"), "Largest magnitude of the force.", "N", ge=0.0, allow_inf_nan=True
     )
     start_after: float = field(
-        0.0, "Time from the first sample during which the force is zero.", "s", ge=0.0
+        0.0, "Time after the first sample during which the force is zero.", "s", ge=0.0
     )
 
     def as_washout(self) -> WashoutParameters:
@@ -276,20 +287,20 @@ class WashoutControllerParameters(NodeParameters):
 class AnalyzerParameters(NodeParameters):
     """Parameters of the analyzer node."""
 
-    bag: str = field("", "Directory to record to; empty: none.", fixed=Fixed.ACTIVE)
+    bag: str = field("", "Directory to record to; empty: no recording.", fixed=Fixed.ACTIVE)
     window: int = field(
-        20, "Cycles to average over.", "cycles", fixed=Fixed.ACTIVE, ge=1, le=100_000
+        20, "Number of cycles to average.", "cycles", fixed=Fixed.ACTIVE, ge=1, le=100_000
     )
     flush_period: float = field(
         1.0,
-        "Wall time after which what was recorded is on disk.",
+        "Longest wall time until a recorded message is on disk.",
         "s",
         fixed=Fixed.CONFIGURED,
         ge=_SHORTEST,
     )
     max_bag_size: int = field(
         0,
-        "Size from which on a bag goes on in a further file; 0: any.",
+        "Size at which the bag continues in a new file; 0: no limit.",
         "bytes",
         fixed=Fixed.ACTIVE,
         ge=0,
@@ -297,7 +308,7 @@ class AnalyzerParameters(NodeParameters):
     )
     max_bag_duration: float = field(
         0.0,
-        "Time between stamps beyond which a bag goes on in a further file; 0: any.",
+        "Recorded time at which the bag continues in a new file; 0: no limit.",
         "s",
         fixed=Fixed.ACTIVE,
         ge=0.0,
@@ -309,16 +320,16 @@ class AnalyzerParameters(NodeParameters):
 
 
 class ReplayParameters(NodeParameters):
-    """Parameters of the replay node, which is part of no scenario."""
+    """Parameters of the replay node, which scenarios do not contain."""
 
     bag: str = field(
-        "", "Bag to replay: its directory, or one of its files.", fixed=Fixed.CONFIGURED
+        "", "Bag to replay: its directory or one of its files.", fixed=Fixed.CONFIGURED
     )
-    rate: float = field(1.0, "Recorded time over wall time.", fixed=Fixed.ACTIVE, ge=SMALLEST)
-    loop: bool = field(False, "Begin anew at the end of the bag.", fixed=Fixed.ACTIVE)
+    rate: float = field(1.0, "Recorded time divided by wall time.", fixed=Fixed.ACTIVE, ge=SMALLEST)
+    loop: bool = field(False, "Start again at the end of the bag.", fixed=Fixed.ACTIVE)
     start: float = field(
         0.0,
-        "Recorded time, from the bag's first message on, to begin at.",
+        "Recorded time to start at, from the bag's first message.",
         "s",
         fixed=Fixed.CONFIGURED,
         ge=0.0,
@@ -332,7 +343,9 @@ class ReplayParameters(NodeParameters):
         ge=SMALLEST,
         allow_inf_nan=True,
     )
-    topics: list[str] = field([], "Topics to replay; none: all of the bag.", fixed=Fixed.CONFIGURED)
+    topics: list[str] = field(
+        [], "Topics to replay; empty: all topics of the bag.", fixed=Fixed.CONFIGURED
+    )
     clock: bool = field(False, "Publish recorded time on /clock.", fixed=Fixed.CONFIGURED)
 
 
@@ -341,4 +354,4 @@ NODE_PARAMETERS: dict[str, type[NodeParameters]] = {
     "washout_controller": WashoutControllerParameters,
     "analyzer": AnalyzerParameters,
 }
-"""The parameter model of every node by the node's name."""
+"""The parameter model of each node, by node name."""

@@ -1,4 +1,4 @@
-"""YAML as ROS reads it, which is not quite as PyYAML does."""
+"""YAML as ROS reads it, which differs from PyYAML in some scalars."""
 
 import re
 from math import inf
@@ -25,35 +25,35 @@ _NUMBER = re.compile(f"(?:{_SCALARS['int']}|{_SCALARS['float']})")
 
 
 def parse(text: str, source: str) -> Any:
-    """Return what YAML says; InvalidInputError, naming `source`, where it is none."""
+    """Parse YAML; raise InvalidInputError, naming `source`, if it is invalid."""
     try:
         return yaml.load(text, Loader=_RosLoader)
     except yaml.YAMLError as error:
         reason = " ".join(str(error).split())
         raise InvalidInputError(f"{source} is not YAML: {reason}") from None
     except RecursionError:
-        raise InvalidInputError(f"{source} is not taken: it is nested too deep") from None
+        raise InvalidInputError(f"{source} cannot be read: it is nested too deeply") from None
     except (ArithmeticError, AttributeError, LookupError, ValueError):
         raise InvalidInputError(
-            f"{source} is not YAML: a tag (!!) does not suit its value"
+            f"{source} is not YAML: a tag (!!) does not match its value"
         ) from None
 
 
 def number_in(text: str) -> float | None:
-    """Return the number that a text is to ROS, None if it is none."""
+    """Return the number that ROS reads in a text; None if it is not a number."""
     value = yaml.load(text, Loader=_RosLoader) if _NUMBER.fullmatch(text) else None
     return value if isinstance(value, int | float) else None
 
 
 def dump(values: Any) -> str:
-    """Return values as YAML of which no reader takes a string for anything else."""
+    """Return values as YAML with all strings quoted, so that no reader converts them."""
     return yaml.dump(values, Dumper=_QuotingDumper, sort_keys=False)
 
 
 class _RosLoader(yaml.SafeLoader):
-    """Reads scalars as rcl does, which takes 1e3 for a number and knows no dates.
+    """Loader that reads scalars as rcl does: 1e3 is a number, and there are no dates.
 
-    Like rcl it refuses aliases, with which a small file could unfold into a boundless one.
+    Like rcl it refuses aliases, with which a small file could expand without bound.
     """
 
     bool_values: ClassVar[dict[str, bool]] = {**yaml.SafeLoader.bool_values, "y": True, "n": False}
@@ -61,12 +61,12 @@ class _RosLoader(yaml.SafeLoader):
     def compose_node(self, parent: Any, index: Any) -> Any:
         if self.check_event(yaml.AliasEvent):
             event = self.peek_event()
-            raise yaml.YAMLError(f"aliases are not taken, line {event.start_mark.line + 1}")
+            raise yaml.YAMLError(f"aliases are not supported, line {event.start_mark.line + 1}")
         return super().compose_node(parent, index)
 
 
 def _whole_number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float | str:
-    """Return a number for a whole one beyond 64 bits, and its text for one beyond any number."""
+    """Return an integer, beyond 64 bits a float, and beyond floats the text."""
     try:
         value = loader.construct_yaml_int(node)
         return value if -(2**63) <= value < 2**63 else float(value)
@@ -75,7 +75,7 @@ def _whole_number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float
 
 
 def _number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> float | str:
-    """Return the text of a number that overflows or underflows."""
+    """Return a float, or the text of one that overflows or underflows."""
     text: str = node.value.lower()
     value = float(loader.construct_yaml_float(node))
     zero = not text.partition("e")[0].strip("+-.0")
@@ -94,7 +94,7 @@ for _tag, _pattern in _SCALARS.items():
 
 
 class _QuotingDumper(yaml.SafeDumper):
-    """Quotes every string, so that no reader takes it for anything else."""
+    """Dumper that quotes every string, so that no reader converts it."""
 
 
 _QuotingDumper.add_representer(

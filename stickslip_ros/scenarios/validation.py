@@ -1,4 +1,4 @@
-"""Values of parameters, checked: a refusal names the parameter, its value and what is allowed."""
+"""Validation of parameters: an error names the parameter, its value and what is allowed."""
 
 from collections.abc import Iterator, Mapping
 from enum import StrEnum
@@ -21,7 +21,7 @@ _KIND_NAMES = {
 
 
 class ParameterGroup(BaseModel):
-    """Parameters that belong together: those of a node, or a part of these."""
+    """A group of parameters: those of a node, or a part of them."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True
@@ -29,9 +29,9 @@ class ParameterGroup(BaseModel):
 
     @classmethod
     def validated(cls, values: Mapping[str, Any], source: str) -> Self:
-        """Return the parameters given by their flat names, the rest at their defaults.
+        """Return the parameters given by flat name, the others at their defaults.
 
-        Raises InvalidInputError naming `source`, parameter, value and what is allowed.
+        Raises InvalidInputError that names `source`, parameter, value and what is allowed.
         """
         known = known_parameters(cls)
         for name, value in values.items():
@@ -47,9 +47,9 @@ class ParameterGroup(BaseModel):
 
     @classmethod
     def check_bounds(cls, name: str, value: Any) -> None:
-        """Refuse a value that is out of its bounds whatever the other parameters are.
+        """Refuse a value that is out of its own bounds; other parameters do not matter.
 
-        Raises InvalidInputError naming parameter, value and what is allowed.
+        Raises InvalidInputError that names parameter, value and what is allowed.
         """
         try:
             cls.model_validate(_nested({name: value}))
@@ -58,13 +58,13 @@ class ParameterGroup(BaseModel):
                 raise InvalidInputError(_explain(cls, error, {name: value})) from None
 
     def flat(self) -> dict[str, Any]:
-        """Return the values by their flat names, as plain Python types."""
+        """Return the values by flat name, as plain Python types."""
         values = flattened(self.model_dump(mode="python"))
         return {name: str(value) if isinstance(value, StrEnum) else value for name, value in values}
 
 
 def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str, Any]) -> str:
-    """Return in one line which values are refused, and what is allowed."""
+    """Return one line on the values that are refused and what is allowed."""
     known = known_parameters(model)
     complaints: list[str] = []
     for detail in error.errors():
@@ -98,7 +98,7 @@ def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def flattened(values: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield nested values by their flat names, such as friction.static."""
+    """Yield nested values by flat name, such as friction.static."""
     for name, value in values.items():
         if isinstance(value, dict):
             yield from flattened(cast(dict[Any, Any], value), f"{prefix}{name}.")

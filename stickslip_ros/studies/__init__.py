@@ -1,1 +1,1 @@
-"""Many runs: sweeps, diagrams, designs and the reproduction of the paper."""
+"""Studies of many runs: sweeps, basins of attraction, bifurcation diagrams and design."""

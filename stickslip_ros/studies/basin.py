@@ -1,4 +1,4 @@
-"""Basins of attraction: which motion a start leads to, and what share of starts each one gets."""
+"""Basins of attraction: the motion that each start leads to, and the share of starts of each."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -14,10 +14,10 @@ from stickslip_ros.studies.settling import CYCLES, SettlingCourse
 from stickslip_ros.studies.study import Point, Study
 
 POSITION, VELOCITY = "plant.initial.position", "plant.initial.velocity"
-"""What a start is made of; the washout filter is at rest."""
+"""Parameters that define a start; the washout filter starts at rest."""
 
 COURSE = SettlingCourse(transient=50.0, patience=80)
-"""How long a motion is followed, unless told otherwise: most are steady soon."""
+"""Default settling of a basin study: short at first, since most motions are steady soon."""
 
 
 @dataclass(frozen=True)
@@ -25,34 +25,54 @@ class Attractor:
     """A motion that starts lead to; SI units."""
 
     regime: Regime | None
-    """None: it is not known, for the motion failed or completed no cycle."""
+    """Regime of the motion; None: unknown, because the motion failed or completed no cycle."""
     steady: bool
-    """Whether the motions have settled; those that have not may be on their way to another."""
+    """Whether the motions have settled; those that have not may still reach another attractor."""
     amplitude: float | None
-    """m; None unless they are cycles that have settled."""
+    """Amplitude of the displacement, m; None unless the motions are settled cycles."""
     midpoint: float | None
-    """m; likewise."""
+    """Midpoint of the displacement, m; None unless the motions are settled cycles."""
     count: int = 0
-    """Starts that lead to it."""
+    """Number of starts that lead to it."""
     share: float = 0.0
-    """Basin stability: what share of the starts that is."""
+    """Basin stability: the share of the starts that lead to it, 0 to 1."""
     standard_error: float = 0.0
-    """Of the share of a random sample of n, sqrt(S (1 - S) / n); a grid's is smaller, as a rule."""
+    """Of the share S of n random starts, sqrt(S (1 - S) / n); usually smaller on a grid."""
 
     of = Renamed("from_point")
 
     @classmethod
     def from_point(cls, point: Point) -> Self:
-        """Return the attractor that a motion has come to, for all that is known."""
+        """Return the attractor that a motion has reached, as far as known.
+
+        Parameters
+        ----------
+        point : Point
+            A computed point of a study.
+
+        Returns
+        -------
+        Attractor
+            The attractor; its count and share are 0.
+        """
         measures, steady = point.measures, point.steady
         if steady and measures.regime in CYCLES:
             return cls(measures.regime, steady, measures.amplitude, measures.midpoint)
         return cls(measures.regime, steady, None, None)
 
     def is_like(self, other: "Attractor") -> bool:
-        """Return whether two are the same but for rounding and the last of the transient.
+        """Return whether two attractors are the same, up to rounding and a remaining transient.
 
-        Cycles are if regime, amplitude and midpoint are, the latter within two percent.
+        Parameters
+        ----------
+        other : Attractor
+            The attractor to compare with.
+
+        Returns
+        -------
+        bool
+            Whether `regime` and `steady` are equal, and amplitude and midpoint differ by 2 % of
+            the amplitude at most.
         """
         if (self.regime, self.steady) != (other.regime, other.steady):
             return False
@@ -63,20 +83,31 @@ class Attractor:
 
 @dataclass(frozen=True)
 class Basins:
-    """Which attractor each start of a study leads to."""
+    """The attractors of a basin study, and the one that each start leads to."""
 
     attractors: tuple[Attractor, ...]
-    """The one with most starts first."""
+    """The attractors; the one with the most starts comes first."""
     order: tuple[int, ...]
-    """Place in `attractors` of each attractor in the order in which they were found."""
+    """Index in `attractors` of each attractor in `found`."""
     found: tuple[Attractor, ...]
-    """The attractors in that order."""
+    """The attractors in the order in which they were found."""
 
     of = Renamed("from_points")
 
     @classmethod
     def from_points(cls, points: Iterable[Point]) -> Self:
-        """Return what the points of a study, taken one at a time, have come to."""
+        """Return the attractors that the points of a study have reached.
+
+        Parameters
+        ----------
+        points : Iterable[Point]
+            The points, as from `Journal.points`. They are read once, one at a time.
+
+        Returns
+        -------
+        Basins
+            The attractors with their shares of the points.
+        """
         found: list[Attractor] = []
         counts: list[int] = []
         for point in points:
@@ -97,7 +128,18 @@ class Basins:
         return cls(tuple(attractors), order, tuple(found))
 
     def place(self, point: Point) -> int:
-        """Return the place in `attractors` of that which a point has come to."""
+        """Return which of the attractors a point has reached.
+
+        Parameters
+        ----------
+        point : Point
+            One of the points that the basins were made from.
+
+        Returns
+        -------
+        int
+            Index in `attractors`.
+        """
         return self.order[_place(Attractor.from_point(point), self.found)]
 
 
@@ -108,9 +150,45 @@ def basin_study(
     course: SettlingCourse | None = None,
     continuous: bool = False,
 ) -> Study:
-    """Return the study of the starts in `plan`, a grid or a sample over `POSITION` and `VELOCITY`.
+    """Return the study of the starts in a plan.
 
-    What they lead to is told by `Basins`. Raises InvalidInputError for another plan.
+    Compute it with `run` or `compute_columns`; `Basins` groups the results by attractor.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario; all parameters but the initial state apply.
+    plan : Grid or RandomSample
+        The starts, over `plant.initial.position` (m) and `plant.initial.velocity` (m/s).
+    course : SettlingCourse, optional
+        How long each motion is followed; by default transients of 50 natural periods, at most 80
+        of them.
+    continuous : bool
+        Whether the control acts without sampling (eq. 19).
+
+    Returns
+    -------
+    Study
+        The study, ready to be computed.
+
+    Raises
+    ------
+    InvalidInputError
+        If the plan is over other parameters or is carried on, or no start is valid.
+
+    Examples
+    --------
+    >>> from stickslip_ros.scenarios.files import load_scenario
+    >>> from stickslip_ros.studies.journal import Journal
+    >>> from stickslip_ros.studies.plan import Grid
+    >>> from stickslip_ros.studies.runner import run
+    >>> scenario = load_scenario("paper", ["plant.expects_control=false"])
+    >>> study = basin_study(scenario, Grid(default_axes(scenario, 2)))
+    >>> with Journal(study) as journal:
+    ...     run(journal)
+    ...     basins = Basins.from_points(journal.points())
+    >>> [(str(each.regime), each.share) for each in basins.attractors]
+    [('stick_slip', 1.0)]
     """
     if set(plan.parameters) != {POSITION, VELOCITY} or plan.carried:
         raise InvalidInputError(
@@ -122,10 +200,29 @@ def basin_study(
 
 
 def default_axes(scenario: Scenario, count: int) -> tuple[Axis, Axis]:
-    """Return so many positions and velocities each, twice as far as a vibration goes, about.
+    """Return axes of positions and velocities about twice as wide as a vibration.
 
-    That has the amplitude at which the slide is as fast as the belt, or that to which static
-    friction bends the spring, whichever is more.
+    The vibration is estimated by the larger of two amplitudes: the one at which the slide is as
+    fast as the belt, and the spring's deflection under static friction.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario whose drive sets the range.
+    count : int
+        Number of values of each axis, at least 2.
+
+    Returns
+    -------
+    tuple[Axis, Axis]
+        Axes of `plant.initial.position` (m), centred on the equilibrium, and
+        `plant.initial.velocity` (m/s), centred on zero.
+
+    Examples
+    --------
+    >>> from stickslip_ros.scenarios.files import load_scenario
+    >>> [axis.count for axis in default_axes(load_scenario("paper"), 5)]
+    [5, 5]
     """
     drive = scenario.plant.as_drive()
     bent = drive.friction.static * drive.length_scale
@@ -138,6 +235,6 @@ def default_axes(scenario: Scenario, count: int) -> tuple[Axis, Axis]:
 
 
 def _place(attractor: Attractor, found: Sequence[Attractor]) -> int:
-    """Return the first of those found that is like it, or, without, how many there are."""
+    """Return the index of the first attractor found that is like it, or else their number."""
     places = (place for place, other in enumerate(found) if other.is_like(attractor))
     return next(places, len(found))

@@ -1,4 +1,4 @@
-"""Bifurcation diagrams: what a drive's motion from rest settles on, for one drive after another."""
+"""Bifurcation diagrams: the settled motions from rest of a sequence of drives."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from stickslip_ros.studies.settling import (
 )
 
 COURSE = SettlingCourse(transient=300.0, cycles=6)
-"""How long a motion from rest is followed, unless told otherwise."""
+"""Default settling of a bifurcation diagram."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class BifurcationDiagram:
     measures: tuple[Measures, ...]
     """The measures of each row."""
     row: npt.NDArray[np.intp]
-    """Row that each turning point belongs to, ascending. A motion that runs away has none."""
+    """Row that each turning point belongs to, ascending. A motion that diverges has none."""
     position: FloatArray
     """Displacement of each turning point, m: the Poincare section X' = 0."""
 
@@ -39,7 +39,7 @@ class BifurcationDiagram:
 def bifurcation_diagram(
     drives: Sequence[Drive], progress: Progress = lambda _: None, course: SettlingCourse = COURSE
 ) -> BifurcationDiagram:
-    """Return what each drive settles on from rest at X = 0."""
+    """Return the motion that each drive settles on from rest at X = 0."""
     settler = Settler()
     settled: list[Settled] = []
     for drive in drives:

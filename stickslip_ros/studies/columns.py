@@ -1,4 +1,4 @@
-"""The points of a study as columns: in memory for a program, as a table in a file for the rest."""
+"""The points of a study as columns: arrays in memory, or a table in a CSV or JSON file."""
 
 import csv
 import json
@@ -22,37 +22,39 @@ from stickslip_ros.studies.runner import IN_FLIGHT, CountPoints, run, run_here
 from stickslip_ros.studies.study import MEASURES, Point, Study
 
 COLUMNS = (*MEASURES, "steady", "turning_points", "reason")
-"""What a table has of each point, besides the values of the parameters."""
+"""Columns of a table, in addition to the values of the parameters."""
 
 
 @dataclass(frozen=True)
 class Columns:
-    """What became of the n points of a study, in the order of its plan; SI units.
+    """The results of the n points of a study, in the order of its plan; SI units.
 
-    NaN or None stands for what does not exist, such as the period of a motion that has none, and
-    for points that are not done.
+    All arrays have shape (n,). NaN or None marks a value that does not exist, such as the period of
+    a motion at rest, and a point that is not computed yet.
     """
 
     plan: Plan
+    """The points of the study."""
     values: Mapping[str, FloatArray]
-    """Of each parameter that varies, by NODE.PARAMETER; arrays of n."""
+    """Values of each varied parameter, by NODE.PARAMETER."""
     amplitude: FloatArray
-    """m"""
+    """Amplitude of the displacement, m."""
     velocity_amplitude: FloatArray
-    """m/s"""
+    """Amplitude of the velocity, m/s."""
     midpoint: FloatArray
-    """m"""
+    """Midpoint of the displacement, m."""
     period: FloatArray
-    """s"""
+    """Period of the limit cycle, s."""
     frequency: FloatArray
-    """Hz"""
+    """Frequency of the limit cycle, Hz."""
     stick_fraction: FloatArray
+    """Share of the time in which the slide sticks, 0 to 1."""
     cycles: npt.NDArray[np.intp]
-    """How many the measures are means over."""
+    """Number of cycles that the measures are means of."""
     regime: npt.NDArray[np.object_]
-    """A `Regime` or None."""
+    """The `Regime`, or None."""
     steady: npt.NDArray[np.bool_]
-    """Whether the motion has settled (see `studies.settled`)."""
+    """Whether the motion has settled."""
     turning_points: tuple[tuple[float, ...], ...]
     """Poincare section x' = 0 of each point, m."""
     reason: npt.NDArray[np.object_]
@@ -62,7 +64,18 @@ class Columns:
 
     @classmethod
     def from_journal(cls, journal: Journal) -> Self:
-        """Return what a journal holds."""
+        """Return the points of a journal as columns.
+
+        Parameters
+        ----------
+        journal : Journal
+            The journal; it need not be complete.
+
+        Returns
+        -------
+        Columns
+            One row for each point of the study's plan.
+        """
         plan = journal.study.plan
         count = plan.size
         numbers: dict[str, Any] = {name: np.full(count, np.nan) for name in MEASURES}
@@ -97,18 +110,50 @@ def compute_columns(
     path: Path | None = None,
     progress: CountPoints = lambda _: None,
 ) -> Columns:
-    """Compute a study and return what became of its points.
+    """Compute a study and return its points as columns.
 
-    In this process, in several `workers` here, or through any `executor`, which then holds
-    `in_flight` tasks at a time; all give the same. `path` is a journal, from which a study that was
-    interrupted goes on, and which is there for the next time when it is done. `progress` is told
-    how many points are done. Raises RunError if workers keep dying.
+    The result does not depend on how the work is shared.
 
-        scenario = load_scenario("paper", ["plant.expects_control=false"])
-        study = sweep_study(scenario, [Axis("plant.belt_speed", 0.02, 0.6, 59)])
-        found = compute_columns(study)
-        sticks = found.regime == Regime.STICK_SLIP
-        print(found.values["plant.belt_speed"][sticks].max())
+    Parameters
+    ----------
+    study : Study
+        The study, as from `sweep_study` or `basin_study`.
+    workers : int
+        Number of processes on this machine; 1 computes in this process.
+    executor : concurrent.futures.Executor, optional
+        Executor to use instead of `workers`.
+    in_flight : int
+        Number of tasks that the executor holds at a time.
+    path : Path, optional
+        Journal file. An interrupted study continues from it, and it is kept at the end. Without a
+        path the journal is a temporary file.
+    progress : Callable[[int], None]
+        Receives the number of points that are done.
+
+    Returns
+    -------
+    Columns
+        The results, one row for each point.
+
+    Raises
+    ------
+    InvalidInputError
+        If `path` is not a journal of this study, or cannot be written.
+    RunError
+        If the worker processes keep dying, or the executor gives up.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.measures.cycle_measures import Regime
+    >>> from stickslip_ros.scenarios.files import load_scenario
+    >>> from stickslip_ros.studies.plan import Axis
+    >>> from stickslip_ros.studies.sweep import sweep_study
+    >>> scenario = load_scenario("paper", ["plant.expects_control=false"])
+    >>> study = sweep_study(scenario, [Axis("plant.belt_speed", 0.1, 0.6, 6)])
+    >>> found = compute_columns(study)
+    >>> sticks = found.regime == Regime.STICK_SLIP
+    >>> print(f"{found.values['plant.belt_speed'][sticks].max():.1f}")
+    0.4
     """
     with Journal(study, path) as journal:
         if executor is not None:
@@ -119,11 +164,11 @@ def compute_columns(
 
 
 ExtraColumns = Mapping[str, Callable[[Point], Any]]
-"""Columns of a table before the measures: their names, and what makes them of a point."""
+"""Extra columns of a table, before the measures: their names, and a function of a point each."""
 
 
 def write_csv(stream: TextIO, journal: Journal, further: ExtraColumns) -> None:
-    """Write a row for each point that is done; turning points are separated by spaces."""
+    """Write a row for each point that is done, with turning points separated by spaces."""
     plan = journal.study.plan
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([*plan.parameters, *further, *COLUMNS])
@@ -138,10 +183,10 @@ def write_json(
 ) -> None:
     """Write one object: the parameters, their values, and an array for each column.
 
-    Of a grid, `values` has a list for each axis and the arrays are row-major over the axes, and
-    over the directions before, if it is carried on; otherwise `values` has the parameters' values
-    of each point. `made_of`, ready for JSON, is written besides. The arrays pass through files:
-    memory is for one piece of the study.
+    For a grid, `values` has a list for each axis, and the arrays are row-major over the axes; if
+    the grid is carried on, the direction is the slowest index. Otherwise `values` has the
+    parameters' values of each point. The entries of `made_of`, ready for JSON, are added. The
+    arrays pass through temporary files, so that memory holds one piece of the study only.
     """
     study = journal.study
     plan = study.plan

@@ -1,4 +1,4 @@
-"""Trials of a washout controller: what becomes of a vibration when it comes on, by simulation."""
+"""Trials of a washout controller: simulated vibrations while the control is switched on."""
 
 from collections.abc import Iterator
 from copy import copy
@@ -21,23 +21,23 @@ from stickslip_ros.physics.theory.linear_sampled_loop import SETTLED
 from stickslip_ros.stamps import NANOSECONDS
 
 FILTER_SETTLED = 5.0
-"""Time after which the washout filter has forgotten its start, in 1/d."""
+"""Time after which the start of the washout filter no longer matters, in 1/d."""
 
 
 @dataclass(frozen=True)
 class Vibration:
-    """What a drive does without control at one belt speed, sampled; SI units."""
+    """The vibration of a drive without control at one belt speed, sampled; SI units."""
 
     drive: Drive
     rate: float
     """Samples per second, Hz."""
     regime: Regime | None
     period: float | None
-    """s; None unless it vibrates."""
+    """Period, s; None unless the drive vibrates."""
     position: FloatArray
-    """Displacement at the samples of some whole cycles; empty unless it vibrates."""
+    """Displacement at the samples of some whole cycles, m; empty unless the drive vibrates."""
     velocity: FloatArray
-    """Velocity at the same samples."""
+    """Velocity at the same samples, m/s."""
 
     @property
     def size(self) -> float:
@@ -54,9 +54,10 @@ class Vibration:
         return self.period is not None
 
     def filtered(self, corner_frequency: float) -> FloatArray:
-        """Return what a washout filter (rad/s), once it has settled, lets through of the velocity.
+        """Return the output of a settled washout filter for the velocity, m/s.
 
-        From the whole cycles, as a periodic sequence, by the filter's response to each harmonic.
+        `corner_frequency` is in rad/s. The whole cycles are treated as a periodic sequence, and
+        the filter's response is applied to each harmonic.
         """
         count = len(self.velocity)
         if count == 0:
@@ -65,12 +66,12 @@ class Vibration:
         return np.fft.irfft(differences / (forward - np.exp(-corner_frequency / self.rate)), count)
 
     def peak_force(self, gains: WashoutGains) -> float:
-        """Return the largest force, N, of a washout controller that comes on at the worst phase."""
+        """Return the largest force, N, of a washout controller activated at the worst phase."""
         return float(np.abs(gains.force(self.filtered(gains.corner_frequency))).max(initial=0.0))
 
     @cached_property
     def _harmonics(self) -> tuple[Any, Any]:
-        """Each harmonic's factor from sample to sample, and the differences of the velocity."""
+        """Factor of each harmonic from sample to sample, and its velocity difference."""
         count = len(self.velocity)
         forward = np.exp(2j * np.pi * np.arange(count // 2 + 1) / count)
         return forward, (forward - 1.0) * np.fft.rfft(self.velocity)
@@ -78,13 +79,14 @@ class Vibration:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a trial came to; SI units."""
+    """The result of a trial; SI units."""
 
     peak_force: float
+    """Largest force, N."""
     settling_time: float | None
-    """Until the distance from the equilibrium stays below a hundredth of its first size."""
+    """1 % settling time of the distance from the equilibrium, s; None if it does not settle."""
     grows: bool
-    """Whether the motion ran away, or ended no nearer than it began."""
+    """Whether the motion diverged, or ended no nearer to the equilibrium than it started."""
 
 
 class Bench:
@@ -98,9 +100,10 @@ class Bench:
         self._recording = Motion(drive, 0.0, 0.0, record=True)
 
     def vibration(self, drive: Drive) -> Vibration:
-        """Return the vibration of `drive`, the outermost if there are several.
+        """Return the vibration of `drive`, the largest if there are several.
 
-        It begins where the belt tears the slide loose: there stick-slip cycles begin too.
+        The motion starts at the point of release, where the slip phase of a stick-slip cycle
+        starts too.
         """
         motion = self._recording
         motion.drive = drive
@@ -117,7 +120,7 @@ class Bench:
             found, before = self._measured(loading), amplitude
         if found.period is None:
             return Vibration(drive, self._rate, found.regime, None, np.empty(0), np.empty(0))
-        # The samples of the fewest cycles that have nearly a whole number, or some most nearly.
+        # The fewest cycles that last nearly a whole number of samples, or else the nearest of all.
         lengths = np.arange(1, 13) * (found.period * self._rate)
         counts = np.maximum(np.rint(lengths), 1.0)
         misses = np.abs(counts / lengths - 1.0)
@@ -131,7 +134,7 @@ class Bench:
         return Vibration(drive, self._rate, found.regime, found.period, position, velocity)
 
     def _measured(self, loading: float) -> Measures:
-        """Measure the next ten cycles, each with `loading` (s) besides its slip."""
+        """Measure the next ten cycles, each of a natural period and `loading` (s)."""
         motion = self._recording
         motion.take_breakpoints()
         motion.advance((10 + 2) * (motion.drive.natural_period + loading))
@@ -144,10 +147,10 @@ class Bench:
     def catch(
         self, vibration: Vibration, washout: WashoutParameters, phases: int, patience: float
     ) -> Iterator[Outcome]:
-        """Let the control come on at so many phases of a vibration, its filter having settled.
+        """Activate the control, its filter settled, at `phases` phases of a vibration.
 
-        And once more where the force is largest as it does. `patience` (s) is how long to wait for
-        the vibration to settle. The force is not limited.
+        One more trial activates it where this gives the largest force. The vibration has
+        `patience` (s) to settle. The force is not limited.
         """
         count = len(vibration.velocity)
         assert vibration.period is not None
@@ -168,9 +171,9 @@ class Bench:
     def throw(
         self, drive: Drive, washout: WashoutParameters, speed: float, patience: float
     ) -> list[Outcome]:
-        """Throw the slide out of its equilibrium at `speed` (m/s), either way.
+        """Start the slide from its equilibrium at `speed` (m/s) in either direction.
 
-        Each time both with a filter that was at rest and with one that begins with the throw.
+        Each start is tried with a filter that was at rest and with one that starts with the slide.
         """
         outcomes: list[Outcome] = []
         for velocity in (speed, -speed):

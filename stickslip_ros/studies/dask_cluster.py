@@ -13,15 +13,15 @@ _TIMEOUT = "10s"
 
 
 class DaskError(RunError):
-    """A task has ended several workers of a cluster."""
+    """A task has killed several workers of a cluster."""
 
 
 @contextmanager
 def dask_executor(address: str) -> Generator[tuple[Executor, int]]:
-    """Connect to the scheduler at `address`; provide the executor and how many tasks it may hold.
+    """Connect to the scheduler at `address`; provide the executor and the tasks that it may hold.
 
-    A task whose worker dies is computed again by another one. Raises InvalidInputError where
-    nothing answers, or distributed is not installed, and DaskError for a task that has killed
+    A task whose worker dies is computed again by another worker. Raises InvalidInputError if
+    no scheduler answers or distributed is not installed, and DaskError for a task that has killed
     several workers.
     """
     try:
@@ -32,7 +32,7 @@ def dask_executor(address: str) -> Generator[tuple[Executor, int]]:
         ) from None
     logger = logging.getLogger("distributed")
     with ExitStack() as stack:
-        # Dask logs, with tracebacks, what is raised here as an error.
+        # Dask logs errors with tracebacks; they are raised here instead.
         stack.callback(logger.setLevel, logger.level)
         logger.setLevel(logging.CRITICAL)
         try:

@@ -1,4 +1,4 @@
-"""What gains do, simulated: they catch vibrations, and bring back what was thrown."""
+"""Checks of gains by simulation: they suppress vibrations, and hold after fast starts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,27 +15,28 @@ from stickslip_ros.studies.design_task import Task
 
 @dataclass(frozen=True)
 class Check:
-    """What a proposal does at one belt speed, predicted and simulated; SI units."""
+    """Predicted and simulated behaviour of a proposal at one belt speed; SI units."""
 
     belt_speed: float
+    """Belt speed, m/s."""
     vibrates: bool
-    """Whether there is a vibration without control, to be caught."""
+    """Whether the drive vibrates without control."""
     decay_rate: float
-    """At which a small deviation dies out, 1/s."""
+    """Decay rate of a small deviation, 1/s."""
     predicted_settling_time: float
-    """In which a small deviation falls to a hundredth, s."""
+    """Predicted 1 % settling time of a small deviation, s."""
     settling_time: float | None
-    """Simulated, until a hundredth of the vibration is left, at the worst phase; None without."""
+    """Simulated 1 % settling time of the vibration at the worst phase, s; None without it."""
     predicted_peak_force: float
-    """When the control comes on at the worst phase of the vibration, N."""
+    """Predicted peak force when the control is activated at the worst phase, N."""
     peak_force: float | None
-    """Simulated, at the worst phase, N; None without vibration."""
+    """Simulated peak force at the worst phase, N; None without vibration."""
 
 
 def check_at_speed(
     bench: Bench, candidates: Candidates, index: int, controller: WashoutParameters
 ) -> Check:
-    """Return what the controller does at one of the speeds."""
+    """Return the check of the controller at one of the belt speeds."""
     loop, vibration = candidates.loops[index], candidates.vibrations[index]
     gains = controller.gains
     decay_rate = loop.decay_rate(gains)
@@ -63,10 +64,10 @@ def check_at_speed(
 
 
 def failure_of(task: Task, check: Check) -> str | None:
-    """Return in what the simulated control fails, if it does."""
+    """Return how the simulated control fails; None if it does not."""
     speed = f"at a belt speed of {task.shown(check.belt_speed, 'm/s')}"
     if check.vibrates and check.settling_time is None:
-        return f"{speed} the vibration does not die out, though a small one would"
+        return f"{speed} the vibration does not decay, although a small one would"
     if check.peak_force is not None and check.peak_force > task.force_limit:
         return (
             f"{speed} the force reaches {task.shown(check.peak_force, 'N')}, above the limit of "
@@ -78,7 +79,7 @@ def failure_of(task: Task, check: Check) -> str | None:
 def throw_from_high_speeds(
     task: Task, bench: Bench, drives: Sequence[Drive], controller: WashoutParameters, done: Progress
 ) -> tuple[str | None, str | None]:
-    """Return what is to be said of motions that begin fast, and in what the controller fails."""
+    """Return a remark on motions with a fast start, and how the controller fails, if it does."""
 
     def escapes(drive: Drive, speed: float, controller: WashoutParameters) -> bool:
         patience = 20.0 * drive.natural_period
@@ -91,11 +92,11 @@ def throw_from_high_speeds(
     for number, (drive, speed) in enumerate(throws, 1):
         if escapes(drive, speed, controller):
             slide = (
-                f"thrown to {task.shown(speed, 'm/s')} off a belt at "
-                f"{task.shown(drive.belt_speed, 'm/s')} the slide"
+                f"started at {task.shown(speed, 'm/s')} on a belt at "
+                f"{task.shown(drive.belt_speed, 'm/s')}, the slide"
             )
             if controller.cubic_gain != 0.0 or escapes(drive, speed, unlimited):
-                return None, f"{slide} does not come back"
+                return None, f"{slide} does not return to equilibrium"
             remark = remark or f"{slide} needs more force than the limit"
         done(number / len(throws))
     return remark, None

@@ -1,4 +1,4 @@
-"""How far stable loops are from instability."""
+"""Stability margins of sampled loops."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,19 +14,19 @@ from stickslip_ros.studies.design_task import Task
 
 @dataclass(frozen=True)
 class Margins:
-    """How far stable loops are from the instability of one of them: of all, the one next to it."""
+    """Smallest gain and delay margins of a set of stable loops."""
 
     gain_down: float | None
-    """Factor below one of the linear gain that makes one unstable; None: there is none."""
+    """Largest factor below one of the linear gain at which a loop is unstable; None: no such."""
     gain_up: float | None
-    """Factor above one that does; None: there is none."""
+    """Smallest factor above one of the linear gain at which a loop is unstable; None: no such."""
     delay: float | None
-    """Further delay of the force that does, s; None: none within half a natural period, or as far
-    as theory goes."""
+    """Delay margin: smallest additional delay of the force at which a loop is unstable, s; None: no
+    such within half a natural period, or within the range of the theory."""
 
 
 def margins(loops: Sequence[LinearSampledLoop], gains: WashoutGains) -> Margins:
-    """Return how far loops that are stable with these gains (SI units) are from instability."""
+    """Return the margins of loops that are stable with these gains (SI units)."""
     factors = [
         end / gains.linear
         for loop in loops
@@ -56,12 +56,12 @@ def _delay_margin(loop: LinearSampledLoop, gains: WashoutGains) -> float | None:
 
 
 def little_margin(task: Task, found: Margins) -> str | None:
-    """Return what is to be said of loops that are next to instability; None where none is."""
+    """Return a remark on loops with a small margin; None if all margins are large enough."""
     little = [
         f"{factor:.3g} times the linear gain is unstable"
         for factor in (found.gain_down, found.gain_up)
         if factor is not None and 1.0 / 1.1 < factor < 1.1
     ]
     if found.delay is not None and found.delay < 0.02 * task.drive.natural_period:
-        little.append(f"a further delay of {task.shown(found.delay, 's')} makes it unstable")
-    return f"there is next to no margin: {', '.join(little)}" if little else None
+        little.append(f"an additional delay of {task.shown(found.delay, 's')} makes it unstable")
+    return f"the margin is very small: {', '.join(little)}" if little else None

@@ -1,4 +1,4 @@
-"""Gains that damp a drive fastest within a force limit, by the linear sampled loop."""
+"""Search for the gains that damp fastest within a force limit, by the linear sampled loop."""
 
 from collections.abc import Sequence
 from copy import copy
@@ -17,18 +17,18 @@ from stickslip_ros.studies.design_task import Task
 from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
 
 CUBIC_SHARES = (0.0, 0.125, 0.25, 0.5)
-"""Cubic gains that are considered, in the friction law's own cubic coefficient.
+"""Cubic gains to try, as shares of the friction law's own cubic coefficient.
 
-With all of it the loop would escape to infinity from high speeds. A positive one softens the
-control where the vibration is large, so that more linear gain fits under the force limit.
+With a share of 1 the loop would diverge from high speeds. A positive cubic gain reduces the force
+where the vibration is large, so that the force limit allows more linear gain.
 """
 
 RESERVE = 0.95
-"""Share of what is allowed that the first proposal uses."""
+"""Share of the allowed force and gain that the first proposal uses."""
 
 
 class Candidates:
-    """What theory says of gains: from the linear loops of the range, and the vibrations there."""
+    """Gains by theory: from the linear loops of the speed range, and the vibrations there."""
 
     def __init__(self, task: Task, vibrations: Sequence[Vibration]) -> None:
         self.vibrations = vibrations
@@ -38,38 +38,38 @@ class Candidates:
             if (loop := LinearSampledLoop.from_drive(vibration.drive, task.rate, task.force_delay))
         ]
         self.task = task
-        # The loops differ in one number, the slope of the friction: those at its ends tell all.
+        # The loops differ in the slope of the friction only: the two extreme ones decide.
         slopes = [float(loop.jacobian[SPEED, SPEED]) for loop in self.loops]
         ends = sorted({int(np.argmin(slopes)), int(np.argmax(slopes))})
         self._extremes = [self.loops[index].coarsened() for index in ends]
-        # Twice what brings the slide to rest without overshoot: beyond it nothing is won.
+        # Twice the gain that settles without overshoot: a larger one does not damp faster.
         unit = task.drive.normal_force / task.drive.speed_scale
         self._largest_gain = (4.0 + 2.0 * max(map(abs, slopes))) * unit
         self._cubic_coefficient = _cubic_coefficient(task.drive)
         self._peaks: dict[float, float] = {}
-        """By corner frequency, the largest filtered speed of all vibrations, m/s."""
+        """Largest filtered speed of all vibrations, m/s, by cutoff frequency."""
 
     def limited(self, force_limit: float) -> Self:
-        """Return those for another force limit, N."""
+        """Return the candidates for another force limit, N."""
         other = copy(self)
         other.task = replace(self.task, force_limit=force_limit)
         return other
 
     def free_peak_force(self) -> float:
-        """Return the largest force, N, of the fastest gains without limit; 0 if none is stable."""
+        """Return the peak force, N, of the fastest gains without limit; 0 if none are stable."""
         gains = self.limited(inf).best(RESERVE, CUBIC_SHARES)
         if gains is None:
             return 0.0
         return max(vibration.peak_force(gains) for vibration in self.vibrations)
 
     def slowest(self, gains: WashoutGains) -> LinearSampledLoop:
-        """Return the loop in which a small deviation dies out most slowly."""
+        """Return the loop in which a small deviation decays most slowly."""
         return min(self.loops, key=lambda loop: loop.decay_rate(gains))
 
     def best(self, strength: float, cubic_shares: Sequence[float]) -> WashoutGains | None:
-        """Return the gains that damp fastest with the share `strength` of what is allowed.
+        """Return the gains that damp fastest, with the share `strength` of what is allowed.
 
-        They have three digits, and are zero if nothing vibrates. None if none is stable.
+        They have three digits, and are zero if nothing vibrates. None if no gains are stable.
         """
         if not any(vibration.vibrates for vibration in self.vibrations):
             none = WashoutGains(rounded(self.task.drive.angular_frequency), 0.0, 0.0)
@@ -87,7 +87,7 @@ class Candidates:
         return best
 
     def why_zero(self) -> str:
-        """Return why zero gains may be proposed."""
+        """Return the reason for zero gains."""
         if any(vibration.vibrates for vibration in self.vibrations):
             return "no gains within the force limit damp faster than none"
         distances = {
@@ -98,7 +98,7 @@ class Candidates:
         said = ["nothing vibrates without control at these belt speeds: the gains are zero"]
         if distances:
             nearest = min(distances)
-            little = ", with next to no margin" if nearest < log10(1.05) else ""
+            little = ", with a very small margin" if nearest < log10(1.05) else ""
             said.append(distances[nearest] + little)
         return "; ".join(said)
 
@@ -118,13 +118,13 @@ class Candidates:
             )
         return (
             f"the force limit of {self.task.shown(self.task.force_limit, 'N')} is too small for "
-            "gains that make the equilibrium stable at all these belt speeds and catch the "
+            "gains that make the equilibrium stable at all these belt speeds and suppress the "
             "vibration"
         )
 
     def _fastest(self, strength: float, cubic: float) -> WashoutGains:
-        """Return the fastest gains: the best of five grids, each around the best of that before."""
-        # A softening cubic gain is one beside a negative linear gain.
+        """Return the fastest gains: from five grids, each refined around the best point so far."""
+        # A positive cubic gain softens the control with a negative linear gain only.
         limits = np.array(
             [np.log(self._corner_frequencies(2)), [-1.0, 0.0 if cubic > 0.0 else 1.0]]
         )
@@ -148,15 +148,15 @@ class Candidates:
         return best
 
     def _corner_frequencies(self, count: int) -> FloatArray:
-        """Return corner frequencies (rad/s), up to the rate: a faster filter passes nothing on."""
+        """Return cutoff frequencies (rad/s), up to the rate: a faster filter passes nothing."""
         omega = self.task.drive.angular_frequency
         low, high = 0.02 * omega, 20.0 * omega
         return np.geomspace(low, max(min(high, self.task.rate), 2.0 * low), count)
 
     def _largest(self, corner_frequency: float, strength: float, cubic: float) -> float:
-        """Return the magnitude of the linear gain that is allowed.
+        """Return the largest allowed magnitude of the linear gain.
 
-        With a softening cubic gain the force k v - k2 v^3 may be largest short of the peak.
+        With a softening cubic gain the force k v - k2 v^3 may be largest below the peak speed.
         """
         if corner_frequency not in self._peaks:
             self._peaks[corner_frequency] = max(
@@ -171,14 +171,14 @@ class Candidates:
 
 
 def _cubic_coefficient(drive: Drive) -> float:
-    """Return by what the friction force falls with the cube of high speeds, N s^3/m^3, or zero."""
+    """Return the coefficient of the falling cubic friction at high speed, N s^3/m^3, or zero."""
     law, high = drive.friction.scaled(drive.speed_scale), 1e6
     coefficient = -float(law.coefficient(high, 1.0)) / high**3
     return coefficient * drive.normal_force / drive.speed_scale**3 if coefficient > 1e-6 else 0.0
 
 
 def rounded(value: float, digits: int = 3, *, up: bool = False) -> float:
-    """Return a value with so many significant digits, `up` or to the nearest."""
+    """Return a value rounded to `digits` significant digits, `up` or to the nearest."""
     if value == 0.0:
         return 0.0
     if up:

@@ -1,4 +1,4 @@
-"""What gains are wanted for: a drive, its loop, a force limit and a range of belt speeds."""
+"""The task of a design: a drive, its loop, a force limit and a range of belt speeds."""
 
 from dataclasses import dataclass, field, replace
 from math import inf
@@ -12,24 +12,25 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.scenarios.files import Scenario
 
 OWN_SPEED_RANGE = 0.1
-"""Share of a scenario's belt speed by which the range goes below and above it by default."""
+"""Default half width of the speed range, as a share of the scenario's belt speed."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """What gains are wanted for; SI units."""
+    """The task of a design; SI units. Create it with `Task.from_scenario`."""
 
     drive: Drive
+    """The drive; `belt_speeds` replaces its belt speed."""
     rate: float
     """Samples per second, Hz."""
     force_delay: float
-    """From a sample to the start of its force, s."""
+    """Delay from a sample to the start of its force, s."""
     force_limit: float
-    """Largest force there may be, N."""
+    """Largest allowed force, N."""
     belt_speeds: tuple[float, float]
-    """Lowest and highest, m/s, above zero; the other direction mirrors them."""
+    """Lowest and highest belt speed, m/s, above zero; the opposite direction is symmetric."""
     scenario: Scenario | None = field(default=None, compare=False, repr=False)
-    """What sets the task, if a scenario does."""
+    """The scenario that the task comes from, if any."""
 
     of = Renamed("from_scenario")
 
@@ -37,16 +38,32 @@ class Task:
     def from_scenario(
         cls, scenario: Scenario, belt_speeds: tuple[float, float] | None = None
     ) -> Self:
-        """Return the task that a scenario sets, by default within 10 % of its own belt speed.
+        """Return the task of a scenario.
 
-        Raises InvalidInputError for speeds that are no range above zero.
+        Parameters
+        ----------
+        scenario : Scenario
+            Source of drive, rate, delay and force limit.
+        belt_speeds : tuple[float, float], optional
+            Lowest and highest belt speed, m/s; by default 10 % below and above the scenario's.
+
+        Returns
+        -------
+        Task
+            The task.
+
+        Raises
+        ------
+        InvalidInputError
+            If the speeds are not a range above zero, or if they are omitted and the scenario's
+            belt is at rest.
         """
         plant = scenario.plant
         if belt_speeds is None:
             own = abs(plant.belt_speed)
             if own == 0.0:
                 raise InvalidInputError(
-                    "plant.belt_speed = 0: gains are for a moving belt, so its speeds must be given"
+                    "plant.belt_speed = 0: gains are for a moving belt, so speeds must be given"
                 )
             belt_speeds = (own * (1.0 - OWN_SPEED_RANGE), own * (1.0 + OWN_SPEED_RANGE))
         low, high = belt_speeds
@@ -58,11 +75,24 @@ class Task:
         return cls(plant.as_drive(), plant.rate, plant.force_delay, limit, (low, high), scenario)
 
     def drives(self) -> list[Drive]:
-        """Return the drive at speeds throughout the range."""
+        """Return the drive at five speeds across the range, or at the only one."""
         low, high = self.belt_speeds
         speeds = np.linspace(low, high, 5 if low < high else 1)
         return [replace(self.drive, belt_speed=speed) for speed in speeds.tolist()]
 
     def shown(self, value: float, unit: str) -> str:
-        """Return a value as remarks show it, without a unit where the drive is dimensionless."""
+        """Return a value as text for a remark.
+
+        Parameters
+        ----------
+        value : float
+            The value, in SI units.
+        unit : str
+            Its unit.
+
+        Returns
+        -------
+        str
+            The value with its unit; without it if the drive is dimensionless.
+        """
         return f"{value:.4g}" if self.drive.is_dimensionless else f"{value:.4g} {unit}"

@@ -1,11 +1,11 @@
-"""How far a belt speed is from the Hopf speed, told to who may have meant another unit."""
+"""Distance of a belt speed from the Hopf speed, which also reveals a wrong unit."""
 
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.hopf import hopf_points
 
 
 def hopf_ratio(drive: Drive) -> float | None:
-    """Return the belt speed in the nearest Hopf speed; None where the drive has none, or rests."""
+    """Return the belt speed over the nearest Hopf speed; None without one or at zero speed."""
     speeds = [point.belt_speed for point in hopf_points(drive)]
     speed = abs(drive.belt_speed)
     if not speeds or speed == 0.0:
@@ -14,7 +14,7 @@ def hopf_ratio(drive: Drive) -> float | None:
 
 
 def hopf_distance(drive: Drive) -> str:
-    """Return a clause on the belt speed and the nearest Hopf speed; empty where there is none."""
+    """Return a clause on the belt speed and the nearest Hopf speed; empty without one."""
     ratio = hopf_ratio(drive)
     if ratio is None:
         return ""

@@ -1,4 +1,4 @@
-"""What a study has found so far, on disk as it comes: interrupted, it goes on from there."""
+"""Journals: the computed points of a study on disk, from which an interrupted study continues."""
 
 import fcntl
 import json
@@ -20,25 +20,50 @@ from stickslip_ros.studies.study import Piece, Point, Study
 from stickslip_ros.versions import versions
 
 _FORMAT = "stickslip_ros study 1"
+_NO_JOURNAL = "exists already, and is not the journal of a study"
 
 
 class Journal:
-    """The points of a study that are done, in a file of lines of JSON; a context manager.
+    """The computed points of a study, in a file of JSON lines; a context manager.
 
-    The first line says what study it is, each further one holds a piece. A line that was not
-    finished, the writer having been killed, is cut off. What is in memory is a bit for each point
-    and two numbers for each piece.
+    The first line describes the study, and each further line holds a piece. An unfinished last
+    line, of a writer that was killed, is removed. Memory holds one bit for each point and two
+    numbers for each piece.
+
+    Examples
+    --------
+    >>> from stickslip_ros.scenarios.files import load_scenario
+    >>> from stickslip_ros.studies.plan import Axis
+    >>> from stickslip_ros.studies.runner import run
+    >>> from stickslip_ros.studies.sweep import sweep_study
+    >>> scenario = load_scenario("paper", ["plant.expects_control=false"])
+    >>> study = sweep_study(scenario, [Axis("plant.belt_speed", 0.2, 0.6, 2)])
+    >>> with Journal(study) as journal:
+    ...     run(journal)
+    ...     print([str(point.measures.regime) for point in journal.points()])
+    ['stick_slip', 'equilibrium']
     """
 
     def __init__(self, study: Study, path: Path | None = None) -> None:
-        """Begin the journal at `path`, or go on with the one that is there; None: one in passing.
+        """Start a journal, or continue the one that exists.
 
-        Raises InvalidInputError for a file that is no journal of this study, that another process
-        writes, or that cannot be written.
+        Parameters
+        ----------
+        study : Study
+            The study whose points it holds.
+        path : Path, optional
+            The file; without a path it is a temporary one.
+
+        Raises
+        ------
+        InvalidInputError
+            If the file is not a journal of this study, another process writes it, or it cannot be
+            written.
         """
         self.study = study
+        """The study."""
         self.count = 0
-        """How many points are done."""
+        """Number of points that are done."""
         self._done = bytearray((study.plan.size + 7) // 8)
         self._firsts, self._offsets = array("Q"), array("Q")
         self._ends: dict[int, MotionState | None] = {}
@@ -64,20 +89,48 @@ class Journal:
     ) -> None:
         try:
             self._file.close()
-        except OSError:  # what could not be written, once more
+        except OSError:  # the same failure to write again
             if error is None:
                 raise
 
     def is_done(self, index: int) -> bool:
-        """Return whether a point is done."""
+        """Return whether a point is done.
+
+        Parameters
+        ----------
+        index : int
+            Index of the point in the plan, from 0.
+
+        Returns
+        -------
+        bool
+            Whether the journal holds the point.
+        """
         return bool(self._done[index >> 3] & 1 << (index & 7))
 
     def state_after(self, index: int) -> MotionState | None:
-        """Return where the newest point of a chain ended."""
+        """Return the state in which the newest point of a chain ended.
+
+        Parameters
+        ----------
+        index : int
+            Index of that point in the plan.
+
+        Returns
+        -------
+        MotionState or None
+            The state; None if the motion failed or diverged.
+        """
         return self._ends[index]
 
     def add(self, piece: Piece) -> None:
-        """Keep a piece; it is with the system when this returns."""
+        """Append a piece and hand it to the operating system.
+
+        Parameters
+        ----------
+        piece : Piece
+            The computed points.
+        """
         end = None if piece.end is None else astuple(piece.end)
         line = {"points": [point.as_json() for point in piece.points], "end": end}
         self._file.seek(0, os.SEEK_END)
@@ -87,14 +140,14 @@ class Journal:
         self._enter(offset, [point.number for point in piece.points], piece.end)
 
     def points(self) -> Iterator[Point]:
-        """Yield the points that are done in the order of their index."""
+        """Yield the points that are done, in order of their index."""
         for line in np.argsort(self._firsts):
             self._file.seek(self._offsets[line])
             found = [Point.from_json(values) for values in _parsed(self._file.readline())["points"]]
             yield from sorted(found, key=lambda point: point.number)
 
     def discard(self) -> None:
-        """Remove the file: what was in it stands elsewhere now."""
+        """Remove the file, after its contents were saved elsewhere."""
         if self._path is not None:
             self._path.unlink()
 
@@ -105,7 +158,7 @@ class Journal:
         self._firsts.append(min(indices))
         self._offsets.append(offset)
         if self.study.plan.carried:
-            # Of a chain the newest end is enough, whichever way it goes.
+            # Of a chain only the newest end is needed, in either direction.
             for neighbour in (indices[0] - 1, indices[0] + 1):
                 self._ends.pop(neighbour, None)
             self._ends[indices[-1]] = end
@@ -134,7 +187,7 @@ class Journal:
                 repeated = any(self.is_done(index) for index in indices)
             except (ValueError, LookupError, TypeError):
                 raise InvalidInputError(
-                    f"{self._path}: what begins at byte {offset} is no piece of a study"
+                    f"{self._path}: the line at byte {offset} is not a piece of a study"
                 ) from None
             if not repeated:
                 self._enter(offset, indices, end)
@@ -147,13 +200,13 @@ class Journal:
         except ValueError:
             found = {}
         if found.get("format") != _FORMAT:
-            raise InvalidInputError(f"{self._path}: exists already, and is no study's journal")
+            raise InvalidInputError(f"{self._path}: {_NO_JOURNAL}")
         differing = [key for key in header if found.get(key) != header[key]]
         if differing:
             raise InvalidInputError(
-                f"{self._path}: was begun by another study, which differs in "
-                f"{', '.join(_differences(found, header, differing))}; finish that one, or remove "
-                "the file"
+                f"{self._path}: belongs to another study, which differs in "
+                f"{', '.join(_differences(found, header, differing))}; finish that study, or "
+                "remove the file"
             )
 
 
@@ -163,14 +216,14 @@ def _opened(path: Path | None) -> BinaryIO:
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NONBLOCK, 0o666)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise InvalidInputError(f"{path}: exists already, and is no study's journal")
+        raise InvalidInputError(f"{path}: {_NO_JOURNAL}")
     file = os.fdopen(descriptor, "r+b")
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         there = os.path.samestat(os.fstat(descriptor), path.stat())
     except (BlockingIOError, FileNotFoundError):
         there = False
-    if not there:  # or whoever was has just finished, and removed it
+    if not there:  # or the other process has just finished and removed it
         file.close()
         raise InvalidInputError(f"{path}: another process is writing it")
     return file
@@ -189,7 +242,7 @@ def _parsed(line: bytes) -> dict[str, Any]:
 def _differences(
     found: Mapping[str, Any], expected: Mapping[str, Any], keys: Sequence[str]
 ) -> Iterator[str]:
-    """Yield in which entries the two differ, and how."""
+    """Yield the entries in which the two differ, with both values."""
     for key in keys:
         one, other = found.get(key), expected[key]
         if isinstance(one, dict) and isinstance(other, dict):

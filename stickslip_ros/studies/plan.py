@@ -1,4 +1,4 @@
-"""Which points a study has: values of parameters on a grid, or random ones within ranges."""
+"""The points of a study: values of parameters on a grid, or random values within ranges."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -17,39 +17,55 @@ from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.text import did_you_mean
 
 MOST_POINTS = 1_000_000_000
-"""Points of a study: what is to be kept of them has to go into a file."""
+"""Largest number of points of a study, since its results must fit into a file."""
 
 _NODES = ("plant", "washout_controller")
 
 
 class Carry(StrEnum):
-    """In which order along an axis each point begins where its neighbour ended."""
+    """Direction along an axis in which each point starts from the end of its neighbour."""
 
     UP = "up"
     """From the first value of the axis to the last."""
     DOWN = "down"
     """From the last value to the first."""
     BOTH = "both"
-    """Up, and then down from the values' end anew: where the two differ there is hysteresis."""
+    """Up, then down in a chain of its own: a difference between the two shows hysteresis."""
 
     @property
     def directions(self) -> tuple["Carry", ...]:
-        """UP, DOWN, or the two."""
+        """UP, DOWN, or both."""
         return (Carry.UP, Carry.DOWN) if self is Carry.BOTH else (self,)
 
 
 @dataclass(frozen=True)
 class Axis:
-    """Values of one parameter, from one to another."""
+    """Values of one parameter, equally spaced on a linear or logarithmic scale.
+
+    Raises
+    ------
+    InvalidInputError
+        If the parameter is unknown or not a number, or a value is out of bounds.
+
+    Examples
+    --------
+    >>> axis = Axis("plant.belt_speed", 0.1, 0.5, 5)
+    >>> print(axis)
+    plant.belt_speed=0.1:0.5:5
+    >>> [round(value, 3) for value in axis.values().tolist()]
+    [0.1, 0.2, 0.3, 0.4, 0.5]
+    """
 
     parameter: str
     """NODE.PARAMETER, a number of plant or washout_controller."""
     first: float
+    """First value, in the unit of the parameter."""
     last: float
+    """Last value; it may be below the first."""
     count: int
-    """Of values, both ends included."""
+    """Number of values, both ends included."""
     logarithmic: bool = False
-    """Whether the values are a geometric sequence, not an arithmetic one."""
+    """Whether the values are a geometric sequence instead of an arithmetic one."""
 
     def __post_init__(self) -> None:
         parameter, model = self._parameter, NODE_PARAMETERS[self.parameter.partition(".")[0]]
@@ -58,12 +74,12 @@ class Axis:
             raise InvalidInputError(f"{self}: {ends} must be two different finite numbers")
         if not 2 <= self.count <= MOST_POINTS:
             raise InvalidInputError(
-                f"{self}: {self.count} values are not from 2 to {MOST_POINTS:,} of them"
+                f"{self}: {self.count} values: must be from 2 to {MOST_POINTS:,}"
             )
         if self._parameter.kind is int and self.count > abs(self.last - self.first) + 1.0:
-            raise InvalidInputError(f"{self}: from {ends} there are fewer whole numbers")
+            raise InvalidInputError(f"{self}: there are fewer whole numbers from {ends}")
         if self.logarithmic and not self.first * self.last > 0.0:
-            raise InvalidInputError(f"{self}: with :log {ends} must be of one sign, without zero")
+            raise InvalidInputError(f"{self}: with :log {ends} must have one sign and exclude zero")
         for number in (0, self.count - 1):
             try:
                 model.check_bounds(parameter.name, self.value(number))
@@ -76,9 +92,27 @@ class Axis:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Return the axis that NODE.PARAMETER=A:B:COUNT, or A:B:COUNT:log, stands for.
+        """Return the axis described by a text.
 
-        Raises InvalidInputError for anything else, and for values that are not allowed.
+        Parameters
+        ----------
+        text : str
+            NODE.PARAMETER=A:B:COUNT, or NODE.PARAMETER=A:B:COUNT:log.
+
+        Returns
+        -------
+        Axis
+            The axis from A to B.
+
+        Raises
+        ------
+        InvalidInputError
+            If the text has another form, or a value is not allowed.
+
+        Examples
+        --------
+        >>> Axis.parse("plant.damping=0.01:1:3:log").count
+        3
         """
         parameter, _, values = text.partition("=")
         first, last, count, *spacing = [*values.split(":"), "", ""]
@@ -93,18 +127,40 @@ class Axis:
         return cls(parameter, *ends, number, spacing[0] == "log")
 
     def value(self, number: int) -> float:
-        """Return one of the values; of a parameter that is a whole number, the nearest such."""
+        """Return one of the values.
+
+        Parameters
+        ----------
+        number : int
+            Index of the value, from 0.
+
+        Returns
+        -------
+        float
+            The value in the unit of the parameter, rounded if that is a whole number.
+        """
         value = self.last if number == self.count - 1 else self.at(number / (self.count - 1))
         return round(value) if self._parameter.kind is int else value
 
     def at(self, share: float) -> float:
-        """Return what lies at some share of the way, from 0 to 1."""
+        """Return the value at some share of the way along the axis.
+
+        Parameters
+        ----------
+        share : float
+            0 for the first end, 1 for the last.
+
+        Returns
+        -------
+        float
+            The value in the unit of the parameter, not rounded.
+        """
         if self.logarithmic:
             return self.first * (self.last / self.first) ** share
         return self.first + (self.last - self.first) * share
 
     def values(self) -> FloatArray:
-        """Return all values."""
+        """Return all values, as an array of shape (count,)."""
         return np.array([self.value(number) for number in range(self.count)], dtype=float)
 
     @property
@@ -128,7 +184,7 @@ class Axis:
                 + did_you_mean(f"{node}.{name}", _numbers(*_NODES), every)
             )
         if known[name].kind not in (int, float):
-            raise InvalidInputError(f"{self.parameter}: is no number, and has no values between")
+            raise InvalidInputError(f"{self.parameter}: is not a number, so it has no range")
         return known[name]
 
 
@@ -142,21 +198,31 @@ def _numbers(*nodes: str) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Grid:
-    """All combinations of the values of one axis or several, the last varying fastest.
+    """All combinations of the values of one or more axes; the last axis varies fastest.
 
-    Carried on from neighbour to neighbour along the last axis, they are there once for each
-    direction: all points of the one, then all of the other.
+    With `carry`, points follow each other along the last axis, and the grid has all points of
+    one direction, then all points of the other.
+
+    Examples
+    --------
+    >>> grid = Grid((Axis("plant.belt_speed", 0.1, 0.3, 3), Axis("plant.damping", 0.0, 0.2, 2)))
+    >>> grid.shape, grid.size
+    ((3, 2), 6)
+    >>> grid.values(1)
+    (0.1, 0.2)
     """
 
     kind: ClassVar[str] = "grid"
-    """Name of such a plan in journals and tables."""
+    """Name of this kind of plan in journals and tables."""
     axes: tuple[Axis, ...]
+    """The axes."""
     carry: Carry | None = None
+    """Direction in which points are carried on; None: each starts in the initial state."""
 
     def __post_init__(self) -> None:
         _check_different(self.parameters)
         if self.size > MOST_POINTS:
-            raise InvalidInputError(f"{self.size} points are more than {MOST_POINTS:,}")
+            raise InvalidInputError(f"{self.size} points: must be at most {MOST_POINTS:,}")
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -165,12 +231,12 @@ class Grid:
 
     @property
     def directions(self) -> tuple[Carry | None, ...]:
-        """In which the points are carried on; one None if they are not."""
+        """Directions in which the points are carried on; one None if they are not."""
         return (None,) if self.carry is None else self.carry.directions
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Numbers of the axes' values."""
+        """Number of values of each axis."""
         return tuple(axis.count for axis in self.axes)
 
     @property
@@ -180,15 +246,37 @@ class Grid:
 
     @property
     def carried(self) -> bool:
-        """Whether each point of a chain begins where the one before ended."""
+        """Whether each point of a chain starts where the previous one ended."""
         return self.carry is not None
 
     def direction(self, index: int) -> Carry | None:
-        """Return the direction in which a point is carried on."""
+        """Return the direction in which a point is carried on.
+
+        Parameters
+        ----------
+        index : int
+            Index of the point, from 0.
+
+        Returns
+        -------
+        Carry or None
+            UP or DOWN; None if the grid is not carried on.
+        """
         return self.directions[index // prod(self.shape)]
 
     def values(self, index: int) -> tuple[float, ...]:
-        """Return the values of the parameters at a point."""
+        """Return the values of the parameters at a point.
+
+        Parameters
+        ----------
+        index : int
+            Index of the point, from 0.
+
+        Returns
+        -------
+        tuple[float, ...]
+            One value for each axis, in the unit of its parameter.
+        """
         values: list[float] = []
         for axis in reversed(self.axes):
             index, number = divmod(index, axis.count)
@@ -196,7 +284,7 @@ class Grid:
         return tuple(reversed(values))
 
     def corners(self) -> Iterator[int]:
-        """Yield the points at the ends of all axes."""
+        """Yield the indices of the points at the ends of all axes."""
         for ends in product((0, 1), repeat=len(self.axes)):
             index = 0
             for axis, end in zip(self.axes, ends, strict=True):
@@ -204,7 +292,7 @@ class Grid:
             yield index
 
     def chains(self) -> Iterator[range]:
-        """Yield the points in the order in which they are carried on; else, all at once."""
+        """Yield the indices of each chain in its order; without `carry`, all indices together."""
         if self.carry is None:
             yield range(self.size)
             return
@@ -216,24 +304,30 @@ class Grid:
 
 @dataclass(frozen=True)
 class RandomSample:
-    """Values that are uniformly distributed between the ends of some axes, independent of another.
+    """Independent random values, uniformly distributed between the ends of some axes.
 
-    Between those of a logarithmic axis it is their logarithms that are.
+    For a logarithmic axis the logarithms are uniformly distributed. A point depends on the seed
+    and its index only, so a larger sample starts with the points of a smaller one.
 
-    A point follows from the seed and its index: of two samples with one seed, the larger begins
-    with the smaller.
+    Examples
+    --------
+    >>> sample = RandomSample((Axis("plant.belt_speed", 0.1, 0.5, 2),), size=3, seed=1)
+    >>> 0.1 <= sample.values(0)[0] <= 0.5
+    True
     """
 
     kind: ClassVar[str] = "sample"
-    """Name of such a plan in journals and tables."""
+    """Name of this kind of plan in journals and tables."""
     axes: tuple[Axis, ...]
-    """Whose counts do not matter."""
+    """The ranges; their counts do not matter."""
     size: int
+    """Number of points."""
     seed: int = 0
+    """Seed of the random numbers, 0 or more."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.size <= MOST_POINTS:
-            raise InvalidInputError(f"{self.size} points are not from 1 to {MOST_POINTS:,} of them")
+            raise InvalidInputError(f"{self.size} points: must be from 1 to {MOST_POINTS:,}")
         if self.seed < 0:
             raise InvalidInputError(f"seed {self.seed}: must be 0 or more")
         _check_different(self.parameters)
@@ -245,27 +339,38 @@ class RandomSample:
 
     @property
     def carried(self) -> bool:
-        """Never."""
+        """Always false: the points of a sample are independent."""
         return False
 
     def values(self, index: int) -> tuple[float, ...]:
-        """Return the values of the parameters at a point."""
-        # The index first: it is one word, and what numpy makes of words does not tell where a
-        # longer seed ends.
+        """Return the values of the parameters at a point.
+
+        Parameters
+        ----------
+        index : int
+            Index of the point, from 0.
+
+        Returns
+        -------
+        tuple[float, ...]
+            One value for each axis, in the unit of its parameter.
+        """
+        # The index comes first: it is one word, while numpy would mix the words of a longer seed
+        # with those that follow.
         shares = np.random.default_rng((index, self.seed)).random(len(self.axes)).tolist()
         return tuple(axis.at(share) for axis, share in zip(self.axes, shares, strict=True))
 
     def corners(self) -> Iterator[int]:
-        """Yield the first points."""
+        """Yield the indices of the first points."""
         yield from range(min(self.size, 10))
 
     def chains(self) -> Iterator[range]:
-        """Yield all points at once."""
+        """Yield all indices together."""
         yield range(self.size)
 
 
 Plan = Grid | RandomSample
-"""The points of a study, by their index from 0 on."""
+"""The points of a study, by index from 0."""
 
 
 def _check_different(parameters: Sequence[str]) -> None:

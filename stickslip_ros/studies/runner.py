@@ -1,4 +1,4 @@
-"""Running a study: in this process, in several here, or wherever an executor takes its tasks."""
+"""Running a study: in this process, in several local processes, or through an executor."""
 
 import signal
 from collections.abc import Callable, Generator, Iterator
@@ -23,20 +23,20 @@ from stickslip_ros.studies.settling import MotionState
 from stickslip_ros.studies.study import Piece, compute, pieces_of
 
 IN_FLIGHT = 64
-"""Tasks that an executor holds at a time, unless told otherwise: memory is for these only."""
+"""Default number of tasks that an executor holds at a time, which limits the memory."""
 
 _LARGEST_TASK = 1000
-"""Points of a task, at most."""
+"""Largest number of points of a task."""
 
 _SCANNED = 100_000
-"""Points that are looked at, at most, before those missing among them are begun."""
+"""Largest number of points to scan before the missing ones among them are started."""
 
 CountPoints = Callable[[int], None]
-"""Takes how many points are done."""
+"""A function that receives the number of points that are done."""
 
 
 class WorkersDiedError(RunError):
-    """An executor has lost those that do its work."""
+    """An executor has lost its workers."""
 
 
 def run(
@@ -46,12 +46,39 @@ def run(
     in_flight: int = IN_FLIGHT,
     progress: CountPoints = lambda _: None,
 ) -> None:
-    """Compute the points of the journal's study that it does not have yet.
+    """Compute the points of a journal's study that are missing.
 
-    In this process, or through any `executor`, which gets `in_flight` tasks at a time; a task is
-    some points. What is found does not depend on that, to the last bit on one kind of processor.
-    `progress` is told how many points are done. Interrupted, what was done is in the journal.
-    Raises WorkersDiedError if the executor gives up.
+    If the run is interrupted, the journal holds the points that are done. The result does not
+    depend on the executor, to the last bit on one kind of processor.
+
+    Parameters
+    ----------
+    journal : Journal
+        The journal of the study.
+    executor : concurrent.futures.Executor, optional
+        Executor of the tasks, of some points each; without one this process computes them.
+    in_flight : int
+        Number of tasks that the executor holds at a time.
+    progress : Callable[[int], None]
+        Receives the number of points that are done.
+
+    Raises
+    ------
+    InvalidInputError
+        If `in_flight` is below 1.
+    WorkersDiedError
+        If the executor gives up.
+
+    Examples
+    --------
+    >>> from stickslip_ros.scenarios.files import load_scenario
+    >>> from stickslip_ros.studies.plan import Axis
+    >>> from stickslip_ros.studies.sweep import sweep_study
+    >>> scenario = load_scenario("paper", ["plant.expects_control=false"])
+    >>> with Journal(sweep_study(scenario, [Axis("plant.belt_speed", 0.2, 0.6, 3)])) as journal:
+    ...     run(journal)
+    ...     journal.count
+    3
     """
     if in_flight < 1:
         raise InvalidInputError(f"{in_flight} tasks in flight: must be 1 or more")
@@ -73,7 +100,7 @@ def run(
 
     if study.plan.carried:
         parallel = chains
-    else:  # each piece may be begun at once
+    else:  # the pieces are independent
         parallel = (_Chain(iter((piece,)), None) for chain in chains for piece in chain.pieces)
     try:
         while True:
@@ -88,8 +115,8 @@ def run(
                     submit(chain)
     except (BrokenExecutor, CancelledError) as error:
         raise WorkersDiedError(
-            f"{type(executor).__name__} has lost its workers, {journal.count} of "
-            f"{study.plan.size} points being done: {error or 'a task was cancelled'}"
+            f"{type(executor).__name__} has lost its workers with {journal.count} of "
+            f"{study.plan.size} points done: {error or 'a task was cancelled'}"
         ) from None
     finally:
         for task in waiting:
@@ -99,9 +126,9 @@ def run(
 
 
 def run_here(journal: Journal, workers: int, progress: CountPoints = lambda _: None) -> None:
-    """Do as `run` does, in so many processes of this machine.
+    """Run the study as `run` does, in `workers` processes of this machine.
 
-    Should one be killed, others take its place. Raises RunError if they keep dying.
+    Processes that are killed are replaced. Raises RunError if they keep dying.
     """
     if workers < 1:
         raise InvalidInputError(f"{workers} workers: must be 1 or more")
@@ -118,9 +145,9 @@ def run_here(journal: Journal, workers: int, progress: CountPoints = lambda _: N
             deaths = 1 if journal.count > before else deaths + 1
             if deaths == 3:
                 raise RunError(
-                    f"worker processes were killed {deaths} times without getting anywhere, "
-                    f"{journal.count} of {journal.study.plan.size} points being done: is memory "
-                    "short, or does a script lack `if __name__ == '__main__':`?"
+                    f"worker processes were killed {deaths} times without progress, with "
+                    f"{journal.count} of {journal.study.plan.size} points done: check that there "
+                    "is enough memory, and that a script has `if __name__ == '__main__':`"
                 ) from None
         else:
             return
@@ -128,18 +155,18 @@ def run_here(journal: Journal, workers: int, progress: CountPoints = lambda _: N
 
 @contextmanager
 def local_processes(workers: int) -> Generator[ProcessPoolExecutor]:
-    """Provide so many processes here, which end when this one does, however it does.
+    """Provide `workers` processes on this machine, which end whenever this one ends.
 
-    They are not forked: heyoka's compiler has threads, which a fork would lose.
+    They are spawned, not forked, because a fork would lose the threads of heyoka's compiler.
     """
     others = set(active_children())
     pool = ProcessPoolExecutor(workers, get_context("spawn"), initializer=_begin_worker)
     try:
-        # They inherit what is blocked: who is interrupted terminates its workers.
+        # Workers inherit the blocked signals: this process terminates them on an interrupt.
         unblocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             for _ in range(workers):
-                pool.submit(bool)  # it does nothing, in a process that begins for it
+                pool.submit(bool)  # an empty task, which starts a process
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, unblocked)
         yield pool
@@ -165,15 +192,15 @@ def _end_with_parent() -> None:
 
 @dataclass
 class _Chain:
-    """Pieces that are computed one after the other."""
+    """Pieces that are computed in sequence."""
 
     pieces: Iterator[range]
     start: MotionState | None
-    """Where the next piece begins."""
+    """State in which the next piece starts."""
 
 
 def _missing(journal: Journal) -> Iterator[tuple[range, MotionState | None]]:
-    """Yield runs of points that are not done, and where the first one of each begins."""
+    """Yield runs of missing points, and the state in which the first point of each starts."""
     carried = journal.study.plan.carried
     chains = journal.study.plan.chains()
     if not carried:
@@ -196,8 +223,8 @@ def _record(journal: Journal, piece: Piece, progress: CountPoints) -> MotionStat
 
 
 def _task_size(journal: Journal, in_flight: int) -> int:
-    size = min(int(0.25 / journal.study.cost()), _LARGEST_TASK)  # tasks of 0.25 s, about
+    size = min(int(0.25 / journal.study.cost()), _LARGEST_TASK)  # tasks of about 0.25 s
     if in_flight > 1 and not journal.study.plan.carried:
-        # 16 tasks for each worker, at least, so that they end at about the same time.
+        # At least 16 tasks for each worker, so that all workers end at about the same time.
         size = min(size, journal.study.plan.size // (16 * in_flight // 2))
     return max(size, 1)

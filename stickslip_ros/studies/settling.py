@@ -1,4 +1,4 @@
-"""What a drive settles on from one start: the points that sweeps and basins are made of."""
+"""The motion that a drive settles on from one start: a point of a sweep or basin study."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -18,36 +18,49 @@ from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
 
 CYCLES = (Regime.STICK_SLIP, Regime.PURE_SLIP)
-"""Regimes that have an amplitude to be steady."""
+"""Regimes of a limit cycle, which has an amplitude."""
 
 _RESTS = (Regime.EQUILIBRIUM, Regime.STUCK)
 
 LONGEST = 1e6
-"""Natural periods or cycles that a motion is followed for at most."""
+"""Largest number of natural periods or cycles of one motion."""
 
 
 @dataclass(frozen=True)
 class MotionState:
-    """Where a motion stands; SI units."""
+    """State of a motion; SI units."""
 
     position: float
+    """Displacement, m."""
     velocity: float
+    """Velocity, m/s."""
     low_passed: float | None = None
-    """What the washout filter holds back of the speed, m/s; None: all of it, the filter rests."""
+    """Low-pass state of the washout filter, m/s; None: equal to the velocity, no output."""
 
 
 @dataclass(frozen=True)
 class SettlingCourse:
-    """How long a motion is followed."""
+    """How long a motion is simulated until it is measured.
+
+    Raises
+    ------
+    InvalidInputError
+        If a value is out of range.
+
+    Examples
+    --------
+    >>> SettlingCourse(transient=50.0, patience=80)
+    SettlingCourse(transient=50.0, cycles=4, patience=80)
+    """
 
     transient: float = 200.0
-    """Natural periods that are passed over, besides the time in which a slow belt loads the spring
-    at first, and, under control, `start_after`."""
+    """Transient that is skipped, in natural periods, 0 to 1e6. The first loading of the spring by a
+    slow belt and, under control, `start_after` are added to it."""
     cycles: int = 4
-    """Whole cycles that are then measured, where there are any."""
+    """Number of whole cycles that are then measured, if there are any, 1 to 1e6."""
     patience: int = 1
-    """How often both may be done, one after the other, until the motion is steady and what is
-    measured twice the same: near an unstable cycle it may seem steady for a while."""
+    """Largest number of repetitions of both, 1 to 1e6. They end when the motion is steady and two
+    results are the same: near an unstable cycle a motion may seem steady for a while."""
 
     def __post_init__(self) -> None:
         for shown, value, least in (
@@ -61,20 +74,20 @@ class SettlingCourse:
 
 @dataclass(frozen=True)
 class ControlledDrive:
-    """A drive, and how it is controlled and sampled, if it is."""
+    """A drive with its control and sampling, if any."""
 
     drive: Drive
     washout: WashoutParameters | None = None
-    """The controller; None: there is none."""
+    """The controller; None: no control."""
     sampled: PlantParameters | None = None
-    """How the loop is sampled; None: not at all, control being continuous (eq. 19)."""
+    """Sampling of the loop; None: no sampling, and continuous control (eq. 19)."""
 
     @classmethod
     def from_scenario(cls, scenario: Scenario, *, continuous: bool = False) -> "ControlledDrive":
-        """Return the case of a scenario, its control `continuous` if asked for.
+        """Return the case of a scenario, with sampled or `continuous` control.
 
-        Without controller and disturbance there is nothing to sample: the motion is the same.
-        Raises InvalidInputError for what continuous control does not have.
+        Without controller and disturbance the loop is not sampled, since the motion is the same.
+        Raises InvalidInputError if continuous control does not support the scenario.
         """
         plant = scenario.plant
         washout = scenario.washout_controller.as_washout() if plant.expects_control else None
@@ -92,7 +105,7 @@ class ControlledDrive:
 
 
 def check_continuous(scenario: Scenario) -> None:
-    """Raise InvalidInputError for what continuous control does not have."""
+    """Raise InvalidInputError if continuous control does not support the scenario."""
     plant, washout = scenario.plant, scenario.washout_controller
     for name, value, needed in (
         ("washout_controller.force_limit", washout.force_limit, float("inf")),
@@ -102,39 +115,40 @@ def check_continuous(scenario: Scenario) -> None:
     ):
         if value != needed:
             raise InvalidInputError(
-                f"continuous control knows no {name}: it is {value}, and must be {needed}"
+                f"{name} = {value} is refused: with continuous control it must be {needed}"
             )
 
 
 class Settled(NamedTuple):
-    """What is left of a motion after its transient."""
+    """A motion after its transient."""
 
     measures: Measures
     turning_points: FloatArray
     """Displacements at which the velocity is zero, m: the Poincare section x' = 0. In equilibrium
-    the one place of rest; none where the motion runs away."""
+    the rest position only; none if the motion diverges."""
     end: MotionState
-    """Where the motion ended."""
+    """State in which the motion ended."""
 
     @property
     def steady(self) -> bool:
-        """Whether the motion has settled: its measures say so, or it rests behind its transient."""
+        """Whether the motion has settled: by its measures, or at rest after its transient."""
         return _is_settled(self.measures)
 
 
 class Settler:
-    """Follows one motion after another; what they are like does not depend on those before.
+    """Simulates motions in sequence; each one is independent of those before.
 
-    Compiling an integrator costs more than most motions: it is done once for each friction law.
+    Compiling an integrator costs more than most motions, so it is compiled once for each friction
+    law.
     """
 
     def __init__(self) -> None:
         self._motions: dict[bool, Motion] = {}
 
     def settle(self, case: ControlledDrive, start: MotionState, course: SettlingCourse) -> Settled:
-        """Follow the motion from `start` and measure what is left after the transient.
+        """Simulate the motion from `start` and measure it after the transient.
 
-        Raises RunError for a motion too stiff to be followed.
+        Raises RunError if the motion is too stiff to integrate.
         """
         drive, washout = case.drive, case.washout
         continuous = washout is not None and case.sampled is None
@@ -147,10 +161,10 @@ class Settler:
         loading = 0.0 if drive.belt_speed == 0.0 else loading_time(drive)
         transient = course.transient * drive.natural_period
         controlled = washout is not None or case.sampled is not None
-        if controlled:  # without, the slide rides a slow belt in one step
+        if controlled:  # otherwise one step covers the stick phase on a slow belt
             loading = min(loading, 50.0 * drive.natural_period)
             transient += loading
-        # One cycle is under way when it begins, and one when it ends.
+        # The first and the last cycle are incomplete.
         cycles = max(course.cycles, LEAST_CYCLES) + 2
         block = cycles * drive.natural_period
         law = loop = None
@@ -177,7 +191,7 @@ class Settler:
             advance(transient, section)
             if motion.sticking and not controlled and drive.belt_speed != 0.0:
                 left = (release_position(drive) - motion.position) / drive.belt_speed
-                if left > drive.natural_period:  # the transient is but begun
+                if left > drive.natural_period:  # the transient has only started
                     motion.advance(left)
                     motion.advance(transient)
             motion.recording = True
@@ -185,7 +199,7 @@ class Settler:
             done, step = 0.0, block
             while not motion.unbounded and done < longest and not (done and section.done):
                 advance(step, section)
-                done, step = done + step, done + step  # a slow belt's cycles are that long
+                done, step = done + step, done + step  # cycles on a slow belt are that long
             if motion.unbounded:
                 section.meter.report_run_away()
             return section
@@ -204,7 +218,7 @@ class Settler:
 
 
 def _begin_control(motion: Motion, washout: WashoutParameters, start: MotionState) -> None:
-    """Let the filter run for `start_after`, and the controller act from then on."""
+    """Run the filter alone for `start_after`, then activate the controller."""
     gains = (washout.linear_gain, washout.cubic_gain)
     motion.set_gains(
         washout.corner_frequency, *(gains if washout.start_after == 0.0 else (0.0, 0.0))
@@ -216,14 +230,14 @@ def _begin_control(motion: Motion, washout: WashoutParameters, start: MotionStat
 
 
 def _is_settled(measures: Measures) -> bool:
-    """Return whether a motion is steady; one that rests behind a transient is."""
+    """Return whether a motion is steady; a motion at rest after its transient is."""
     if measures.steady is None:
         return measures.regime in _RESTS
     return measures.steady
 
 
 def _alike(before: Measures, after: Measures) -> bool:
-    """Return whether regime and amplitude are the same."""
+    """Return whether regime and amplitude agree."""
     one, other = before.amplitude, after.amplitude
     if before.regime is not after.regime or one is None or other is None:
         return before.regime is after.regime
@@ -231,7 +245,7 @@ def _alike(before: Measures, after: Measures) -> bool:
 
 
 class _Section:
-    """Measures a motion, keeps its Poincare section, and counts the cycles that are measured."""
+    """Measures a motion, keeps its Poincare section, and counts the measured cycles."""
 
     def __init__(self, cycles: int) -> None:
         self.meter = CycleMeter(cycles)
@@ -239,18 +253,18 @@ class _Section:
         self._sections = [np.empty(0)]
 
     def take_motion(self, motion: MeasuredMotion) -> None:
-        """Keep where the slide turned, as an observer."""
+        """Keep the turning points of the slide, as an observer."""
         breakpoints = motion.breakpoints
         self._sections.append(breakpoints.position[breakpoints.velocity == 0.0])
         self._missing -= len(motion.cycles)
 
     @property
     def done(self) -> bool:
-        """Whether there are cycles enough, or no more will come."""
+        """Whether there are enough cycles, or no more will follow."""
         return self._missing <= 0 or self.meter.measures().regime in _RESTS
 
     def settled(self, end: MotionState) -> Settled:
-        """Return what was found, the motion having come to `end`."""
+        """Return the settled motion, which ended in the state `end`."""
         measures = self.meter.measures()
         section = np.concatenate(self._sections)
         if measures.regime is Regime.UNBOUNDED:

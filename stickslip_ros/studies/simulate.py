@@ -1,4 +1,4 @@
-"""The closed loop of a scenario without ROS, measured on the motion itself."""
+"""Simulation of a scenario's closed loop without ROS, measured on the motion itself."""
 
 from stickslip_ros.physics.loop.motion_tracer import MotionTracer
 from stickslip_ros.physics.loop.simulation import simulate_continuous, simulate_sampled
@@ -19,9 +19,10 @@ def simulate(
     progress: Progress = lambda _: None,
     observer: RunObserver | None = None,
 ) -> Measures:
-    """Return the measures of the scenario's motion over `duration` (s), which an `observer` sees.
+    """Return the measures of the scenario's motion over `duration` (s).
 
-    Raises InvalidInputError for what `continuous` control does not have.
+    An `observer` receives the motion. Raises InvalidInputError if `continuous` control does not
+    support the scenario.
     """
     if continuous:
         check_continuous(scenario)

@@ -1,4 +1,4 @@
-"""What theory says of a scenario, without running it."""
+"""Stability of a scenario by theory, without a simulation of it."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -27,7 +27,7 @@ from stickslip_ros.text import quantity
 
 Section = dict[str, Any]
 Notes = dict[str, str]
-"""Why a quantity does not exist, or what it leaves out, by its place among the sections."""
+"""Why a quantity does not exist, or what it omits, by its place in the sections."""
 
 _NO_CONTROL = "the scenario has no controller"
 
@@ -42,7 +42,7 @@ _SAMPLED_LOOP = (
 
 
 def stability(scenario: Scenario) -> tuple[Section, Notes]:
-    """Return what theory says of the scenario, SI units, and notes on it."""
+    """Return the theoretical quantities of the scenario, in SI units, and notes on them."""
     plant = scenario.plant
     drive = plant.as_drive()
     gains = scenario.washout_controller.as_washout().gains if plant.expects_control else None
@@ -57,27 +57,28 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
         "closed_forms": _closed_forms(drive, gains),
     }
     if plant.force_jitter > 0.0 and "sampled_loop" not in notes:
-        notes["sampled_loop"] = "force_jitter is left out: the delay of the force is constant here"
+        notes["sampled_loop"] = "force_jitter is omitted: the delay of the force is constant here"
     if expansion is None:
         reach = float(drive.friction.static) * drive.length_scale
         shown = f"{reach:.4g}" if drive.is_dimensionless else quantity(reach, "m")
         reason = (
-            f"the belt rests, and friction holds the slide anywhere within mu_s N / k = {shown}"
+            "the belt is at rest, and friction holds the slide anywhere within mu_s N / k = "
+            f"{shown}"
         )
         for place, value in _places(found):
             if value is None and not {place, place.split(".")[0]} & notes.keys():
                 notes[place] = reason
     elif found["closed_forms"] is None:
-        notes["closed_forms"] = "there are closed forms for the cubic Stribeck law only"
+        notes["closed_forms"] = "closed forms exist for the cubic Stribeck law only"
     return found, notes
 
 
 def _places(found: Section) -> Iterator[tuple[str, Any]]:
-    """Yield the figures by their place, those of sections as section.name."""
+    """Yield the quantities with their places; within sections as section.name."""
     for section, value in found.items():
         if isinstance(value, dict):
-            figures = cast(Section, value)
-            yield from ((f"{section}.{name}", figure) for name, figure in figures.items())
+            quantities = cast(Section, value)
+            yield from ((f"{section}.{name}", each) for name, each in quantities.items())
         else:
             yield section, value
 
@@ -98,7 +99,7 @@ def _open_loop(drive: Drive, expansion: Expansion | None, notes: Notes) -> Secti
         notes["open_loop.hopf_speeds"] = _why_no_hopf_speed(drive)
     if not cycles:
         notes["open_loop.limit_cycles"] = (
-            "no motion was found that repeats itself, or the drive is too stiff to be followed"
+            "no periodic motion was found, or the drive is too stiff to integrate"
         )
     return {
         **_eigenvalues(drive, expansion),
@@ -110,7 +111,7 @@ def _open_loop(drive: Drive, expansion: Expansion | None, notes: Notes) -> Secti
 def _why_no_hopf_speed(drive: Drive) -> str:
     moving = expand(replace(drive, belt_speed=drive.belt_speed or drive.speed_scale))
     assert moving is not None
-    if abs(moving.jacobian[SPEED, SPEED]) < 1e-12:  # that is rounding
+    if abs(moving.jacobian[SPEED, SPEED]) < 1e-12:  # rounding only
         return "the slope of the friction and the damping balance: the equilibrium is neutral"
     return (
         "the slope of the friction and the damping balance at no belt speed; the equilibrium is "
@@ -136,11 +137,11 @@ def _sticking(drive: Drive, notes: Notes) -> Section:
     lowest, highest = onset.followed
     if not onset.ranges:
         notes["sticking.speed_ranges"] = (
-            f"it sticks at no belt speed from {lowest:.4g} to {highest:.4g} m/s"
+            f"the slide sticks at no belt speed from {lowest:.4g} to {highest:.4g} m/s"
         )
     elif len(onset.ranges) > 1:
         notes["sticking.speed_ranges"] = (
-            f"between them the slide overtakes the belt; looked for from {lowest:.4g} to "
+            f"between the ranges the slide overtakes the belt; searched from {lowest:.4g} to "
             f"{highest:.4g} m/s"
         )
     return {
@@ -168,7 +169,7 @@ def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Sect
     points = hopf_points(drive, gains)
     if not points:
         notes["closed_loop.hopf_speeds"] = (
-            "at no belt speed does a pair of eigenvalues cross the imaginary axis with these gains"
+            "with these gains no pair of eigenvalues crosses the imaginary axis at any belt speed"
         )
     possible = limit_cycle_from_hopf(drive, gains), limit_cycle_of_run(drive, 0.0, gains=gains)
     cycles = [cycle for cycle in possible if cycle is not None]
@@ -176,8 +177,8 @@ def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Sect
         cycles.pop()
     if not cycles:
         notes["closed_loop.limit_cycles"] = (
-            "none found from rest at zero displacement, nor from the Hopf point at the critical "
-            "linear gain; others are not looked for, and a very stiff loop is not followed"
+            "none found from rest at zero displacement or from the Hopf point at the critical "
+            "linear gain; there is no search for others, and none in a very stiff loop"
         )
     return {
         **_eigenvalues(drive, expansion),
@@ -192,9 +193,9 @@ def _why_no_gain(drive: Drive, gains: WashoutGains) -> str:
     assert expansion is not None
     product = expansion.jacobian[SPEED, SPEED] * gains.scaled(drive).corner_frequency
     return (
-        "no linear gain stabilises the equilibrium: by Routh and Hurwitz p d must be below 1 and "
-        f"is {product:.4g} (p the slope of friction less damping, d the corner frequency, "
-        "dimensionless)"
+        "no linear gain stabilises the equilibrium: by the Routh-Hurwitz criterion p d must be "
+        f"below 1 and is {product:.4g} (p the slope of friction less damping, d the cutoff "
+        "frequency, dimensionless)"
     )
 
 
@@ -210,7 +211,7 @@ def _sampled_loop(
     intervals = loop.stable_linear_gains(gains.corner_frequency)
     if not intervals:
         reason = (
-            "no linear gain stabilises the equilibrium at this rate and delay with a corner "
+            "no linear gain stabilises the equilibrium at this rate and delay with a cutoff "
             f"frequency of {gains.corner_frequency:g} rad/s"
         )
         for name in ("critical_linear_gain", "stable_linear_gains"):
@@ -229,10 +230,7 @@ def _sampled_loop(
 
 
 def _closed_forms(drive: Drive, gains: WashoutGains | None) -> Section | None:
-    """Return what can be written down for the cubic Stribeck law, in the same units.
-
-    What does not exist is left out.
-    """
+    """Return the closed forms of the cubic Stribeck law, in the same units; omit missing ones."""
     cubic = CubicLoop.from_drive(drive)
     if cubic is None:
         return None
@@ -269,13 +267,13 @@ def _cycle(cycle: LimitCycle) -> Section:
         "stable": cycle.stable,
         "multipliers": [[value.real, value.imag] for value in cycle.multipliers],
         **cycle.measures.as_dict(),
-        "period": cycle.period,  # the measures have none for the smallest cycles
+        "period": cycle.period,  # the measures of the smallest cycles have none
         "frequency": 1.0 / cycle.period,
     }
 
 
 def why_no_stability_map(scenario: Scenario) -> str | None:
-    """Return why there is no linear sampled loop to draw a map of; None where there is one."""
+    """Return why there is no linear sampled loop for a map; None if there is one."""
     plant = scenario.plant
     if not plant.expects_control:
         return _NO_CONTROL
@@ -283,9 +281,9 @@ def why_no_stability_map(scenario: Scenario) -> str | None:
 
 
 def stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]:
-    """Return where the sampled loop is stable, and the critical gain over the delay of the force.
+    """Return the map of decay rates of the sampled loop, and the critical gains over the delay.
 
-    There is none where `why_no_stability_map` gives a reason.
+    Call it only if `why_no_stability_map` returns None.
     """
     plant = scenario.plant
     drive, gains = plant.as_drive(), scenario.washout_controller.as_washout().gains

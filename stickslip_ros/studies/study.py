@@ -1,4 +1,4 @@
-"""A study: many points of one scenario, each followed from its start to what it settles on."""
+"""A study: many points of one scenario, each simulated until its motion has settled."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -20,34 +20,34 @@ from stickslip_ros.studies.settling import (
 MEASURES = tuple(
     measure.name for measure in fields(Measures) if measure.name not in ("steady", "trend")
 )
-"""Names of the measures of a point, which says itself whether it is steady."""
+"""Names of the measures of a point, which has `steady` as an attribute of its own."""
 
 _NUDGE = EQUILIBRIUM_SPEED / 2.0
-"""Share of the belt speed by which a slide at rest is pushed before it is carried on: where the
-next equilibrium is the same but unstable, rounding would take for ever, or be none."""
+"""Share of the belt speed by which a slide at rest is pushed before it is carried on: rounding
+alone would leave an unstable equilibrium very late or never."""
 
 
 class Point(NamedTuple):
-    """What became of one point."""
+    """The result of one point."""
 
     number: int
-    """In the plan, from 0 on."""
+    """Index in the plan, from 0."""
     measures: Measures
     steady: bool
     """Whether it has settled (see `Settled`)."""
     turning_points: tuple[float, ...]
     """Poincare section x' = 0, m (see `Settled`)."""
     reason: str | None
-    """Why it has no cycle to measure; None where it has, or rests."""
+    """Why it has no cycle to measure; None if it has one or is at rest."""
 
     def as_json(self) -> list[Any]:
-        """Return what `from_json` makes the same point of, to the last bit."""
+        """Return values from which `from_json` makes the same point, to the last bit."""
         measures = [getattr(self.measures, name) for name in MEASURES]
         return [self.number, *measures, self.steady, list(self.turning_points), self.reason]
 
     @classmethod
     def from_json(cls, values: Sequence[Any]) -> Self:
-        """Return the point that `as_json` has written down."""
+        """Return the point of the values that `as_json` returned."""
         number, *measures, steady, turning_points, reason = values
         named: dict[str, Any] = dict(zip(MEASURES, measures, strict=True))
         named["regime"] = None if named["regime"] is None else Regime(named["regime"])
@@ -59,18 +59,18 @@ class Piece(NamedTuple):
 
     points: list[Point]
     end: MotionState | None
-    """Where what follows the last one begins; None: in its own initial state, since that one ran
-    away or failed, or since nothing is carried on."""
+    """State in which the point after the last one starts; None: its own initial state, because the
+    last one diverged or failed, or the plan is not carried on."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """The points of a plan, all else being as in a scenario.
+    """The points of a plan, with all other parameters from a scenario.
 
-    A motion begins in the scenario's initial state, or, where the plan carries on, in the state in
-    which the neighbour's ended, filter included; what forces were under way is then forgotten, and
-    `start_after` is for the first point of a chain only. Where it ended at rest it is pushed by
-    less than what counts as rest.
+    A motion starts in the scenario's initial state. If the plan is carried on, it starts in the
+    state in which its neighbour ended, filter included; delayed forces are then dropped, and
+    `start_after` applies to the first point of a chain only. A motion that ended at rest gets a
+    push that is smaller than the limit of rest.
     """
 
     scenario: Scenario
@@ -82,7 +82,7 @@ class Study:
     def case(self, index: int) -> tuple[ControlledDrive, MotionState]:
         """Return the drive and loop of a point, and its initial state.
 
-        Raises InvalidInputError where its values are out of bounds or do not go together.
+        Raises InvalidInputError if its values are out of bounds or not compatible.
         """
         values = dict(zip(self.plan.parameters, self.plan.values(index), strict=True))
         scenario = self.scenario.changed(values)
@@ -92,7 +92,7 @@ class Study:
         )
 
     def check(self) -> None:
-        """Raise InvalidInputError if no corner of the plan, nor its middle, can be."""
+        """Raise InvalidInputError if neither a corner of the plan nor its middle is valid."""
         refusals: list[StickslipError] = []
         for index in (*self.plan.corners(), self.plan.size // 2):
             try:
@@ -104,7 +104,7 @@ class Study:
         raise refusals[0]
 
     def cost(self) -> float:
-        """Return how long a point takes, about, s."""
+        """Return the approximate time that a point takes, s."""
         for index in (self.plan.size // 2, 0, self.plan.size - 1):
             with suppress(StickslipError):
                 case, _ = self.case(index)
@@ -117,7 +117,7 @@ class Study:
         return periods * case.drive.natural_period * case.sampled.rate * 1e-5
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what the result depends on, ready for JSON."""
+        """Return everything that the result depends on, ready for JSON."""
         plan: Any = self.plan
         return {
             "scenario": self.scenario.as_dict(),
@@ -128,7 +128,7 @@ class Study:
 
 
 class _Settlers(local):
-    """One of each thread: integrators are compiled once, and used by one at a time."""
+    """One settler for each thread, since one thread at a time may use an integrator."""
 
     def __init__(self) -> None:
         self.settler = Settler()
@@ -138,10 +138,10 @@ _SETTLERS = _Settlers()
 
 
 def compute(study: Study, points: Sequence[int], start: MotionState | None) -> Piece:
-    """Return what becomes of some points, in their order; a pure function, for any process.
+    """Compute some points in their order; a pure function, for any process.
 
-    Where the plan carries on, the first one begins in `start`; without, in its initial state, as
-    does the one after a point that failed or ran away.
+    If the plan is carried on, the first point starts in `start`. With None it starts in its
+    initial state, as does the point after one that failed or diverged.
     """
     carried, end = study.plan.carried, start
     found: list[Point] = []
@@ -154,7 +154,7 @@ def compute(study: Study, points: Sequence[int], start: MotionState | None) -> P
 def _compute_point(
     study: Study, index: int, start: MotionState | None
 ) -> tuple[Point, MotionState | None]:
-    """Return what becomes of a point, and where the next one of a chain begins."""
+    """Return a computed point, and the state in which the next one of a chain starts."""
     try:
         case, initial = study.case(index)
         if start is not None and case.washout is not None:
@@ -167,11 +167,11 @@ def _compute_point(
     measures, end, reason = replace(settled.measures, steady=None, trend=None), settled.end, None
     match measures.regime:
         case Regime.UNBOUNDED:
-            end, reason = None, "the motion runs away"
+            end, reason = None, "the motion diverges"
         case Regime.EQUILIBRIUM:
             end = replace(end, velocity=end.velocity - _NUDGE * case.drive.belt_speed)
         case None:
-            reason = "no whole cycle in the time that is measured"
+            reason = "no whole cycle in the measured time"
         case _:
             pass
     turning_points = tuple(settled.turning_points.tolist())
@@ -179,6 +179,6 @@ def _compute_point(
 
 
 def pieces_of(points: range, size: int) -> Iterator[range]:
-    """Cut points into pieces of so many."""
+    """Yield the points in pieces of `size`."""
     for first in range(0, len(points), size):
         yield points[first : first + size]

@@ -1,4 +1,4 @@
-"""Where theory has the Hopf bifurcation and the limits of sticking, over any parameter."""
+"""Hopf bifurcations and limits of sticking by theory, over any parameter."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,34 +23,34 @@ _Margin = Callable[[ControlledDrive], float]
 HOPF_POINT = "Hopf point"
 
 STABILITY_LIMIT = "limit of stability"
-"""Of a sampled loop, a pair of whose multipliers leaves the unit circle there, or one at -1."""
+"""Of a sampled loop: a pair of multipliers, or one at -1, leaves the unit circle there."""
 
 STICKING_LIMIT = "limit of sticking"
-"""An end of a range in which a slide that stuck sticks again; there may be several ranges."""
+"""An end of a range in which a slide sticks again after release; there may be several ranges."""
 
 _MAPPED = 50
-"""Values of each of two axes for which there are margins."""
+"""Number of values of each axis of a map."""
 
 
 @dataclass(frozen=True)
 class TransitionMap:
-    """On which side of its transitions theory has the motion, over two parameters."""
+    """Margins of the transitions by theory, over two parameters."""
 
     first: FloatArray
-    """n values of the first parameter."""
+    """Values of the first parameter, shape (n,)."""
     second: FloatArray
-    """m values of the second one."""
+    """Values of the second parameter, shape (m,)."""
     margins: Mapping[str, FloatArray]
-    """By the name of a transition, what is zero there; NaN where theory has no say. (n, m)"""
+    """Margin by name of the transition, zero at it, NaN without a theory; shape (n, m)."""
 
 
 def hopf_margin(case: ControlledDrive, *, coarse: bool = False) -> float:
-    """Return what is above zero where the equilibrium is stable, and zero at the Hopf bifurcation.
+    """Return a margin above zero if the equilibrium is stable, and zero at the Hopf bifurcation.
 
-    Without sampling it is the least Hurwitz determinant: of two or three eigenvalues only a pair
-    can cross, their product being other than zero. Of a sampled loop it is what the spectral radius
-    leaves to one, or with `coarse` that of nearly the same loop if its order is high. NaN on a belt
-    at rest, and for a loop that is not linear near the equilibrium, or not the same at each sample.
+    Without sampling it is the smallest Hurwitz determinant: of two or three eigenvalues only a pair
+    can cross, because their product is not zero. For a sampled loop it is one minus the spectral
+    radius, with `coarse` that of a similar loop of lower order. NaN on a belt at rest, and for a
+    loop that is not linear near the equilibrium or changes from sample to sample.
     """
     drive, washout, plant = case.drive, case.washout, case.sampled
     if washout is None or plant is None:
@@ -63,9 +63,9 @@ def hopf_margin(case: ControlledDrive, *, coarse: bool = False) -> float:
 
 
 def stick_margin(case: ControlledDrive, release: Release) -> float:
-    """Return what is above zero where a slide that stuck sticks again, and zero at the limit.
+    """Return a margin above zero if the slide sticks again after release, and zero at the limit.
 
-    NaN on a belt at rest, and under control or a disturbance, for which there is no such theory.
+    NaN on a belt at rest, and under control or a disturbance, for which there is no theory.
     """
     drive = case.drive
     if case.washout is not None or case.sampled is not None or drive.belt_speed == 0.0:
@@ -74,7 +74,7 @@ def stick_margin(case: ControlledDrive, release: Release) -> float:
 
 
 def sign_changes(margin: Callable[[float], float], values: Sequence[float]) -> Iterator[float]:
-    """Yield where `margin` changes sign between neighbours of the `values`, to rounding."""
+    """Yield the points where `margin` changes sign between neighbouring `values`, to rounding."""
     known = [(value, found) for value in values if (found := margin(value)) != 0.0]
     for (before, one), (after, other) in pairwise(known):
         if one * other < 0.0:
@@ -82,10 +82,10 @@ def sign_changes(margin: Callable[[float], float], values: Sequence[float]) -> I
 
 
 def transitions(study: Study, axis: Axis) -> dict[str, list[float]]:
-    """Return the values of the axis' parameter at the transitions there are, by name, SI units.
+    """Return the values of the axis' parameter at each kind of transition, by name, SI units.
 
-    All else is as in the study's scenario. Two closer than a two-hundredth of the axis may be
-    overlooked.
+    All other parameters are those of the study's scenario. Two transitions closer than 1/200 of
+    the axis may be missed.
     """
     values = replace(axis, count=201).values().tolist()
     found: dict[str, list[float]] = {}
@@ -97,7 +97,7 @@ def transitions(study: Study, axis: Axis) -> dict[str, list[float]]:
 
 
 def transition_map(study: Study, axes: tuple[Axis, Axis]) -> TransitionMap:
-    """Return the margins over two axes of those transitions of which theory has a say."""
+    """Return the margins over two axes of the transitions that have a theory."""
     first, second = (replace(axis, count=_MAPPED).values() for axis in axes)
     names = [axis.parameter for axis in axes]
     margins: dict[str, FloatArray] = {}
@@ -118,7 +118,7 @@ def _margins(study: Study, *, coarse: bool = False) -> dict[str, _Margin]:
 
 
 def _at(study: Study, parameters: Sequence[str], margin: _Margin, *values: float) -> float:
-    """Return the margin where parameters have these values; NaN where they cannot, or it cannot."""
+    """Return the margin for these values of the parameters; NaN if these are invalid."""
     try:
         scenario = study.scenario.changed(dict(zip(parameters, values, strict=True)))
         return margin(ControlledDrive.from_scenario(scenario, continuous=study.continuous))

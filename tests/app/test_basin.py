@@ -79,7 +79,7 @@ def test_without_ranges_the_starts_are_around_the_equilibrium(stickslip: Run) ->
         (["--velocity=a:b:3"], "--velocity=a:b:3: "),
         (["--position=1:2:3:4"], "--position=1:2:3:4: must be A:B:COUNT"),
         (["--seed", "1"], "--seed 1: is for a random --sample"),
-        (["--sample", "0"], "0 points are not from 1 to"),
+        (["--sample", "0"], "0 points: must be from 1 to"),
         (["--sample", "9", "--seed", "-1"], "--seed -1: must be 0 or more"),
         (["--plot", "basin.txt"], "--plot basin.txt: must end in one of"),
     ],

@@ -110,7 +110,7 @@ def test_that_jitter_is_left_out_is_said_where_it_matters() -> None:
     with_it, notes = theory_of(load_scenario("paper", [jitter]))
     without, _ = theory_of(load_scenario("paper", []))
     assert with_it == without
-    assert "force_jitter is left out" in notes["sampled_loop"]
+    assert "force_jitter is omitted" in notes["sampled_loop"]
     _, notes = theory_of(load_scenario("paper", [jitter, "plant.expects_control=false"]))
     assert notes["sampled_loop"] == "the scenario has no controller"
 

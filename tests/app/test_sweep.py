@@ -126,12 +126,12 @@ def test_a_point_that_cannot_be_is_a_row_with_its_reason(stickslip: Run) -> None
             ["--over", "plant.speed=1:2:3"],
             "plant.speed: unknown parameter; did you mean plant.belt_speed or",
         ),
-        (["--over", "plant.pace=1:2:3"], "plant.pace: is no number"),
+        (["--over", "plant.pace=1:2:3"], "plant.pace: is not a number"),
         (["--over", "plant.mass=1:2"], "must be NODE.PARAMETER=A:B:COUNT"),
         (["--over", "plant.mass=1:1:3"], "must be two different finite numbers"),
-        (["--over", "plant.mass=1:2:1"], "1 values are not from 2 to"),
+        (["--over", "plant.mass=1:2:1"], "1 values: must be from 2 to"),
         (["--over", "plant.damping=-1:1:3"], "damping = -1.0 is refused: must be a finite number"),
-        (["--over", "plant.belt_speed=-1:1:3:log"], "must be of one sign, without zero"),
+        (["--over", "plant.belt_speed=-1:1:3:log"], "must have one sign and exclude zero"),
         (["--over", "washout_controller.linear_gain=-1:0:3"], "there is no controller"),
         (["--over", "plant.friction.static=0.1:0.2:3"], "friction.minimum = 0.25 must not exceed"),
         ([*SPEEDS, *SPEEDS], "must be different parameters"),
@@ -181,7 +181,7 @@ def test_interrupted_it_keeps_what_is_done_and_goes_on_from_there(
     kept = part.read_bytes()
     done = stickslip(*FREE, *SPEEDS, "--out", "table.csv")
     assert done.returncode == 2
-    assert "was begun by another study, which differs in plan.axes" in done.stderr
+    assert "belongs to another study, which differs in plan.axes" in done.stderr
     assert part.read_bytes() == kept
     done = stickslip(*FREE, *speeds, "--out", "table.csv")
     assert done.returncode == 0, done.stderr

@@ -60,9 +60,9 @@ def test_the_format_follows_the_ending(
 
 def test_it_says_what_it_shows(tmp_path: Path) -> None:
     picture = drawn(tmp_path / "basin.svg").read_text(encoding="utf-8")
-    for text in (*LABELS, "belt speed", "equilibrium", "displacement at the start (m)"):
+    for text in (*LABELS, "belt speed", "equilibrium", "initial displacement (m)"):
         assert text in picture
-    assert "Which motion each of 1200 starts leads to" in picture
+    assert "Motion that each of 1200 starts leads to" in picture
 
 
 def test_it_is_in_the_units_of_the_drive() -> None:
@@ -70,14 +70,14 @@ def test_it_is_in_the_units_of_the_drive() -> None:
     found = starts(**small, belt_speed=4e-4, equilibrium_position=5e-4, title="a $title")
     figure = basin_figure(**found)
     (axes,) = figure.axes
-    assert axes.get_xlabel() == "displacement at the start (mm)"
-    assert axes.get_ylabel() == "velocity at the start (mm/s)"
+    assert axes.get_xlabel() == "initial displacement (mm)"
+    assert axes.get_ylabel() == "initial velocity (mm/s)"
     assert figure.get_suptitle().endswith(": a $title")
     *_, belt, equilibrium = axes.lines
     assert belt.get_ydata() == pytest.approx([0.4, 0.4])
     assert equilibrium.get_xdata() == pytest.approx([0.5])
     (axes,) = basin_figure(**found, units=Units(dimensionless=True)).axes
-    assert axes.get_xlabel() == "displacement at the start (dimensionless)"
+    assert axes.get_xlabel() == "initial displacement (dimensionless)"
     assert axes.lines[-1].get_xdata() == [5e-4]
 
 

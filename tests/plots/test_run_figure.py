@@ -290,12 +290,12 @@ def test_where_no_force_came_the_last_one_is_dotted() -> None:
     assert x[:2] == pytest.approx((1.0, 1.5))
     assert y[0] == pytest.approx(7.0)
     (legend,) = figure.legends
-    assert "none came: the last one" in {text.get_text() for text in legend.get_texts()}
+    assert "no new force: last one" in {text.get_text() for text in legend.get_texts()}
 
 
 def test_without_such_a_gap_the_legend_says_nothing_of_it(reference: Drawn) -> None:
     (legend,) = reference.figure.legends
-    assert "none came: the last one" not in {text.get_text() for text in legend.get_texts()}
+    assert "no new force: last one" not in {text.get_text() for text in legend.get_texts()}
 
 
 def test_rounding_is_no_wave() -> None:
@@ -428,4 +428,4 @@ def test_forces_that_did_not_act_are_dots() -> None:
     (legend,) = figure.legends
     texts = {text.get_text() for text in legend.get_texts()}
     assert "sent, did not act" in texts
-    assert "none came: the last one" not in texts
+    assert "no new force: last one" not in texts

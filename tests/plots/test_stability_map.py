@@ -89,16 +89,16 @@ def test_axes_have_units(tmp_path: Path) -> None:
     path = tmp_path / "map.svg"
     save(stability_figure(map_of(), None), path)
     picture = path.read_text(encoding="utf-8")
-    for label in ("corner frequency d (rad/s)", "linear gain k1 (N s/m)", "decay rate (1/s)"):
+    for label in ("cutoff frequency d (rad/s)", "linear gain k1 (N s/m)", "decay rate (1/s)"):
         assert label in picture
-    assert "belt speed 40 mm/s, sample rate 1 kHz, force 2.5 ms late" in picture
+    assert "belt speed 40 mm/s, sample rate 1 kHz, force delay 2.5 ms" in picture
 
 
 def test_curves_are_told_apart_without_colour() -> None:
     rates, delays = np.array([100.0, 300.0, 1000.0]), np.linspace(0.0, 0.006, 4)
     critical = CriticalGainCurves.over(FEED_DRIVE, 20.0, rates, delays)
     _, axes, _ = stability_figure(map_of(), critical).axes
-    assert axes.get_xlabel() == "delay of the force (ms)"
+    assert axes.get_xlabel() == "force delay (ms)"
     curves = axes.lines[:3]
     assert [curve.get_label() for curve in curves] == ["100 Hz", "300 Hz", "1 kHz"]
     assert len({curve.get_linestyle() for curve in curves}) == 3
@@ -110,7 +110,7 @@ def test_for_the_unit_drive_it_is_dimensionless() -> None:
     assert loop is not None
     found = StabilityMap.around(loop, WashoutGains(2.0, -1.0, -1.0), points=11)
     axes, bar = stability_figure(found, None).axes
-    assert axes.get_xlabel() == "corner frequency d (dimensionless)"
+    assert axes.get_xlabel() == "cutoff frequency d (dimensionless)"
     assert bar.get_ylabel() == "decay rate (dimensionless)"
     assert axes.get_title() == "belt speed 0.4, sample rate 100"
 

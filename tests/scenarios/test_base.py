@@ -45,7 +45,7 @@ def test_a_base_that_leads_back_is_refused(tmp_path: Path) -> None:
     for one, other in (("one", "other"), ("other", "one")):
         write(tmp_path / f"{one}.yaml", section("/**/scenario", f"{{base: {other}.yaml}}"))
     message = refusal(str(tmp_path / "one.yaml"))
-    assert message.endswith("one.yaml is a file that it completes")
+    assert message.endswith("one.yaml leads back to itself")
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_a_base_that_leads_back_is_refused(tmp_path: Path) -> None:
         ("{base: 5}", "base = 5 is refused: must be the name or the path of a scenario"),
         ('{base: ""}', "base = '' is refused"),
         ("{}", "base = None is refused"),
-        ("{basis: paper}", "unknown parameter basis; known is base"),
+        ("{basis: paper}", "unknown parameter basis; the only one is base"),
     ],
 )
 def test_a_bad_base_is_refused(tmp_path: Path, parameters: str, fragment: str) -> None:

@@ -45,7 +45,7 @@ def test_a_section_that_matches_no_node_is_refused(
     path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))
     message = refusal(path, namespace=namespace)
     assert message.startswith(f"{path}: section /{pattern.strip('/')} matches no node")
-    assert f"in namespace {namespace} there are plant, washout_controller, analyzer" in message
+    assert f"the nodes in namespace {namespace} are plant, washout_controller, analyzer" in message
 
 
 def test_sections_of_other_nodes_are_left_alone_where_there_may_be_some(tmp_path: Path) -> None:

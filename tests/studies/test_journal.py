@@ -179,7 +179,7 @@ def test_the_journal_of_another_study_is_refused_with_what_differs(
     with pytest.raises(InvalidInputError) as refusal:
         Journal(speeds(5), path)
     message = str(refusal.value)
-    assert message.startswith(f"{path}: was begun by another study, which differs in ")
+    assert message.startswith(f"{path}: belongs to another study, which differs in ")
     assert difference in message
     assert message.count(", not ") == 1
     assert path.read_bytes() == before
@@ -202,7 +202,7 @@ def test_the_journal_of_another_study_is_refused_with_what_differs(
 )
 def test_a_file_that_is_no_journal_is_refused_and_left_as_it_is(path: Path, content: bytes) -> None:
     path.write_bytes(content)
-    with pytest.raises(InvalidInputError, match=r"is no study's journal|another study"):
+    with pytest.raises(InvalidInputError, match=r"is not the journal of a study|another study"):
         Journal(speeds(5), path)
     assert path.read_bytes() == content
 
@@ -242,7 +242,7 @@ def test_a_line_that_is_no_piece_is_refused_and_the_file_left_as_it_is(
         file.write(f"{line}\n")
     before = path.read_bytes()
     with pytest.raises(
-        InvalidInputError, match=f"what begins at byte {offset} is no piece of a study"
+        InvalidInputError, match=f"the line at byte {offset} is not a piece of a study"
     ):
         Journal(study, path)
     assert path.read_bytes() == before

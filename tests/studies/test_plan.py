@@ -66,16 +66,16 @@ FORM = "must be NODE.PARAMETER=A:B:COUNT, or A:B:COUNT:log"
             "washout_controller.gain=1:2:3",
             r"did you mean washout_controller\.cubic_gain or washout_controller\.linear_gain\?",
         ),
-        ("plant.friction.law=1:2:3", "is no number"),
-        ("plant.autostart=0:1:2", "is no number"),
+        ("plant.friction.law=1:2:3", "is not a number"),
+        ("plant.autostart=0:1:2", "is not a number"),
         ("plant.belt_speed=1:1:3", "1:1 must be two different finite numbers"),
         ("plant.belt_speed=1:nan:3", "1:nan must be two different finite numbers"),
         ("washout_controller.force_limit=1:inf:3", "1:inf must be two different finite numbers"),
-        ("plant.belt_speed=1:2:1", "1 values are not from 2 to 1,000,000,000"),
-        ("plant.belt_speed=1:2:-3", "-3 values are not from 2 to 1,000,000,000"),
-        (f"plant.belt_speed=1:2:{MOST_POINTS + 1}", "values are not from 2 to 1,000,000,000"),
-        ("plant.belt_speed=0:1:3:log", "with :log 0:1 must be of one sign, without zero"),
-        ("plant.belt_speed=-1:1:3:log", "with :log -1:1 must be of one sign, without zero"),
+        ("plant.belt_speed=1:2:1", "1 values: must be from 2 to 1,000,000,000"),
+        ("plant.belt_speed=1:2:-3", "-3 values: must be from 2 to 1,000,000,000"),
+        (f"plant.belt_speed=1:2:{MOST_POINTS + 1}", "values: must be from 2 to 1,000,000,000"),
+        ("plant.belt_speed=0:1:3:log", "with :log 0:1 must have one sign and exclude zero"),
+        ("plant.belt_speed=-1:1:3:log", "with :log -1:1 must have one sign and exclude zero"),
         ("plant.mass=0:1:3", "plant.mass=0:1:3: mass = 0.0.* above 0 kg"),
         ("plant.mass=1:-1:3", "mass = -1.0.* above 0 kg"),
         ("plant.belt_speed=0:1e31:3", r"belt_speed = 1e\+31.* at most 1e\+30"),
@@ -193,7 +193,7 @@ def test_a_grid_refuses_one_parameter_twice_and_too_many_points() -> None:
     with pytest.raises(InvalidInputError, match="belt_speed: must be different parameters"):
         Grid((AXES[0], Axis(SPEED, 0.0, 1.0, 2)))
     many = replace(AXES[0], count=40_000), replace(AXES[1], count=40_000)
-    with pytest.raises(InvalidInputError, match="1600000000 points are more than 1,000,000,000"):
+    with pytest.raises(InvalidInputError, match="1600000000 points: must be at most 1,000,000,000"):
         Grid(many)
 
 
@@ -229,7 +229,7 @@ def test_a_sample_is_uniform_and_its_axes_are_independent() -> None:
 
 @pytest.mark.parametrize("size", [0, -1, MOST_POINTS + 1])
 def test_a_sample_of_no_points_or_too_many_is_refused(size: int) -> None:
-    with pytest.raises(InvalidInputError, match=f"^{size} points are not from 1 to 1,000,000,000"):
+    with pytest.raises(InvalidInputError, match=f"^{size} points: must be from 1 to 1,000,000,000"):
         RandomSample((AXES[0],), size)
 
 

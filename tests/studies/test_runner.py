@@ -323,7 +323,7 @@ def test_workers_that_keep_dying_end_the_run_and_what_is_done_is_kept(
 
     monkeypatch.setattr(runner, "local_processes", counted)
     with Journal(study) as journal:
-        with pytest.raises(RunError, match=r"were killed 3 times without getting anywhere, . of 6"):
+        with pytest.raises(RunError, match=r"were killed 3 times without progress, with . of 6"):
             run_here(journal, 2)
         assert 3 <= len(pools) <= 8
         found = list(journal.points())

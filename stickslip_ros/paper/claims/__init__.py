@@ -25,7 +25,7 @@ COMPUTATIONS = (
     | control_effect.computes
     | conclusions.computes
 )
-"""What computes each claim that is decidable, by its identifier."""
+"""The computation of each decidable claim, by its identifier."""
 
 
 def _claim(
@@ -49,7 +49,7 @@ def _chapters() -> tuple[Chapter, ...]:
 
 
 CHAPTERS = _chapters()
-"""The parts of the paper in its order, the abstract with the conclusions."""
+"""The parts of the paper in order; the abstract is with the conclusions."""
 
 CLAIMS = tuple(claim for chapter in CHAPTERS for claim in chapter.claims)
 """The claims of all chapters."""

@@ -31,7 +31,7 @@ from stickslip_ros.physics.theory.roots import zero_between
 computes = Computations()
 
 _CLEAR_OF_HOPF = 0.98
-"""Share of the Hopf speed beyond which a diagram looks at motions that are still on their way."""
+"""Share of the Hopf speed above which the motions of a diagram have not settled yet."""
 
 
 def _rows(figure: BifurcationFigure, chosen: Callable[[float, Regime | None], bool]) -> list[int]:
@@ -44,13 +44,13 @@ def _rows(figure: BifurcationFigure, chosen: Callable[[float, Regime | None], bo
 
 
 def _turning_points(figure: BifurcationFigure, row: int) -> int:
-    """Return how many different turning points a row of the diagram has."""
+    """Return the number of different turning points in a row of the diagram."""
     found = np.sort(figure.diagram.position[figure.diagram.row == row])
-    return 1 + int(np.sum(np.diff(found) > 1e-6))  # those closer to each other are one
+    return 1 + int(np.sum(np.diff(found) > 1e-6))  # closer ones count as one
 
 
 def _periodicity(figure: BifurcationFigure, end: float) -> Observation:
-    """Observe whether the motions that vibrate, up to some value, are other than periodic."""
+    """Observe whether the vibrations up to the value `end` are not periodic."""
     rows = _rows(figure, lambda value, regime: regime in VIBRATING and value < end)
     counts = {_turning_points(figure, row) for row in rows}
     return Observation(
@@ -69,7 +69,7 @@ def _(_: Evidence) -> Observation:
     return Observation(
         f"real part {inside.real:.5f} below, {outside.real:.5f} above",
         inside.real > 0.0 > outside.real and min(inside.imag, outside.imag) > 0.0,
-        remark=f"0.01 to both sides of v_b1; imaginary part {inside.imag:.5f}.",
+        remark=f"0.01 on both sides of v_b1; imaginary part {inside.imag:.5f}.",
     )
 
 
@@ -87,7 +87,7 @@ def _(_: Evidence) -> Formula:
             - DAMPING * speed
             - gamma * position
         },
-        "Eq. 2 has made the stiffness one.",
+        "In eq. 2 the scales make the stiffness one.",
     )
 
 
@@ -102,8 +102,8 @@ def _(evidence: Evidence) -> Number:
     return Number(
         sqrt(float(quadratic[-1])),
         {TAKEN_FOR_DAMPING: hopf_point(TAKEN_DAMPING).belt_speed},
-        "From Fig. 2: where the speed amplitudes of pure slip extrapolate to zero. Theory with the "
-        f"same damping has {hopf_point().belt_speed:.4f}.",
+        "From Fig. 2: the speed amplitudes of pure slip extrapolate to zero there. Theory with the "
+        f"same damping gives {hopf_point().belt_speed:.4f}.",
     )
 
 
@@ -116,8 +116,8 @@ def _(_: Evidence) -> Observation:
         f"{'stable' if below else 'unstable'} below, {'stable' if above else 'unstable'} above",
         below and not above and vanishes,
         above and not below and vanishes,
-        "The other way round: it is as the speed falls that stability is lost; the cycle vanishes "
-        "as the speed rises.",
+        "The opposite is true: stability is lost as the speed falls, and the cycle vanishes as the "
+        "speed rises.",
     )
 
 
@@ -150,7 +150,7 @@ def _(evidence: Evidence) -> Observation:
         f"{sum(agree)} of {len(agree)} belt speeds",
         all(agree),
         remark=f"Vibrating up to {_CLEAR_OF_HOPF:g} v_b1, at rest from v_b1/{_CLEAR_OF_HOPF:g} on, "
-        f"with v_b1 = {speed:.5f} for the damping that the motion has.",
+        f"with v_b1 = {speed:.5f} for the damping of the motion.",
     )
 
 
@@ -163,20 +163,20 @@ def _(evidence: Evidence) -> Observation:
     return Observation(
         f"from beta = {critical:.4f} on at rest",
         vibrating[0] and not vibrating[-1] and edges == 1,
-        remark=f"At v0 = {figure.diagram.drives[0].belt_speed:g}, by p = 0; the diagram has the "
-        f"last vibration, still dying out, at {figure.values[vibrating].max():.4f}.",
+        remark=f"At v0 = {figure.diagram.drives[0].belt_speed:g}, by p = 0; the last vibration in "
+        f"the diagram, still decaying, is at {figure.values[vibrating].max():.4f}.",
     )
 
 
 @computes("fig-3-end")
 def _(evidence: Evidence) -> Number:
     belt_speed = evidence.bifurcation(3).diagram.drives[0].belt_speed
-    # At v0 = 0.4, which the other figures use, and with v0 chosen to make it so.
+    # At v0 = 0.4, as in the other figures, and with v0 chosen to give the printed beta.
     fitting = zero_between(lambda v: critical_beta(v) - 0.02, 0.1, 0.499)
     return Number(
         critical_beta(0.4),
         {f"With the belt speed {belt_speed:g} in place of 0.4": critical_beta(belt_speed)},
-        "The belt speed of the figure is not printed; computed is 0.4, which other figures have. "
+        "The belt speed of the figure is not printed; 0.4 is used, as in other figures. "
         f"The printed beta belongs to v0 = {fitting:.4f}.",
     )
 
@@ -206,7 +206,7 @@ def _(evidence: Evidence) -> Observation:
         f"On the speed amplitude: over a stiffness of {figure.values[0]:g} to "
         f"{figure.values[-1]:g} it changes by a factor of {ratios[1]:.3g}, and over one of "
         f"{far[0]:g} to {far[1]:g} by {softest / stiffest:.3g}. The stick fraction changes by "
-        f"{ratios[2]:.3g}, and goes to zero (see Fig. 10).",
+        f"{ratios[2]:.3g}, and falls to zero (see Fig. 10).",
     )
 
 
@@ -217,7 +217,7 @@ def _(evidence: Evidence) -> Observation:
     return Observation(
         f"{sum(vibrating)} of {len(vibrating)} stiffnesses vibrate",
         all(vibrating),
-        remark="The trace p, whose sign decides, does not contain the stiffness.",
+        remark="The sign of the trace p decides, and p does not contain the stiffness.",
     )
 
 
@@ -237,7 +237,7 @@ def _(evidence: Evidence) -> Observation:
         f"from mu_s/mu_m = {critical:.4f} on",
         vibrating[-1] and not vibrating[0] and edges == 1,
         remark=f"By p = 0, at v0 = {figure.diagram.drives[0].belt_speed:g}; in the diagram from "
-        f"{figure.values[vibrating].min():.4f} on, where a vibration still dies out slowly. A "
+        f"{figure.values[vibrating].min():.4f} on, where a vibration still decays slowly. A "
         f"ratio of 1000 too makes it vibrate below v0 = {hopf_points(slippery)[0].belt_speed:.4f} "
         "only.",
     )

@@ -1,4 +1,4 @@
-"""What a claim of the paper is, and how a computation judges it."""
+"""Claims of the paper, and how a computation judges them."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -13,11 +13,11 @@ import numpy.typing as npt
 from stickslip_ros.paper.figures import BifurcationFigure, PaperFigure, PortraitFigure
 
 _ROUNDING = 1e-9
-"""Share of the largest value, or of one, below which a difference is rounding alone."""
+"""Share of the largest value, or of one, below which a difference is rounding only."""
 
 
 class Verdict(StrEnum):
-    """What the computation says of a claim."""
+    """The result of a computation for a claim."""
 
     HOLDS = "holds"
     CORRECTED = "holds with a correction"
@@ -27,22 +27,22 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """A claim beside what the equations give."""
+    """A claim compared with the result of the equations."""
 
     computed: float | str | None
-    """The number, or in words or several numbers what was found; None if not decidable."""
+    """The number, or the result in words; None if not decidable."""
     difference: float | None
-    """Computed less printed number; of a formula the largest deviation over the points tried."""
+    """Computed minus printed number; for a formula the largest deviation at the tested points."""
     verdict: Verdict
     remark: str
-    """Which correction, or why it does not hold or is not decidable, and further evidence."""
+    """The correction, or why it does not hold or is not decidable, and further evidence."""
 
 
 class Evidence:
-    """The computed figures, each asked for when a claim first wants it."""
+    """The computed figures, each computed when a claim first needs it."""
 
     def __init__(self, figure: Callable[[int], PaperFigure]) -> None:
-        """Take a function that gives the figure of a number, such as `compute_figure`."""
+        """Take a function that returns the figure with a number, such as `compute_figure`."""
         self._figure = cache(figure)
 
     def bifurcation(self, number: int) -> BifurcationFigure:
@@ -59,10 +59,10 @@ class Evidence:
 
 
 class Computed(Protocol):
-    """What the computation gives for a claim."""
+    """The result of the computation for a claim."""
 
     def finding(self, printed: Any, /) -> Finding:
-        """Judge what is printed: the number, the formula, or None for a statement in words."""
+        """Judge the printed number or formula, or None for a statement in words."""
         ...
 
 
@@ -71,23 +71,23 @@ class Claim:
     """A number, a formula or a statement of the paper."""
 
     identifier: str
-    """Unique, and the same from one version to the next."""
+    """Unique, and the same in all versions."""
     place: str
-    """Where the paper has it: equation, figure or section."""
+    """Place in the paper: equation, figure or section."""
     statement: str
-    """What it says, in our words."""
+    """The claim, in our words."""
     printed: float | str | None
-    """The number or the formula as printed, None for a statement in words."""
+    """The number or the formula as printed; None for a statement in words."""
     compute: Callable[[Evidence], Computed]
-    """Computes what the claim is about."""
+    """Computes the subject of the claim."""
 
     def check(self, evidence: Evidence) -> Finding:
-        """Compute what the claim is about, and judge it."""
+        """Compute the subject of the claim, and judge it."""
         return self.compute(evidence).finding(self.printed)
 
 
 class Chapter(NamedTuple):
-    """The claims of a part of the paper, in its order."""
+    """The claims of a part of the paper, in order."""
 
     title: str
     claims: tuple[Claim, ...]
@@ -97,13 +97,14 @@ _Computation = TypeVar("_Computation", bound=Callable[..., Computed])
 
 
 class Computations(dict[str, Callable[[Evidence], Computed]]):
-    """What computes the claims that a file is about, by their identifier."""
+    """The computations of the claims in a file, by their identifier."""
 
     def __call__(self, claim: str, *arguments: Any) -> Callable[[_Computation], _Computation]:
-        """Return a decorator for the function that computes what a claim is about.
+        """Return a decorator for the function that computes the subject of a claim.
 
-        One expression needs none: `computes[claim] = lambda evidence: ...`.
-        It takes the evidence and the further `arguments`; with others it may compute other claims.
+        The function takes the evidence and the `arguments`; with other arguments it may compute
+        other claims. A single expression needs no decorator:
+        `computes[claim] = lambda evidence: ...`.
         """
 
         def add(compute: _Computation) -> _Computation:
@@ -115,16 +116,16 @@ class Computations(dict[str, Callable[[Evidence], Computed]]):
 
 @dataclass(frozen=True)
 class Number:
-    """What the equations give for a printed number.
+    """The result of the equations for a printed number.
 
-    It holds if the computed number is the printed one when rounded to its last digit.
+    It holds if the computed number, rounded to the last printed digit, equals the printed one.
     """
 
     value: float
     corrections: Mapping[str, float] = field(default_factory=dict[str, float])
-    """What other calculations give, by what is different in them, such as "With i in front".
+    """Results of other calculations, by their difference, such as "With i in front".
 
-    The first one that gives what is printed counts.
+    The first one that gives the printed number counts.
     """
     remark: str = ""
 
@@ -147,15 +148,15 @@ class Number:
 
 @dataclass(frozen=True)
 class Formula:
-    """The values of a printed formula at some points, and what they must be.
+    """The values of a printed formula at some points, and the true values.
 
-    It holds if its values are the true ones but for rounding.
+    It holds if its values are the true ones up to rounding.
     """
 
     printed: npt.ArrayLike | None
-    """None if it cannot be evaluated as it stands."""
+    """None if it cannot be evaluated as printed."""
     true: npt.ArrayLike
-    """From the equations or a definition, by another way."""
+    """From the equations or a definition, by another method."""
     corrections: Mapping[str, npt.ArrayLike] = field(default_factory=dict[str, npt.ArrayLike])
     """Values of corrected formulas; the first one that agrees with the true ones counts."""
     remark: str = ""
@@ -180,7 +181,7 @@ class Formula:
 
 @dataclass(frozen=True)
 class Observation:
-    """What the computation shows of a statement in words."""
+    """The result of the computation for a statement in words."""
 
     found: float | str
     holds: bool
@@ -200,17 +201,17 @@ class Observation:
 
 @dataclass(frozen=True)
 class Undecidable:
-    """Nothing: no computation can say anything of the statement."""
+    """No result: no computation can decide the statement."""
 
     why: str
 
     def finding(self, _: Any) -> Finding:
-        """Return that it is not decidable, and why."""
+        """Return the verdict "not decidable" with the reason."""
         return Finding(None, None, Verdict.UNDECIDABLE, self.why)
 
 
 def agrees(printed: float, computed: float) -> bool:
-    """Return whether `computed` is what is printed, to half a unit of the last printed digit."""
+    """Return whether `computed` equals `printed`, to half a unit of the last printed digit."""
     exponent = Decimal(repr(printed)).as_tuple().exponent
     assert isinstance(exponent, int)
     return abs(computed - printed) <= 0.5 * 10.0**exponent * (1.0 + 1e-9)

@@ -66,7 +66,7 @@ def _(_: Evidence, coefficient: Callable[[Nonlinearity], complex]) -> Number:
     """Return four times the imaginary part of g20 or g11, which are imaginary at v_b1."""
     return number_for_both(
         lambda damping: 4.0 * coefficient(_at_hopf_point(damping)).imag,
-        "{taken:.5f} with the damping of eq. 8; a slip of the pen, since eq. 11 prints the same "
+        "{taken:.5f} with the damping of eq. 8; a misprint, since eq. 11 prints the same "
         f"product 3.6 v_b1 with the digits {3.6 * PRINTED_HOPF_SPEED:.4f}.",
     )
 
@@ -104,10 +104,10 @@ computes["eq-14-imaginary"] = lambda _: _on_samples(
             (q.by(2, 1, 1, 1) + q.by(2, 1, 2, 2) - q.by(1, 1, 1, 2) - q.by(1, 2, 2, 2)) / 8.0
         )
     },
-    "Without consequence for sigma, which is made of the real part.",
+    "This does not affect sigma, which contains the real part only.",
 )
 computes["eq-14-value"] = lambda _: Number(
-    _at_hopf_point(DAMPING).cubic.real, remark="Whatever the damping."
+    _at_hopf_point(DAMPING).cubic.real, remark="For any damping."
 )
 
 
@@ -136,20 +136,20 @@ computes["eq-15-value"] = lambda _: Number(
 computes["eq-15-imaginary"] = lambda _: number_for_both(
     lambda damping: ((q := _at_hopf_point(damping)).g20 * q.g11).real / 2.0,
     "Of i g20 g11 / 2; even with the damping of eq. 8 it is 3.6^2 v_b1^2 / 32 = {taken:.4f}. "
-    "Without consequence for sigma.",
+    "This does not affect sigma.",
 )
 
 
 @computes("eq-23-value", attrgetter("g20"))
 @computes("eq-24-value", attrgetter("g11"))
 def _(_: Evidence, coefficient: Callable[[Nonlinearity], complex]) -> Number:
-    """Return four times the size of g20 or g11 in the closed loop."""
+    """Return four times the magnitude of g20 or g11 in the closed loop."""
     taken = 4.0 * coefficient(_at_critical_gain(TAKEN_DAMPING))
     return number_for_both(
         lambda damping: 4.0 * abs(coefficient(_at_critical_gain(damping))),
-        f"{complex_number(taken)} with the damping of eq. 8: printed is that of the loop without "
-        "filter, with -+ i. The formula asks for coordinates in which the linear part has Jordan "
-        "form; there the filter takes part.",
+        f"{complex_number(taken)} with the damping of eq. 8: the printed value is that of the loop "
+        "without filter, with -+ i. The formula needs coordinates in which the linear part has "
+        "Jordan form; these contain the filter.",
     )
 
 
@@ -179,7 +179,7 @@ def _(_: Evidence, coefficient: Callable[[Nonlinearity], complex]) -> Observatio
         max(abs(here), abs(taken)) < 1e-9,
         remark="In Jordan coordinates, y3 scaled to the slide's speed, with the damping of eq. 8; "
         f"{complex_number(here)} with that of eq. 5. The quadratic friction acts on all three "
-        "coordinates: each of them moves the slide.",
+        "coordinates, since each of them moves the slide.",
     )
 
 
@@ -193,7 +193,7 @@ computes["eq-27-formula"] = lambda _: _on_samples(
             / (4.0 * (2j * q.frequency - q.third_eigenvalue))
         )
     },
-    "As printed a parameter value mu_0 is subtracted from an eigenvalue.",
+    "The printed formula subtracts an eigenvalue from a parameter value mu_0.",
 )
 
 
@@ -218,7 +218,7 @@ def _(_: Evidence) -> Number:
     passed = 1j / (1j + FILTER.corner_frequency)
     return number_for_both(
         slope,
-        "Printed is what a gain on the speed itself would do; it acts on what the filter passes, "
+        "The printed value is for a gain on the speed itself; the gain acts on the filter output, "
         f"which is {abs(passed):.3f} of the speed at the frequency one and "
         f"{np.angle(passed, deg=True):.0f} degrees ahead. The gain called k3 is the k2 of eq. 18.",
     )
@@ -237,8 +237,8 @@ computes["eq-30-formula"] = lambda _: _on_samples(
 )
 computes["eq-30-value"] = lambda _: number_for_both(
     lambda damping: critical(STUDIED_SPEED, damping).first_lyapunov_coefficient,
-    "By the projection method; {taken:.5f} with the damping of eq. 8. Of G21 half belongs in "
-    "sigma, which eq. 15 has and eq. 30 has not.",
+    "By the projection method; {taken:.5f} with the damping of eq. 8. Half of G21 belongs in "
+    "sigma, as in eq. 15 but not in eq. 30.",
 )
 
 
@@ -251,5 +251,5 @@ def _(_: Evidence) -> Observation:
 computes["eq-30-imaginary"] = lambda _: number_for_both(
     lambda damping: _beat(_at_critical_gain(damping)).real,
     "Of i g20 g11 / (2 omega_0); {taken:.4f} with the damping of eq. 8. The factor v0^2 is "
-    "missing, and 16 should be 32. Without consequence for sigma.",
+    "missing, and 16 should be 32. This does not affect sigma.",
 )

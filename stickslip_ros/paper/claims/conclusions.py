@@ -1,4 +1,4 @@
-"""The abstract and section 5, which say alike what the paper has found."""
+"""The abstract and section 5, which both summarize the results of the paper."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,7 +23,7 @@ from stickslip_ros.paper.figures import STRIBECK, unit_drive
 computes = Computations()
 
 _STILL_ON_ITS_WAY = 0.02
-"""Trace so small that a motion is not settled when a bifurcation diagram looks at it."""
+"""Trace below which the motions of a bifurcation diagram have not settled yet."""
 
 
 @computes("critical-speed-confirmed")
@@ -38,9 +38,9 @@ def _(evidence: Evidence) -> Observation:
     return Observation(
         f"{sum(agree)} of {len(agree)} drives",
         all(agree),
-        remark="Of Fig. 2 to 5, vibrating where p > 0 and at rest where p < 0; without those of p "
-        f"within {_STILL_ON_ITS_WAY:g} of zero, which are still on their way. The p is that of the "
-        "damping in eq. 5; eq. 8 has another.",
+        remark="Of Fig. 2 to 5: they vibrate if p > 0 and rest if p < 0; drives with p within "
+        f"{_STILL_ON_ITS_WAY:g} of zero, which have not settled yet, are omitted. The p is that of "
+        "the damping in eq. 5; eq. 8 has another.",
     )
 
 
@@ -49,20 +49,20 @@ def _(_: Evidence) -> Observation:
     sigma = hopf_point().first_lyapunov_coefficient
     distances = (2e-2, 2e-3, 2e-4)
     found, expected = zip(*map(_multipliers, distances), strict=True)
-    # The share by which a deviation falls in a turn.
+    # The share by which a deviation falls in one cycle.
     ratios = [(1.0 - a) / (1.0 - b) for a, b in zip(found, expected, strict=True)]
     return Observation(
         f"sigma = {sigma:.4g}, multipliers {_listed(found)}",
         (sigma < 0.0) == (max(found) < 1.0)
         and falling([abs(ratio - 1.0) for ratio in ratios])
         and abs(ratios[-1] - 1.0) < 1e-2,
-        remark=f"At distances {listed(distances)} below v_b1, by shooting; sigma lets expect "
+        remark=f"At distances {listed(distances)} below v_b1, by shooting; sigma predicts "
         f"{_listed(expected)}.",
     )
 
 
 def _multipliers(distance: float) -> tuple[float, float]:
-    """Return the Floquet multiplier of the cycle so far below v_b1, and what sigma lets expect."""
+    """Return the Floquet multiplier of the cycle at this distance below v_b1, and that of sigma."""
     speed = hopf_point().belt_speed - distance
     (cycle,) = cycles(speed)
     # Near the cycle of r' = alpha r + sigma r^3 a deviation grows by exp(-2 alpha T).
@@ -104,7 +104,7 @@ def _(evidence: Evidence) -> Observation:
         ", ".join(str(measures.regime) for measures in quiet),
         all(measures.regime in VIBRATING for measures in loud)
         and not any(measures.regime in VIBRATING for measures in quiet),
-        remark="The ends of Fig. 2, 3 and 5; at v0 = "
+        remark="At the ends of Fig. 2, 3 and 5; at v0 = "
         f"{ends[0].drives[slow].belt_speed:.3g}, at no damping and at the "
         f"largest ratio it is {', '.join(str(measures.regime) for measures in loud)}.",
     )
@@ -127,10 +127,10 @@ def _(evidence: Evidence) -> Observation:
         all(falling([without, *values]) for values in (sizes[0][1:], sizes[1], sizes[2])),
         sizes[0][-1] < without and falling([without, *sizes[1]]),
         "Not with every gain: with d = 2 and a small k1 it changes by "
-        f"{largest / without - 1.0:+.2%}, though the speed amplitude falls. Fig. 13; over k2 "
+        f"{largest / without - 1.0:+.2%}, although the speed amplitude falls. In Fig. 13: over k2 "
         f"{listed(sizes[1])}, over k1 with d = 0.2 {listed(sizes[2])}. At v0 = 0.1 nine tenths of "
-        f"the critical gain change it by {slower:+.0%}; with d = 20, where no gain is critical at "
-        f"v0 = 0.4, k1 = -10 changes it by {high:+.0%}.",
+        f"the critical gain change it by {slower:+.0%}; with d = 20, for which no gain is critical "
+        f"at v0 = 0.4, k1 = -10 changes it by {high:+.0%}.",
     )
 
 
@@ -144,22 +144,22 @@ def _(evidence: Evidence) -> Observation:
         not any(vibrating),
         not all(vibrating),
         f"Only beyond the critical k1, {critical(0.4, DAMPING).linear:.4f} with d = 2 and "
-        f"{critical(0.4, DAMPING, 0.2).linear:.4f} with d = 0.2, where the limit cycle is gone. "
-        f"Elsewhere, in {vibrating.count(True)}, the equilibrium is unstable in a cycle as before.",
+        f"{critical(0.4, DAMPING, 0.2).linear:.4f} with d = 0.2, where there is no limit cycle. "
+        f"In the other {vibrating.count(True)} an unstable equilibrium lies in a cycle as before.",
     )
 
 
 @computes("more-effective")
 def _(_: Evidence) -> Observation:
-    # A force k1 y on the speed itself adds to p and leaves the equilibrium too, since y = 0 there.
+    # A force k1 y on the speed itself adds to p and keeps the equilibrium too, since y = 0 there.
     plain = -trace(0.4)
     corners = (FILTER.corner_frequency, 0.2, 0.02)
     washout = [critical(0.4, DAMPING, d).linear for d in corners]
     return Observation(
         f"k1 = {washout[0]:.4f} against {plain:.4f}",
         min(map(abs, washout)) < abs(plain),
-        remark=f"The paper compares it with nothing. A plain force k1 y needs {plain:.4f} at v0 = "
-        f"0.4 and leaves the equilibrium as well; the filter needs {washout[0] / plain:.3g} times "
+        remark=f"The paper makes no comparison. A plain force k1 y needs {plain:.4f} at v0 = "
+        f"0.4 and keeps the equilibrium too; the filter needs {washout[0] / plain:.3g} times "
         f"that with d = 2, {washout[1] / plain:.3g} times with d = 0.2 and "
         f"{washout[2] / plain:.5g} times with d = 0.02.",
     )

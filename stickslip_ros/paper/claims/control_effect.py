@@ -1,4 +1,4 @@
-"""Section 4: what the control does, Fig. 12 and 13."""
+"""Section 4: the effect of the control, Fig. 12 and 13."""
 
 from dataclasses import replace
 from functools import cache
@@ -37,8 +37,8 @@ _FIG_12_SPEEDS = (0.48, 0.49, 0.492)
 
 computes["fig-12-place"] = lambda _: Number(
     hopf_point().belt_speed,
-    remark="The Hopf speed for beta = 0.01 in eq. 5: what is seen there is the supercritical "
-    f"Hopf point itself, which eq. 8 has put at {hopf_point(TAKEN_DAMPING).belt_speed:.4f}.",
+    remark="The Hopf speed for beta = 0.01 in eq. 5: the change there is the supercritical "
+    f"Hopf point itself, which eq. 8 places at {hopf_point(TAKEN_DAMPING).belt_speed:.4f}.",
 )
 
 
@@ -58,9 +58,10 @@ def _(_: Evidence) -> Observation:
         listed(here),
         exponent < 0.1,
         remark=f"Amplitudes of the limit cycles at v0 = {listed(_FIG_12_SPEEDS)}; with the damping "
-        f"of eq. 8 {listed(taken)}. They go to zero without a jump: amplitude squared over the "
+        f"of eq. 8 {listed(taken)}. They fall to zero without a jump: amplitude squared over the "
         f"distance to v_b1 is {listed(squares)} at distances {listed(distances)}, and at the "
-        f"last the amplitude goes with power {exponent:.3f} of it. A root is steep there.",
+        f"smallest the amplitude varies with power {exponent:.3f} of it. A square root is steep "
+        "there.",
     )
 
 
@@ -82,7 +83,7 @@ def _(evidence: Evidence) -> Observation:
         taken,
         f"{TAKEN_FOR_DAMPING} p = {listed([trace(v, TAKEN_DAMPING) for v in speeds])}, up to v0 = "
         f"{hopf_point(TAKEN_DAMPING).belt_speed:.4f}. With that "
-        f"of eq. 5 the motion at 0.49 dies out slowly: amplitude {listed(left)} "
+        f"of eq. 5 the motion at 0.49 decays slowly: amplitude {listed(left)} "
         f"after {listed(ends)}.",
     )
 
@@ -98,7 +99,7 @@ def _(_: Evidence) -> Observation:
         f"multipliers {listed(multipliers)}",
         multipliers[-1] > 1.0 and resting[-1],
         remark=f"At v0 = {listed(falling_speeds)} with the damping of eq. 8: the cycle is stable "
-        f"and becomes more so; {resting.count(False)} of the equilibria are unstable, while "
+        f"and becomes more stable; {resting.count(False)} of the equilibria are unstable, while "
         f"above v_b1 it is {'stable' if above else 'unstable'}.",
     )
 
@@ -106,7 +107,7 @@ def _(_: Evidence) -> Observation:
 @computes("fig-12-subcritical")
 @computes("jump-subcritical")
 def _(_: Evidence) -> Observation:
-    """Observe whether unstable cycles surround a stable equilibrium anywhere near."""
+    """Observe whether unstable cycles surround a stable equilibrium anywhere nearby."""
     sigmas = for_both(lambda damping: hopf_point(damping).first_lyapunov_coefficient)
     speeds = (*SLOWER, 0.2, 0.4, 0.48, 0.488, STUDIED_SPEED, 0.492, 0.5, *FASTER)
     found = [cycle for speed in speeds for cycle in cycles(speed)]
@@ -114,8 +115,8 @@ def _(_: Evidence) -> Observation:
     return Observation(
         f"sigma = {listed(sigmas)}",
         max(sigmas) > 0.0 or bool(unstable),
-        remark="For both dampings: supercritical, as section 2 finds too. Among the "
-        f"{len(found)} limit cycles at v0 = {listed(speeds)} {len(unstable)} are unstable.",
+        remark="For both dampings: supercritical, as in section 2. "
+        f"{len(unstable)} of the {len(found)} limit cycles at v0 = {listed(speeds)} are unstable.",
     )
 
 
@@ -139,10 +140,10 @@ def _(evidence: Evidence) -> Observation:
         listed(sizes),
         falling(sizes) and all(map(falling, left.values())),
         falling(sizes) and falling(left[0.4, 2.0]),
-        "Only where the filter passes the vibration and sticking does not hold its size. At "
-        f"v0 = 0.4, d = 2, k1 = 0, k2 = {listed(gains)}: it takes k2 = {gains[-1]:g} to "
-        f"lower the amplitude by {1.0 - sizes[-1] / sizes[0]:.0%}. What k2 = {listed(strong[1:])} "
-        f"leave of it: {'; '.join(shares)}.",
+        "Only if the filter passes the vibration and sticking does not fix its amplitude. At "
+        f"v0 = 0.4, d = 2, k1 = 0, k2 = {listed(gains)}: k2 = {gains[-1]:g} reduces the "
+        f"amplitude by {1.0 - sizes[-1] / sizes[0]:.0%}. With k2 = {listed(strong[1:])} the "
+        f"remaining shares are {'; '.join(shares)}.",
     )
 
 
@@ -164,15 +165,15 @@ def _(_: Evidence) -> Number:
         f"{taken:.4g} with the damping of eq. 8: the filter passes little of the speed and shifts "
         f"its phase. At v0 = {listed(speeds)} it is {'; '.join(others)}: the printed bound is that "
         "of a filter with d near zero, which passes the speed unchanged. "
-        "For large vibrations this bound, the cubic coefficient of the friction, does mean "
-        "something whatever the filter: above k2 = "
-        f"{min(slow):.3f} to {max(slow):.3f} the motion runs away from X' = -30, above "
+        "For large vibrations this bound, the cubic coefficient of the friction, applies to any "
+        "filter: above k2 = "
+        f"{min(slow):.3f} to {max(slow):.3f} the motion diverges from X' = -30, above "
         f"{min(fast):.3f} to {max(fast):.3f} from X' = -900 (these v0, d = 0.2 to 20, k1 = 0).",
     )
 
 
 def _largest_cubic_gain(belt_speed: float, corner_frequency: float, speed: float) -> float:
-    """Return the cubic gain above which the motion with that speed at first runs away."""
+    """Return the cubic gain above which the motion with that initial speed diverges."""
     motion = _controlled_motion()
 
     def stays(cubic: float) -> bool:
@@ -203,14 +204,14 @@ def _(_: Evidence) -> Observation:
         directed[0] and abs(here.belt_speed - STUDIED_SPEED) < 1e-3,
         directed[1] and abs(taken.belt_speed - STUDIED_SPEED) < 1e-3,
         f"{TAKEN_FOR_DAMPING} v = {taken.belt_speed:.5f}; sigma = "
-        f"{taken.first_lyapunov_coefficient:.4f}, so that stable cycles begin below it.",
+        f"{taken.first_lyapunov_coefficient:.4f}, so stable cycles start below it.",
     )
 
 
 computes["before-control"] = lambda _: Observation(
     f"sigma = {hopf_point().first_lyapunov_coefficient:.6g}",
     hopf_point().first_lyapunov_coefficient < 0.0,
-    remark="As section 2 has it; the same section 4.2 goes on to call it subcritical.",
+    remark="As in section 2; the same section 4.2 then calls it subcritical.",
 )
 
 
@@ -251,9 +252,9 @@ def _(_: Evidence) -> Observation:
     return Observation(
         f"sigma = {before:.4g} without, {after:.4g} with it",
         before > 0.0 > after,
-        remark="There was none to remove; the filter brings sigma nearer to zero, if anything."
+        remark="There is none to remove; the filter only brings sigma nearer to zero."
         if abs(after) < abs(before)
-        else "There was none to remove.",
+        else "There is none to remove.",
     )
 
 
@@ -267,7 +268,7 @@ def _(evidence: Evidence) -> Observation:
     return Observation(
         f"by factors of {listed(ratios)}",
         min(ratios) > 1.1,
-        remark=f"Of the motions that vibrate. Over k1 with d = 2: {listed(linear)}; over k2: "
+        remark=f"For the vibrating motions. Over k1 with d = 2: {listed(linear)}; over k2: "
         f"{listed(cubic)}; over k1 with d = 0.2: {listed(slow)}.",
     )
 
@@ -284,8 +285,8 @@ def _(evidence: Evidence) -> Observation:
         f"{ends} at {linear.portraits[-1].case.label}",
         ends is Regime.EQUILIBRIUM and all(resting),
         remark=f"k1 does, below {critical(0.4, DAMPING).linear:.4f}: with k1 = -1 and -10 the "
-        f"slide comes to rest from {sum(resting)} of {len(resting)} starts up to 3 away. k2 alone "
-        "cannot, as it does "
+        f"slide settles at rest from {sum(resting)} of {len(resting)} starts up to 3 away. k2 "
+        "alone cannot, because it does "
         f"not change the eigenvalues: {vibrates} of {len(cubic.portraits)} motions vibrate, with "
         f"k2 = {known(strongest.case.gains).cubic:g} at the amplitude {amplitude(strongest):.4f}.",
     )
@@ -313,5 +314,5 @@ def _(_: Evidence) -> Observation:
         taken,
         f"That is {needed / PRINTED_GAIN:.0f} times the {PRINTED_GAIN:g} found for v0 = 0.49, "
         f"which leaves the amplitude {left:.4f} of {without:.4f}; with the "
-        f"corner frequency d = 0.2 in place of 2, {slow:.4f} would do.",
+        f"cutoff frequency d = 0.2 in place of 2, {slow:.4f} is sufficient.",
     )

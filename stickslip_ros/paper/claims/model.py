@@ -39,7 +39,7 @@ _SLIDE = Drive(
 """A drive with no scale of one."""
 
 _FASTEST = 2.0
-"""Relative speed up to which the friction law is looked at."""
+"""Largest relative speed at which the friction law is evaluated."""
 
 
 def _kinetic(speed: float) -> float:
@@ -47,7 +47,7 @@ def _kinetic(speed: float) -> float:
 
 
 def _smallest_kinetic() -> tuple[float, float]:
-    """Return the smallest kinetic coefficient, and at which relative speed it is reached."""
+    """Return the smallest kinetic coefficient, and its relative speed."""
     # Without damping the trace is the friction's slope at the belt's speed.
     speed = zero_between(lambda v: trace(v, 0.0), 1e-3, _FASTEST)
     return _kinetic(speed), speed
@@ -56,8 +56,8 @@ def _smallest_kinetic() -> tuple[float, float]:
 computes["normal-vibration"] = lambda _: Observation(
     "depends on time" if time_dependent() else "constant normal force",
     time_dependent(),
-    remark="Nothing in eq. 1 to 5 but the state changes with time, and the state holds no "
-    "normal motion: N is a constant, and only sets the scales.",
+    remark="In eq. 1 to 5 only the state changes with time, and it contains no normal motion. "
+    "N is a constant that only sets the scales.",
 )
 
 
@@ -71,7 +71,7 @@ def _(_: Evidence) -> Formula:
     return Formula(
         acceleration / scale,
         rates(drive, STATES[:2])[1],
-        remark="Compared with the dimensionless equations that are integrated, scaled to SI units.",
+        remark="Compared with the integrated dimensionless equations, scaled to SI units.",
     )
 
 
@@ -104,8 +104,8 @@ def _(_: Evidence) -> Formula:
         None,
         _SLIDE.damping_coefficient,
         {"With omega, which is not defined, read as omega_0": read},
-        f"The coefficient of X' is c / sqrt(k m) = {_SLIDE.damping_coefficient:.4g} for the drive "
-        "tried.",
+        f"The coefficient of X' is c / sqrt(k m) = {_SLIDE.damping_coefficient:.4g} for the tested "
+        "drive.",
     )
 
 
@@ -117,14 +117,14 @@ def _(_: Evidence) -> Formula:
         None,
         Equations(Stribeck, continuous_control=False).parameters(_SLIDE)["belt_speed"],
         {"With L, which is not defined, read as N/k": read},
-        "One symbol stands for the speed in m/s and for the dimensionless one.",
+        "One symbol is used for the speed in m/s and for the dimensionless one.",
     )
 
 
 computes["excitation-frequency"] = lambda _: Observation(
     "time-dependent" if time_dependent() else "autonomous",
     time_dependent(),
-    remark="Omega is scaled but used nowhere: the equations do not contain time.",
+    remark="Omega is scaled but not used: the equations do not contain time.",
 )
 
 
@@ -139,13 +139,13 @@ def _(_: Evidence) -> Formula:
     return Formula(
         printed,
         -static * np.sign(v) + a * v - b * v**3,
-        remark="The odd cubic that begins at mu_s and has its smallest size mu_m at v_m, solved "
-        f"for: a = {a:.4g}, b = {b:.4g}.",
+        remark="The odd cubic that starts at mu_s and has its smallest magnitude mu_m at v_m has "
+        f"a = {a:.4g}, b = {b:.4g}.",
     )
 
 
 computes["static-coefficient"] = lambda _: Number(
-    _kinetic(0.0), remark="The law's size as the relative speed goes to zero."
+    _kinetic(0.0), remark="The magnitude of the law as the relative speed approaches zero."
 )
 computes["smallest-coefficient"] = lambda _: Number(
     _smallest_kinetic()[0], remark="Where heyoka's derivative of the law is zero."
@@ -163,7 +163,7 @@ def _(_: Evidence) -> Observation:
         isclose(STRIBECK.static, smallest, rel_tol=1e-6),
         isclose(STRIBECK.static, break_away, rel_tol=1e-6)
         and isclose(STRIBECK.minimum, smallest, rel_tol=1e-6),
-        f"The other way round: the slide breaks away at mu_s = {STRIBECK.static:g}, and "
+        f"The opposite is true: the slide breaks away at mu_s = {STRIBECK.static:g}, and "
         f"mu_m = {STRIBECK.minimum:g} is the smallest coefficient while it slips.",
     )
 
@@ -172,7 +172,7 @@ def _(_: Evidence) -> Observation:
 def _(evidence: Evidence) -> Observation:
     smallest_at = _smallest_kinetic()[1]
     end = zero_between(lambda v: _kinetic(v) - STRIBECK.static, smallest_at, _FASTEST)
-    # A slide that sticks comes up to the belt's speed, and its speed spans twice the amplitude.
+    # A slide that sticks reaches the belt's speed, and its speed spans twice the amplitude.
     fastest = 2.0 * (cycles(exact_onset() * (1.0 - 1e-6))[0].measures.velocity_amplitude or 0.0)
     highest = float(evidence.bifurcation(2).values.max())
     return Observation(
@@ -180,8 +180,8 @@ def _(evidence: Evidence) -> Observation:
         end >= max(fastest, highest),
         end > smallest_at,
         f"Only below {end:.4g}, where it exceeds the static coefficient; at twice v_m it is "
-        f"{_kinetic(2.0 * smallest_at):.4g} already. The belt of Fig. 2 goes up to {highest:.4g}, "
-        f"and the vibrations, at the onset of sticking, up to {fastest:.4g}.",
+        f"{_kinetic(2.0 * smallest_at):.4g} already. The belt of Fig. 2 reaches {highest:.4g}, "
+        f"and the vibrations at the onset of sticking {fastest:.4g}.",
     )
 
 
@@ -201,7 +201,11 @@ def _(_: Evidence) -> Formula:
     return Formula(
         law,
         rates(unit_drive(0.4), STATES[:2])[1],
-        {"With eq. 2 for eq. 3, which goes into it,": law - DAMPING * STATES[1] - STATES[0]},
+        {
+            "With eq. 2, which contains eq. 3, in place of eq. 3": law
+            - DAMPING * STATES[1]
+            - STATES[0]
+        },
     )
 
 
@@ -217,8 +221,8 @@ def _(evidence: Evidence) -> Observation:
         max(abs(least), abs(most)) < 1e-9,
         max(abs(least), abs(most)) <= limit * (1.0 + 1e-9),
         f"At v0 = {portrait.drive.belt_speed:g} a slide that sticks needs a friction of "
-        f"{least:.4g} to {most:.4g}; with sgn(0) = 0 the system gives it none. The rule it "
-        f"lacks: the slide sticks while X + 2 beta v0 is within mu_s = {limit:g}.",
+        f"{least:.4g} to {most:.4g}; with sgn(0) = 0 the system gives none. The missing "
+        f"rule: the slide sticks while X + 2 beta v0 is within mu_s = {limit:g}.",
     )
 
 
@@ -235,7 +239,7 @@ def _(evidence: Evidence) -> Observation:
     return Observation(
         f"at {sum(resting)} of {len(fast)} belt speeds",
         all(resting) and off < 1e-4 and only_rest_at(FASTER),
-        remark=f"All of Fig. 2 that are 5 percent or more above the Hopf speed of "
+        remark=f"All speeds of Fig. 2 that are 5 percent or more above the Hopf speed of "
         f"{hopf_point().belt_speed:.5g}; X deviates from mu(-v0) by {off:.4%} at most. At "
         f"v0 = {listed(FASTER)} too the equilibrium is stable and shooting finds no limit cycle.",
     )

@@ -1,4 +1,4 @@
-"""The coefficients of eq. 12 to 15 and 23 to 30 by their definition, and for any nonlinearity.
+"""The coefficients of eq. 12 to 15 and 23 to 30 by definition, for any nonlinearity.
 
 They belong to y1' = -w y2 + Q1, y2' = w y1 + Q2 and, in a loop with a filter, y3' = lambda3 y3 + Q3
 (Hassard, Kazarinoff and Wan, Theory and Applications of Hopf Bifurcation, 1981, ch. 1 and 2). With
@@ -18,23 +18,23 @@ from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.linear import Expansion
 
 _FREQUENCY, _THIRD_EIGENVALUE = 1.3, -0.7
-"""Of the linear part that goes with a sample; neither is one."""
+"""Frequency and eigenvalue of the linear part of a sample; neither is one."""
 
 
 @dataclass(frozen=True)
 class Nonlinearity:
-    """Second and third derivatives of Q at the origin, with the linear part they go with."""
+    """Second and third derivatives of Q at the origin, with their linear part."""
 
     second: FloatArray
-    """Shape (n, n, n)."""
+    """Second derivatives, shape (n, n, n)."""
     third: FloatArray
-    """Shape (n, n, n, n)."""
+    """Third derivatives, shape (n, n, n, n)."""
     frequency: float = 1.0
     third_eigenvalue: float = _THIRD_EIGENVALUE
 
     @classmethod
     def at(cls, expansion: Expansion) -> Self:
-        """Return that of a loop at its Hopf point, y2 being the slide's speed in the plane."""
+        """Return the nonlinearity of a loop at its Hopf point; in the plane y2 is the speed."""
         decomposed: Any = np.linalg.eig(expansion.jacobian)
         values, vectors = decomposed
         upper = int(np.argmax(values.imag))
@@ -53,7 +53,7 @@ class Nonlinearity:
         return cls(second, cubic, float(values[upper].imag), third)
 
     def by(self, component: int, *variables: int) -> float:
-        """Return the derivative of a component of Q by two or three variables, from 1 on."""
+        """Return the derivative of a component of Q by two or three variables, counted from 1."""
         tensor = self.second if len(variables) == 2 else self.third
         return float(tensor[component - 1][tuple(variable - 1 for variable in variables)])
 
@@ -64,7 +64,7 @@ class Nonlinearity:
 
     @property
     def g11(self) -> complex:
-        """That by z and its conjugate."""
+        """Second derivative of Q1 + i Q2 by z and its conjugate."""
         return self._plane(self._z, self._z.conj())
 
     @property
@@ -124,7 +124,7 @@ class Nonlinearity:
 
 
 def samples(order: int) -> list[Nonlinearity]:
-    """Return arbitrary nonlinearities of a system of that order, in which no derivative is zero."""
+    """Return arbitrary nonlinearities of a system of that order, without zero derivatives."""
     random = np.random.default_rng(order)
     found: list[Nonlinearity] = []
     for _ in range(5):

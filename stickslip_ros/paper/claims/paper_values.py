@@ -1,6 +1,6 @@
-"""What the claims are judged by: the theory and the motion, at the paper's parameters.
+"""Reference values for the claims: the theory and the motion, at the paper's parameters.
 
-Everything is dimensionless, on the unit drive of `figures`.
+Everything is dimensionless, for the unit drive of `figures`.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,28 +33,28 @@ DAMPING = 0.02
 """Coefficient 2 beta of X' in eq. 5 for the paper's beta of 0.01."""
 
 TAKEN_DAMPING = 0.01
-"""What stands in its place in eq. 8, and in all that follows from there: beta."""
+"""The value used in its place in eq. 8 and in all that follows from it: beta."""
 
 TAKEN_FOR_DAMPING = f"With the damping coefficient {TAKEN_DAMPING:g} in place of {DAMPING:g}"
 """The correction that many of the paper's numbers need."""
 
 PRINTED_HOPF_SPEED = 0.4944
-"""v_b1, with which eq. 11 goes on."""
+"""v_b1, which eq. 11 uses."""
 
 PRINTED_GAIN = -0.0395
 """Critical linear gain of eq. 21."""
 
 STUDIED_SPEED = 0.49
-"""The belt speed of section 4.1, with which eq. 20 to 30 go on."""
+"""The belt speed of section 4.1, which eq. 20 to 30 use."""
 
 FILTER = WashoutGains(corner_frequency=2.0, linear=0.0, cubic=0.0)
-"""A washout filter with the corner frequency that eq. 20 has; no gain."""
+"""A washout filter with the cutoff frequency of eq. 20 and no gain."""
 
 _ROUNDING = 1e-12
-"""Share of the belt's speed within which a speed is that of the belt."""
+"""Deviation below which a speed equals that of the belt, as a share of it."""
 
 BELT_SPEEDS = np.array([0.1, 0.25, 0.4, STUDIED_SPEED, 0.7, 1.0])
-"""Where formulas in the belt speed are evaluated."""
+"""Belt speeds at which formulas are evaluated."""
 
 SLOWER = (0.02, 0.05, 0.1)
 """Belt speeds down to a tenth of those of the figures."""
@@ -63,11 +63,11 @@ FASTER = (1.0, 2.0, 5.0, 10.0)
 """Belt speeds up to ten times those of the figures."""
 
 STATES: FloatArray = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 40))
-"""Where formulas in the state X, Y, W are evaluated."""
+"""States X, Y, W at which formulas are evaluated."""
 
 
 def known(value: _T | None) -> _T:
-    """Return what there is for every drive that the claims are about."""
+    """Return a value that exists for every drive of the claims."""
     assert value is not None
     return value
 
@@ -85,7 +85,7 @@ def trace(belt_speed: float, damping: float = DAMPING) -> float:
 
 
 def trace_of(drive: Drive) -> float:
-    """Return p of any drive; where it is above zero the equilibrium is unstable."""
+    """Return p of any drive; above zero the equilibrium is unstable."""
     return float(np.trace(known(expand(drive)).jacobian))
 
 
@@ -97,24 +97,24 @@ def hopf_point(damping: float = DAMPING) -> HopfPoint:
 
 
 def printed_trace(belt_speeds: FloatArray) -> FloatArray:
-    """Return 0.44 - 1.8 v0^2, as eq. 8 has it."""
+    """Return 0.44 - 1.8 v0^2, as in eq. 8."""
     return 0.44 - 1.8 * belt_speeds**2
 
 
 def critical_beta(belt_speed: float) -> float:
-    """Return the beta of eq. 5 from which on the equilibrium is stable, p = 0."""
+    """Return the beta of eq. 5 above which the equilibrium is stable, p = 0."""
     return trace(belt_speed, 0.0) / 2.0
 
 
 def for_both(compute: Callable[[float], _T]) -> tuple[_T, _T]:
-    """Return what it gives for the damping of eq. 5, and for that of eq. 8."""
+    """Return the results for the damping of eq. 5 and for that of eq. 8."""
     return compute(DAMPING), compute(TAKEN_DAMPING)
 
 
 def number_for_both(compute: Callable[[float], float], remark: str = "") -> Number:
     """Return the number for the damping of eq. 5, corrected to that of eq. 8.
 
-    In the remark "{taken}" stands for the latter.
+    "{taken}" in the remark is replaced by the latter.
     """
     here, taken = for_both(compute)
     return Number(here, {TAKEN_FOR_DAMPING: taken}, remark.format(taken=taken))
@@ -129,7 +129,7 @@ def formula_for_both(
 
 
 def overdamped_from() -> float:
-    """Return the belt speed from which on the eigenvalues are real, p = -2."""
+    """Return the belt speed above which the eigenvalues are real, p = -2."""
     return zero_between(lambda speed: trace(speed) + 2.0, hopf_point().belt_speed, 2.0)
 
 
@@ -140,12 +140,12 @@ def onset(damping: float = DAMPING, stiffness: float = 1.0) -> StickingOnset:
 
 
 def exact_onset(damping: float = DAMPING, stiffness: float = 1.0) -> float:
-    """Return that of the motion itself."""
+    """Return the onset of sticking of the motion itself."""
     return known(onset(damping, stiffness).exact)
 
 
 def approximate_onset(damping: float = DAMPING) -> float:
-    """Return that by averaging."""
+    """Return the onset of sticking by averaging."""
     return known(onset(damping).approximate)
 
 
@@ -158,7 +158,7 @@ def cycles(
 
 
 def only_rest_at(belt_speeds: Sequence[float]) -> bool:
-    """Return whether the equilibrium is stable at each of them, and there is no limit cycle."""
+    """Return whether at each speed the equilibrium is stable and there is no limit cycle."""
     return all(expansion(speed).stable and not cycles(speed) for speed in belt_speeds)
 
 
@@ -176,9 +176,9 @@ def controlled_amplitude(belt_speed: float, gains: WashoutGains, damping: float 
 
 
 def arrivals(drive: Drive) -> list[float]:
-    """Return the reactions k x + c v0 with which a slide comes to the belt's speed.
+    """Return the reactions k x + c v0 with which a slide reaches the belt's speed.
 
-    That is after the belt let go of it, up to the first with which friction can hold it.
+    They start after the release and end with the first one that friction can hold.
     """
     motion = _motion()
     motion.begin(drive, release_position(drive), drive.belt_speed)
@@ -192,10 +192,10 @@ def arrivals(drive: Drive) -> list[float]:
 
 
 def stays(drive: Drive) -> bool:
-    """Return whether the motion from rest at X = 0 does not run away."""
+    """Return whether the motion from rest at X = 0 does not diverge."""
     motion = _motion()
     motion.begin(drive, 0.0, 0.0)
-    motion.advance(600.0)  # what is going to run away has done so by then
+    motion.advance(600.0)  # a diverging motion has diverged by then
     return not motion.unbounded
 
 
@@ -227,7 +227,7 @@ def rates(drive: Drive, states: FloatArray, gains: WashoutGains | None = None) -
 
 
 def time_dependent() -> bool:
-    """Return whether anything in the equations changes with time but the state."""
+    """Return whether the equations depend on time explicitly."""
     _, compiled = _compiled(type(unit_drive(1.0).friction), False)
     return bool(compiled.is_time_dependent)
 

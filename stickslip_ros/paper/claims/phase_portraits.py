@@ -47,7 +47,7 @@ from stickslip_ros.physics.theory.roots import zero_between
 computes = Computations()
 
 _PRINTED_ONSET = 0.4372
-"""v_b0."""
+"""The printed v_b0."""
 
 
 def _stick_falls(portraits: Sequence[Portrait]) -> bool:
@@ -119,10 +119,10 @@ def _(_: Evidence) -> Observation:
     return Observation(
         f"{len(found)} limit cycle at v0 = 0.45",
         not found,
-        remark="There is a stable one, of the amplitude "
+        remark="There is a stable one with amplitude "
         f"{listed([cycle.measures.amplitude or 0.0 for cycle in found])}, period "
         f"{listed([cycle.period for cycle in found])} and Floquet multiplier "
-        f"{listed([abs(cycle.multipliers[0]) for cycle in found])}. Section 2 expects it too.",
+        f"{listed([abs(cycle.multipliers[0]) for cycle in found])}. Section 2 predicts it too.",
     )
 
 
@@ -144,8 +144,8 @@ def _(evidence: Evidence) -> Observation:
 computes["vb0"] = lambda _: Number(
     exact_onset(),
     {"By averaging, an approximation": approximate_onset()},
-    "The periodic orbit that touches the belt's speed has the computed one. The paper does not "
-    "say where its value comes from.",
+    "At the computed speed the periodic orbit touches the belt's speed. The paper does not "
+    "give the origin of its value.",
 )
 
 
@@ -163,7 +163,7 @@ def _(_: Evidence) -> Observation:
         f"{of_hopf:.4f} and {of_onset:.4f}",
         apart < rounding,
         remark=f"Damping coefficients that give v_b1 = {PRINTED_HOPF_SPEED:g} and, by averaging, "
-        f"v_b0 = {_PRINTED_ONSET:g}; on the motion the latter belongs to {of_exact:.4f}.",
+        f"v_b0 = {_PRINTED_ONSET:g}; for the motion itself the latter needs {of_exact:.4f}.",
     )
 
 
@@ -240,8 +240,8 @@ def _(evidence: Evidence, figure: int) -> Observation:
 
 computes["linear-slope"] = lambda _: Number(
     trace(1e-9, 0.0),
-    remark="Computed is the Stribeck law's slope at zero relative speed, "
-    f"{trace(1e-9, 0.0) / PRINTED_SLOPE:.4g} times what is printed.",
+    remark="The computed value is the Stribeck law's slope at zero relative speed, "
+    f"{trace(1e-9, 0.0) / PRINTED_SLOPE:.4g} times the printed one.",
 )
 
 
@@ -258,7 +258,7 @@ def _(evidence: Evidence) -> Observation:
     return Observation(
         f"{regimes(damped).count(Regime.EQUILIBRIUM)} of {len(damped)} dampings come to rest",
         set(regimes(damped)) == {Regime.EQUILIBRIUM} and not found,
-        remark="Without any damping what the start put in neither grows nor dies out: amplitude "
+        remark="Without damping the initial vibration neither grows nor decays: amplitude "
         f"{listed(ranges)} belt speeds. At v0 = {listed(speeds)} with beta = {listed(betas)} "
         f"shooting finds {len(found)} limit cycles.",
     )
@@ -281,7 +281,7 @@ def _(evidence: Evidence) -> Observation:
         vibrates[0] and vibrates[2],
         f"On a slow belt: with the printed slope below v0 = {fastest[0]:.3f}, with half of it, "
         f"that of the Stribeck law, below {fastest[1]:.3f}, at beta = 0.01 and from rest. On a "
-        f"faster one it runs away: at v0 = {least[1].drive.belt_speed:g} with the printed slope "
+        f"faster belt it diverges: at v0 = {least[1].drive.belt_speed:g} with the printed slope "
         f"the speed passes 10 at tau = {passes or 0.0:.1f}.",
     )
 
@@ -305,12 +305,12 @@ def _(evidence: Evidence) -> Observation:
         f"{listed(printed)} with the printed slope",
         all(_stick_falls(panel.portraits) for panel in panels),
         all(_stick_falls(panel.portraits) for panel in (panels[0], panels[2])),
-        "Where the slide comes to the belt's speed gently enough to stick at once: with half the "
+        "If the slide reaches the belt's speed slowly enough to stick immediately: with half the "
         f"slope, that of the Stribeck law, {listed(tangent)}; with the printed one at v0 = "
-        f"{panels[2].portraits[0].drive.belt_speed:g} {listed(slow)}. At v0 = {belt_speed:g} that "
-        f"is so above beta = {gentle:.4f}; below, it overruns the belt before it sticks, and the "
+        f"{panels[2].portraits[0].drive.belt_speed:g} {listed(slow)}. At v0 = {belt_speed:g} this "
+        f"holds above beta = {gentle:.4f}; below, it overtakes the belt before it sticks, and the "
         f"stick fraction rises with the damping: {listed(overrunning)} at beta = {listed(betas)}. "
-        f"Up to beta = {bounded:.4f} the motion runs away.",
+        f"Up to beta = {bounded:.4f} the motion diverges.",
     )
 
 
@@ -335,8 +335,8 @@ def _(_: Evidence) -> Observation:
     return Observation(
         f"v_b1 = {listed(speeds)}",
         falling(speeds),
-        remark=f"For stiffness {listed(stiffnesses)}: the Hopf speed does not depend on it, as the "
-        "trace p does not. The same holds in SI units, where p is (N mu' - c)/m.",
+        remark=f"For stiffness {listed(stiffnesses)}: the Hopf speed does not depend on it, since "
+        "the trace p does not. The same holds in SI units, where p is (N mu' - c)/m.",
     )
 
 
@@ -349,7 +349,7 @@ def _of_stiffnesses(evidence: Evidence) -> list[Portrait]:
 @computes("fig-10-end")
 def _(_: Evidence) -> Observation:
     def beyond_friction(stiffness: float, arrival: int) -> float:
-        """Return by how much friction cannot hold a slide that comes to the belt's speed."""
+        """Return the excess over friction of a slide that reaches the belt's speed."""
         return abs(arrivals(unit_drive(0.2, stiffness=stiffness))[arrival]) - STRIBECK.static
 
     overruns = zero_between(lambda stiffness: beyond_friction(stiffness, 0), 1.0, 100.0)
@@ -362,11 +362,11 @@ def _(_: Evidence) -> Observation:
         [cycle.measures.regime for cycle in found] == [Regime.PURE_SLIP] * len(stiffer)
         and all(cycle.stable for cycle in found)
         and all(cycle.measures.regime is Regime.STICK_SLIP for cycle in less),
-        remark=f"Above stiffness {overruns:.4g} the slide comes to the belt's speed with a "
-        "reaction that friction cannot hold, and overruns the belt; it sticks when it comes back "
-        f"to the belt's speed, until above {never:.4g} friction cannot hold it then either. "
-        "Shooting finds one stable cycle, which does not stick, at stiffness "
-        f"{listed(stiffer)}. Just below the onset of sticking less is enough, since that moves "
+        remark=f"Above stiffness {overruns:.4g} the slide reaches the belt's speed with a "
+        "reaction that friction cannot hold, and overtakes the belt; it sticks when it returns "
+        f"to the belt's speed, but above {never:.4g} friction cannot hold it then either. "
+        "Shooting finds one stable cycle without sticking at stiffness "
+        f"{listed(stiffer)}. Just below the onset of sticking less is sufficient, since that moves "
         f"from v0 = {exact_onset():.5f} at stiffness 1 to {exact_onset(stiffness=2.0):.5f} at 2 "
         f"and {exact_onset(stiffness=50.0):.5f} at 50.",
     )
@@ -409,8 +409,8 @@ def _(evidence: Evidence) -> Observation:
         listed(stick_fractions(portraits)),
         _stick_falls(portraits) and falling(fractions[::-1]),
         _stick_falls(portraits),
-        f"As long as the slide does not overrun the belt before it sticks. {_of_minima(evidence)} "
-        f"At v0 = {belt_speed:g}, where it does so below mu_m = {overruns:.4f}, it is "
+        f"As long as the slide does not overtake the belt before it sticks. {_of_minima(evidence)} "
+        f"At v0 = {belt_speed:g}, where it does so below mu_m = {overruns:.4f}, the fraction is "
         f"{listed(fractions)} for mu_m = {listed(minima)}.",
     )
 

@@ -87,9 +87,9 @@ def _(_: Evidence) -> Formula:
         printed(3.0),
         at_rest - friction,
         {"With the factor v0 in the last term": printed(3.0 * belt_speed)},
-        "F2 is minus the change of the friction, so that -F stands in eq. 16; v_r is its value "
-        "-v0 at rest. All this while the slide is slower than the belt: beyond, friction changes "
-        "sign.",
+        "F2 is minus the change of the friction, so eq. 16 contains -F; v_r is its value -v0 at "
+        "rest. This holds while the slide is slower than the belt: at higher speed friction "
+        "changes sign.",
     )
 
 
@@ -111,10 +111,10 @@ def _(_: Evidence) -> Observation:
     )
     expected = float(expansion(0.45).eigenvalues[0].real)
     return Observation(
-        f"{growth:.5f} beside {expected:.5f}",
+        f"{growth:.5f} and {expected:.5f}",
         abs(growth / expected - 1.0) < 1e-3,
         remark="Growth rate of a small vibration at v0 = 0.45, from the motion over "
-        f"{len(turns) - 1} cycles, beside the real part of the eigenvalues.",
+        f"{len(turns) - 1} cycles, and the real part of the eigenvalues.",
     )
 
 
@@ -149,7 +149,7 @@ def _(_: Evidence) -> Formula:
 
 
 computes["eq-8-constant"] = lambda _: number_for_both(
-    lambda damping: _growth(damping)[0], "Eq. 5 has 2 beta, eq. 8 takes beta once."
+    lambda damping: _growth(damping)[0], "Eq. 5 has 2 beta, but eq. 8 has beta."
 )
 computes["eq-8-square"] = lambda _: Number(
     _growth()[1], remark="Three times the cubic coefficient of the law."
@@ -170,7 +170,7 @@ def _(_: Evidence) -> Formula:
 computes["eq-8-polynomial"] = lambda _: Formula(
     [[1.0, -trace(speed), 1.0] for speed in BELT_SPEEDS],
     [np.poly(expansion(speed).jacobian) for speed in BELT_SPEEDS],
-    remark="With whatever damping p has.",
+    remark="For any damping in p.",
 )
 
 
@@ -188,8 +188,8 @@ def _(_: Evidence) -> Observation:
 
 computes["vb1"] = lambda _: number_for_both(
     lambda damping: hopf_point(damping).belt_speed,
-    "The slip of eq. 8: with the damping of eq. 5 the loop is stable above "
-    f"{hopf_point().belt_speed:.5f} already.",
+    "The error is in eq. 8: with the damping of eq. 5 the loop is already stable above "
+    f"{hopf_point().belt_speed:.5f}.",
 )
 
 
@@ -228,7 +228,7 @@ def _(_: Evidence) -> Observation:
         max(at_hopf, elsewhere) < 1e-9,
         at_hopf < 1e-9,
         f"Only at v_b1 (off by {at_hopf:.6f}), where the untransformed matrix is [[0, 1], [-1, 0]] "
-        "and eq. 12 to 15 use it. No transformation was made.",
+        "and eq. 12 to 15 use it. No transformation is made.",
     )
 
 
@@ -266,9 +266,9 @@ def _(_: Evidence) -> Formula:
             )
             / 2.0
         },
-        f"Up to v0 = {overdamped_from():.4f} p^2 - 4 is below zero, {radicands.min():.4g} at the "
-        "least, so that the printed root is of a negative number; from there on it is not, and the "
-        f"two eigenvalues are real, as printed (tried up to v0 = {max(speeds):g}).",
+        f"Up to v0 = {overdamped_from():.4f} p^2 - 4 is negative, {radicands.min():.4g} at the "
+        "least, so the printed root is that of a negative number; above it is not, and the "
+        f"two eigenvalues are real, as printed (tested up to v0 = {max(speeds):g}).",
     )
 
 
@@ -283,7 +283,7 @@ def _(_: Evidence) -> Number:
             TAKEN_FOR_DAMPING: hopf_point(TAKEN_DAMPING).crossing_speed,
             "With p' in place of p'/2, at v0 = 0.4944": doubled,
         },
-        "The factor 1/2 of alpha = p/2 got lost, and the 0 in alpha'(0) stands for v_b1: the "
+        "The factor 1/2 of alpha = p/2 is missing, and the 0 in alpha'(0) means v_b1: the "
         f"eigenvalues cross at {hopf_point(TAKEN_DAMPING).crossing_speed:.5f} there.",
     )
 
@@ -305,7 +305,7 @@ def _(_: Evidence) -> Observation:
         f"one stable cycle at each of {len(speeds)} belt speeds" if below else "other cycles",
         below and not expansion(STUDIED_SPEED).stable,
         below,
-        "With v_b1 computed with beta = 0.01 in eq. 5: at "
+        "With v_b1 computed from beta = 0.01 in eq. 5: at "
         f"v0 = {STUDIED_SPEED:g} < {PRINTED_HOPF_SPEED:g} the equilibrium is stable and there are "
         f"{len(cycles(STUDIED_SPEED))} cycles. Largest multiplier below: "
         f"{max(abs(here[0].multipliers[0]) for here in found):.4f}.",
@@ -357,7 +357,7 @@ def _(evidence: Evidence) -> Observation:
         ", ".join(f"{regime} at {len(found)} belt speeds" for regime, found in kinds.items()),
         all(kinds.values()) and not others,
         remark="Of Fig. 2: stick-slip up to "
-        f"{max(kinds[Regime.STICK_SLIP], default=0.0):.4f}, pure slip above; at rest at the rest.",
+        f"{max(kinds[Regime.STICK_SLIP], default=0.0):.4f}, pure slip above; otherwise at rest.",
     )
 
 
@@ -368,8 +368,8 @@ def _(_: Evidence) -> Observation:
     return Observation(
         _complex(upper),
         upper.real < 0.0 < upper.imag,
-        remark="A deviation falls to a hundredth in "
-        f"{log(100.0) / -upper.real:.0f}; with the damping of eq. 8 it would take "
+        remark="The 1 % settling time of a deviation is "
+        f"{log(100.0) / -upper.real:.0f}; with the damping of eq. 8 it would be "
         f"{log(100.0) / -taken.real:.0f}.",
     )
 

@@ -1,4 +1,4 @@
-"""What claims say of values in words, and of phase portraits in numbers."""
+"""Summaries of values in words, and of phase portraits in numbers."""
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
@@ -10,12 +10,12 @@ VIBRATING = (Regime.STICK_SLIP, Regime.PURE_SLIP)
 
 
 def falling(values: Sequence[float]) -> bool:
-    """Return whether each value is below the one before."""
+    """Return whether each value is below the previous one."""
     return all(later < earlier for earlier, later in pairwise(values))
 
 
 def border(holds: Callable[[float], bool], low: float, high: float) -> float:
-    """Return up to where it holds, between `low`, where it does, and `high`, where it does not."""
+    """Return the border between `low`, where `holds` is true, and `high`, where it is false."""
     while high - low > 1e-4:
         middle = (low + high) / 2.0
         low, high = (middle, high) if holds(middle) else (low, middle)
@@ -33,18 +33,18 @@ def belt_speeds(portraits: Sequence[Portrait]) -> str:
 
 
 def regimes(portraits: Sequence[Portrait]) -> list[Regime | None]:
-    """Return the regime that each motion ends in."""
+    """Return the final regime of each motion."""
     return [portrait.measures.regime for portrait in portraits]
 
 
 def amplitude(portrait: Portrait) -> float:
-    """Return the displacement amplitude that a motion ends with, zero at rest."""
+    """Return the final displacement amplitude of a motion, zero at rest."""
     at_rest = portrait.measures.regime is Regime.EQUILIBRIUM
     return 0.0 if at_rest else portrait.measures.amplitude or 0.0
 
 
 def stick_fractions(portraits: Sequence[Portrait]) -> list[float]:
-    """Return the stick fractions of those motions that vibrate."""
+    """Return the stick fractions of the vibrating motions."""
     return [
         portrait.measures.stick_fraction or 0.0
         for portrait in portraits

@@ -46,15 +46,15 @@ def _(_: Evidence) -> Observation:
     return Observation(
         f"{square:.4g} y^2, {cube:.4g} y^3",
         max(abs(square), abs(cube)) < 1e-9,
-        remark=f"The square and the cube of the Stribeck law are in F, at v0 = {STUDIED_SPEED:g}; "
-        "with a linear law there would be no limit cycle to speak of.",
+        remark=f"F contains square and cube of the Stribeck law, at v0 = {STUDIED_SPEED:g}; "
+        "with a linear law there would be no limit cycle to study.",
     )
 
 
 def _slow_states() -> FloatArray:
-    """Return deviations from the equilibrium in which the slide is slower than the belt, up to ten.
+    """Return deviations from the equilibrium, up to ten, with the slide slower than the belt.
 
-    Near it too: half of them are of the size of one.
+    Half of them are of the order of one.
     """
     states = STATES * np.where(np.arange(STATES.shape[1]) % 2, 10.0, 1.0)
     states[1] = STUDIED_SPEED - np.abs(states[1])
@@ -83,7 +83,7 @@ def _(_: Evidence) -> Formula:
         printed,
         _loop_rates(None)[1],
         {"With the factor v0 in the last term of F": corrected},
-        "C and K, which are not defined, are 2 beta and 1. F as in eq. 6: while the slide is "
+        "C and K, which are not defined, are 2 beta and 1. F is as in eq. 6, with the slide "
         "slower than the belt.",
     )
 
@@ -126,7 +126,7 @@ def _(_: Evidence) -> Observation:
     return Observation(
         f"v_b1 = {listed(without)}",
         falling(without) and bool(np.allclose(without, with_cubic, rtol=1e-12)),
-        remark=f"For k1 = {listed(gains)} with d = 2, whatever k2.",
+        remark=f"For k1 = {listed(gains)} with d = 2 and any k2.",
     )
 
 
@@ -139,8 +139,8 @@ def _(_: Evidence) -> Formula:
     return Formula(
         [y, -friction - DAMPING * y - x + force, v],
         _loop_rates(_SOME_GAINS),
-        remark="With F corrected as in eq. 16, while the slide is slower than the belt. Eq. 18 "
-        "goes into eq. 17, not the reverse.",
+        remark="With F corrected as in eq. 16, with the slide slower than the belt. Eq. 18 "
+        "is inserted into eq. 17, not the reverse.",
     )
 
 
@@ -151,11 +151,11 @@ def _printed_jacobian(p: float, linear: float) -> FloatArray:
 computes["eq-20"] = lambda _: Formula(
     _printed_jacobian(trace(STUDIED_SPEED), _SOME_GAINS.linear),
     expansion(STUDIED_SPEED, gains=_SOME_GAINS).jacobian,
-    remark="That d = 2 is to be read from it; the text does not say so.",
+    remark="The matrix implies d = 2; the text does not give it.",
 )
 computes["eq-20-trace"] = lambda _: number_for_both(
     lambda damping: trace(STUDIED_SPEED, damping),
-    "With the damping of eq. 5 there is nothing to control at v0 = 0.49: p is below zero.",
+    "With the damping of eq. 5 there is nothing to control at v0 = 0.49: p is negative.",
 )
 
 
@@ -219,7 +219,7 @@ def _(_: Evidence) -> Number:
             TAKEN_FOR_DAMPING: exact,
             f"{TAKEN_FOR_DAMPING}, and p rounded to {p:g}": rounded,
         },
-        f"Without that rounding it is {exact:.6f}. The printed c2 did not lead there.",
+        f"Without that rounding it is {exact:.6f}. The printed c2 does not give this value.",
     )
 
 
@@ -245,15 +245,15 @@ def _(_: Evidence) -> Formula:
         printed,
         [values[0].real for values in found],
         remark="It deviates from the sum of all three eigenvalues, the trace of eq. 20, by "
-        f"{off:.6f}. The pair's real part at v0 = {STUDIED_SPEED:g} is {at_studied:.6f}, as it "
-        "must be near zero for a Hopf point.",
+        f"{off:.6f}. The pair's real part at v0 = {STUDIED_SPEED:g} is {at_studied:.6f}, near "
+        "zero as a Hopf point requires.",
     )
 
 
 computes["eq-22-value"] = lambda _: number_for_both(
     _crossing,
-    "At the critical gain, by projection onto the eigenvectors; printed is the derivative of "
-    "the trace of eq. 20. With the damping of eq. 8 it is {taken:.5f}.",
+    "At the critical gain, by projection onto the eigenvectors; the printed value is the "
+    "derivative of the trace of eq. 20. With the damping of eq. 8 it is {taken:.5f}.",
 )
 
 
