@@ -26,7 +26,7 @@ What needs more says so in HTML comments right above it, each on a line of its o
 `<!-- test: file NAME -->`
     Saved under that name, a path from where the reader is, for later blocks, one of which has to
     use it; itself it is run if it is a test and no later block has its name. If the checkout has
-    that file, or has it in docs/examples, the block must be its text.
+    that file, or has it in examples, the block must be its text.
 `<!-- test: after CODE -->`
     For `python`: run after this line of code, which imports what the reader has by then.
 `<!-- test: output -->`

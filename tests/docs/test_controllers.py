@@ -1,37 +1,30 @@
-"""docs/controllers.md: the numbers on it are those of the examples."""
+"""docs/controllers.md: the values on it are those of the example."""
 
 import json
 import sys
 from collections.abc import Iterator
 from importlib import import_module
-from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-DOCS = Path(__file__).parents[2] / "docs"
-EXAMPLES = DOCS / "examples"
-PAGE = (DOCS / "controllers.md").read_text(encoding="utf-8")
+from tests.docs.page import CHECKOUT
+
+KEPT = json.loads((CHECKOUT / "docs/gallery/comparison.json").read_text(encoding="utf-8"))
 
 
 @pytest.fixture
 def compare(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
-    monkeypatch.syspath_prepend(EXAMPLES)
-    yield import_module("compare")
-    for module in ("compare", "velocity_feedback"):
+    monkeypatch.syspath_prepend(CHECKOUT / "examples")
+    yield import_module("compare_controllers")
+    for module in ("compare_controllers", "velocity_feedback"):
         del sys.modules[module]
 
 
-def test_the_table_on_the_page_is_that_of_the_kept_figures(compare: ModuleType) -> None:
-    kept = json.loads((EXAMPLES / "comparison.json").read_text(encoding="utf-8"))
-    assert compare.BEGIN + compare.table(kept) + compare.END in PAGE
-
-
 @pytest.mark.long
-def test_the_kept_figures_are_those_of_today(compare: ModuleType) -> None:
-    kept = json.loads((EXAMPLES / "comparison.json").read_text(encoding="utf-8"))
-    assert len(kept) == len(compare.BELT_SPEEDS) * len(compare.CONTROLLERS)
-    for row in kept:
+def test_the_kept_values_are_those_of_today(compare: ModuleType) -> None:
+    assert len(KEPT) == len(compare.BELT_SPEEDS) * len(compare.CONTROLLERS)
+    for row in KEPT:
         case = row["belt_speed"], row["controller"]
         found = compare.figures(*case, compare.run(*case))
         assert found.keys() == row.keys()
