@@ -141,8 +141,15 @@ def comparison() -> Iterator[str]:
     """Yield what examples/compare_controllers.py has written, as a table."""
     kept = (HERE / "gallery" / "comparison.json").read_text(encoding="utf-8")
     yield table(
-        "belt speed, mm/s|control|regime|amplitude, µm|settles at, µm|peak force, N"
-        "|final force, N".split("|"),
+        [
+            "belt speed, mm/s",
+            "control",
+            "regime",
+            "amplitude, µm",
+            "settles at, µm",
+            "peak force, N",
+            "final force, N",
+        ],
         [
             [
                 f"{row['belt_speed'] * 1e3:g}",
