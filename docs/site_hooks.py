@@ -36,7 +36,8 @@ def on_files(files: Files, *, config: MkDocsConfig) -> Files:
             files.remove(file)
     for pattern in PUBLISHED:
         for path in sorted(CHECKOUT.glob(pattern)):
-            files.append(_file(path.relative_to(CHECKOUT).as_posix(), config))
+            name = path.relative_to(CHECKOUT).as_posix()
+            files.append(File(name, str(CHECKOUT), config.site_dir, config.use_directory_urls))
     return files
 
 
@@ -45,13 +46,8 @@ def on_page_content(content: str, **_: object) -> str:
     return _FORMULA.sub(_as_mathml, content)
 
 
-def _file(path: str, config: MkDocsConfig) -> File:
-    file = File(path, str(CHECKOUT), config.site_dir, config.use_directory_urls)
-    if path.startswith("docs/") and path != "docs/README.md":
-        file.dest_uri = file.dest_uri.removeprefix("docs/")
-    return file
-
-
 def _as_mathml(formula: re.Match[str]) -> str:
-    display = "inline" if formula[2] == "(" else "block"
-    return convert(html.unescape(formula[3]), display=display)
+    latex = html.unescape(formula[3])
+    # A bar that does not grow, and a word whose letters stand together.
+    latex = latex.replace("\\lvert", "|").replace("\\rvert", "|").replace("\\mathit", "\\text")
+    return convert(latex, display="inline" if formula[2] == "(" else "block")

@@ -70,10 +70,7 @@ def parsed(path: Path) -> Page:
 
 def place(site: Path, page: str) -> Path:
     """Where a page of the checkout is on the site."""
-    if page == "README.md":
-        return site / "index.html"
-    name = page if page == "docs/README.md" else page.removeprefix("docs/")
-    return site / name.removesuffix(".md").removesuffix("README") / "index.html"
+    return site / page.removesuffix(".md").removesuffix("README") / "index.html"
 
 
 def test_every_page_has_what_it_has_on_github(site: Path) -> None:
@@ -91,7 +88,7 @@ def test_the_public_names_are_filled_in(site: Path) -> None:
     for page in (CHECKOUT / "docs/reference").glob("*.md"):
         names = re.findall(r"^::: (\S+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
         assert names
-        assert set(names) <= parsed(site / "reference" / page.stem / "index.html").anchors
+        assert set(names) <= parsed(site / "docs/reference" / page.stem / "index.html").anchors
 
 
 def test_no_link_of_the_site_is_broken(site: Path) -> None:
