@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Iterator
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -22,12 +23,13 @@ def compare(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
 
 
 @pytest.mark.long
-def test_the_kept_values_are_those_of_today(compare: ModuleType) -> None:
-    assert len(KEPT) == len(compare.BELT_SPEEDS) * len(compare.CONTROLLERS)
-    for row in KEPT:
-        case = row["belt_speed"], row["controller"]
-        found = compare.figures(*case, compare.run(*case))
+def test_the_kept_values_are_those_of_today(compare: ModuleType, tmp_path: Path) -> None:
+    compare.main(tmp_path)
+    assert (tmp_path / "compare_controllers.png").stat().st_size > 0
+    today = json.loads((tmp_path / "comparison.json").read_text(encoding="utf-8"))
+    assert len(today) == len(KEPT) == len(compare.BELT_SPEEDS) * len(compare.CONTROLLERS)
+    for found, row in zip(today, KEPT, strict=True):
         assert found.keys() == row.keys()
         for name, value in row.items():
             close = pytest.approx(value, rel=1e-6, abs=1e-8) if isinstance(value, float) else value
-            assert found[name] == close, (case, name)
+            assert found[name] == close, (row["belt_speed"], row["controller"], name)
