@@ -12,6 +12,7 @@ CHECKOUT = Path(__file__).parents[1]
 
 PUBLISHED = (
     "*.md",
+    "CITATION.cff",
     "LICENSE",
     "bags/*.md",
     "bags/*.json",
