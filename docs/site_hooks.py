@@ -49,6 +49,6 @@ def on_page_content(content: str, **_: object) -> str:
 
 def _as_mathml(formula: re.Match[str]) -> str:
     latex = html.unescape(formula[3])
-    # A bar that does not grow, and a word whose letters stand together.
+    # latex2mathml lets only one of two bars grow, and spaces the letters of a word.
     latex = latex.replace("\\lvert", "|").replace("\\rvert", "|").replace("\\mathit", "\\text")
     return convert(latex, display="inline" if formula[2] == "(" else "block")

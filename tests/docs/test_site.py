@@ -54,8 +54,8 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         command, cwd=CHECKOUT, env=environment, capture_output=True, text=True, timeout=280
     )
     assert built.returncode == 0, built.stderr
-    said = [line for line in built.stderr.splitlines() if re.match("INFO|WARNING|ERROR", line)]
-    assert [re.sub(r"[\d.]+|/\S*", "", line) for line in said] == [
+    output = [line for line in built.stderr.splitlines() if re.match("INFO|WARNING|ERROR", line)]
+    assert [re.sub(r"[\d.]+|/\S*", "", line) for line in output] == [
         "INFO    -  Cleaning site directory",
         "INFO    -  Building documentation to directory: ",
         "INFO    -  Documentation built in  seconds",
