@@ -18,7 +18,7 @@ PYTEST := $(BIN)/python -m pytest --timeout=300 --numprocesses=3 --dist=workstea
 # What Python compiles is kept, even if the environment says not to: the tests start hundreds.
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: setup demo check test-quick test test-all lint bench screenshot clean
+.PHONY: setup demo check test-quick test test-all lint site gallery bench screenshot clean
 
 setup: $(READY)
 
@@ -37,7 +37,7 @@ $(READY): setup.py setup.cfg pyproject.toml package.xml Makefile
 	test -e $@ || $$python -m venv --clear $(VENV)
 	@rm -f $@
 	@$(PIP) --upgrade pip
-	@$(PIP) --editable '.[ros,test,dev]'
+	@$(PIP) --editable '.[ros,test,dev,docs]'
 	@rm -rf $(VENV)/lib/stickslip_ros $(VENV)/share/stickslip_ros
 	@mkdir $(VENV)/lib/stickslip_ros $(VENV)/share/stickslip_ros
 	@ln -s '$(CURDIR)/config' '$(CURDIR)/package.xml' $(VENV)/share/stickslip_ros
@@ -75,6 +75,14 @@ lint: setup
 bench: setup
 	@mkdir -p build
 	$(BIN)/python -m benchmarks --out build/benchmarks.json || test $$? -eq 77
+
+# The documentation as a web site: build/site/index.html.
+site: setup
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
+
+# The figures of docs/gallery.md, drawn again by the scripts and notebooks.
+gallery: setup
+	$(BIN)/python docs/gallery.py
 
 # The picture of the dashboard in README.md; needs a browser, and a machine that has time for it.
 screenshot: setup

@@ -89,12 +89,23 @@ setup(
             *DASHBOARD,
             "distributed",
             "hypothesis",
+            "ipykernel",  # runs the notebooks of examples/, with nbclient
             "markdown-it-py",  # finds the blocks of code in the docs
+            "nbclient",
             "playwright",  # drives the browser of the system: no download of its own
             "pytest",
             "pytest-timeout",
             "rosbags",
             "setuptools>=70.1",  # the first to make wheels unaided
+        ],
+        # The documentation as a web site (make site).
+        "docs": [
+            "latex2mathml",  # formulas that need no script in the browser
+            "mkdocs-material",
+            "mkdocs>=1.6",  # the first that checks the anchors of links
+            "mkdocstrings[python]",
+            "pymdown-extensions",
+            "ruff",  # breaks the lines of signatures
         ],
         "dev": ["colcon-common-extensions", "colcon-ros", "pyright", "pytest-xdist", "ruff"],
     },

@@ -1,20 +1,19 @@
-"""What the pages take from the code: parameters, topics, numbers of the theory, the reference.
+"""What the pages take from the code: parameters, topics, numbers of the theory, of an example.
 
 Fills in what stands between `<!-- generated: NAME -->` and `<!-- end: NAME -->` on the pages beside
 this file.
 """
 
+import json
 import re
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from math import isinf
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from api import PUBLIC, reference
-
 from stickslip_ros.messages.topics import TOPICS
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
@@ -22,7 +21,7 @@ from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters, 
 from stickslip_ros.studies.stability import stability
 
 HERE = Path(__file__).parent
-PAGES = ("parameters.md", "topics.md", "theory.md", "reference.md")
+PAGES = ("parameters.md", "topics.md", "theory.md", "controllers.md")
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -138,11 +137,43 @@ def _figures(value: Any) -> str:
     return ", ".join(f"{v:.5g}" for v in (value if isinstance(value, list | tuple) else [value]))
 
 
+def comparison() -> Iterator[str]:
+    """Yield what examples/compare_controllers.py has written, as a table."""
+    kept = (HERE / "gallery" / "comparison.json").read_text(encoding="utf-8")
+    yield table(
+        [
+            "belt speed, mm/s",
+            "control",
+            "regime",
+            "amplitude, µm",
+            "settles at, µm",
+            "peak force, N",
+            "final force, N",
+        ],
+        [
+            [
+                f"{row['belt_speed'] * 1e3:g}",
+                row["controller"],
+                Regime.label(row["regime"]),
+                f"{row['amplitude'] * 1e6:.1f}",
+                f"{row['midpoint'] * 1e6:.1f}" if row["regime"] == "equilibrium" else "",
+                _newtons(row["peak_force"]),
+                _newtons(row["resting_force"]),
+            ]
+            for row in json.loads(kept)
+        ],
+    )
+
+
+def _newtons(force: float | None) -> str:
+    return "" if force is None else f"{force:.1f}"
+
+
 BLOCKS: dict[str, Callable[[], Iterator[str]]] = {
     "parameters": parameters,
     "topics": topics,
     "numbers": numbers,
-    **{section: partial(reference, section) for section in PUBLIC},
+    "comparison": comparison,
 }
 
 

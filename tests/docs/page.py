@@ -34,7 +34,7 @@ The directives:
 `file NAME`
     Saved under that name, a path relative to the reader's directory, for later blocks, one of
     which has to use it. The block itself is run if it is a test and no later block has its name.
-    If the checkout has that file, or has it in docs/examples, the block must be its text.
+    If the checkout has that file, or has it in examples, the block must be its text.
 `after CODE`
     For `python`: run after this line of code, which imports what the reader has by then.
 `output`

@@ -128,7 +128,7 @@ def save(block: Block, page: list[Block], shell: Shell) -> None:
         stem in "\n".join([b.to_run, *b.directives.get("after", [])]) for b in later
     )
     assert used, f"{block.place}: {name} is saved but not used"
-    for kept in (CHECKOUT / name, CHECKOUT / "docs/examples" / name):
+    for kept in (CHECKOUT / name, CHECKOUT / "examples" / name):
         if kept.is_file():
             assert kept.read_text(encoding="utf-8") == block.text, f"{block.place}: not {kept}"
     shell.path(name).parent.mkdir(parents=True, exist_ok=True)

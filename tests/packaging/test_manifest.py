@@ -14,10 +14,12 @@ KEYS = {
     "fastapi": {"python3-fastapi"},
     "heyoka": set(),
     "hypothesis": {"python3-hypothesis"},
+    "ipykernel": set(),
     "lz4": set(),
     "markdown-it-py": set(),
     "matplotlib": {"python3-matplotlib"},
     "mcap": set(),
+    "nbclient": set(),
     "nicegui": set(),
     "numpy": {"python3-numpy"},
     "orjson": {"python3-orjson"},
@@ -82,6 +84,8 @@ def test_the_manifest_tells_what_has_no_key():
     (extra,) = required("dask")
     assert not KEYS[extra]
     assert f"to test them: {extra}." in text
+    site = ", ".join(sorted(required("docs"), key=str.lower))
+    assert f"from PyPI: {site}." in " ".join(text.replace("[python]", "").split())
     keys = sorted(key for name in required("dashboard") for key in KEYS[name])
     assert f"For the dashboard: {', '.join(keys)}, and nicegui from PyPI;" in text
 

@@ -1,0 +1,114 @@
+"""The web site: it builds without a warning, shows what GitHub shows, and has no broken link."""
+
+import os
+import re
+import subprocess
+import sys
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from markdown_it import MarkdownIt
+
+from tests.docs.page import CHECKOUT, pages
+
+pytestmark = [pytest.mark.long, pytest.mark.process]
+
+COUNTED = ("h2", "li", "table", "tr", "pre", "img")
+
+
+class Page(HTMLParser):
+    """Elements, anchors and links of a page of the site."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.counts = dict.fromkeys(COUNTED, 0)
+        self.anchors: set[str] = set()
+        self.links: set[str] = set()
+        self._in_article = False
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = dict(attrs)
+        self._in_article |= tag == "article"
+        if self._in_article and tag in COUNTED:
+            self.counts[tag] += 1
+        if found.get("id"):
+            self.anchors.add(str(found["id"]))
+        for name in ("href", "src"):
+            if found.get(name):
+                self.links.add(str(found[name]))
+
+    def handle_endtag(self, tag: str) -> None:
+        self._in_article &= tag != "article"
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
+    environment = os.environ | {"NO_COLOR": "1", "NO_MKDOCS_2_WARNING": "1"}
+    built = subprocess.run(
+        command, cwd=CHECKOUT, env=environment, capture_output=True, text=True, timeout=280
+    )
+    assert built.returncode == 0, built.stderr
+    output = [line for line in built.stderr.splitlines() if re.match("INFO|WARNING|ERROR", line)]
+    assert [re.sub(r"[\d.]+|/\S*", "", line) for line in output] == [
+        "INFO    -  Cleaning site directory",
+        "INFO    -  Building documentation to directory: ",
+        "INFO    -  Documentation built in  seconds",
+    ]
+    return folder
+
+
+@cache
+def parsed(path: Path) -> Page:
+    return Page(path.read_text(encoding="utf-8"))
+
+
+def place(site: Path, page: str) -> Path:
+    """Where a page of the checkout is on the site."""
+    return site / page.removesuffix(".md").removesuffix("README") / "index.html"
+
+
+def test_every_page_has_what_it_has_on_github(site: Path) -> None:
+    for page in pages():
+        if page.startswith("docs/reference/"):  # filled in
+            continue
+        text = (CHECKOUT / page).read_text(encoding="utf-8")
+        html = MarkdownIt().enable("table").render(text)
+        expected = Page(f"<article>{html}</article>").counts
+        found = parsed(place(site, page)).counts
+        assert found == expected, page
+
+
+def test_the_public_names_are_filled_in(site: Path) -> None:
+    for page in (CHECKOUT / "docs/reference").glob("*.md"):
+        names = re.findall(r"^::: (\S+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+        assert names
+        assert set(names) <= parsed(site / "docs/reference" / page.stem / "index.html").anchors
+
+
+def test_no_link_of_the_site_is_broken(site: Path) -> None:
+    for path in sorted(site.rglob("*.html")):
+        if path.name == "404.html":
+            continue
+        for link in parsed(path).links:
+            split = urlsplit(link)
+            if split.scheme:
+                assert split.scheme in ("http", "https", "data"), f"{path}: {link}"
+                continue
+            target = (path.parent / unquote(split.path)).resolve() if split.path else path
+            target = target / "index.html" if target.is_dir() else target
+            assert target.is_file(), f"{path}: {link}"
+            if split.fragment and target.suffix == ".html":
+                assert split.fragment in parsed(target).anchors, f"{path}: {link}"
+
+
+def test_a_reader_of_the_site_asks_no_other_server(site: Path) -> None:
+    for path in site.rglob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r'<(script|img|iframe)[^>]* src="https?:', text), path
+        assert not re.search(r'<link[^>]* href="https?:(?![^>]*rel="canonical")', text), path
