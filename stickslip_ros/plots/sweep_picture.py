@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
 from stickslip_ros.plots.style import DASHES, GREY, LIGHT_GREY, MANY, set_title, styled
@@ -41,6 +42,22 @@ _AWAY = REGIMES[Regime.UNBOUNDED]._replace(colour=LIGHT_GREY, hatch="...")
 
 _MEASURES = {"amplitude": ("amplitude", "m"), "stick_fraction": ("stick fraction", "")}
 """What is drawn beside the regimes: name and unit."""
+
+
+Colour = Literal["regime", "amplitude", "stick_fraction"]
+"""What a map shows."""
+
+
+def sweep_figure(columns: Columns, study: Study, colour: Colour = "regime") -> Figure:
+    """Return the bifurcation diagram of a sweep over one parameter, the map of one over two.
+
+    Raises InvalidInputError for another `colour` than the regime in a diagram.
+    """
+    if len(_grid(study).axes) == 2:
+        return map_figure(columns, study, colour)
+    if colour != "regime":
+        raise InvalidInputError(f"colour {colour}: is for maps, of two parameters")
+    return diagram_figure(columns, study)
 
 
 @styled
@@ -103,7 +120,7 @@ def diagram_figure(columns: Columns, study: Study) -> Figure:
 def map_figure(
     columns: Columns,
     study: Study,
-    colour: Literal["regime", "amplitude", "stick_fraction"] = "regime",
+    colour: Colour = "regime",
 ) -> Figure:
     """Return the map of a sweep over two parameters, the first one from left to right.
 

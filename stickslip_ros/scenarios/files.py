@@ -69,6 +69,31 @@ class Scenario:
         }
         return replace(self, **changes)
 
+    def overridden(self, overrides: Sequence[str]) -> Self:
+        """Return the scenario with further overrides, texts NODE.PARAMETER=VALUE.
+
+        Raises InvalidInputError as `load_scenario` does.
+        """
+        by_node: dict[str, dict[str, Any]] = {}
+        texts: dict[str, str] = {}
+        for override in overrides:
+            node, parameter, value = _parse_override(override)
+            by_node.setdefault(node, {})[parameter] = value
+            texts[node] = f"{texts.get(node, '')} {override:.80}"
+        changes: dict[str, Any] = {
+            node: NODE_PARAMETERS[node].validated(
+                {**self._flat[node], **new}, f"{self.path} with{texts[node]}, {node}"
+            )
+            for node, new in by_node.items()
+        }
+        given = {f"{node}.{name}" for node, new in by_node.items() for name in new}
+        return replace(
+            self,
+            overrides=(*self.overrides, *overrides),
+            given=self.given | given,
+            **changes,
+        )
+
     @cached_property
     def _flat(self) -> dict[str, dict[str, Any]]:
         return self.as_dict()
@@ -116,27 +141,19 @@ def load_scenario(
     other_sections: list[str] = []
     for file in files[::-1]:
         other_sections = file.apply(values, namespace, other_nodes=other_nodes)
-    for node, parameters in values.items():
-        NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
-    given = dict.fromkeys(NODE_PARAMETERS, "")
-    for override in overrides:
-        node, parameter, value = _parse_override(override)
-        values[node][parameter] = value
-        given[node] += f" {override:.80}"
     models: dict[str, Any] = {
-        node: NODE_PARAMETERS[node].validated(
-            parameters, f"{path} with{given[node]}, {node}" if given[node] else f"{path}, {node}"
-        )
+        node: NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
         for node, parameters in values.items()
     }
-    return Scenario(
+    scenario = Scenario(
         name=path.stem,
-        overrides=tuple(overrides),
+        overrides=(),
         path=path,
         other_sections=tuple(other_sections),
         given=frozenset(f"{node}.{name}" for node in values for name in values[node]),
         **models,
     )
+    return scenario.overridden(overrides) if overrides else scenario
 
 
 def config_directories() -> list[Path]:

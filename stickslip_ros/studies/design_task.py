@@ -42,6 +42,10 @@ class Task:
         Raises InvalidInputError for speeds that are no range above zero.
         """
         plant = scenario.plant
+        if not plant.expects_control:
+            raise InvalidInputError(
+                "plant.expects_control = False: without control there are no gains"
+            )
         if belt_speeds is None:
             own = abs(plant.belt_speed)
             if own == 0.0:

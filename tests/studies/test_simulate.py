@@ -48,7 +48,7 @@ def test_forces_and_friction_are_seen_with_the_motion(continuous: bool) -> None:
     simulate(scenario, 20.0, continuous=continuous, observer=seen)
     time, force = (np.concatenate(columns) for columns in zip(*seen.control, strict=True))
     end, friction = (np.concatenate(columns) for columns in zip(*seen.friction, strict=True))
-    step = scenario.plant.as_drive().natural_period / 64.0
+    step = scenario.plant.as_drive().natural_period / 60.0
     assert all(0.0 < later - earlier <= step * 1.001 for earlier, later in pairwise(time))
     assert end == pytest.approx(np.append(time[1:], 20.0))
     assert not force[time < 4.99].any()

@@ -7,7 +7,7 @@ import numpy as np
 from stickslip_ros.physics.measures.observer import MeasuredMotion, RunObserver
 from stickslip_ros.physics.motion.motion import Motion
 
-_STEPS_PER_PERIOD = 64
+_STEPS_PER_PERIOD = 60
 """Steps in a natural period, at least: a line through their ends is as good as the motion."""
 
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from stickslip_ros.physics.loop.motion_tracer import MotionTracer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver, RunObserver
@@ -28,19 +29,24 @@ def simulate_sampled(
     meter: CycleMeter,
     progress: Progress = lambda _: None,
     observer: MotionObserver | None = None,
+    recorder: TrajectoryRecorder | None = None,
 ) -> Measures:
     """Run `loop` over `motion` for `duration` (s), rounded to whole samples, and measure it.
 
     `motion` must record its breakpoints; `washout` None leaves the loop without control. An
-    `observer` sees the motion in blocks.
+    `observer` sees the motion in blocks; a `recorder` takes each sample with its answer, except
+    for the last one, which is not answered here.
     """
     samples = round(duration / loop.period)
     sample = loop.sample
     for number in range(1, samples + 1):
+        force = None
         if washout is not None:
             force = washout.answer(sample.stamp, sample.velocity)
             if force is not None:
                 loop.offer(sample.stamp, force)
+        if recorder is not None:
+            recorder.take(sample, force or 0.0)
         sample = loop.advance()
         if number % 1000 == 0 or number == samples or motion.unbounded:
             measure_block(motion, meter, observer)
@@ -58,15 +64,18 @@ def simulate_continuous(
     meter: CycleMeter,
     progress: Progress = lambda _: None,
     observer: RunObserver | None = None,
+    recorder: TrajectoryRecorder | None = None,
 ) -> Measures:
     """Run `motion` under the washout law acting without sampling (eq. 19) and measure it.
 
     `motion` must record its breakpoints and have been made for continuous control. The filter runs
     from the start, the gains act after `start_after` (s). An `observer` sees motion and forces, in
-    blocks.
+    blocks; a `recorder` takes samples at its rate.
     """
     tracer = None if observer is None else MotionTracer(motion, observer)
     advance = motion.advance if tracer is None else tracer.advance
+    if recorder is not None:
+        advance = recorder.sampling(motion, advance)
     free = duration if washout is None else min(washout.start_after, duration)
     block = 10.0 * motion.drive.natural_period
     done = 0.0
@@ -82,6 +91,8 @@ def simulate_continuous(
             done += step
             measure_block(motion, meter, tracer)
             progress(done / duration)
+    if recorder is not None:
+        recorder.take_due(motion)
     if motion.unbounded:
         meter.report_run_away()
     return meter.measures()
