@@ -1,5 +1,6 @@
 """A recorded run from its bag: a report of its measures and counts."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ def report_of_bag(
     window: int | None = None,
     namespace: str | None = None,
     observer: RunObserver | None = None,
+    take: Callable[[SampleColumns | ForceColumns], None] = lambda _: None,
 ) -> dict[str, Any]:
     """Return measures, counts and completeness of the recording at `path`, ready for JSON.
 
@@ -34,7 +36,8 @@ def report_of_bag(
     whole cycles of it (None: as many as the analyzer did). The drive is that in the ROS
     `namespace`, None where there is only one. `complete` says whether `missing`, sentences on what
     the bag lacks, is empty; `notes` are sentences on what makes the measures doubtful. A
-    `observer` sees all of the part; its times are those of `start` and `end`.
+    `observer` sees all of the part; its times are those of `start` and `end`. `take` gets its joint
+    states and its control forces as they are read, each in their order.
 
     Raises BagError for what is no bag or holds neither joint states nor control forces, and
     InvalidInputError for an empty part.
@@ -47,7 +50,7 @@ def report_of_bag(
             dropped_known=recording.dropped_known,
             observer=observer,
         )
-        run = _RunReader(meter, start, end, observer)
+        run = _RunReader(meter, start, end, observer, take)
         # To measure each chunk by itself would take twice as long.
         for block in recording.blocks(least=20_000):
             run.feed(*block)
@@ -75,10 +78,15 @@ class _RunReader:
     """Feeds a meter with the part of a run that lies between two instants."""
 
     def __init__(
-        self, meter: RunMeter, start: float, end: float, observer: RunObserver | None
+        self,
+        meter: RunMeter,
+        start: float,
+        end: float,
+        observer: RunObserver | None,
+        take: Callable[[SampleColumns | ForceColumns], None],
     ) -> None:
         self.meter = meter
-        self._observer = observer
+        self._observer, self._take = observer, take
         self.first: int | None = None
         """Stamp from which the instants count, ns, once there is one."""
         self.has_states = False
@@ -97,6 +105,7 @@ class _RunReader:
             part = states[self._part(states.stamp, first)]
             self.measured += len(part)
             self.meter.motion.feed(part)
+            self._take(part)
             if self._observer is not None:
                 time = (part.stamp - first) / NANOSECONDS
                 self._observer.take_friction(time, part.friction_force)
@@ -128,6 +137,7 @@ class _RunReader:
         forces, dropped = (each[self._part(each.stamp, first)] for each in (forces, dropped))
         self.measured += len(forces)
         self.meter.feed_forces(forces, dropped)
+        self._take(forces)
 
     def _part(self, stamp: IntArray, first: int) -> BoolArray:
         since = stamp - first

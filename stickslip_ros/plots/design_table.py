@@ -27,7 +27,7 @@ WORST = {
     "predicted_peak_force": ("peak force", "N"),
     "peak_force": ("simulated", "N"),
 }
-_CHECKS = {"belt_speed": ("belt speed", "m/s"), "vibrates": ("vibrates", "")} | WORST
+CHECKS = {"belt_speed": ("belt speed", "m/s"), "vibrates": ("vibrates", "")} | WORST
 
 
 def design_tables(name: str, found: Design) -> Iterator[TextTable | str]:
@@ -48,10 +48,9 @@ def design_tables(name: str, found: Design) -> Iterator[TextTable | str]:
             yield TextTable("to instability at any of these belt speeds", ["margins", ""], margins)
         checks = [asdict(check) for check in found.checks]
         columns = [
-            units.texts([check[key] for check in checks], unit)
-            for key, (_, unit) in _CHECKS.items()
+            units.texts([check[key] for check in checks], unit) for key, (_, unit) in CHECKS.items()
         ]
-        headings = [label for label, _ in _CHECKS.values()]
+        headings = [label for label, _ in CHECKS.values()]
         rows = list(zip(*columns, strict=True))
         yield TextTable("while it catches the vibration", headings, rows)
     if found.remark is not None:

@@ -17,6 +17,7 @@ from stickslip_ros.scenarios.parameters import (
     WashoutControllerParameters,
 )
 from stickslip_ros.scenarios.sections import PARAMETERS_KEY, ScenarioFile, read_file
+from stickslip_ros.tables import TextTable
 from stickslip_ros.text import did_you_mean
 
 DEFAULT_NAMESPACE = "/feed_drive"
@@ -26,7 +27,7 @@ LONGEST_NAMESPACE = 200
 _NAMED_BY_PATH = "a file is given by its path ending in .yaml"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scenario:
     """What one run is made of: the parameters of every node, and where they come from."""
 
@@ -93,6 +94,30 @@ class Scenario:
             given=self.given | given,
             **changes,
         )
+
+    def __repr__(self) -> str:
+        return "\n".join(self._table().lines())
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+    def _table(self) -> TextTable:
+        """Return the parameters of the drive and its controller, and others that are given."""
+        shown = [f"plant.{name}" for name in (*self.plant.drive_names(), "rate")]
+        if self.plant.expects_control:
+            shown += [f"washout_controller.{name}" for name in self.washout_controller.law_names()]
+        shown += sorted(self.given.difference(shown))
+        dimensionless = self.plant.as_drive().is_dimensionless
+        rows: list[list[str]] = []
+        for full_name in shown:
+            node, _, name = full_name.partition(".")
+            value, known = self._flat[node][name], known_parameters(NODE_PARAMETERS[node])[name]
+            text = f"{value:.10g}" if isinstance(value, float) else str(value)
+            unit = "" if dimensionless else known.unit or ""
+            note = "" if full_name in self.given else "default"
+            rows.append([full_name, f"{text} {unit}".rstrip(), note])
+        title = f"scenario {' '.join([self.name, *self.overrides])}"
+        return TextTable(title, ["", "", ""], rows)
 
     @cached_property
     def _flat(self) -> dict[str, dict[str, Any]]:
