@@ -38,9 +38,13 @@ def names_of(parameters: Iterable[str]) -> list[str]:
     return [keyword_of(parameter) for parameter in parameters]
 
 
-def attributes(quantity: Quantity, units: Units) -> dict[str, str]:
-    """Return the attributes of a variable, by the CF conventions; a number has the unit 1."""
-    return {"long_name": quantity.label, "units": units.of_unit(quantity.unit) or "1"}
+def _units(columns: Any, quantities: Mapping[str, Quantity], units: Units) -> dict[str, str]:
+    """Return the unit of each column that has numbers, by the CF conventions: 1 without any."""
+    return {
+        name: units.of_unit(quantity.unit) or "1"
+        for name, quantity in quantities.items()
+        if columns[name].dtype.kind in "fi"
+    }
 
 
 def made_of(scenario: Scenario) -> dict[str, str]:
@@ -61,9 +65,7 @@ def data_frame(
 ) -> Any:
     """Return columns as a pandas.DataFrame; its `attrs["units"]` has the unit of each."""
     frame = _optional("pandas").DataFrame(dict(columns))
-    frame.attrs["units"] = {
-        name: attributes(quantity, units)["units"] for name, quantity in quantities.items()
-    }
+    frame.attrs["units"] = _units(frame, quantities, units)
     return frame if index is None else frame.set_index(index)
 
 
@@ -77,7 +79,9 @@ def data_set(
     """Return variables, each with its dimensions, as an xarray.Dataset with units."""
     found = _optional("xarray").Dataset(dict(variables), dict(coordinates), dict(attrs))
     for name, quantity in quantities.items():
-        found[name].attrs.update(attributes(quantity, units))
+        found[name].attrs["long_name"] = quantity.label
+    for name, unit in _units(found, quantities, units).items():
+        found[name].attrs["units"] = unit
     return found
 
 
@@ -86,6 +90,6 @@ def _optional(package: str) -> Any:
         return import_module(package)
     except ModuleNotFoundError as error:
         raise RunError(
-            f"a table of {package} needs {error.name}, which is not installed: "
+            f"to_{package} needs {error.name}, which is not installed: "
             "pip install 'stickslip_ros[analysis]'"
         ) from None

@@ -141,7 +141,7 @@ def simulate(
     >>> import stickslip_ros as ss
     >>> run = ss.simulate("paper", duration=100)
     >>> len(run.trajectory), run.measures.regime.value
-    (10001, 'equilibrium')
+    (10001, 'pure_slip')
 
     """
     chosen = as_scenario(scenario)

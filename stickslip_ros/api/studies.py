@@ -100,7 +100,8 @@ class _Result(Shown):
         xarray.Dataset
             A variable for each column, with `units` and `long_name`. Its dimensions are the varied
             parameters by their keywords, or `point` for a random sample; `direction` for a sweep
-            that is carried on; `turning_point` for the turning points, filled up with NaN.
+            that is carried on; `turning_point` for the turning points, filled up with NaN. In
+            `regime` and `reason` "" stands for none.
 
         Raises
         ------
@@ -111,6 +112,7 @@ class _Result(Shown):
         plan = self.study.plan
         names = names_of(plan.parameters)
         values = self._values()
+        values |= {name: _texts(values[name]) for name in ("regime", "reason")}
         coordinates: dict[str, Any] = {}
         dimensions, shape = ["point"], [plan.size]
         if isinstance(plan, Grid):
@@ -174,7 +176,8 @@ class Sweep(_Result):
         """
         plan = self.study.plan
         assert isinstance(plan, Grid)
-        return {} if len(plan.axes) > 1 else theory.transitions(self.study, plan.axes[0])
+        axis, *others = plan.axes
+        return {} if others else theory.transitions(self.study, axis)
 
     def plot(self, colour: "Colour" = "regime") -> "Figure":
         """Return the figure that `stickslip sweep --plot` draws.
@@ -300,8 +303,8 @@ def sweep(
     --------
     >>> import stickslip_ros as ss
     >>> found = ss.sweep(ss.scenario("paper", expects_control=False), belt_speed=(0.40, 0.48, 9))
-    >>> found.columns.regime[[0, -1]].tolist()
-    [<Regime.STICK_SLIP: 'stick_slip'>, <Regime.EQUILIBRIUM: 'equilibrium'>]
+    >>> [regime.value for regime in found.columns.regime[[0, -1]]]
+    ['stick_slip', 'pure_slip']
 
     """
     if carry is not None and carry not in list(Carry):
@@ -415,6 +418,11 @@ def _course(course: SettlingCourse, transient: float | None, cycles: int | None)
         transient=course.transient if transient is None else transient,
         cycles=course.cycles if cycles is None else cycles,
     )
+
+
+def _texts(values: Any) -> Any:
+    """Return texts, of which some are None, as an array that a file can hold."""
+    return np.array([value or "" for value in values], dtype=str)
 
 
 def _padded(rows: tuple[tuple[float, ...], ...]) -> Any:

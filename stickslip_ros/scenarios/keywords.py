@@ -23,7 +23,7 @@ def parameter_of(keyword: str) -> str:
     Raises InvalidInputError for one that no node has, or that several nodes have.
     """
     known = _parameters()
-    found = known.get(keyword, ())
+    found: list[str] = [*known.get(keyword, ())]
     if not found:
         raise InvalidInputError(
             f"{keyword:.80}: no node has such a parameter; "
