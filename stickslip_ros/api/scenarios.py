@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.keywords import overrides_of
 
@@ -11,7 +12,11 @@ ScenarioLike = Scenario | str | Path
 
 
 def scenario(
-    name_or_path: ScenarioLike, /, *overrides: str, base: str | None = None, **parameters: Any
+    name_or_path: ScenarioLike,
+    /,
+    *overrides: str,
+    base: str | Path | None = None,
+    **parameters: Any,
 ) -> Scenario:
     """Return a scenario, with some parameters changed.
 
@@ -22,9 +27,9 @@ def scenario(
         scenario that is to be changed.
     *overrides : str
         Texts NODE.PARAMETER=VALUE, as after `-p` on the command line.
-    base : str, optional
-        Scenario that gives the parameters that the file omits. By default this is the one that the
-        section `scenario` of the file names.
+    base : str or Path, optional
+        Scenario that gives the parameters that the file omits, by its name or path. By default
+        this is the one that the section `scenario` of the file names.
     **parameters : Any
         Values in SI units. The keyword is the parameter's name with `_` for each `.`, such as
         `belt_speed`, `friction_static` or `initial_position`, where only one of plant, controller
@@ -52,9 +57,11 @@ def scenario(
 
     """
     texts = [*overrides, *overrides_of(parameters)]
-    if isinstance(name_or_path, Scenario):
-        return name_or_path.overridden(texts)
-    return load_scenario(str(name_or_path), texts, base=base)
+    if not isinstance(name_or_path, Scenario):
+        return load_scenario(str(name_or_path), texts, base=None if base is None else str(base))
+    if base is not None:
+        raise InvalidInputError(f"base = {base}: {name_or_path.name} is loaded, and needs no base")
+    return name_or_path.overridden(texts)
 
 
 def as_scenario(given: ScenarioLike) -> Scenario:

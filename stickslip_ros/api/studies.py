@@ -387,9 +387,8 @@ def basin(
     starts = ("position", POSITION, position), ("velocity", VELOCITY, velocity)
     for place, (name, parameter, given) in enumerate(starts):
         if given is not None:
-            # Of a sample only the ends matter.
-            values = (*given, 2) if sample is not None and len(given) == 2 else given
-            axes[place] = _axis(name, parameter, values)
+            ends = sample is not None and isinstance(given, tuple) and len(given) == 2
+            axes[place] = _axis(name, parameter, (*given, 2) if ends else given)
     plan = Grid(tuple(axes)) if sample is None else RandomSample(tuple(axes), sample, seed)
     course = _course(BASIN_COURSE, transient, cycles)
     study = basin_study(chosen, plan, course=course, continuous=continuous)

@@ -16,6 +16,7 @@ from stickslip_ros.studies.columns import COLUMNS
 EVERY = [
     f"{node}.{name}" for node, model in NODE_PARAMETERS.items() for name in known_parameters(model)
 ]
+SHIPPED = Path(__file__).parents[2] / "config"
 SHARED = {"autostart", "wait_for", "use_sim_time"}
 
 
@@ -116,7 +117,10 @@ def test_a_path_and_a_base(tmp_path: Path) -> None:
     file.write_text("/**/plant:\n  ros__parameters:\n    damping: 100.0\n")
     found = ss.scenario(file, base="feed_drive")
     assert (found.plant.damping, found.plant.mass) == (100.0, 100.0)
+    assert ss.scenario(file, base=SHIPPED / "feed_drive.yaml") == found
     assert ss.scenario(str(file)).plant.mass == 1.0
+    with pytest.raises(InvalidInputError, match="mine is loaded, and needs no base"):
+        ss.scenario(found, base="paper")
     with pytest.raises(InvalidInputError, match="did you mean feed_drive"):
         ss.scenario("feeddrive")
 

@@ -212,7 +212,8 @@ def test_a_basin_of_random_starts() -> None:
     ("options", "meant"),
     [
         ({"position": (0.0, 1.0)}, "position = (0.0, 1.0) is refused"),
-        ({"velocity": 1.0, "sample": None}, "velocity = 1.0 is refused"),
+        ({"velocity": 1.0}, "velocity = 1.0 is refused"),
+        ({"velocity": 1.0, "sample": 3}, "velocity = 1.0 is refused"),
         ({"sample": 0}, "0 points"),
         ({"sample": 3, "seed": -1}, "seed -1"),
     ],
