@@ -384,7 +384,10 @@ def basin(
     """
     chosen = as_scenario(scenario)
     axes = list(default_axes(chosen, COUNT))
-    starts = ("position", POSITION, position), ("velocity", VELOCITY, velocity)
+    starts: list[tuple[str, str, Any]] = [
+        ("position", POSITION, position),
+        ("velocity", VELOCITY, velocity),
+    ]
     for place, (name, parameter, given) in enumerate(starts):
         if given is not None:
             ends = sample is not None and isinstance(given, tuple) and len(given) == 2
