@@ -47,6 +47,7 @@ class RecordedRun(Shown):
     drive: Drive | None
     """The drive whose parameters were recorded; None where the bag does not tell it."""
     _history: RunHistory
+    """What the figure is drawn from."""
 
     @property
     def measures(self) -> Measures:
@@ -65,7 +66,6 @@ class RecordedRun(Shown):
         -------
         matplotlib.figure.Figure
             Motion, force, phase portrait, cycles and friction law.
-
         """
         from stickslip_ros.plots.run_figure import recorded_run_figure
 
@@ -87,7 +87,6 @@ class RecordedRun(Shown):
         ------
         RunError
             If pandas is not installed.
-
         """
         return data_frame(self._columns(), _COLUMNS, Units.for_drive(self.drive), index="time")
 
@@ -104,7 +103,6 @@ class RecordedRun(Shown):
         ------
         RunError
             If xarray is not installed.
-
         """
         columns = self._columns()
         time = columns.pop("time")
@@ -168,7 +166,6 @@ def read_bag(
     >>> recorded = ss.read_bag("bags/reference")
     >>> recorded.measures.regime.value, f"{recorded.measures.amplitude:.2e}"
     ('stick_slip', '3.26e-04')
-
     """
     bag = Path(path)
     history = RunHistory()

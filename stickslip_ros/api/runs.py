@@ -40,6 +40,7 @@ class Run(Shown):
     trajectory: Trajectory
     """The motion at the samples t = n/rate, as numpy arrays."""
     _history: RunHistory
+    """What the figure is drawn from."""
 
     def plot(self) -> "Figure":
         """Return the figure that `stickslip simulate --plot` draws.
@@ -48,7 +49,6 @@ class Run(Shown):
         -------
         matplotlib.figure.Figure
             Motion, force, phase portrait, cycles and friction law.
-
         """
         from stickslip_ros.plots.run_figure import simulated_run_figure
 
@@ -66,7 +66,6 @@ class Run(Shown):
         ------
         RunError
             If pandas is not installed.
-
         """
         return data_frame(vars(self.trajectory), _COLUMNS, self._units, index="time")
 
@@ -83,7 +82,6 @@ class Run(Shown):
         ------
         RunError
             If xarray is not installed.
-
         """
         columns = dict(vars(self.trajectory))
         time = columns.pop("time")
@@ -142,7 +140,6 @@ def simulate(
     >>> run = ss.simulate("paper", duration=100)
     >>> len(run.trajectory), run.measures.regime.value
     (10001, 'pure_slip')
-
     """
     chosen = as_scenario(scenario)
     length = simulation.default_duration(chosen) if duration is None else float(duration)

@@ -54,7 +54,6 @@ def scenario(
     (0.03, 0.35)
     >>> ss.scenario(drive, "washout_controller.linear_gain=-2000").washout_controller.linear_gain
     -2000.0
-
     """
     texts = [*overrides, *overrides_of(parameters)]
     if not isinstance(name_or_path, Scenario):

@@ -83,7 +83,6 @@ class _Result(Shown):
         ------
         RunError
             If pandas is not installed.
-
         """
         values = self._values()
         values |= {"turning_points": list(self.columns.turning_points)}
@@ -107,7 +106,6 @@ class _Result(Shown):
         ------
         RunError
             If xarray is not installed.
-
         """
         plan = self.study.plan
         names = names_of(plan.parameters)
@@ -196,7 +194,6 @@ class Sweep(_Result):
         ------
         InvalidInputError
             For a `colour` of a sweep over one parameter, and for an unknown one.
-
         """
         from stickslip_ros.plots.sweep_picture import sweep_figure
 
@@ -226,7 +223,6 @@ class Basin(_Result):
         -------
         matplotlib.figure.Figure
             Which motion each start leads to.
-
         """
         from stickslip_ros.plots.basin_picture import study_figure
 
@@ -305,7 +301,6 @@ def sweep(
     >>> found = ss.sweep(ss.scenario("paper", expects_control=False), belt_speed=(0.40, 0.48, 9))
     >>> [regime.value for regime in found.columns.regime[[0, -1]]]
     ['stick_slip', 'pure_slip']
-
     """
     if carry is not None and carry not in list(Carry):
         raise InvalidInputError(f"carry = {shown(carry)} is refused: must be up, down or both")
@@ -380,7 +375,6 @@ def basin(
     >>> drive = ss.scenario("paper", expects_control=False, belt_speed=0.46)
     >>> [attractor.share for attractor in ss.basin(drive, sample=20, seed=1).attractors]
     [1.0]
-
     """
     chosen = as_scenario(scenario)
     axes = list(default_axes(chosen, COUNT))

@@ -60,7 +60,6 @@ class Stability(Shown):
         ------
         InvalidInputError
             If there is no linear sampled loop, without a controller for example.
-
         """
         reason = stabilities.why_no_stability_map(self.scenario)
         if reason is not None:
@@ -98,7 +97,6 @@ def stability(scenario: ScenarioLike) -> Stability:
     >>> found = ss.stability("paper")
     >>> found.open_loop["stable"], found.closed_loop["stable"]
     (False, True)
-
     """
     chosen = as_scenario(scenario)
     found, notes = stabilities.stability(chosen)
@@ -142,7 +140,6 @@ class Proposal(Shown):
         ------
         RunError
             If there is nothing to propose.
-
         """
         scenario = self.design.scenario
         if scenario is None:
@@ -161,7 +158,6 @@ class Proposal(Shown):
         ------
         RunError
             If there is nothing to propose.
-
         """
         around = self.design.map_around()
         if around is None:
@@ -182,7 +178,6 @@ class Proposal(Shown):
         ------
         RunError
             If pandas is not installed.
-
         """
         columns = {name: [asdict(check)[name] for check in self.checks] for name in CHECKS}
         quantities = {name: Quantity(*labelled) for name, labelled in CHECKS.items()}
@@ -234,7 +229,6 @@ def design(
     >>> found = ss.design("feed_drive", belt_speed=0.04, force_limit=200)
     >>> found.scenario.washout_controller.force_limit
     200.0
-
     """
     chosen = as_scenario(scenario)
     if force_limit is not None:

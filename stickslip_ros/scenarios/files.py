@@ -71,9 +71,22 @@ class Scenario:
         return replace(self, **changes)
 
     def overridden(self, overrides: Sequence[str]) -> Self:
-        """Return the scenario with further overrides, texts NODE.PARAMETER=VALUE.
+        """Return the scenario with further overrides.
 
-        Raises InvalidInputError as `load_scenario` does.
+        Parameters
+        ----------
+        overrides : Sequence[str]
+            Texts NODE.PARAMETER=VALUE, the value written as in a scenario file.
+
+        Returns
+        -------
+        Scenario
+            The changed copy.
+
+        Raises
+        ------
+        InvalidInputError
+            If a name is unknown, or a value is not allowed.
         """
         by_node: dict[str, dict[str, Any]] = {}
         texts: dict[str, str] = {}

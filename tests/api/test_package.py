@@ -1,7 +1,6 @@
 """What `import stickslip_ros as ss` offers, and what it costs."""
 
 import ast
-import doctest
 import importlib.metadata
 import subprocess
 import sys
@@ -75,11 +74,3 @@ def test_the_old_package_of_that_name_does_not_hide_the_function() -> None:
         vars(ss).pop("scenario", None)
         for name in ("stickslip_ros.scenario.files", "stickslip_ros.scenario"):
             sys.modules.pop(name)
-
-
-@pytest.mark.parametrize("module", ["scenarios", "runs", "recordings", "theory", "studies"])
-def test_the_examples_of_the_docstrings(module: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(SOURCE)
-    failed, tried = doctest.testmod(import_module(f"stickslip_ros.api.{module}"))
-    assert tried > 0
-    assert failed == 0
