@@ -1,4 +1,4 @@
-"""A recorded run from its bag: a report of its measures and counts."""
+"""Report the measures and counts of a recorded run."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -14,9 +14,9 @@ from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
 _DEFAULT_WINDOW = 20
-"""Cycles to average over for a bag of somebody else's."""
+"""Cycles to average over for a bag of another recorder."""
 _LONGEST = 9e9
-"""Time, s, that stamps can tell."""
+"""Longest time, s, that stamps can express."""
 
 
 def report_of_bag(
@@ -29,18 +29,49 @@ def report_of_bag(
     observer: RunObserver | None = None,
     take: Callable[[SampleColumns | ForceColumns], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """Return measures, counts and completeness of the recording at `path`, ready for JSON.
+    """Return measures, counts and completeness of a recording, ready for JSON.
 
-    Only what lies from `start` on and before `end` (s after the first joint state or, where there
-    is none, the first force; a start of 0 leaves nothing out) is measured, over the last `window`
-    whole cycles of it (None: as many as the analyzer did). The drive is that in the ROS
-    `namespace`, None where there is only one. `complete` says whether `missing`, sentences on what
-    the bag lacks, is empty; `notes` are sentences on what makes the measures doubtful. A
-    `observer` sees all of the part; its times are those of `start` and `end`. `take` gets its joint
-    states and its control forces as they are read, each in their order.
+    Times count from the first joint state or, if there is none, from the first force.
 
-    Raises BagError for what is no bag or holds neither joint states nor control forces, and
-    InvalidInputError for an empty part.
+    Parameters
+    ----------
+    path : Path
+        A bag directory, or one MCAP file.
+    start : float
+        Start of the part that is measured, s; 0 includes everything from the beginning.
+    end : float
+        End of the part that is measured, s; samples at `end` are excluded.
+    window : int or None
+        Number of whole cycles at the end of the part over which the measures are averaged; None:
+        as many as the analyzer used.
+    namespace : str or None
+        ROS namespace of the drive; None if the bag holds only one drive.
+    observer : RunObserver or None
+        Receives the samples and cycles of the whole part, with times as in `start` and `end`.
+    take : callable, optional
+        Receives the joint states and the control forces of the part as they are read, each in
+        their order.
+
+    Returns
+    -------
+    dict
+        Measures (SI units) and counts by name. `complete` is True if `missing`, sentences on what
+        the bag lacks, is empty. `notes` are sentences on what makes the measures doubtful.
+
+    Raises
+    ------
+    BagError
+        If `path` is not a bag, or holds neither joint states nor control forces.
+    InvalidInputError
+        If the part is empty.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from stickslip_ros.bags.report import report_of_bag
+    >>> report = report_of_bag(Path("bags/reference"), start=1.0)
+    >>> report["complete"], report["samples"]
+    (True, 2001)
     """
     if not start < end:
         raise InvalidInputError(f"the part from {start} s to {end} s is empty")
@@ -51,7 +82,7 @@ def report_of_bag(
             observer=observer,
         )
         run = _RunReader(meter, start, end, observer, take)
-        # To measure each chunk by itself would take twice as long.
+        # Measuring each chunk by itself would take twice as long.
         for block in recording.blocks(least=20_000):
             run.feed(*block)
         run.finish()
@@ -70,12 +101,12 @@ def report_of_bag(
         before = "" if end == float("inf") else f" and before {end:g} s"
         raise InvalidInputError(f"{path} holds no samples from {start:g} s on{before}")
     if not run.has_states:
-        missing.append("the bag holds no joint states: nothing is known of the motion")
+        missing.append("the bag holds no joint states: the motion is unknown")
     return {**run.meter.report(), "complete": not missing, "missing": missing}
 
 
 class _RunReader:
-    """Feeds a meter with the part of a run that lies between two instants."""
+    """Feed a meter with the part of a run between two instants."""
 
     def __init__(
         self,
@@ -88,10 +119,10 @@ class _RunReader:
         self.meter = meter
         self._observer, self._take = observer, take
         self.first: int | None = None
-        """Stamp from which the instants count, ns, once there is one."""
+        """Stamp from which the instants count, ns, once it is known."""
         self.has_states = False
         self.measured = 0
-        """Joint states and forces in the part."""
+        """Number of joint states and forces in the part."""
         self._start, self._end = (
             round(min(instant, _LONGEST) * NANOSECONDS)
             for instant in (start if start > 0.0 else -_LONGEST, end)
@@ -111,13 +142,13 @@ class _RunReader:
                 self._observer.take_friction(time, part.friction_force)
         if self.first is None:
             self._early.append((forces, dropped))
-            if sum(len(forces.stamp) for forces, _ in self._early) > 1_000_000:  # for the memory
+            if sum(len(forces.stamp) for forces, _ in self._early) > 1_000_000:  # limits the memory
                 self._begin_without_states()
         else:
             self._feed_forces(forces, dropped, self.first)
 
     def finish(self) -> None:
-        """Measure what was kept back: the last forces, or all where there is no joint state."""
+        """Measure what is still pending: the last forces, or all if there is no joint state."""
         self._begin_without_states()
         self.meter.finish()
 

@@ -51,7 +51,7 @@ def test_what_is_lost_is_counted_by_the_stamps(tmp_path):
     assert (report["samples"], report["lost_samples"]) == (993, 7)
 
 
-def test_a_plant_that_was_started_anew_is_measured_from_wherever_its_stamps_begin(tmp_path):
+def test_a_restarted_plant_is_measured_from_its_first_stamp(tmp_path):
     with Recorder(tmp_path / "bag") as recorder:
         channel = recorder.add_topic(STATES, "sensor_msgs/msg/JointState", QosProfile(depth=10))
         for stamp in [*STAMPS, *(stamp - 4 * SECOND for stamp in STAMPS)]:
@@ -66,7 +66,7 @@ def test_without_joint_states_the_forces_are_measured_and_it_is_said(tmp_path):
     report = report_of_bag(tmp_path / "bag")
     assert report["peak_force"] == pytest.approx(14.99)
     assert (report["amplitude"], report["samples"], report["complete"]) == (None, 0, False)
-    assert report["missing"] == ["the bag holds no joint states: nothing is known of the motion"]
+    assert report["missing"] == ["the bag holds no joint states: the motion is unknown"]
 
 
 def test_without_forces_the_motion_is_measured(tmp_path):
@@ -141,5 +141,5 @@ def test_a_growing_bag_is_measured_as_far_as_it_goes(tmp_path):
                 report = report_of_bag(tmp_path / "bag")
                 assert report["samples"] == count
                 assert not report["complete"]
-                assert any("still at work" in sentence for sentence in report["missing"])
+                assert any("still running" in sentence for sentence in report["missing"])
     assert report_of_bag(tmp_path / "bag")["complete"]

@@ -1,4 +1,4 @@
-"""What an observer sees of a motion that is simulated, besides what is measured of it."""
+"""The forces of a simulated motion, for an observer."""
 
 from math import ceil
 
@@ -8,11 +8,11 @@ from stickslip_ros.physics.measures.observer import MeasuredMotion, RunObserver
 from stickslip_ros.physics.motion.motion import Motion
 
 _STEPS_PER_PERIOD = 60
-"""Steps in a natural period, at least: a line through their ends is as good as the motion."""
+"""Least number of steps in a natural period: a line through their ends then shows the motion."""
 
 
 class MotionTracer:
-    """Advances a motion in short steps, and shows an observer its forces along with the motion."""
+    """Advances a motion in short steps, and passes its forces and the motion to an observer."""
 
     def __init__(self, motion: Motion, observer: RunObserver) -> None:
         self._motion, self._observer = motion, observer
@@ -21,7 +21,7 @@ class MotionTracer:
         """Time (s) and force (N) from then on; time, and friction force (N) up to then."""
 
     def advance(self, duration: float) -> None:
-        """Advance the motion by `duration` (s), or until it runs away."""
+        """Advance the motion by `duration` (s), or until it is unbounded."""
         motion = self._motion
         steps = max(1, ceil(duration / motion.drive.natural_period * _STEPS_PER_PERIOD))
         for _ in range(steps):
@@ -33,7 +33,7 @@ class MotionTracer:
             self._forces.append((start, force, self._now, motion.friction_force))
 
     def take_motion(self, motion: MeasuredMotion) -> None:
-        """Pass the motion on to the observer, and the forces up to its end."""
+        """Pass the motion to the observer, and the forces up to its end."""
         start, force, end, friction = np.array(self._forces).reshape(-1, 4).T
         self._forces.clear()
         self._observer.take_motion(motion)

@@ -1,4 +1,4 @@
-"""The closed loop without ROS, sampled or continuous as in the paper, and its measures."""
+"""Simulation of the closed loop without ROS, sampled or continuous as in the paper."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from stickslip_ros.progress import Progress
 
 
 def measure_block(motion: Motion, meter: CycleMeter, observer: MotionObserver | None) -> None:
-    """Feed a meter, and show an observer, what `motion` has recorded since the last time."""
+    """Feed a meter, and an observer, with what `motion` has recorded since the last call."""
     breakpoints, belt_speed = motion.take_breakpoints(), motion.drive.belt_speed
     cycles = meter.feed(breakpoints, belt_speed)
     if observer is not None:
@@ -31,11 +31,56 @@ def simulate_sampled(
     observer: MotionObserver | None = None,
     recorder: TrajectoryRecorder | None = None,
 ) -> Measures:
-    """Run `loop` over `motion` for `duration` (s), rounded to whole samples, and measure it.
+    """Simulate the sampled loop and measure its motion.
 
-    `motion` must record its breakpoints; `washout` None leaves the loop without control. An
-    `observer` sees the motion in blocks; a `recorder` takes each sample with its answer, except
-    for the last one, which is not answered here.
+    Parameters
+    ----------
+    loop : SampledLoop
+        Loop to advance.
+    motion : Motion
+        Motion of `loop`; it must record its breakpoints.
+    washout : Washout or None
+        Controller that answers the samples; None for no control.
+    duration : float
+        Simulated time, s; rounded to whole samples.
+    meter : CycleMeter
+        Meter that receives the motion.
+    progress : callable, optional
+        Called with the completed share, 0 to 1, every 1000 samples.
+    observer : MotionObserver, optional
+        Receives the motion in blocks.
+    recorder : TrajectoryRecorder, optional
+        Takes each sample with the control force that answers it, except for the last sample, which
+        is not answered here.
+
+    Returns
+    -------
+    Measures
+        Measures over the last whole cycles.
+
+    Raises
+    ------
+    RunError
+        If the motion is so stiff that it would take too many steps.
+
+    Examples
+    --------
+    A washout controller suppresses the vibration:
+
+    >>> from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+    >>> from stickslip_ros.physics.loop.simulation import simulate_sampled
+    >>> from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
+    >>> from stickslip_ros.physics.measures import CycleMeter
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.motion import Motion
+    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
+    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
+    >>> motion = Motion(drive, position=0.0, velocity=0.0, record=True)
+    >>> loop = SampledLoop(motion, rate=1000.0, start=0)
+    >>> washout = Washout(WashoutParameters(20.0, linear_gain=-3000.0, cubic_gain=0.0))
+    >>> simulate_sampled(loop, motion, washout, 5.0, CycleMeter(20)).regime.value
+    'equilibrium'
     """
     samples = round(duration / loop.period)
     sample = loop.sample
@@ -66,11 +111,53 @@ def simulate_continuous(
     observer: RunObserver | None = None,
     recorder: TrajectoryRecorder | None = None,
 ) -> Measures:
-    """Run `motion` under the washout law acting without sampling (eq. 19) and measure it.
+    """Simulate a motion with the washout law acting without sampling (eq. 19), and measure it.
 
-    `motion` must record its breakpoints and have been made for continuous control. The filter runs
-    from the start, the gains act after `start_after` (s). An `observer` sees motion and forces, in
-    blocks; a `recorder` takes samples at its rate.
+    The filter runs from the start, and the gains act after `washout.start_after`.
+
+    Parameters
+    ----------
+    motion : Motion
+        Motion with continuous control that records its breakpoints.
+    washout : WashoutParameters or None
+        Constants of the controller; None for no control. `force_limit` is not used.
+    duration : float
+        Simulated time, s.
+    meter : CycleMeter
+        Meter that receives the motion.
+    progress : callable, optional
+        Called with the completed share, 0 to 1, every ten natural periods.
+    observer : RunObserver, optional
+        Receives motion and forces in blocks.
+    recorder : TrajectoryRecorder, optional
+        Takes samples at its rate.
+
+    Returns
+    -------
+    Measures
+        Measures over the last whole cycles.
+
+    Raises
+    ------
+    RunError
+        If the motion is so stiff that it would take too many steps.
+
+    Examples
+    --------
+    A washout controller without sampling suppresses the vibration:
+
+    >>> from stickslip_ros.physics.loop.simulation import simulate_continuous
+    >>> from stickslip_ros.physics.loop.washout import WashoutParameters
+    >>> from stickslip_ros.physics.measures import CycleMeter
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Stribeck
+    >>> from stickslip_ros.physics.motion import Motion
+    >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
+    ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
+    >>> motion = Motion(drive, 0.0, 0.0, continuous_control=True, record=True)
+    >>> washout = WashoutParameters(20.0, linear_gain=-3000.0, cubic_gain=0.0)
+    >>> simulate_continuous(motion, washout, 5.0, CycleMeter(20)).regime.value
+    'equilibrium'
     """
     tracer = None if observer is None else MotionTracer(motion, observer)
     advance = motion.advance if tracer is None else tracer.advance
