@@ -67,7 +67,7 @@ class RecordedRun(Shown):
         matplotlib.figure.Figure
             Motion, force, phase portrait, cycles and friction law.
         """
-        from stickslip_ros.plots.run_figure import recorded_run_figure
+        from stickslip_ros.plots.recorded_run import recorded_run_figure
 
         return shown_in_notebooks(
             recorded_run_figure(self.path, self.drive, self._history, self.report)

@@ -50,7 +50,7 @@ class Run(Shown):
         matplotlib.figure.Figure
             Motion, force, phase portrait, cycles and friction law.
         """
-        from stickslip_ros.plots.run_figure import simulated_run_figure
+        from stickslip_ros.plots.simulated_run import simulated_run_figure
 
         return shown_in_notebooks(simulated_run_figure(self.scenario, self._history, self.measures))
 

@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     }
     if plot is not None and history is not None:
         # Half as long again to import as everything else.
-        from stickslip_ros.plots.run_figure import recorded_run_figure
+        from stickslip_ros.plots.recorded_run import recorded_run_figure
 
         drive = recorded_drive(bags[0], arguments.namespace)
         write_picture(plot, recorded_run_figure(bags[0], drive, history, reports[str(bags[0])]))

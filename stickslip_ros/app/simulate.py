@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     if plot is not None and history is not None:
         # Half as long again to import as everything else.
-        from stickslip_ros.plots.run_figure import simulated_run_figure
+        from stickslip_ros.plots.simulated_run import simulated_run_figure
 
         write_picture(plot, simulated_run_figure(scenario, history, measures))
     if arguments.json:

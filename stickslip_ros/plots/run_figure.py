@@ -1,8 +1,7 @@
 """The picture of a run: motion, force, phase portrait, cycles and friction law."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -14,8 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of, with_trend
-from stickslip_ros.physics.model.disturbance import DisturbanceKind
+from stickslip_ros.physics.measures.cycle_measures import Measures, with_trend
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.decimation import intervals, peaks
 from stickslip_ros.plots.regimes import REGIMES
@@ -32,7 +30,6 @@ from stickslip_ros.plots.style import (
     styled,
 )
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.files import Scenario
 
 LAST_CYCLES = 5
 """Cycles that are enlarged, and are in the phase portrait."""
@@ -126,27 +123,6 @@ def run_figure(
         handles.append(Line2D([], [], **_DROPPED | {"ms": 6.0}, label="sent, did not act"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
-
-
-def simulated_run_figure(scenario: Scenario, history: RunHistory, measures: Measures) -> Figure:
-    """Return the picture of a simulated run of a scenario."""
-    disturbed = scenario.plant.disturbance.kind is not DisturbanceKind.NONE
-    title = " ".join([scenario.name, *scenario.overrides])
-    force = "control force and disturbance" if disturbed else "control force"
-    return run_figure(history, measures, scenario.plant.as_drive(), title=title, force=force)
-
-
-def recorded_run_figure(
-    bag: Path, drive: Drive | None, history: RunHistory, report: Mapping[str, Any]
-) -> Figure:
-    """Return the picture of a recorded run, from the `report` of its bag.
-
-    `drive` is None where the bag does not tell it.
-    """
-    notes = [*report["missing"], *report["notes"]]
-    if drive is None:
-        notes.append("the bag does not say what drive it was: no equilibrium, no friction law")
-    return run_figure(history, measures_of(report), drive, title=str(bag), notes=notes)
 
 
 class _Picture:

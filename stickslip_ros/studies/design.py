@@ -1,7 +1,7 @@
-"""Gains for a drive: those that damp it fastest within a force limit, tried out by simulation.
+"""Design of a washout controller: the gains that damp fastest within a force limit.
 
-What is proposed comes from the linear sampled loop and from the vibration without control. It is
-then tried on the drive itself, sampled, held and delayed as between the nodes.
+The proposal comes from the linear sampled loop and from the vibration without control. It is then
+checked by simulation of the drive, sampled, held and delayed as between the nodes.
 """
 
 from collections.abc import Callable
@@ -27,30 +27,31 @@ from stickslip_ros.studies.design_search import CUBIC_SHARES, RESERVE, Candidate
 from stickslip_ros.studies.design_task import Task
 
 _SHARE_OF_VIBRATIONS = 0.1
-"""Share of the work, about, that it is to find the vibrations without control."""
+"""Approximate share of the work that goes into the vibrations without control."""
 
 
 @dataclass(frozen=True)
 class Design:
-    """Gains for a task, or why there are none."""
+    """The proposed controller of a task, or the reason why there is none."""
 
     task: Task
+    """The task."""
     controller: WashoutParameters | None = None
-    """What is proposed; None if nothing does what is asked."""
+    """The proposed controller; None if no gains meet the task."""
     remark: str | None = None
-    """Why there is no proposal, or what must be said of it."""
+    """Why there is no proposal, or a caution about it."""
     slowest: LinearSampledLoop | None = None
-    """The loop at the belt speed at which a small deviation dies out most slowly."""
+    """The loop at the belt speed at which a small deviation decays most slowly."""
     margins: Margins | None = None
-    """Those of the loops of all speeds; None without control."""
+    """Smallest stability margins of the loops at all speeds; None without control."""
     checks: tuple[Check, ...] = ()
-    """In the order of the belt speeds."""
+    """Checks of the proposal, in order of belt speed."""
 
     @property
     def scenario(self) -> Scenario | None:
-        """The scenario of the task with what is proposed; None without a proposal or a scenario.
+        """The task's scenario with the proposal; None without a proposal or a scenario.
 
-        Its belt speed is that of the scenario, or the one in the range that is next to it.
+        Its belt speed is that of the scenario, or the nearest one within the range.
         """
         scenario = self.task.scenario
         if self.controller is None or scenario is None:
@@ -64,7 +65,10 @@ class Design:
 
     @property
     def parameter_file(self) -> str | None:
-        """The `scenario`, complete; without one the proposed gains alone."""
+        """Text of a parameter file with the proposal; None without one.
+
+        It contains the complete `scenario`, or the gains alone if the task has no scenario.
+        """
         if self.controller is None:
             return None
         if self.scenario is None:
@@ -74,18 +78,47 @@ class Design:
         return parameter_file(nodes)
 
     def map_around(self) -> StabilityMap | None:
-        """Return where the slowest loop is stable around the proposal; None without a proposal."""
+        """Return the stability map of the slowest loop around the proposal.
+
+        Returns
+        -------
+        StabilityMap or None
+            None without a proposal.
+        """
         if self.slowest is None or self.controller is None:
             return None
         return StabilityMap.around(self.slowest, self.controller.gains)
 
 
 def design(task: Task, progress: Progress = lambda _: None) -> Design:
-    """Return the gains that damp the slowest speed of the range fastest, and what they do.
+    """Find the gains with the fastest decay at the slowest belt speed of the range.
 
-    The force stays within the limit while the vibration is caught at any phase, the filter having
-    forgotten its start. What fails in simulation is not proposed: the next attempt is more
-    cautious, and after some the design says why there is none, and from which limit on there is.
+    The force stays within the limit when the control, its filter settled, is activated at any phase
+    of the vibration. Gains that fail in simulation are not proposed: the next attempt is more
+    cautious. If all attempts fail, the remark gives the reason and a sufficient force limit, if
+    one exists.
+
+    Parameters
+    ----------
+    task : Task
+        The drive, its loop, the force limit and the range of belt speeds.
+    progress : Callable[[float], None]
+        Receives the share of the work that is done, 0 to 1.
+
+    Returns
+    -------
+    Design
+        The proposal with its margins and checks, or the reason why there is none.
+
+    Examples
+    --------
+    >>> from stickslip_ros.scenarios.files import load_scenario
+    >>> from stickslip_ros.studies.design import Task, design
+    >>> overrides = ["washout_controller.force_limit=200"]
+    >>> task = Task.from_scenario(load_scenario("feed_drive", overrides), (0.03, 0.05))
+    >>> found = design(task)
+    >>> max(check.peak_force or 0.0 for check in found.checks) < 200.0
+    True
     """
     found = _design(task, progress)
     if task.scenario is None or task.scenario.plant.force_jitter == 0.0:
@@ -106,20 +139,20 @@ def _design(task: Task, progress: Progress) -> Design:
         progress(_SHARE_OF_VIBRATIONS * number / len(drives))
         if vibrations[-1].regime is Regime.UNBOUNDED:
             speed = task.shown(drive.belt_speed, "m/s")
-            reason = f"without control the motion runs away at a belt speed of {speed}"
-            return Design(task, remark=f"{reason}, so there is no limit cycle to catch it from")
+            reason = f"without control the motion diverges at a belt speed of {speed}"
+            return Design(task, remark=f"{reason}, so there is no limit cycle to suppress")
     candidates = Candidates(task, vibrations)
     found = _propose(bench, candidates, progress)
     if found.controller is None and not isinf(task.force_limit):
         enough = _sufficient_limit(bench, candidates)
         if enough is not None:
             limit = f"a force limit of about {task.shown(enough, 'N')}"
-            return replace(found, remark=f"{found.remark}; from {limit} on there is a proposal")
+            return replace(found, remark=f"{found.remark}; {limit} is sufficient")
     return found
 
 
 def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Design:
-    """Return a proposal that was tried out, or why there is none."""
+    """Return a proposal that was checked by simulation, or the reason why there is none."""
     task, drives = candidates.task, candidates.task.drives()
     strength, shares = RESERVE, CUBIC_SHARES
     failure: str | None = None
@@ -170,9 +203,9 @@ def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Desi
 
 
 def _sufficient_limit(bench: Bench, candidates: "Candidates") -> float | None:
-    """Return the lowest force limit (N) with which there is a proposal, to a few per cent.
+    """Return the lowest force limit (N) for which there is a proposal, to a few per cent.
 
-    None where even a force without limit does not do.
+    None if even a force without limit does not suffice.
     """
 
     def simulated(limit: float) -> Design:
@@ -193,10 +226,10 @@ def _sufficient_limit(bench: Bench, candidates: "Candidates") -> float | None:
             low, high = (low, middle) if does(middle) else (middle, high)
         return low, rounded(high, up=True)
 
-    # What decays more slowly takes too long to be tried, and needs hardly less force.
+    # A slower decay takes too long to simulate, and needs hardly less force.
     slowest = 0.01 / candidates.task.drive.natural_period
     limit = least = candidates.task.force_limit
-    # To try one limit takes longer than to narrow it down in theory.
+    # One simulated limit takes longer than bisection with the linear theory.
     enough = candidates.free_peak_force() / RESERVE
     if enough > limit:
         least, enough = narrowed(in_theory, limit, enough)

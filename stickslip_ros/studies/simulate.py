@@ -1,4 +1,4 @@
-"""The closed loop of a scenario without ROS, measured on the motion itself."""
+"""Simulation of a scenario's closed loop without ROS, measured on the motion itself."""
 
 from math import isfinite
 
@@ -36,8 +36,8 @@ def simulate(
 ) -> Measures:
     """Return the measures of the scenario's motion over `duration` (s).
 
-    An `observer` sees the motion, a `recorder` takes its samples. Raises InvalidInputError for a
-    duration that is none, and for what `continuous` control does not have.
+    An `observer` receives the motion, a `recorder` takes its samples. Raises InvalidInputError for
+    a duration that is not allowed, or if `continuous` control does not support the scenario.
     """
     if not 0.0 <= duration < float("inf"):
         raise InvalidInputError(f"a duration of {duration:g} s: must be finite, 0 or more")
