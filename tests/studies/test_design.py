@@ -1,4 +1,4 @@
-"""Gains for a drive, and whether they meet the stated requirements."""
+"""Gains for a drive, and whether they do what they are said to."""
 
 import re
 from dataclasses import replace
@@ -245,7 +245,7 @@ def test_next_to_no_margin_is_said() -> None:
     late = designed(replace(FEED, force_delay=0.018, belt_speeds=(0.02, 0.04)))
     assert late.margins is not None
     assert late.margins.delay == pytest.approx(2e-4, rel=0.1)
-    assert "the margin is very small: an additional delay of 0.0001" in (late.remark or "")
+    assert "next to no margin: a further delay of 0.0001" in (late.remark or "")
     assert "margin" not in (designed(FEED).remark or "")
 
 
@@ -253,7 +253,7 @@ def test_next_to_no_margin_is_said() -> None:
     ("belt_speed", "said"),
     [
         (40.0, "40 m/s is 818.4 times the Hopf speed of 0.04888 m/s (belt speeds are in m/s)"),
-        (0.05, "(belt speeds are in m/s), with a very small margin"),
+        (0.05, "(belt speeds are in m/s), with next to no margin"),
     ],
 )
 def test_zero_gains_come_with_the_distance_from_the_hopf_speed(
