@@ -1,4 +1,4 @@
-"""Results as objects of pandas and xarray, which are imported when they are asked for."""
+"""Results as pandas and xarray objects; both packages are imported on first use."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
@@ -15,19 +15,19 @@ from stickslip_ros.versions import versions
 
 
 class Quantity(NamedTuple):
-    """What a column is: its label and SI unit."""
+    """Label and SI unit of a column."""
 
     label: str
     unit: str = ""
 
 
 def of_measure(name: str) -> Quantity:
-    """Return what the column of a measure is."""
+    """Return label and unit of a measure."""
     return Quantity(*LABELS.get(name, (name.replace("_", " "), "")))
 
 
 def of_parameter(parameter: str) -> Quantity:
-    """Return what the column of NODE.PARAMETER is."""
+    """Return label and unit of NODE.PARAMETER."""
     node, _, name = parameter.partition(".")
     known = known_parameters(NODE_PARAMETERS[node])[name]
     return Quantity(known.meaning.rstrip("."), known.unit or "")
@@ -48,7 +48,7 @@ def _units(columns: Any, quantities: Mapping[str, Quantity], units: Units) -> di
 
 
 def made_of(scenario: Scenario) -> dict[str, str]:
-    """Return the attributes of a data set: what it was made from."""
+    """Return the attributes of a data set: scenario, overrides and version."""
     return {
         "scenario": scenario.name,
         "overrides": " ".join(scenario.overrides),

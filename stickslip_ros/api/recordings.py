@@ -1,4 +1,4 @@
-"""Recorded runs: what a bag holds, and the measures of it."""
+"""Recorded runs: the samples in a bag, and their measures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -45,9 +45,9 @@ class RecordedRun(Shown):
     report: Mapping[str, Any]
     """Measures, counts and completeness, as `stickslip report --json` has them."""
     drive: Drive | None
-    """The drive whose parameters were recorded; None where the bag does not tell it."""
+    """The drive whose parameters were recorded; None if the bag does not hold them."""
     _history: RunHistory
-    """What the figure is drawn from."""
+    """The data of the figure."""
 
     @property
     def measures(self) -> Measures:
@@ -56,7 +56,7 @@ class RecordedRun(Shown):
 
     @property
     def missing(self) -> list[str]:
-        """What the bag lacks, in sentences."""
+        """What is missing in the bag, in sentences."""
         return self.report["missing"]
 
     def plot(self) -> "Figure":
@@ -142,7 +142,7 @@ def read_bag(
     Parameters
     ----------
     path : Path or str
-        Bag directory or one MCAP file, also one that is still recorded, cut off or damaged.
+        Bag directory or one MCAP file, also one that is being recorded, cut off or damaged.
     start, end : float
         Part to read, s from the first sample.
     namespace : str, optional
@@ -156,9 +156,9 @@ def read_bag(
     Raises
     ------
     BagError
-        For what is no bag, or holds neither joint states nor control forces.
+        If `path` is not a bag, or holds neither joint states nor control forces.
     InvalidInputError
-        For an empty part.
+        If the part is empty.
 
     Examples
     --------

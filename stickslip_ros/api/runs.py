@@ -29,7 +29,7 @@ class Run(Shown):
     """A simulated run; it prints as a table of its measures."""
 
     scenario: Scenario
-    """What was simulated."""
+    """The scenario that was simulated."""
     duration: float
     """Simulated time, s."""
     continuous: bool
@@ -40,7 +40,7 @@ class Run(Shown):
     trajectory: Trajectory
     """The motion at the samples t = n/rate, as numpy arrays."""
     _history: RunHistory
-    """What the figure is drawn from."""
+    """The data of the figure."""
 
     def plot(self) -> "Figure":
         """Return the figure that `stickslip simulate --plot` draws.
@@ -114,14 +114,14 @@ def simulate(
     Parameters
     ----------
     scenario : Scenario, str or Path
-        What to simulate, or its name or path.
+        The scenario, its name or its path.
     duration : float, optional
         Simulated time, s. By default this is the scenario's own duration, or 200 natural periods.
     continuous : bool
         Let the controller act without sampling, as in the paper's eq. 19. By default its force is
         held from sample to sample, as between the nodes.
-    progress : callable
-        Takes the share that is done, from 0 to 1.
+    progress : callable, optional
+        Receives the share that is done, 0 to 1.
 
     Returns
     -------
@@ -131,8 +131,8 @@ def simulate(
     Raises
     ------
     InvalidInputError
-        For a scenario or a duration that is not allowed, and for what continuous control does not
-        have.
+        If the scenario or the duration is not allowed, or if continuous control does not support
+        the scenario.
 
     Examples
     --------

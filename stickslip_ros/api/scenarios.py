@@ -43,8 +43,8 @@ def scenario(
     Raises
     ------
     InvalidInputError
-        For a scenario, a parameter or a value that is not allowed, and for a keyword that several
-        nodes have.
+        If the scenario, a parameter or a value is not allowed, or if several nodes have a keyword's
+        parameter.
 
     Examples
     --------

@@ -61,9 +61,9 @@ class _Result(Shown):
     """The points of a study as columns."""
 
     study: Study
-    """What was computed: scenario, points, and how long each motion was followed."""
+    """The scenario, its points, and how long each motion was simulated."""
     columns: Columns
-    """What became of each point, as numpy arrays."""
+    """The result of each point, as numpy arrays."""
 
     @property
     def scenario(self) -> Scenario:
@@ -164,13 +164,13 @@ class _Result(Shown):
 
 
 class Sweep(_Result):
-    """What a scenario settles on over one parameter or two; it prints as a table of regimes."""
+    """Settled motions over one or two parameters; it prints as a table of regimes."""
 
     @cached_property
     def transitions(self) -> Mapping[str, list[float]]:
-        """Where theory has the Hopf point and the limits of sticking, by name, SI units.
+        """Values at the Hopf point and the limits of sticking, by theory; SI units.
 
-        Of a sweep over two parameters there are none: the map has them as curves.
+        A sweep over two parameters has none here: its figure shows them as curves.
         """
         plan = self.study.plan
         assert isinstance(plan, Grid)
@@ -193,7 +193,7 @@ class Sweep(_Result):
         Raises
         ------
         InvalidInputError
-            For a `colour` of a sweep over one parameter, and for an unknown one.
+            If `colour` is unknown, or given for a sweep over one parameter.
         """
         from stickslip_ros.plots.sweep_picture import sweep_figure
 
@@ -204,7 +204,7 @@ class Sweep(_Result):
 
 
 class Basin(_Result):
-    """Which motion each start leads to; it prints as a table of these motions."""
+    """The motion that each start leads to; it prints as a table of these motions."""
 
     @cached_property
     def basins(self) -> Basins:
@@ -253,12 +253,12 @@ def sweep(
     progress: CountPoints = lambda _: None,
     **parameters: Values,
 ) -> Sweep:
-    """Measure what a scenario settles on, over the values of one parameter or two.
+    """Measure the settled motion of a scenario over the values of one or two parameters.
 
     Parameters
     ----------
     scenario : Scenario, str or Path
-        What to vary, or its name or path.
+        The scenario, its name or its path.
     *axes : str
         Texts NODE.PARAMETER=A:B:COUNT or NODE.PARAMETER=A:B:COUNT:log, as after `--over` on the
         command line.
@@ -268,17 +268,18 @@ def sweep(
     continuous : bool
         Let the controller act without sampling, which takes a fraction of the time.
     transient : float, optional
-        Natural periods that are passed over at each point (200).
+        Natural periods before the measurement at each point (200).
     cycles : int, optional
-        Whole cycles that are measured then (4).
+        Whole cycles to measure (4).
     workers : int
-        Processes that share the points. A script needs `if __name__ == "__main__":` then.
+        Processes that share the points. With more than one a script needs
+        `if __name__ == "__main__":`.
     executor : concurrent.futures.Executor, optional
         Computes the points instead, on a cluster for example.
     journal : Path, optional
         File from which a sweep that was interrupted continues.
-    progress : callable
-        Takes the number of points that are done.
+    progress : callable, optional
+        Receives the number of points that are done.
     **parameters : tuple
         `(first, last, count)` or `(first, last, count, "log")` by keyword as for `scenario`, SI
         units, ends included.
@@ -291,7 +292,7 @@ def sweep(
     Raises
     ------
     InvalidInputError
-        For what is not allowed.
+        If an argument is not allowed.
     RunError
         If worker processes keep dying.
 
@@ -339,12 +340,12 @@ def basin(
     journal: Path | None = None,
     progress: CountPoints = lambda _: None,
 ) -> Basin:
-    """Find which motion each start leads to, and the share of the starts that each motion gets.
+    """Find the motion that each start leads to, and the share of the starts of each motion.
 
     Parameters
     ----------
     scenario : Scenario, str or Path
-        What to start, or its name or path.
+        The scenario, its name or its path.
     position, velocity : tuple, optional
         `(first, last, count)` of the starts, m and m/s; of a sample `(first, last)` is enough. By
         default 40 each, about twice as far to either side as a vibration goes.
@@ -354,7 +355,7 @@ def basin(
     seed : int
         Which sample it is, 0 or more.
     continuous, transient, cycles, workers, executor, journal, progress
-        As for `sweep`; the transient is 50 natural periods, and repeated until the motion is
+        As for `sweep`. The transient is 50 natural periods and is repeated until the motion is
         steady.
 
     Returns
@@ -365,7 +366,7 @@ def basin(
     Raises
     ------
     InvalidInputError
-        For what is not allowed.
+        If an argument is not allowed.
     RunError
         If worker processes keep dying.
 

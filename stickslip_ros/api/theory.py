@@ -1,4 +1,4 @@
-"""Theory and design: what is known of a scenario without running it, and gains for it."""
+"""Theory and design: the stability of a scenario, and gains for it."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Stability(Shown):
-    """What theory says of a scenario; it prints as tables. SI units; None is what does not exist.
+    """Results of theory for a scenario; it prints as tables. SI units; None does not exist.
 
     The keys are those of `stickslip stability --json`.
     """
 
     scenario: Scenario
-    """What it is about."""
+    """The scenario that was analyzed."""
     equilibrium_position: float | None
     """Displacement of a slide at rest, m."""
     open_loop: Mapping[str, Any]
@@ -44,7 +44,7 @@ class Stability(Shown):
     sampled_loop: Mapping[str, Any]
     """Stability and settling of the loop as the nodes run it."""
     closed_forms: Mapping[str, Any] | None
-    """What can be written down for the cubic Stribeck law."""
+    """Closed forms for the cubic Stribeck law; None for other laws."""
     notes: Mapping[str, str]
     """Why a value does not exist, by its place."""
 
@@ -79,17 +79,17 @@ def stability(scenario: ScenarioLike) -> Stability:
     Parameters
     ----------
     scenario : Scenario, str or Path
-        What to analyze, or its name or path.
+        The scenario, its name or its path.
 
     Returns
     -------
     Stability
-        What theory says, by section.
+        Results by section.
 
     Raises
     ------
     InvalidInputError
-        For a scenario that is not allowed.
+        If the scenario is not allowed.
 
     Examples
     --------
@@ -108,7 +108,7 @@ class Proposal(Shown):
     """Gains for a range of belt speeds; it prints as tables."""
 
     design: designing.Design
-    """The task, what is proposed, and what was tried."""
+    """The task, the proposal and its checks."""
 
     @property
     def controller(self) -> WashoutParameters | None:
@@ -117,17 +117,17 @@ class Proposal(Shown):
 
     @property
     def remark(self) -> str | None:
-        """Why there is no proposal, or what must be said of it."""
+        """Why there is no proposal, or a caution about it."""
         return self.design.remark
 
     @property
     def margins(self) -> designing.Margins | None:
-        """How far the gain and the delay are from instability; None without control."""
+        """Stability margins of gain and delay; None without control."""
         return self.design.margins
 
     @property
     def checks(self) -> tuple[designing.Check, ...]:
-        """What the proposal does at each belt speed, predicted and simulated."""
+        """Checks of the proposal at each belt speed, predicted and simulated."""
         return self.design.checks
 
     @property
@@ -200,28 +200,28 @@ def design(
     force_limit: float | None = None,
     progress: Progress = lambda _: None,
 ) -> Proposal:
-    """Propose gains that damp the vibration within a force limit, tried out by simulation.
+    """Propose gains that damp the vibration within a force limit, checked by simulation.
 
     Parameters
     ----------
     scenario : Scenario, str or Path
-        The drive and its loop, or its name or path; its gains do not matter.
+        The scenario, its name or its path; its gains are not used.
     belt_speed : float or tuple, optional
         One belt speed, or lowest and highest, m/s. By default within 10 % of the scenario's.
     force_limit : float, optional
         Largest force, N. By default this is the scenario's.
-    progress : callable
-        Takes the share that is done, from 0 to 1.
+    progress : callable, optional
+        Receives the share that is done, 0 to 1.
 
     Returns
     -------
     Proposal
-        The gains, and what they do; or why there are none.
+        The gains with their margins and checks, or the reason why there are none.
 
     Raises
     ------
     InvalidInputError
-        For what is not allowed.
+        If an argument is not allowed.
 
     Examples
     --------

@@ -24,6 +24,7 @@ from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.transitions import TransitionMap, transition_map, transitions
+from stickslip_ros.text import shown
 
 _FULL: Any = {"mew": 0.0}
 _HOLLOW: Any = {"mfc": "white", "mew": 0.8}
@@ -51,12 +52,17 @@ Colour = Literal["regime", "amplitude", "stick_fraction"]
 def sweep_figure(columns: Columns, study: Study, colour: Colour = "regime") -> Figure:
     """Return the bifurcation diagram of a sweep over one parameter, the map of one over two.
 
-    Raises InvalidInputError for another `colour` than the regime in a diagram.
+    Raises InvalidInputError for an unknown `colour`, and in a diagram for any but the regime.
     """
+    colours = ("regime", *_MEASURES)
+    if colour not in colours:
+        raise InvalidInputError(
+            f"colour = {shown(colour)} is refused: must be one of {', '.join(colours)}"
+        )
     if len(_grid(study).axes) == 2:
         return map_figure(columns, study, colour)
     if colour != "regime":
-        raise InvalidInputError(f"colour {colour}: is for maps, of two parameters")
+        raise InvalidInputError(f"colour = {colour}: is for maps, of two parameters")
     return diagram_figure(columns, study)
 
 

@@ -64,6 +64,8 @@ def test_a_map_has_two_dimensions() -> None:
     found = ss.sweep(FREE, belt_speed=(0.3, 0.5, 3), damping=(0.01, 0.1, 2, "log"), **SHORT)
     assert found.transitions == {}
     assert isinstance(found.plot("amplitude"), Figure)
+    with pytest.raises(InvalidInputError, match="must be one of regime, amplitude, stick_fraction"):
+        found.plot("velocity")  # pyright: ignore
     data = found.to_xarray()
     assert data["amplitude"].dims == ("belt_speed", "damping")
     assert np.array_equal(data["amplitude"].to_numpy().ravel(), found.columns.amplitude)
@@ -136,7 +138,7 @@ def test_units_are_those_of_the_drive() -> None:
         ({"belt_speed": (0.1, 0.1, 3)}, {}, "two different finite numbers"),
         ({"mass": (-1.0, 1.0, 3)}, {}, "mass = -1.0 is refused"),
         ({"window": (1, 3, 3)}, {}, "analyzer"),
-        ({"friction_law": (1, 3, 3)}, {}, "is no number"),
+        ({"friction_law": (1, 3, 3)}, {}, "plant.friction.law: is no"),
         ({"linear_gain": (-2, 0, 3)}, {}, "without control there is no controller"),
         ({}, {}, "0 parameters: a sweep is over one or two"),
         ({"belt_speed": (0.1, 0.2, 3)}, {"carry": "left"}, "carry = 'left' is refused"),
