@@ -16,6 +16,7 @@ EXECUTABLES = {
     "stickslip": "stickslip_ros.app.main:main",
 }
 
+ANALYSIS = ["pandas>=2.2.2", "xarray>=2024.6"]  # pandas: the first built for numpy 2
 DASHBOARD = ["fastapi", "nicegui>=3", "orjson", "uvicorn"]
 
 STUB = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
@@ -79,6 +80,8 @@ setup(
         "zstandard>=0.22",  # the oldest wheels for 3.12
     ],
     extras_require={
+        # Results as tables and data sets (to_pandas, to_xarray).
+        "analysis": ANALYSIS,
         # A web page that shows a run (stickslip dashboard); all but NiceGUI are what it stands on.
         "dashboard": DASHBOARD,
         # Studies on a cluster (stickslip sweep --dask).
@@ -86,6 +89,7 @@ setup(
         # ROS itself, where none is installed; the message packages come with these two.
         "ros": ["ros-jazzy-common-interfaces", "ros-jazzy-rclpy[fastrtps]"],
         "test": [
+            *ANALYSIS,
             *DASHBOARD,
             "distributed",
             "hypothesis",

@@ -1,10 +1,80 @@
-"""Stick-slip vibration of a feed drive: simulated, controlled and measured as ROS 2 nodes."""
+"""Stick-slip vibration of a feed drive: simulated, controlled and measured.
+
+    import stickslip_ros as ss
+
+    run = ss.simulate(ss.scenario("feed_drive", belt_speed=0.03), duration=10)
+    run.measures, run.plot(), run.to_pandas()
+
+The names below are loaded when they are first used: importing the package takes a few milliseconds.
+"""
 
 from stickslip_ros.interrupts import NODE_SCRIPTS, end_quietly_if_interrupted, is_run
 
 if is_run(__name__, "stickslip", *NODE_SCRIPTS):
     end_quietly_if_interrupted()
 
-from stickslip_ros.deprecated_names import find_moved_modules  # what takes time comes second
+from typing import TYPE_CHECKING, Any  # what takes time comes second
+
+from stickslip_ros.deprecated_names import find_moved_modules
+
+if TYPE_CHECKING:
+    from stickslip_ros.api.recordings import RecordedRun, read_bag
+    from stickslip_ros.api.runs import Run, simulate
+    from stickslip_ros.api.scenarios import scenario
+    from stickslip_ros.api.studies import Basin, Sweep, basin, sweep
+    from stickslip_ros.api.theory import Proposal, Stability, design, stability
+    from stickslip_ros.errors import StickslipError
+    from stickslip_ros.scenarios.files import Scenario
+
+    __version__: str
 
 find_moved_modules()
+
+__all__ = [
+    "Basin",
+    "Proposal",
+    "RecordedRun",
+    "Run",
+    "Scenario",
+    "Stability",
+    "StickslipError",
+    "Sweep",
+    "__version__",
+    "basin",
+    "design",
+    "read_bag",
+    "scenario",
+    "simulate",
+    "stability",
+    "sweep",
+]
+
+_HOMES = {
+    "api.recordings": ("RecordedRun", "read_bag"),
+    "api.runs": ("Run", "simulate"),
+    "api.scenarios": ("scenario",),
+    "api.studies": ("Basin", "Sweep", "basin", "sweep"),
+    "api.theory": ("Proposal", "Stability", "design", "stability"),
+    "errors": ("StickslipError",),
+    "scenarios.files": ("Scenario",),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its module (PEP 562)."""
+    from importlib import import_module, metadata
+
+    if name == "__version__":
+        value: Any = metadata.version(__name__)
+    else:
+        home = next((module for module, names in _HOMES.items() if name in names), None)
+        if home is None:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = getattr(import_module(f"{__name__}.{home}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return the names of the package, those that are not loaded yet included."""
+    return sorted({*globals(), *__all__})

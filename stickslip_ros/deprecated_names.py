@@ -107,6 +107,19 @@ class _MovedModules(MetaPathFinder, Loader):
 
     def exec_module(self, module: ModuleType) -> None:
         vars(module)["__getattr__"] = moved_from(module.__name__)
+        if module.__name__ == "stickslip_ros.scenario":
+            module.__class__ = _CallableScenario
+
+
+class _CallableScenario(ModuleType):
+    """The package that was `stickslip_ros.scenario`, where a public function of that name is now.
+
+    The import system puts it in the place of that function.
+    """
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        function = import_module("stickslip_ros.api.scenarios").scenario
+        return function(*arguments, **options)
 
 
 def find_moved_modules() -> None:

@@ -3,8 +3,6 @@
 import argparse
 from dataclasses import asdict
 
-import numpy as np
-
 from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
@@ -16,20 +14,18 @@ from stickslip_ros.app.arguments import (
 from stickslip_ros.app.output import print_table
 from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.plots.units import Units
+from stickslip_ros.plots.basin_table import basin_table
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.basin import (
+    COUNT,
     COURSE,
     POSITION,
     VELOCITY,
-    Attractor,
     Basins,
     basin_study,
     default_axes,
 )
 from stickslip_ros.studies.columns import Columns
-from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Grid, Plan, RandomSample
 
 HELP = "find which motion each start leads to, and the share of starts that each motion gets"
@@ -37,9 +33,6 @@ HELP = "find which motion each start leads to, and the share of starts that each
 _DESCRIPTION = f"""{HELP} (basin stability), over a grid of starts or a random sample. A start is a
 displacement and a velocity of the slide; the washout filter is at rest. Each motion is followed
 until it is steady, for {COURSE.patience} transients at most."""
-
-_COUNT = 40
-"""Positions and velocities of the grid."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,8 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             f"--{name}",
             metavar="A:B:COUNT",
-            help=f"{what} of the grid, {unit}, as in --{name} -2:2:{_COUNT} (of a --sample A:B "
-            f"will do; default: {_COUNT}, twice as far to either side as a vibration goes, about)",
+            help=f"{what} of the grid, {unit}, as in --{name} -2:2:{COUNT} (of a --sample A:B "
+            f"will do; default: {COUNT}, twice as far to either side as a vibration goes, about)",
         )
     parser.add_argument(
         "--sample",
@@ -83,11 +76,14 @@ def run(arguments: argparse.Namespace) -> int:
         basins = Basins.from_points(journal.points())
         made = {"attractors": [asdict(attractor) for attractor in basins.attractors]}
         if arguments.plot is not None:
-            _draw(arguments, journal, basins)
+            # Half as long again to import as everything else.
+            from stickslip_ros.plots.basin_picture import study_figure
+
+            columns = Columns.from_journal(journal)
+            write_picture(arguments.plot, study_figure(columns, basins, study))
         write_results(arguments, journal, {"attractor": basins.place}, made)
         if not arguments.json:
-            title = f"{scenario.name}, {study.plan.size} starts"
-            _print(title, basins, Units.for_drive(scenario.plant.as_drive()))
+            print_table(*basin_table(study, basins))
     return 0
 
 
@@ -96,7 +92,7 @@ def _plan(arguments: argparse.Namespace, scenario: Scenario) -> Plan:
         raise InvalidInputError(f"--seed {arguments.seed}: is for a random --sample")
     if arguments.seed is not None and arguments.seed < 0:
         raise InvalidInputError(f"--seed {arguments.seed}: must be 0 or more")
-    axes = list(default_axes(scenario, _COUNT))
+    axes = list(default_axes(scenario, COUNT))
     for place, (option, parameter) in enumerate((("position", POSITION), ("velocity", VELOCITY))):
         text: str | None = getattr(arguments, option)
         if text is None:
@@ -111,55 +107,3 @@ def _plan(arguments: argparse.Namespace, scenario: Scenario) -> Plan:
     if arguments.sample is None:
         return Grid(tuple(axes))
     return RandomSample(tuple(axes), arguments.sample, arguments.seed or 0)
-
-
-def _print(title: str, basins: Basins, units: Units) -> None:
-    rows = [
-        [
-            _name(attractor),
-            units.text(attractor.amplitude, "m"),
-            units.text(attractor.midpoint, "m"),
-            str(attractor.count),
-            f"{attractor.share:.4f}",
-            f"{attractor.standard_error:.4f}",
-        ]
-        for attractor in basins.attractors
-    ]
-    headings = ["motion", "amplitude", "midpoint", "starts", "share", "standard error"]
-    print_table(title, headings, rows)
-
-
-def _name(attractor: Attractor) -> str:
-    name = Regime.label(attractor.regime)
-    return name if attractor.steady or attractor.regime is None else f"{name}, not steady"
-
-
-def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> None:
-    # Half as long again to import as everything else.
-    from stickslip_ros.plots.basin_picture import basin_figure
-
-    plan, scenario = journal.study.plan, journal.study.scenario
-    drive = scenario.plant.as_drive()
-    units = Units.for_drive(drive)
-    columns = Columns.from_journal(journal)
-    figure = basin_figure(
-        position=columns.values[POSITION],
-        velocity=columns.values[VELOCITY],
-        attractor=np.array([basins.place(point) for point in journal.points()]),
-        regimes=[attractor.regime for attractor in basins.attractors],
-        labels=[_label(attractor, units) for attractor in basins.attractors],
-        grid_shape=plan.shape if isinstance(plan, Grid) else None,
-        belt_speed=drive.belt_speed,
-        equilibrium_position=drive.equilibrium_position,
-        units=units,
-        title=" ".join([scenario.name, *scenario.overrides]),
-    )
-    write_picture(arguments.plot, figure)
-
-
-def _label(attractor: Attractor, units: Units) -> str:
-    amplitude = ""
-    if attractor.amplitude is not None:
-        amplitude = f", amplitude {units.text(attractor.amplitude, 'm')}"
-    share, error = 100.0 * attractor.share, 100.0 * attractor.standard_error
-    return f"{_name(attractor)}{amplitude}: {share:.1f} % \N{PLUS-MINUS SIGN} {error:.1f} %"

@@ -3,8 +3,8 @@
 import argparse
 import shlex
 import sys
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, replace
+from collections.abc import Iterable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +19,9 @@ from stickslip_ros.app.arguments import (
     write_picture,
     writing,
 )
-from stickslip_ros.app.output import finite, print_json, print_table, progress_bar
+from stickslip_ros.app.output import print_json, print_table, progress_bar
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.theory.stability_map import StabilityMap
-from stickslip_ros.plots.units import Units
+from stickslip_ros.plots.design_table import CONTROLLER, MARGINS, WORST, design_tables
 from stickslip_ros.studies.design import Design, Task, design
 from stickslip_ros.studies.design_task import OWN_SPEED_RANGE
 from stickslip_ros.text import printable
@@ -33,28 +32,7 @@ _DESCRIPTION = f"""{HELP}. The drive, rate and force_delay are the scenario's, t
 washout_controller.force_limit (-p washout_controller.force_limit=200). Its gains do not matter.
 What is proposed was simulated: the vibration is caught at several belt speeds and phases."""
 
-_CONTROLLER = {
-    "corner_frequency": ("corner frequency", "rad/s"),
-    "linear_gain": ("linear gain", "N s/m"),
-    "cubic_gain": ("cubic gain", "N s^3/m^3"),
-    "force_limit": ("force limit", "N"),
-    "start_after": ("start after", "s"),
-}
-
-_PROPOSED = [f"washout_controller.{name}" for name in _CONTROLLER if name != "force_limit"]
-
-_MARGINS = {
-    "gain_down": ("unstable below this share of the linear gain", ""),
-    "gain_up": ("unstable above this multiple of it", ""),
-    "delay": ("unstable with this further delay", "s"),
-}
-_WORST = {
-    "predicted_settling_time": ("settles in", "s"),
-    "settling_time": ("simulated", "s"),
-    "predicted_peak_force": ("peak force", "N"),
-    "peak_force": ("simulated", "N"),
-}
-_CHECKS = {"belt_speed": ("belt speed", "m/s"), "vibrates": ("vibrates", "")} | _WORST
+_PROPOSED = [f"washout_controller.{name}" for name in CONTROLLER if name != "force_limit"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,21 +61,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     scenario = scenario_of(arguments, unused=_PROPOSED)
-    if not scenario.plant.expects_control:
-        raise InvalidInputError("plant.expects_control = False: without control there are no gains")
     task = Task.from_scenario(scenario, _belt_speeds(arguments.belt_speed))
     if arguments.out is not None:
         check_new("--out", arguments.out)
     check_picture(arguments.plot)
     with progress_bar(f"designing for {scenario.name}", 1.0) as progress:
         found = design(task, progress)
-    if scenario.plant.force_jitter > 0.0:
-        no_jitter = "force_jitter is left out: the delay of the force is constant here"
-        found = replace(found, remark="; ".join(filter(None, (found.remark, no_jitter))))
     if arguments.json:
         print_json({**_as_dict(found), **made_of(scenario)})
     else:
-        _print(scenario.name, found)
+        for part in design_tables(scenario.name, found):
+            if isinstance(part, str):
+                print(part)
+            else:
+                print_table(*part)
         if found.parameter_file is not None and arguments.out is None:
             print(
                 "--out FILE writes the scenario with these gains, --json has it as parameter_file"
@@ -135,11 +112,11 @@ def _draw(path: Path, found: Design) -> None:
     # Half as long again to import as everything else.
     from stickslip_ros.plots.stability_map import stability_figure
 
-    if found.slowest is None or found.controller is None:
+    around = found.map_around()
+    if around is None:
         _leave_out(f"--plot {path}: not drawn")
-        return
-    map_around = StabilityMap.around(found.slowest, found.controller.gains)
-    write_picture(path, stability_figure(map_around, None))
+    else:
+        write_picture(path, stability_figure(around, None))
 
 
 def _leave_out(what: str) -> None:
@@ -148,7 +125,7 @@ def _leave_out(what: str) -> None:
 
 def _as_dict(found: Design) -> dict[str, Any]:
     controller, slowest, task = found.controller, found.slowest, found.task
-    values = asdict(controller) if controller else dict.fromkeys(_CONTROLLER)
+    values = asdict(controller) if controller else dict.fromkeys(CONTROLLER)
     checks = [asdict(check) for check in found.checks]
     return {
         "belt_speeds": list(task.belt_speeds),
@@ -156,8 +133,8 @@ def _as_dict(found: Design) -> dict[str, Any]:
         "force_limit": task.force_limit,
         "worst_belt_speed": slowest.drive.belt_speed if slowest else None,
         "decay_rate": min((check.decay_rate for check in found.checks), default=None),
-        **{name: _largest(check[name] for check in checks) for name in _WORST},
-        "margins": asdict(found.margins) if found.margins else dict.fromkeys(_MARGINS),
+        **{name: _largest(check[name] for check in checks) for name in WORST},
+        "margins": asdict(found.margins) if found.margins else dict.fromkeys(MARGINS),
         "checks": checks,
         "parameter_file": found.parameter_file,
         "remark": found.remark,
@@ -166,32 +143,3 @@ def _as_dict(found: Design) -> dict[str, Any]:
 
 def _largest(values: Iterable[float | None]) -> float | None:
     return max((value for value in values if value is not None), default=None)
-
-
-def _rows(
-    figures: Mapping[str, Any], labels: Mapping[str, tuple[str, str]], units: Units
-) -> list[list[str]]:
-    return [[label, units.text(figures[key], unit)] for key, (label, unit) in labels.items()]
-
-
-def _print(name: str, found: Design) -> None:
-    units = Units.for_drive(found.task.drive)
-    speeds = units.texts(sorted({*found.task.belt_speeds}), "m/s")
-    task = f"{name}, belt speed {' to '.join(speeds)}"
-    if found.controller is None:
-        print(f"{task}: nothing to propose")
-    else:
-        proposed = _rows(finite(asdict(found.controller)), _CONTROLLER, units)
-        print_table(task, ["proposal", ""], proposed)
-        if found.margins is not None:
-            margins = _rows(asdict(found.margins), _MARGINS, units)
-            print_table("to instability at any of these belt speeds", ["margins", ""], margins)
-        checks = [asdict(check) for check in found.checks]
-        columns = [
-            units.texts([check[key] for check in checks], unit)
-            for key, (_, unit) in _CHECKS.items()
-        ]
-        headings = [label for label, _ in _CHECKS.values()]
-        print_table("while it catches the vibration", headings, zip(*columns, strict=True))
-    if found.remark is not None:
-        print(found.remark)

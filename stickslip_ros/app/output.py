@@ -6,46 +6,17 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from rich.cells import cell_len, set_cell_size
+from rich.cells import cell_len
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
-from stickslip_ros.physics.measures.cycle_measures import Regime, with_trend
-from stickslip_ros.plots.units import NOISE, SI, Units
+from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.plots.measure_table import measure_table
+from stickslip_ros.plots.units import Units
+from stickslip_ros.tables import TextTable
 from stickslip_ros.text import printable
-
-_LABELS: dict[str, tuple[str, str]] = {
-    "regime": ("regime", ""),
-    "amplitude": ("amplitude", "m"),
-    "velocity_amplitude": ("velocity amplitude", "m/s"),
-    "midpoint": ("midpoint", "m"),
-    "period": ("period", "s"),
-    "frequency": ("frequency", "Hz"),
-    "stick_fraction": ("stick fraction", ""),
-    "cycles": ("cycles measured", ""),
-    "multipliers": ("Floquet multipliers", ""),
-    "peak_force": ("peak control force", "N"),
-    "peak_applied_force": ("peak control force acting", "N"),
-    "resting_force": ("control force at the end", "N"),
-    "resting_applied_force": ("control force acting at the end", "N"),
-    "samples": ("samples", ""),
-    "lost_samples": ("lost samples", ""),
-    "late_forces": ("late forces", ""),
-    "dropped_forces": ("dropped forces", ""),
-    "missed_deadlines": ("missed deadlines", ""),
-    "steps_per_second": ("steps per second", ""),
-    "duration": ("duration", "s"),
-    "complete": ("bag complete", ""),
-    "bag": ("bag", ""),
-}
-
-_SENT = {
-    "peak_force": ("peak_applied_force", "peak control force sent"),
-    "resting_force": ("resting_applied_force", "control force sent at the end"),
-}
-"""What of a force that was sent acted, and what it is called where that is not the same."""
 
 _STYLES: dict[str, str] = {
     Regime.label(Regime.EQUILIBRIUM): "green",
@@ -54,14 +25,6 @@ _STYLES: dict[str, str] = {
     Regime.label(Regime.UNBOUNDED): "red",
 }
 """Of what stands out on a terminal."""
-
-_SAME_SCALE = {
-    "amplitude": "midpoint",
-    "midpoint": "amplitude",
-    "resting_force": "peak_force",
-    "resting_applied_force": "peak_applied_force",
-}
-"""Which other quantity tells how large one is that may be rounding."""
 
 _ALL_SI: Mapping[str, Units] = {}
 
@@ -89,55 +52,8 @@ def finite(value: Any) -> Any:
 def print_figures(
     title: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, Units] = _ALL_SI
 ) -> None:
-    """Print figures by name, one column for each of `columns`, those that nobody has left out.
-
-    `units` are those of each column, by its name; without it is in SI.
-    """
-    rows = {
-        name: [label, *_row(name, unit, columns, units)]
-        for name, (label, unit) in _LABELS.items()
-        if any(name in figures for figures in columns.values())
-    }
-    _tell_apart(rows, columns)
-    print_table(title, ["", *columns], rows.values())
-
-
-def _tell_apart(rows: dict[str, list[str]], columns: Mapping[str, Mapping[str, Any]]) -> None:
-    """Leave out what acted where it is not known or is what was sent, and drops without any."""
-    for sent, (applied, label) in _SENT.items():
-        known = [figures.get(applied) is not None for figures in columns.values()]
-        cells = zip(known, rows.get(sent, [])[1:], rows.get(applied, [])[1:], strict=False)
-        if any(is_known and of_sent != of_applied for is_known, of_sent, of_applied in cells):
-            rows[sent][0] = label
-        else:
-            rows.pop(applied, None)
-    if not any(figures.get("dropped_forces") for figures in columns.values()):
-        rows.pop("dropped_forces", None)
-
-
-def _row(
-    name: str, unit: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, Units]
-) -> list[str]:
-    """Return the cells of one figure; columns in the same units have the same prefix."""
-    cells: dict[str, str] = {}
-    for shown_in in {units.get(column, SI) for column in columns}:
-        own = [column for column in columns if units.get(column, SI) == shown_in]
-        values = [_shown(name, columns[column]) for column in own]
-        others = [columns[column].get(_SAME_SCALE.get(name, "")) for column in own]
-        largest = max((abs(value) for value in others if value is not None), default=0.0)
-        cells |= zip(own, shown_in.texts(values, unit, largest=largest), strict=True)
-    return [cells[column] for column in columns]
-
-
-def _shown(name: str, figures: Mapping[str, Any]) -> Any:
-    """Return what is shown of a figure: of a regime also whether it is steady."""
-    value = figures.get(name)
-    if name == "regime":
-        return with_trend(Regime.label(value), figures.get("trend"))
-    if name == "velocity_amplitude" and value is not None:
-        amplitude, midpoint = figures.get("amplitude") or 0.0, figures.get("midpoint") or 0.0
-        return 0.0 if amplitude <= NOISE * abs(midpoint) else value  # what is left is rounding
-    return value
+    """Print measures by name, one column for each of `columns`, as `measure_table` has them."""
+    print_table(*measure_table(title, columns, units))
 
 
 def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
@@ -145,17 +61,12 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
 
     In plain text each row is one line whatever its length, the columns two spaces or more apart.
     """
-    shown = [[printable(cell) for cell in row] for row in (headings, *rows)]
     if sys.stdout.isatty():
+        shown = [[printable(cell) for cell in row] for row in (headings, *rows)]
         _print_framed(Console(), printable(title), shown[0], shown[1:])
         return
-    if title:
-        print(printable(title))
-    lines = shown if any(headings) else shown[1:]
-    widths = [max(map(cell_len, column)) for column in zip(*lines, strict=True)]
-    for line in lines:
-        padded = map(set_cell_size, line[:-1], widths)
-        print("  ".join([*padded, line[-1]]).rstrip())
+    for line in TextTable(title, headings, rows).lines():
+        print(line)
 
 
 @contextmanager

@@ -1,23 +1,16 @@
 """`stickslip report`: the measures of recorded runs."""
 
 import argparse
-import json
-from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 from stickslip_ros.app.arguments import add_json, add_plot, check_picture, seconds, write_picture
 from stickslip_ros.app.output import print_figures, print_json
-from stickslip_ros.app.why_no_cycle import why_no_cycle
-from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.parameter_field import known_parameters
-from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.plots.why_no_cycle import why_no_cycle
+from stickslip_ros.studies.recorded_drive import recorded_drive
 from stickslip_ros.text import printable
 from stickslip_ros.versions import versions
 
@@ -76,15 +69,18 @@ def run(arguments: argparse.Namespace) -> int:
         for bag in bags
     }
     if plot is not None and history is not None:
-        drive = _drive_of(bags[0], arguments.namespace)
-        _draw(plot, bags[0], drive, history, reports[str(bags[0])])
+        # Half as long again to import as everything else.
+        from stickslip_ros.plots.recorded_run import recorded_run_figure
+
+        drive = recorded_drive(bags[0], arguments.namespace)
+        write_picture(plot, recorded_run_figure(bags[0], drive, history, reports[str(bags[0])]))
     if arguments.json:
         results = [{**report, "bag": bag} for bag, report in reports.items()]
         result = results[0] if len(results) == 1 else {"reports": results}
         print_json({**result, "versions": versions()})
         return 0
     several = len(reports) > 1
-    drives = {str(bag): _drive_of(bag, arguments.namespace) for bag in bags}
+    drives = {str(bag): recorded_drive(bag, arguments.namespace) for bag in bags}
     print_figures(
         "" if several else str(bags[0]),
         {bag if several else "": report for bag, report in reports.items()},
@@ -98,32 +94,3 @@ def run(arguments: argparse.Namespace) -> int:
         for sentence in sentences:
             print(printable(f"{bag}: {sentence}") if several else sentence)
     return 0
-
-
-def _draw(
-    path: Path, bag: Path, drive: Drive | None, history: RunHistory, report: dict[str, Any]
-) -> None:
-    # Half as long again to import as everything else.
-    from stickslip_ros.plots.run_figure import run_figure
-
-    notes = [*report["missing"], *report["notes"]]
-    if drive is None:
-        notes.append("the bag does not say what drive it was: no equilibrium, no friction law")
-    measures = Measures(**{field.name: report[field.name] for field in fields(Measures)})
-    write_picture(path, run_figure(history, measures, drive, title=str(bag), notes=notes))
-
-
-def _drive_of(bag: Path, namespace: str | None) -> Drive | None:
-    """Return the drive whose parameters were recorded, None where they are not or not all."""
-    with Recording(bag, namespace) as recording:
-        texts = recording.metadata("stickslip_ros/plant") or {}
-    try:
-        values = {
-            name: json.loads(text)
-            for name, text in texts.items()
-            if name in known_parameters(PlantParameters)
-        }
-        plant = PlantParameters.validated(values, str(bag))
-    except (ValueError, RecursionError, InvalidInputError):
-        return None
-    return plant.as_drive() if values.keys() >= set(plant.drive_names()) else None

@@ -25,13 +25,13 @@ from stickslip_ros.app.arguments import (
 )
 from stickslip_ros.app.optional_dependencies import check_dashboard, loading_ros
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
-from stickslip_ros.app.why_no_cycle import why_no_cycle
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed_packages import find_executable
 from stickslip_ros.plots.units import Units
+from stickslip_ros.plots.why_no_cycle import why_no_cycle
 from stickslip_ros.running.namespace_lock import NamespaceInUseError
 from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, Scenario
 from stickslip_ros.scenarios.parameters import Pace, WashoutControllerParameters

@@ -1,7 +1,6 @@
 """`stickslip simulate`: the closed loop without ROS, measured on the motion itself."""
 
 import argparse
-from math import isfinite
 from pathlib import Path
 
 from stickslip_ros.app.arguments import (
@@ -16,18 +15,13 @@ from stickslip_ros.app.arguments import (
     write_picture,
 )
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
-from stickslip_ros.app.why_no_cycle import why_no_cycle
-from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.physics.model.disturbance import DisturbanceKind
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.plots.why_no_cycle import why_no_cycle
 from stickslip_ros.studies.settling import check_continuous
-from stickslip_ros.studies.simulate import simulate
+from stickslip_ros.studies.simulate import default_duration, simulate
 
 HELP = "run a scenario without ROS and measure its motion"
-
-_DEFAULT_PERIODS = 200.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration",
         type=seconds,
         metavar="S",
-        help=f"simulated time, s (default: the scenario's, else {_DEFAULT_PERIODS:g} periods)",
+        help="simulated time, s (default: the scenario's, else 200 periods)",
     )
     parser.add_argument(
         "--continuous-control",
@@ -53,10 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     scenario = scenario_of(arguments)
     duration = arguments.duration
-    if duration is None and isfinite(scenario.plant.duration):
-        duration = scenario.plant.duration
-    elif duration is None:
-        duration = _DEFAULT_PERIODS * scenario.plant.as_drive().natural_period
+    if duration is None:
+        duration = default_duration(scenario)
     plot: Path | None = arguments.plot
     check_picture(plot)
     if arguments.continuous_control:
@@ -74,7 +66,10 @@ def run(arguments: argparse.Namespace) -> int:
             observer=history,
         )
     if plot is not None and history is not None:
-        _draw(plot, scenario, history, measures)
+        # Half as long again to import as everything else.
+        from stickslip_ros.plots.simulated_run import simulated_run_figure
+
+        write_picture(plot, simulated_run_figure(scenario, history, measures))
     if arguments.json:
         print_json({**measures.as_dict(), "duration": duration, **made_of(scenario)})
     else:
@@ -83,14 +78,3 @@ def run(arguments: argparse.Namespace) -> int:
         if reason is not None:
             print(reason)
     return 0
-
-
-def _draw(path: Path, scenario: Scenario, history: RunHistory, measures: Measures) -> None:
-    # Half as long again to import as everything else.
-    from stickslip_ros.plots.run_figure import run_figure
-
-    disturbed = scenario.plant.disturbance.kind is not DisturbanceKind.NONE
-    title = " ".join([scenario.name, *scenario.overrides])
-    force = "control force and disturbance" if disturbed else "control force"
-    drive = scenario.plant.as_drive()
-    write_picture(path, run_figure(history, measures, drive, title=title, force=force))

@@ -1,9 +1,6 @@
 """`stickslip sweep`: what a scenario settles on over the values of one parameter or two."""
 
 import argparse
-from collections import Counter
-from collections.abc import Iterable, Iterator
-from itertools import groupby, islice
 
 from stickslip_ros.app.arguments import (
     add_json,
@@ -17,13 +14,11 @@ from stickslip_ros.app.arguments import (
 from stickslip_ros.app.output import print_table
 from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.plots.units import Units
+from stickslip_ros.plots.sweep_table import sweep_table, units_of
 from stickslip_ros.studies.columns import Columns, ExtraColumns
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.settling import SettlingCourse
-from stickslip_ros.studies.study import Point
 from stickslip_ros.studies.sweep import sweep_study
 from stickslip_ros.studies.transitions import transitions
 
@@ -32,9 +27,6 @@ HELP = "measure what a scenario settles on, over the values of one parameter or 
 _DESCRIPTION = f"""{HELP}: amplitude, regime, stick fraction and the turning points of the settled
 motion, for a bifurcation diagram (one parameter) or a map (two). A point that fails or runs away
 is a row of the table, with the reason."""
-
-_MOST_RANGES = 60
-"""Rows of the table on the screen; where there are more, only their regimes are counted."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -95,66 +87,15 @@ def run(arguments: argparse.Namespace) -> int:
         made = {"transitions": {name.lower().replace(" ", "_"): theory[name] for name in theory}}
         write_results(arguments, journal, further, made)
         if not arguments.json:
-            units = Units.for_drive(study.scenario.plant.as_drive(), plan.parameters)
-            _print(journal, plan, units)
+            print_table(*sweep_table(study, journal.points))
             for name, values in theory.items():
-                print(f"{name}: {', '.join(units.texts(values, plan.axes[0].unit))}")
+                print(f"{name}: {', '.join(units_of(study).texts(values, plan.axes[0].unit))}")
     return 0
 
 
 def _draw(arguments: argparse.Namespace, journal: Journal) -> None:
     # Half as long again to import as everything else.
-    from stickslip_ros.plots.sweep_picture import diagram_figure, map_figure
+    from stickslip_ros.plots.sweep_picture import sweep_figure
 
-    columns, study = Columns.from_journal(journal), journal.study
-    if len(arguments.over) == 1:
-        write_picture(arguments.plot, diagram_figure(columns, study))
-    else:
-        write_picture(arguments.plot, map_figure(columns, study, arguments.colour))
-
-
-def _direction_and_regime(point: Point, plan: Grid) -> str:
-    """Return what the points of a row of the table on the screen have in common."""
-    regime = point.reason or Regime.label(point.measures.regime)
-    if point.reason is None and not point.steady:
-        regime += ", not steady"
-    return f"{plan.direction(point.number) or ''} {regime}".lstrip()
-
-
-def _print(journal: Journal, plan: Grid, units: Units) -> None:
-    """Print in which ranges of the parameter there is which regime; of a map, how often."""
-    title = f"{journal.study.scenario.name}, {journal.count} points"
-    if len(plan.axes) == 1:
-        rows = list(islice(_ranges(journal, plan, units), _MOST_RANGES + 1))
-        if len(rows) <= _MOST_RANGES:
-            headings = ["regime", plan.parameters[0], "points", "amplitude", "stick fraction"]
-            print_table(title, headings, rows)
-            return
-    counts = Counter(_direction_and_regime(point, plan) for point in journal.points())
-    rows = [[kind, str(count)] for kind, count in counts.items()]
-    print_table(title, ["regime", "points"], rows)
-
-
-def _ranges(journal: Journal, plan: Grid, units: Units) -> Iterator[list[str]]:
-    largest = max((point.measures.amplitude or 0.0 for point in journal.points()), default=0.0)
-    for kind, points in groupby(journal.points(), lambda point: _direction_and_regime(point, plan)):
-        measured = [
-            (point.measures.amplitude, point.measures.stick_fraction, point.number)
-            for point in points
-        ]
-        amplitudes, stick_fractions, numbers = zip(*measured, strict=True)
-        yield [
-            kind,
-            _range([plan.values(number)[0] for number in numbers], plan.axes[0].unit, units),
-            str(len(numbers)),
-            _range(amplitudes, "m", units, largest),
-            _range(stick_fractions, "", units),
-        ]
-
-
-def _range(values: Iterable[float | None], unit: str, units: Units, largest: float = 0.0) -> str:
-    known = [value for value in values if value is not None]
-    if not known:
-        return "-"
-    low, high = units.texts([min(known), max(known)], unit, largest=largest)
-    return low if low == high else f"{low.split()[0]} to {high}"
+    columns = Columns.from_journal(journal)
+    write_picture(arguments.plot, sweep_figure(columns, journal.study, arguments.colour))

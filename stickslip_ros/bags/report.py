@@ -1,5 +1,6 @@
 """Report the measures and counts of a recorded run."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ def report_of_bag(
     window: int | None = None,
     namespace: str | None = None,
     observer: RunObserver | None = None,
+    take: Callable[[SampleColumns | ForceColumns], None] = lambda _: None,
 ) -> dict[str, Any]:
     """Return measures, counts and completeness of a recording, ready for JSON.
 
@@ -46,6 +48,9 @@ def report_of_bag(
         ROS namespace of the drive; None if the bag holds only one drive.
     observer : RunObserver or None
         Receives the samples and cycles of the whole part, with times as in `start` and `end`.
+    take : callable, optional
+        Receives the joint states and the control forces of the part as they are read, each in
+        their order.
 
     Returns
     -------
@@ -76,7 +81,7 @@ def report_of_bag(
             dropped_known=recording.dropped_known,
             observer=observer,
         )
-        run = _RunReader(meter, start, end, observer)
+        run = _RunReader(meter, start, end, observer, take)
         # Measuring each chunk by itself would take twice as long.
         for block in recording.blocks(least=20_000):
             run.feed(*block)
@@ -104,10 +109,15 @@ class _RunReader:
     """Feed a meter with the part of a run between two instants."""
 
     def __init__(
-        self, meter: RunMeter, start: float, end: float, observer: RunObserver | None
+        self,
+        meter: RunMeter,
+        start: float,
+        end: float,
+        observer: RunObserver | None,
+        take: Callable[[SampleColumns | ForceColumns], None],
     ) -> None:
         self.meter = meter
-        self._observer = observer
+        self._observer, self._take = observer, take
         self.first: int | None = None
         """Stamp from which the instants count, ns, once it is known."""
         self.has_states = False
@@ -126,6 +136,7 @@ class _RunReader:
             part = states[self._part(states.stamp, first)]
             self.measured += len(part)
             self.meter.motion.feed(part)
+            self._take(part)
             if self._observer is not None:
                 time = (part.stamp - first) / NANOSECONDS
                 self._observer.take_friction(time, part.friction_force)
@@ -157,6 +168,7 @@ class _RunReader:
         forces, dropped = (each[self._part(each.stamp, first)] for each in (forces, dropped))
         self.measured += len(forces)
         self.meter.feed_forces(forces, dropped)
+        self._take(forces)
 
     def _part(self, stamp: IntArray, first: int) -> BoolArray:
         since = stamp - first

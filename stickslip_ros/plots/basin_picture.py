@@ -11,9 +11,33 @@ from matplotlib.lines import Line2D
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.plots.basin_table import attractor_name
 from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
 from stickslip_ros.plots.style import AMBER, MANY, PURPLE, SKY_BLUE, YELLOW, set_title, styled
 from stickslip_ros.plots.units import SI, Units
+from stickslip_ros.studies.basin import POSITION, VELOCITY, Attractor, Basins
+from stickslip_ros.studies.columns import Columns
+from stickslip_ros.studies.plan import Grid
+from stickslip_ros.studies.study import Study
+
+
+def study_figure(columns: Columns, basins: Basins, study: Study) -> Figure:
+    """Return the picture of which attractor each start of a study leads to."""
+    plan, scenario = study.plan, study.scenario
+    drive = scenario.plant.as_drive()
+    units = Units.for_drive(drive)
+    return basin_figure(
+        position=columns.values[POSITION],
+        velocity=columns.values[VELOCITY],
+        attractor=np.array([basins.place(point) for point in columns.points()], dtype=np.intp),
+        regimes=[attractor.regime for attractor in basins.attractors],
+        labels=[_label(attractor, units) for attractor in basins.attractors],
+        grid_shape=plan.shape if isinstance(plan, Grid) else None,
+        belt_speed=drive.belt_speed,
+        equilibrium_position=drive.equilibrium_position,
+        units=units,
+        title=" ".join([scenario.name, *scenario.overrides]),
+    )
 
 
 @styled
@@ -83,3 +107,13 @@ def _looks(regimes: Sequence[Regime | None]) -> Iterator[Look]:
             colour, marker, hatch = next(more)
             look = look._replace(colour=colour, marker=marker, hatch=hatch)
         yield look
+
+
+def _label(attractor: Attractor, units: Units) -> str:
+    amplitude = ""
+    if attractor.amplitude is not None:
+        amplitude = f", amplitude {units.text(attractor.amplitude, 'm')}"
+    share, error = 100.0 * attractor.share, 100.0 * attractor.standard_error
+    return (
+        f"{attractor_name(attractor)}{amplitude}: {share:.1f} % \N{PLUS-MINUS SIGN} {error:.1f} %"
+    )

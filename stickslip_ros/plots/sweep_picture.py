@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
 from stickslip_ros.plots.style import DASHES, GREY, LIGHT_GREY, MANY, set_title, styled
@@ -23,6 +24,7 @@ from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.transitions import TransitionMap, transition_map, transitions
+from stickslip_ros.text import shown
 
 _FULL: Any = {"mew": 0.0}
 _HOLLOW: Any = {"mfc": "white", "mew": 0.8}
@@ -41,6 +43,27 @@ _AWAY = REGIMES[Regime.UNBOUNDED]._replace(colour=LIGHT_GREY, hatch="...")
 
 _MEASURES = {"amplitude": ("amplitude", "m"), "stick_fraction": ("stick fraction", "")}
 """Measures that are drawn in addition to the regimes: name and unit."""
+
+
+Colour = Literal["regime", "amplitude", "stick_fraction"]
+"""What a map shows."""
+
+
+def sweep_figure(columns: Columns, study: Study, colour: Colour = "regime") -> Figure:
+    """Return the bifurcation diagram of a sweep over one parameter, the map of one over two.
+
+    Raises InvalidInputError for an unknown `colour`, and in a diagram for any but the regime.
+    """
+    colours = ("regime", *_MEASURES)
+    if colour not in colours:
+        raise InvalidInputError(
+            f"colour = {shown(colour)} is refused: must be one of {', '.join(colours)}"
+        )
+    if len(_grid(study).axes) == 2:
+        return map_figure(columns, study, colour)
+    if colour != "regime":
+        raise InvalidInputError(f"colour = {colour}: is for maps, of two parameters")
+    return diagram_figure(columns, study)
 
 
 @styled
@@ -103,7 +126,7 @@ def diagram_figure(columns: Columns, study: Study) -> Figure:
 def map_figure(
     columns: Columns,
     study: Study,
-    colour: Literal["regime", "amplitude", "stick_fraction"] = "regime",
+    colour: Colour = "regime",
 ) -> Figure:
     """Return the map of a sweep over two parameters, the first one on the horizontal axis.
 

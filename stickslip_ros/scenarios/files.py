@@ -17,6 +17,7 @@ from stickslip_ros.scenarios.parameters import (
     WashoutControllerParameters,
 )
 from stickslip_ros.scenarios.sections import PARAMETERS_KEY, ScenarioFile, read_file
+from stickslip_ros.tables import TextTable
 from stickslip_ros.text import did_you_mean
 
 DEFAULT_NAMESPACE = "/feed_drive"
@@ -26,7 +27,7 @@ LONGEST_NAMESPACE = 200
 _NAMED_BY_PATH = "a file is given by its path ending in .yaml"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Scenario:
     """The parameters of every node in one run, and their source.
 
@@ -104,6 +105,68 @@ class Scenario:
             for node, new in by_node.items()
         }
         return replace(self, **changes)
+
+    def overridden(self, overrides: Sequence[str]) -> Self:
+        """Return the scenario with further overrides.
+
+        Parameters
+        ----------
+        overrides : Sequence[str]
+            Texts NODE.PARAMETER=VALUE, the value written as in a scenario file.
+
+        Returns
+        -------
+        Scenario
+            The changed copy.
+
+        Raises
+        ------
+        InvalidInputError
+            If a name is unknown, or a value is not allowed.
+        """
+        by_node: dict[str, dict[str, Any]] = {}
+        texts: dict[str, str] = {}
+        for override in overrides:
+            node, parameter, value = _parse_override(override)
+            by_node.setdefault(node, {})[parameter] = value
+            texts[node] = f"{texts.get(node, '')} {override:.80}"
+        changes: dict[str, Any] = {
+            node: NODE_PARAMETERS[node].validated(
+                {**self._flat[node], **new}, f"{self.path} with{texts[node]}, {node}"
+            )
+            for node, new in by_node.items()
+        }
+        given = {f"{node}.{name}" for node, new in by_node.items() for name in new}
+        return replace(
+            self,
+            overrides=(*self.overrides, *overrides),
+            given=self.given | given,
+            **changes,
+        )
+
+    def __repr__(self) -> str:
+        return "\n".join(self._table().lines())
+
+    def _repr_html_(self) -> str:
+        return self._table().html()
+
+    def _table(self) -> TextTable:
+        """Return the parameters of the drive and its controller, and others that are given."""
+        shown = [f"plant.{name}" for name in (*self.plant.drive_names(), "rate")]
+        if self.plant.expects_control:
+            shown += [f"washout_controller.{name}" for name in self.washout_controller.law_names()]
+        shown += sorted(self.given.difference(shown))
+        dimensionless = self.plant.as_drive().is_dimensionless
+        rows: list[list[str]] = []
+        for full_name in shown:
+            node, _, name = full_name.partition(".")
+            value, known = self._flat[node][name], known_parameters(NODE_PARAMETERS[node])[name]
+            text = f"{value:.10g}" if isinstance(value, float) else str(value)
+            unit = "" if dimensionless else known.unit or ""
+            note = "" if full_name in self.given else "default"
+            rows.append([full_name, f"{text} {unit}".rstrip(), note])
+        title = f"scenario {' '.join([self.name, *self.overrides])}"
+        return TextTable(title, ["", "", ""], rows)
 
     @cached_property
     def _flat(self) -> dict[str, dict[str, Any]]:
@@ -196,27 +259,19 @@ def load_scenario(
     other_sections: list[str] = []
     for file in files[::-1]:
         other_sections = file.apply(values, namespace, other_nodes=other_nodes)
-    for node, parameters in values.items():
-        NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
-    given = dict.fromkeys(NODE_PARAMETERS, "")
-    for override in overrides:
-        node, parameter, value = _parse_override(override)
-        values[node][parameter] = value
-        given[node] += f" {override:.80}"
     models: dict[str, Any] = {
-        node: NODE_PARAMETERS[node].validated(
-            parameters, f"{path} with{given[node]}, {node}" if given[node] else f"{path}, {node}"
-        )
+        node: NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
         for node, parameters in values.items()
     }
-    return Scenario(
+    scenario = Scenario(
         name=path.stem,
-        overrides=tuple(overrides),
+        overrides=(),
         path=path,
         other_sections=tuple(other_sections),
         given=frozenset(f"{node}.{name}" for node in values for name in values[node]),
         **models,
     )
+    return scenario.overridden(overrides) if overrides else scenario
 
 
 def config_directories() -> list[Path]:

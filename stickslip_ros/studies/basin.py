@@ -20,6 +20,10 @@ COURSE = SettlingCourse(transient=50.0, patience=80)
 """Default settling of a basin study: short at first, since most motions are steady soon."""
 
 
+COUNT = 40
+"""Positions and velocities of a grid of starts, unless told otherwise."""
+
+
 @dataclass(frozen=True)
 class Attractor:
     """A motion that starts lead to; SI units."""

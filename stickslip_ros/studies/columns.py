@@ -2,10 +2,11 @@
 
 import csv
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import ExitStack
 from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
 from shutil import copyfileobj
 from tempfile import TemporaryFile
@@ -16,6 +17,7 @@ import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.deprecated_names import Renamed
+from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Grid, Plan
 from stickslip_ros.studies.runner import IN_FLIGHT, CountPoints, run, run_here
@@ -99,6 +101,22 @@ class Columns:
             turning_points=tuple(turning_points),
             reason=reason,
         )
+
+    def points(self) -> Iterator[Point]:
+        """Yield the points, in their order."""
+        columns = [getattr(self, name).tolist() for name in MEASURES]
+        for number, values in enumerate(zip(*columns, strict=True)):
+            measures: dict[str, Any] = {
+                name: None if isinstance(value, float) and isnan(value) else value
+                for name, value in zip(MEASURES, values, strict=True)
+            }
+            yield Point(
+                number,
+                Measures(**measures),
+                bool(self.steady[number]),
+                self.turning_points[number],
+                self.reason[number],
+            )
 
 
 def compute_columns(

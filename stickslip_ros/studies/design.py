@@ -11,8 +11,10 @@ from math import copysign, inf, isinf, sqrt
 from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
+from stickslip_ros.physics.theory.stability_map import StabilityMap
 from stickslip_ros.progress import Progress
-from stickslip_ros.scenarios.files import parameter_file
+from stickslip_ros.scenarios.files import Scenario, parameter_file
+from stickslip_ros.scenarios.keywords import override
 from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench, Vibration
 from stickslip_ros.studies.design_checks import (
     Check,
@@ -46,24 +48,46 @@ class Design:
     """Checks of the proposal, in order of belt speed."""
 
     @property
+    def scenario(self) -> Scenario | None:
+        """The task's scenario with the proposal; None without a proposal or a scenario.
+
+        Its belt speed is that of the scenario, or the nearest one within the range.
+        """
+        scenario = self.task.scenario
+        if self.controller is None or scenario is None:
+            return None
+        (low, high), own = self.task.belt_speeds, scenario.plant.belt_speed
+        proposed = {
+            f"washout_controller.{name}": value for name, value in asdict(self.controller).items()
+        }
+        proposed["plant.belt_speed"] = copysign(min(max(abs(own), low), high), own)
+        return scenario.overridden([override(name, value) for name, value in proposed.items()])
+
+    @property
     def parameter_file(self) -> str | None:
         """Text of a parameter file with the proposal; None without one.
 
-        It contains the task's complete scenario, or the gains alone if the task has no scenario.
-        Its belt speed is that of the scenario, or the nearest one within the range.
+        It contains the complete `scenario`, or the gains alone if the task has no scenario.
         """
         if self.controller is None:
             return None
-        gains = asdict(self.controller)
-        scenario = self.task.scenario
-        if scenario is None:
-            return parameter_file({"washout_controller": gains})
-        (low, high), own = self.task.belt_speeds, scenario.plant.belt_speed
-        proposed = {f"washout_controller.{name}": value for name, value in gains.items()}
-        proposed["plant.belt_speed"] = copysign(min(max(abs(own), low), high), own)
-        nodes = scenario.changed(proposed).as_dict()
+        if self.scenario is None:
+            return parameter_file({"washout_controller": asdict(self.controller)})
+        nodes = self.scenario.as_dict()
         del nodes["analyzer"]["bag"]
         return parameter_file(nodes)
+
+    def map_around(self) -> StabilityMap | None:
+        """Return the stability map of the slowest loop around the proposal.
+
+        Returns
+        -------
+        StabilityMap or None
+            None without a proposal.
+        """
+        if self.slowest is None or self.controller is None:
+            return None
+        return StabilityMap.around(self.slowest, self.controller.gains)
 
 
 def design(task: Task, progress: Progress = lambda _: None) -> Design:
@@ -96,6 +120,14 @@ def design(task: Task, progress: Progress = lambda _: None) -> Design:
     >>> max(check.peak_force or 0.0 for check in found.checks) < 200.0
     True
     """
+    found = _design(task, progress)
+    if task.scenario is None or task.scenario.plant.force_jitter == 0.0:
+        return found
+    no_jitter = "force_jitter is left out: the delay of the force is constant here"
+    return replace(found, remark="; ".join(filter(None, (found.remark, no_jitter))))
+
+
+def _design(task: Task, progress: Progress) -> Design:
     drives = task.drives()
     reason = why_no_linear_loop(drives[0], task.rate, task.force_delay)
     if reason is not None:

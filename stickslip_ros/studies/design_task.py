@@ -59,6 +59,10 @@ class Task:
             belt is at rest.
         """
         plant = scenario.plant
+        if not plant.expects_control:
+            raise InvalidInputError(
+                "plant.expects_control = False: without control there are no gains"
+            )
         if belt_speeds is None:
             own = abs(plant.belt_speed)
             if own == 0.0:

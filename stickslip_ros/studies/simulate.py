@@ -1,7 +1,11 @@
 """Simulation of a scenario's closed loop without ROS, measured on the motion itself."""
 
+from math import isfinite
+
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.motion_tracer import MotionTracer
 from stickslip_ros.physics.loop.simulation import simulate_continuous, simulate_sampled
+from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
 from stickslip_ros.physics.loop.washout import Washout
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import RunObserver
@@ -9,6 +13,16 @@ from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.settling import check_continuous
+
+_DEFAULT_PERIODS = 200.0
+"""Natural periods of a run that has no duration."""
+
+
+def default_duration(scenario: Scenario) -> float:
+    """Return the scenario's own duration, s, or without one 200 natural periods."""
+    if isfinite(scenario.plant.duration):
+        return scenario.plant.duration
+    return _DEFAULT_PERIODS * scenario.plant.as_drive().natural_period
 
 
 def simulate(
@@ -18,12 +32,15 @@ def simulate(
     continuous: bool = False,
     progress: Progress = lambda _: None,
     observer: RunObserver | None = None,
+    recorder: TrajectoryRecorder | None = None,
 ) -> Measures:
     """Return the measures of the scenario's motion over `duration` (s).
 
-    An `observer` receives the motion. Raises InvalidInputError if `continuous` control does not
-    support the scenario.
+    An `observer` receives the motion, a `recorder` takes its samples. Raises InvalidInputError for
+    a duration that is not allowed, or if `continuous` control does not support the scenario.
     """
+    if not 0.0 <= duration < float("inf"):
+        raise InvalidInputError(f"a duration of {duration:g} s: must be finite, 0 or more")
     if continuous:
         check_continuous(scenario)
     plant = scenario.plant
@@ -37,8 +54,13 @@ def simulate(
     )
     meter = CycleMeter(scenario.analyzer.window)
     if continuous:
-        return simulate_continuous(motion, washout, duration, meter, progress, observer)
+        return simulate_continuous(motion, washout, duration, meter, progress, observer, recorder)
     tracer = None if observer is None else MotionTracer(motion, observer)
     loop = plant.as_loop(motion, advance=None if tracer is None else tracer.advance)
     law = None if washout is None else Washout(washout)
-    return simulate_sampled(loop, motion, law, duration, meter, progress, tracer)
+    measures = simulate_sampled(loop, motion, law, duration, meter, progress, tracer, recorder)
+    if recorder is not None:
+        sample = loop.sample
+        force = None if law is None else law.answer(sample.stamp, sample.velocity)
+        recorder.take(sample, force or 0.0)
+    return measures

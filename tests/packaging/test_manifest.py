@@ -23,6 +23,7 @@ KEYS = {
     "nicegui": set(),
     "numpy": {"python3-numpy"},
     "orjson": {"python3-orjson"},
+    "pandas": {"python3-pandas"},
     "pillow": {"python3-pil"},
     "playwright": {"chromium-browser"},  # what it drives; itself it has no key
     "pydantic": {"python3-pydantic"},
@@ -49,6 +50,7 @@ KEYS = {
     "scipy": {"python3-scipy"},
     "setuptools": {"python3-setuptools"},
     "uvicorn": {"python3-uvicorn"},
+    "xarray": {"python3-xarray"},
     "zstandard": set(),
 }
 
@@ -88,6 +90,8 @@ def test_the_manifest_tells_what_has_no_key():
     assert f"from PyPI: {site}." in " ".join(text.replace("[python]", "").split())
     keys = sorted(key for name in required("dashboard") for key in KEYS[name])
     assert f"For the dashboard: {', '.join(keys)}, and nicegui from PyPI;" in text
+    keys = sorted(key for name in required("analysis") for key in KEYS[name])
+    assert f"For to_pandas and to_xarray: {', '.join(keys)}." in text
 
 
 def test_the_docs_install_in_a_workspace_all_that_is_asked_for():

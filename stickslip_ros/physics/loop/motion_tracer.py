@@ -7,7 +7,7 @@ import numpy as np
 from stickslip_ros.physics.measures.observer import MeasuredMotion, RunObserver
 from stickslip_ros.physics.motion.motion import Motion
 
-_STEPS_PER_PERIOD = 64
+_STEPS_PER_PERIOD = 60
 """Least number of steps in a natural period: a line through their ends then shows the motion."""
 
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from stickslip_ros.physics.loop.motion_tracer import MotionTracer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver, RunObserver
@@ -28,6 +29,7 @@ def simulate_sampled(
     meter: CycleMeter,
     progress: Progress = lambda _: None,
     observer: MotionObserver | None = None,
+    recorder: TrajectoryRecorder | None = None,
 ) -> Measures:
     """Simulate the sampled loop and measure its motion.
 
@@ -47,6 +49,9 @@ def simulate_sampled(
         Called with the completed share, 0 to 1, every 1000 samples.
     observer : MotionObserver, optional
         Receives the motion in blocks.
+    recorder : TrajectoryRecorder, optional
+        Takes each sample with the control force that answers it, except for the last sample, which
+        is not answered here.
 
     Returns
     -------
@@ -80,10 +85,13 @@ def simulate_sampled(
     samples = round(duration / loop.period)
     sample = loop.sample
     for number in range(1, samples + 1):
+        force = None
         if washout is not None:
             force = washout.answer(sample.stamp, sample.velocity)
             if force is not None:
                 loop.offer(sample.stamp, force)
+        if recorder is not None:
+            recorder.take(sample, force or 0.0)
         sample = loop.advance()
         if number % 1000 == 0 or number == samples or motion.unbounded:
             measure_block(motion, meter, observer)
@@ -101,6 +109,7 @@ def simulate_continuous(
     meter: CycleMeter,
     progress: Progress = lambda _: None,
     observer: RunObserver | None = None,
+    recorder: TrajectoryRecorder | None = None,
 ) -> Measures:
     """Simulate a motion with the washout law acting without sampling (eq. 19), and measure it.
 
@@ -120,6 +129,8 @@ def simulate_continuous(
         Called with the completed share, 0 to 1, every ten natural periods.
     observer : RunObserver, optional
         Receives motion and forces in blocks.
+    recorder : TrajectoryRecorder, optional
+        Takes samples at its rate.
 
     Returns
     -------
@@ -150,6 +161,8 @@ def simulate_continuous(
     """
     tracer = None if observer is None else MotionTracer(motion, observer)
     advance = motion.advance if tracer is None else tracer.advance
+    if recorder is not None:
+        advance = recorder.sampling(motion, advance)
     free = duration if washout is None else min(washout.start_after, duration)
     block = 10.0 * motion.drive.natural_period
     done = 0.0
@@ -165,6 +178,8 @@ def simulate_continuous(
             done += step
             measure_block(motion, meter, tracer)
             progress(done / duration)
+    if recorder is not None:
+        recorder.take_due(motion)
     if motion.unbounded:
         meter.report_run_away()
     return meter.measures()

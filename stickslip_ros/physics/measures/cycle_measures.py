@@ -1,11 +1,11 @@
 """The cycle measures, from breakpoints: amplitude, stick fraction, period and regime."""
 
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from enum import StrEnum
 from itertools import pairwise
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -156,6 +156,11 @@ class Measures:
             Value of each attribute by its name.
         """
         return asdict(self)
+
+
+def measures_of(report: Mapping[str, Any]) -> Measures:
+    """Return the measures that a report has by name."""
+    return Measures(**{measure.name: report[measure.name] for measure in fields(Measures)})
 
 
 @dataclass

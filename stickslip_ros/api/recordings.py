@@ -1,0 +1,205 @@
+"""Recorded runs: the samples in a bag, and their measures."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
+from stickslip_ros.api.frames import Quantity, data_frame, data_set
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.physics.loop.trajectory import QUANTITIES
+from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.plots.measure_table import measure_table
+from stickslip_ros.plots.run_history import RunHistory
+from stickslip_ros.plots.units import Units
+from stickslip_ros.plots.why_no_cycle import why_no_cycle
+from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.studies.recorded_drive import recorded_drive
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+    from xarray import Dataset
+
+_COLUMNS = {name: Quantity(*labelled) for name, labelled in QUANTITIES.items()} | {
+    "stamp": Quantity("stamp", "ns")
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RecordedRun(Shown):
+    """A recorded run, or a part of it; it prints as a table of its measures."""
+
+    path: Path
+    """The bag."""
+    samples: SampleColumns
+    """Joint states: stamps and the motion, as numpy arrays."""
+    forces: ForceColumns
+    """Control forces, each with the stamp of the sample that it answers."""
+    report: Mapping[str, Any]
+    """Measures, counts and completeness, as `stickslip report --json` has them."""
+    drive: Drive | None
+    """The drive whose parameters were recorded; None if the bag does not hold them."""
+    _history: RunHistory
+    """The data of the figure."""
+
+    @property
+    def measures(self) -> Measures:
+        """Amplitude, regime and the other measures of the last cycles."""
+        return measures_of(self.report)
+
+    @property
+    def missing(self) -> list[str]:
+        """What is missing in the bag, in sentences."""
+        return self.report["missing"]
+
+    def plot(self) -> "Figure":
+        """Return the figure that `stickslip report --plot` draws.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Motion, force, phase portrait, cycles and friction law.
+        """
+        from stickslip_ros.plots.recorded_run import recorded_run_figure
+
+        return shown_in_notebooks(
+            recorded_run_figure(self.path, self.drive, self._history, self.report)
+        )
+
+    def to_pandas(self) -> "DataFrame":
+        """Return the samples as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each sample, by its time from the first one; SI units, which are in
+            `attrs["units"]`. `control_force` is the answer to the sample, NaN where none came;
+            `stamp` is in ns.
+
+        Raises
+        ------
+        RunError
+            If pandas is not installed.
+        """
+        return data_frame(self._columns(), _COLUMNS, Units.for_drive(self.drive), index="time")
+
+    def to_xarray(self) -> "Dataset":
+        """Return the samples as a data set.
+
+        Returns
+        -------
+        xarray.Dataset
+            A variable for each column of `to_pandas` over the dimension `time`, with `units` and
+            `long_name`.
+
+        Raises
+        ------
+        RunError
+            If xarray is not installed.
+        """
+        columns = self._columns()
+        time = columns.pop("time")
+        variables = {name: (("time",), values) for name, values in columns.items()}
+        attrs = {"bag": str(self.path)}
+        return data_set(variables, {"time": time}, _COLUMNS, Units.for_drive(self.drive), attrs)
+
+    def _columns(self) -> dict[str, Any]:
+        samples = self.samples
+        first = int(samples.stamp[0]) if len(samples) else 0
+        columns: dict[str, Any] = {
+            **vars(samples),
+            "time": (samples.stamp - first) / NANOSECONDS,
+            "control_force": _answers(samples, self.forces),
+        }
+        return {name: columns[name] for name in _COLUMNS}
+
+    def _parts(self) -> Parts:
+        units = Units.for_drive(self.drive)
+        yield measure_table(str(self.path), {"": self.report}, {"": units})
+        yield from [*self.missing, *self.report["notes"]]
+        if len(self.samples):
+            reason = why_no_cycle(self.measures.regime, self.report["duration"], self.drive)
+            if reason is not None:
+                yield reason
+
+
+def read_bag(
+    path: Path | str,
+    *,
+    start: float = 0.0,
+    end: float = float("inf"),
+    namespace: str | None = None,
+) -> RecordedRun:
+    """Read a recorded run, and measure it.
+
+    Parameters
+    ----------
+    path : Path or str
+        Bag directory or one MCAP file, also one that is being recorded, cut off or damaged.
+    start, end : float
+        Part to read, s from the first sample.
+    namespace : str, optional
+        ROS namespace of the drive, such as `/feed_drive`, where a bag holds several.
+
+    Returns
+    -------
+    RecordedRun
+        Samples, forces and measures.
+
+    Raises
+    ------
+    BagError
+        If `path` is not a bag, or holds neither joint states nor control forces.
+    InvalidInputError
+        If the part is empty.
+
+    Examples
+    --------
+    >>> import stickslip_ros as ss
+    >>> recorded = ss.read_bag("bags/reference")
+    >>> recorded.measures.regime.value, f"{recorded.measures.amplitude:.2e}"
+    ('stick_slip', '3.26e-04')
+    """
+    bag = Path(path)
+    history = RunHistory()
+    samples: list[SampleColumns] = []
+    forces: list[ForceColumns] = []
+
+    def take(part: SampleColumns | ForceColumns) -> None:
+        if isinstance(part, SampleColumns):
+            samples.append(part)
+        else:
+            forces.append(part)
+
+    report = report_of_bag(
+        bag, start=start, end=end, namespace=namespace, observer=history, take=take
+    )
+    nothing = np.empty(0)
+    stamps = np.empty(0, dtype=np.int64)
+    return RecordedRun(
+        bag,
+        SampleColumns(stamps, *[nothing] * 5).followed_by(*samples),
+        ForceColumns(stamps, nothing).followed_by(*forces),
+        report,
+        recorded_drive(bag, namespace),
+        history,
+    )
+
+
+def _answers(samples: SampleColumns, forces: ForceColumns) -> FloatArray:
+    """Return the last force that answers each sample, NaN where none does."""
+    found = np.full(len(samples), np.nan)
+    if len(forces):
+        order = np.argsort(forces.stamp, kind="stable")
+        stamps = forces.stamp[order]
+        last = np.searchsorted(stamps, samples.stamp, "right") - 1
+        answered = (last >= 0) & (stamps[last] == samples.stamp)
+        found[answered] = forces.force[order][last[answered]]
+    return found

@@ -1,0 +1,155 @@
+"""Simulated runs: trajectory and measures of a scenario."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
+from stickslip_ros.api.frames import Quantity, data_frame, data_set, made_of
+from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
+from stickslip_ros.physics.loop.trajectory import QUANTITIES, Trajectory, TrajectoryRecorder
+from stickslip_ros.physics.measures.cycle_measures import Measures
+from stickslip_ros.plots.measure_table import measure_table
+from stickslip_ros.plots.run_history import RunHistory
+from stickslip_ros.plots.units import Units
+from stickslip_ros.plots.why_no_cycle import why_no_cycle
+from stickslip_ros.progress import Progress
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.studies import simulate as simulation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+    from xarray import Dataset
+
+_COLUMNS = {name: Quantity(*labelled) for name, labelled in QUANTITIES.items()}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Run(Shown):
+    """A simulated run; it prints as a table of its measures."""
+
+    scenario: Scenario
+    """The scenario that was simulated."""
+    duration: float
+    """Simulated time, s."""
+    continuous: bool
+    """Whether the controller acted without sampling."""
+    measures: Measures
+    """Amplitude, regime and the other measures of the last cycles, as `stickslip simulate` prints
+    them."""
+    trajectory: Trajectory
+    """The motion at the samples t = n/rate, as numpy arrays."""
+    _history: RunHistory
+    """The data of the figure."""
+
+    def plot(self) -> "Figure":
+        """Return the figure that `stickslip simulate --plot` draws.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Motion, force, phase portrait, cycles and friction law.
+        """
+        from stickslip_ros.plots.simulated_run import simulated_run_figure
+
+        return shown_in_notebooks(simulated_run_figure(self.scenario, self._history, self.measures))
+
+    def to_pandas(self) -> "DataFrame":
+        """Return the trajectory as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each sample, by its time; SI units, which are in `attrs["units"]`.
+
+        Raises
+        ------
+        RunError
+            If pandas is not installed.
+        """
+        return data_frame(vars(self.trajectory), _COLUMNS, self._units, index="time")
+
+    def to_xarray(self) -> "Dataset":
+        """Return the trajectory as a data set.
+
+        Returns
+        -------
+        xarray.Dataset
+            A variable for each column over the dimension `time`, with `units` and `long_name`; its
+            own attributes name scenario, overrides and version.
+
+        Raises
+        ------
+        RunError
+            If xarray is not installed.
+        """
+        columns = dict(vars(self.trajectory))
+        time = columns.pop("time")
+        variables = {name: (("time",), values) for name, values in columns.items()}
+        attrs = made_of(self.scenario)
+        return data_set(variables, {"time": time}, _COLUMNS, self._units, attrs)
+
+    @property
+    def _units(self) -> Units:
+        return Units.for_drive(self.scenario.plant.as_drive())
+
+    def _parts(self) -> Parts:
+        title = f"{self.scenario.name}, {self.duration:g} {self._units.of_unit('s')}".rstrip()
+        yield measure_table(title, {"": self.measures.as_dict()}, {"": self._units})
+        drive = self.scenario.plant.as_drive()
+        reason = why_no_cycle(self.measures.regime, self.duration, drive)
+        if reason is not None:
+            yield reason
+
+
+def simulate(
+    scenario: ScenarioLike,
+    duration: float | None = None,
+    *,
+    continuous: bool = False,
+    progress: Progress = lambda _: None,
+) -> Run:
+    """Simulate a scenario without ROS, and measure its motion.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or Path
+        The scenario, its name or its path.
+    duration : float, optional
+        Simulated time, s. By default this is the scenario's own duration, or 200 natural periods.
+    continuous : bool
+        Let the controller act without sampling, as in the paper's eq. 19. By default its force is
+        held from sample to sample, as between the nodes.
+    progress : callable, optional
+        Receives the share that is done, 0 to 1.
+
+    Returns
+    -------
+    Run
+        Trajectory and measures.
+
+    Raises
+    ------
+    InvalidInputError
+        If the scenario or the duration is not allowed, or if continuous control does not support
+        the scenario.
+
+    Examples
+    --------
+    >>> import stickslip_ros as ss
+    >>> run = ss.simulate("paper", duration=100)
+    >>> len(run.trajectory), run.measures.regime.value
+    (10001, 'pure_slip')
+    """
+    chosen = as_scenario(scenario)
+    length = simulation.default_duration(chosen) if duration is None else float(duration)
+    history, recorder = RunHistory(), TrajectoryRecorder(chosen.plant.rate)
+    measures = simulation.simulate(
+        chosen,
+        length,
+        continuous=continuous,
+        progress=progress,
+        observer=history,
+        recorder=recorder,
+    )
+    return Run(chosen, length, continuous, measures, recorder.trajectory(), history)

@@ -1,0 +1,430 @@
+"""Studies: sweeps over parameters, and basins of attraction."""
+
+from collections.abc import Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from operator import index
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
+from stickslip_ros.api.frames import (
+    Quantity,
+    data_frame,
+    data_set,
+    made_of,
+    names_of,
+    of_measure,
+    of_parameter,
+)
+from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.plots.basin_table import basin_table
+from stickslip_ros.plots.sweep_table import sweep_table, units_of
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.scenarios.keywords import parameter_of
+from stickslip_ros.studies import transitions as theory
+from stickslip_ros.studies.basin import (
+    COUNT,
+    POSITION,
+    VELOCITY,
+    Attractor,
+    Basins,
+    basin_study,
+    default_axes,
+)
+from stickslip_ros.studies.basin import COURSE as BASIN_COURSE
+from stickslip_ros.studies.columns import COLUMNS, Columns, compute_columns
+from stickslip_ros.studies.plan import Axis, Carry, Grid, RandomSample
+from stickslip_ros.studies.runner import CountPoints
+from stickslip_ros.studies.settling import SettlingCourse
+from stickslip_ros.studies.study import MEASURES, Study
+from stickslip_ros.studies.sweep import sweep_study
+from stickslip_ros.text import shown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+    from xarray import Dataset
+
+    from stickslip_ros.plots.sweep_picture import Colour
+
+Values = tuple[float, float, int] | tuple[float, float, int, str]
+"""First and last value, how many, and optionally "log"."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Result(Shown):
+    """The points of a study as columns."""
+
+    study: Study
+    """The scenario, its points, and how long each motion was simulated."""
+    columns: Columns
+    """The result of each point, as numpy arrays."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario that was varied."""
+        return self.study.scenario
+
+    def to_pandas(self) -> "DataFrame":
+        """Return the points as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each point; SI units, which are in `attrs["units"]`. Parameters have their
+            keywords as names, the other columns are those of the table that the command writes.
+
+        Raises
+        ------
+        RunError
+            If pandas is not installed.
+        """
+        values = self._values()
+        values |= {"turning_points": list(self.columns.turning_points)}
+        quantities = self._quantities()
+        return data_frame(
+            {name: values[name] for name in quantities}, quantities, units_of(self.study)
+        )
+
+    def to_xarray(self) -> "Dataset":
+        """Return the points as a data set.
+
+        Returns
+        -------
+        xarray.Dataset
+            A variable for each column, with `units` and `long_name`. Its dimensions are the varied
+            parameters by their keywords, or `point` for a random sample; `direction` for a sweep
+            that is carried on; `turning_point` for the turning points, filled up with NaN. In
+            `regime` and `reason` "" stands for none.
+
+        Raises
+        ------
+        RunError
+            If xarray is not installed.
+        """
+        plan = self.study.plan
+        names = names_of(plan.parameters)
+        values = self._values()
+        values |= {name: _texts(values[name]) for name in ("regime", "reason")}
+        coordinates: dict[str, Any] = {}
+        dimensions, shape = ["point"], [plan.size]
+        if isinstance(plan, Grid):
+            dimensions, shape = list(names), list(plan.shape)
+            coordinates = {name: axis.values() for name, axis in zip(names, plan.axes, strict=True)}
+            if plan.carried:
+                dimensions, shape = ["direction", *dimensions], [len(plan.directions), *shape]
+                coordinates["direction"] = [str(direction) for direction in plan.directions]
+        variables = {
+            name: (dimensions, np.asarray(column).reshape(shape))
+            for name, column in values.items()
+            if name not in coordinates
+        }
+        points = _padded(self.columns.turning_points)
+        variables["turning_points"] = (
+            [*dimensions, "turning_point"],
+            points.reshape(*shape, points.shape[1]),
+        )
+        quantities = self._quantities()
+        attrs = made_of(self.scenario)
+        return data_set(variables, coordinates, quantities, units_of(self.study), attrs)
+
+    def _values(self) -> dict[str, Any]:
+        """Return the columns by name, but for the turning points, which are of unequal length."""
+        columns, plan = self.columns, self.study.plan
+        found: dict[str, Any] = dict(
+            zip(names_of(plan.parameters), columns.values.values(), strict=True)
+        )
+        if isinstance(plan, Grid) and plan.carried:
+            found["direction"] = [str(plan.direction(number)) for number in range(plan.size)]
+        found |= {name: getattr(columns, name) for name in COLUMNS if name != "turning_points"}
+        found["regime"] = np.array(
+            [None if regime is None else str(regime) for regime in columns.regime], dtype=object
+        )
+        return found
+
+    def _quantities(self) -> dict[str, Quantity]:
+        """Return what each column is, in the order of the columns."""
+        parameters = self.study.plan.parameters
+        found = {
+            name: of_parameter(parameter)
+            for name, parameter in zip(names_of(parameters), parameters, strict=True)
+        }
+        if self.study.plan.carried:
+            found["direction"] = Quantity("direction in which it is carried on")
+        found |= {name: of_measure(name) for name in MEASURES}
+        found["steady"] = Quantity("whether the motion has settled")
+        found["turning_points"] = Quantity("displacement where the velocity is zero", "m")
+        found["reason"] = Quantity("why there is no cycle")
+        return found
+
+
+class Sweep(_Result):
+    """Settled motions over one or two parameters; it prints as a table of regimes."""
+
+    @cached_property
+    def transitions(self) -> Mapping[str, list[float]]:
+        """Values at the Hopf point and the limits of sticking, by theory; SI units.
+
+        A sweep over two parameters has none here: its figure shows them as curves.
+        """
+        plan = self.study.plan
+        assert isinstance(plan, Grid)
+        axis, *others = plan.axes
+        return {} if others else theory.transitions(self.study, axis)
+
+    def plot(self, colour: "Colour" = "regime") -> "Figure":
+        """Return the figure that `stickslip sweep --plot` draws.
+
+        Parameters
+        ----------
+        colour : {"regime", "amplitude", "stick_fraction"}
+            What the map of a sweep over two parameters shows.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The bifurcation diagram over one parameter, or the map over two.
+
+        Raises
+        ------
+        InvalidInputError
+            If `colour` is unknown, or given for a sweep over one parameter.
+        """
+        from stickslip_ros.plots.sweep_picture import sweep_figure
+
+        return shown_in_notebooks(sweep_figure(self.columns, self.study, colour))
+
+    def _parts(self) -> Parts:
+        yield sweep_table(self.study, self.columns.points)
+
+
+class Basin(_Result):
+    """The motion that each start leads to; it prints as a table of these motions."""
+
+    @cached_property
+    def basins(self) -> Basins:
+        """The motions, with the number and the share of the starts that lead to each."""
+        return Basins.from_points(self.columns.points())
+
+    @property
+    def attractors(self) -> tuple[Attractor, ...]:
+        """The motions that the starts lead to, the one with most starts first."""
+        return self.basins.attractors
+
+    def plot(self) -> "Figure":
+        """Return the figure that `stickslip basin --plot` draws.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Which motion each start leads to.
+        """
+        from stickslip_ros.plots.basin_picture import study_figure
+
+        return shown_in_notebooks(study_figure(self.columns, self.basins, self.study))
+
+    def _values(self) -> dict[str, Any]:
+        places = [self.basins.place(point) for point in self.columns.points()]
+        return super()._values() | {"attractor": np.array(places, dtype=np.intp)}
+
+    def _quantities(self) -> dict[str, Quantity]:
+        return super()._quantities() | {"attractor": Quantity("place in the attractors, from 0")}
+
+    def _parts(self) -> Parts:
+        yield basin_table(self.study, self.basins)
+
+
+def sweep(
+    scenario: ScenarioLike,
+    /,
+    *axes: str,
+    carry: str | None = None,
+    continuous: bool = False,
+    transient: float | None = None,
+    cycles: int | None = None,
+    workers: int = 1,
+    executor: Executor | None = None,
+    journal: Path | None = None,
+    progress: CountPoints = lambda _: None,
+    **parameters: Values,
+) -> Sweep:
+    """Measure the settled motion of a scenario over the values of one or two parameters.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or Path
+        The scenario, its name or its path.
+    *axes : str
+        Texts NODE.PARAMETER=A:B:COUNT or NODE.PARAMETER=A:B:COUNT:log, as after `--over` on the
+        command line.
+    carry : {"up", "down", "both"}, optional
+        Begin each point where its neighbour along the last parameter ended, which shows
+        hysteresis. By default every point begins in the scenario's initial state.
+    continuous : bool
+        Let the controller act without sampling, which takes a fraction of the time.
+    transient : float, optional
+        Natural periods before the measurement at each point (200).
+    cycles : int, optional
+        Whole cycles to measure (4).
+    workers : int
+        Processes that share the points. With more than one a script needs
+        `if __name__ == "__main__":`.
+    executor : concurrent.futures.Executor, optional
+        Computes the points instead, on a cluster for example.
+    journal : Path, optional
+        File from which a sweep that was interrupted continues.
+    progress : callable, optional
+        Receives the number of points that are done.
+    **parameters : tuple
+        `(first, last, count)` or `(first, last, count, "log")` by keyword as for `scenario`, SI
+        units, ends included.
+
+    Returns
+    -------
+    Sweep
+        The points as columns, with the figure and the tables made from them.
+
+    Raises
+    ------
+    InvalidInputError
+        If an argument is not allowed.
+    RunError
+        If worker processes keep dying.
+
+    Examples
+    --------
+    >>> import stickslip_ros as ss
+    >>> found = ss.sweep(ss.scenario("paper", expects_control=False), belt_speed=(0.40, 0.48, 9))
+    >>> [regime.value for regime in found.columns.regime[[0, -1]]]
+    ['stick_slip', 'pure_slip']
+    """
+    if carry is not None and carry not in list(Carry):
+        raise InvalidInputError(f"carry = {shown(carry)} is refused: must be up, down or both")
+    study = sweep_study(
+        as_scenario(scenario),
+        [
+            *map(Axis.parse, axes),
+            *(
+                _axis(keyword, parameter_of(keyword), given)
+                for keyword, given in parameters.items()
+            ),
+        ],
+        carry=None if carry is None else Carry(carry),
+        course=_course(SettlingCourse(), transient, cycles),
+        continuous=continuous,
+    )
+    columns = compute_columns(
+        study, workers=workers, executor=executor, path=journal, progress=progress
+    )
+    return Sweep(study, columns)
+
+
+def basin(
+    scenario: ScenarioLike,
+    /,
+    *,
+    position: Values | tuple[float, float] | None = None,
+    velocity: Values | tuple[float, float] | None = None,
+    sample: int | None = None,
+    seed: int = 0,
+    continuous: bool = False,
+    transient: float | None = None,
+    cycles: int | None = None,
+    workers: int = 1,
+    executor: Executor | None = None,
+    journal: Path | None = None,
+    progress: CountPoints = lambda _: None,
+) -> Basin:
+    """Find the motion that each start leads to, and the share of the starts of each motion.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or Path
+        The scenario, its name or its path.
+    position, velocity : tuple, optional
+        `(first, last, count)` of the starts, m and m/s; of a sample `(first, last)` is enough. By
+        default 40 each, about twice as far to either side as a vibration goes.
+    sample : int, optional
+        Number of random starts, uniformly distributed between the ends of position and velocity,
+        instead of the grid.
+    seed : int
+        Which sample it is, 0 or more.
+    continuous, transient, cycles, workers, executor, journal, progress
+        As for `sweep`. The transient is 50 natural periods and is repeated until the motion is
+        steady.
+
+    Returns
+    -------
+    Basin
+        The starts as columns, and the motions that they lead to.
+
+    Raises
+    ------
+    InvalidInputError
+        If an argument is not allowed.
+    RunError
+        If worker processes keep dying.
+
+    Examples
+    --------
+    >>> import stickslip_ros as ss
+    >>> drive = ss.scenario("paper", expects_control=False, belt_speed=0.46)
+    >>> [attractor.share for attractor in ss.basin(drive, sample=20, seed=1).attractors]
+    [1.0]
+    """
+    chosen = as_scenario(scenario)
+    axes = list(default_axes(chosen, COUNT))
+    starts: list[tuple[str, str, Any]] = [
+        ("position", POSITION, position),
+        ("velocity", VELOCITY, velocity),
+    ]
+    for place, (name, parameter, given) in enumerate(starts):
+        if given is not None:
+            ends = sample is not None and isinstance(given, tuple) and len(given) == 2
+            axes[place] = _axis(name, parameter, (*given, 2) if ends else given)
+    plan = Grid(tuple(axes)) if sample is None else RandomSample(tuple(axes), sample, seed)
+    course = _course(BASIN_COURSE, transient, cycles)
+    study = basin_study(chosen, plan, course=course, continuous=continuous)
+    columns = compute_columns(
+        study, workers=workers, executor=executor, path=journal, progress=progress
+    )
+    return Basin(study, columns)
+
+
+def _axis(name: str, parameter: str, given: Any) -> Axis:
+    try:
+        first, last, count, *spacing = given
+        if isinstance(given, str) or spacing not in ([], ["log"]):
+            raise ValueError
+        return Axis(parameter, float(first), float(last), index(count), bool(spacing))
+    except (TypeError, ValueError):
+        raise InvalidInputError(
+            f"{name} = {shown(given)} is refused: must be (first, last, count) or "
+            "(first, last, count, 'log')"
+        ) from None
+
+
+def _course(course: SettlingCourse, transient: float | None, cycles: int | None) -> SettlingCourse:
+    return replace(
+        course,
+        transient=course.transient if transient is None else transient,
+        cycles=course.cycles if cycles is None else cycles,
+    )
+
+
+def _texts(values: Any) -> Any:
+    """Return texts, of which some are None, as an array that a file can hold."""
+    return np.array([value or "" for value in values], dtype=str)
+
+
+def _padded(rows: tuple[tuple[float, ...], ...]) -> Any:
+    """Return rows of unequal length as an array, filled up with NaN."""
+    found = np.full((len(rows), max(map(len, rows), default=0)), np.nan)
+    for number, row in enumerate(rows):
+        found[number, : len(row)] = row
+    return found

@@ -1,0 +1,249 @@
+"""Theory and design: the stability of a scenario, and gains for it."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
+from stickslip_ros.api.frames import Quantity, data_frame
+from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
+from stickslip_ros.errors import InvalidInputError, RunError
+from stickslip_ros.physics.loop.washout import WashoutParameters
+from stickslip_ros.plots.design_table import CHECKS, design_tables
+from stickslip_ros.plots.stability_table import stability_tables
+from stickslip_ros.plots.units import Units
+from stickslip_ros.progress import Progress
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.scenarios.keywords import override
+from stickslip_ros.studies import design as designing
+from stickslip_ros.studies import stability as stabilities
+from stickslip_ros.text import shown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stability(Shown):
+    """Results of theory for a scenario; it prints as tables. SI units; None does not exist.
+
+    The keys are those of `stickslip stability --json`.
+    """
+
+    scenario: Scenario
+    """The scenario that was analyzed."""
+    equilibrium_position: float | None
+    """Displacement of a slide at rest, m."""
+    open_loop: Mapping[str, Any]
+    """Eigenvalues, Hopf speeds and limit cycles without control."""
+    sticking: Mapping[str, Any]
+    """Belt speeds at which a slide sticks."""
+    closed_loop: Mapping[str, Any]
+    """Eigenvalues, Hopf speeds, limit cycles and critical gains with continuous control."""
+    sampled_loop: Mapping[str, Any]
+    """Stability and settling of the loop as the nodes run it."""
+    closed_forms: Mapping[str, Any] | None
+    """Closed forms for the cubic Stribeck law; None for other laws."""
+    notes: Mapping[str, str]
+    """Why a value does not exist, by its place."""
+
+    def plot(self) -> "Figure":
+        """Return the figure that `stickslip stability --plot` draws.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Where the sampled loop is stable, and the critical gain over the delay of the force.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is no linear sampled loop, without a controller for example.
+        """
+        reason = stabilities.why_no_stability_map(self.scenario)
+        if reason is not None:
+            raise InvalidInputError(f"there is nothing to draw: {reason}")
+        from stickslip_ros.plots.stability_map import stability_figure
+
+        return shown_in_notebooks(stability_figure(*stabilities.stability_map(self.scenario)))
+
+    def _parts(self) -> Parts:
+        found = {name: value for name, value in vars(self).items() if name != "scenario"}
+        return stability_tables(self.scenario, found, dict(self.notes))
+
+
+def stability(scenario: ScenarioLike) -> Stability:
+    """Return equilibrium, Hopf speeds, limit cycles and critical gains of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or Path
+        The scenario, its name or its path.
+
+    Returns
+    -------
+    Stability
+        Results by section.
+
+    Raises
+    ------
+    InvalidInputError
+        If the scenario is not allowed.
+
+    Examples
+    --------
+    >>> import stickslip_ros as ss
+    >>> found = ss.stability("paper")
+    >>> found.open_loop["stable"], found.closed_loop["stable"]
+    (False, True)
+    """
+    chosen = as_scenario(scenario)
+    found, notes = stabilities.stability(chosen)
+    return Stability(chosen, **found, notes=notes)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Proposal(Shown):
+    """Gains for a range of belt speeds; it prints as tables."""
+
+    design: designing.Design
+    """The task, the proposal and its checks."""
+
+    @property
+    def controller(self) -> WashoutParameters | None:
+        """The proposed constants of the washout controller; None if there are none."""
+        return self.design.controller
+
+    @property
+    def remark(self) -> str | None:
+        """Why there is no proposal, or a caution about it."""
+        return self.design.remark
+
+    @property
+    def margins(self) -> designing.Margins | None:
+        """Stability margins of gain and delay; None without control."""
+        return self.design.margins
+
+    @property
+    def checks(self) -> tuple[designing.Check, ...]:
+        """Checks of the proposal at each belt speed, predicted and simulated."""
+        return self.design.checks
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario with the proposed gains, ready to be simulated.
+
+        Its belt speed is that of the scenario, or the nearest one in the range.
+
+        Raises
+        ------
+        RunError
+            If there is nothing to propose.
+        """
+        scenario = self.design.scenario
+        if scenario is None:
+            raise RunError(self._nothing)
+        return scenario
+
+    def plot(self) -> "Figure":
+        """Return the figure that `stickslip design --plot` draws.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The decay rate over corner frequency and linear gain.
+
+        Raises
+        ------
+        RunError
+            If there is nothing to propose.
+        """
+        around = self.design.map_around()
+        if around is None:
+            raise RunError(self._nothing)
+        from stickslip_ros.plots.stability_map import stability_figure
+
+        return shown_in_notebooks(stability_figure(around, None))
+
+    def to_pandas(self) -> "DataFrame":
+        """Return the checks as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each belt speed; SI units, which are in `attrs["units"]`.
+
+        Raises
+        ------
+        RunError
+            If pandas is not installed.
+        """
+        columns = {name: [asdict(check)[name] for check in self.checks] for name in CHECKS}
+        quantities = {name: Quantity(*labelled) for name, labelled in CHECKS.items()}
+        units = Units.for_drive(self.design.task.drive)
+        return data_frame(columns, quantities, units)
+
+    @property
+    def _nothing(self) -> str:
+        return f"there is nothing to propose: {self.remark}"
+
+    def _parts(self) -> Parts:
+        scenario = self.design.task.scenario
+        return design_tables(scenario.name if scenario else "", self.design)
+
+
+def design(
+    scenario: ScenarioLike,
+    belt_speed: float | tuple[float, float] | None = None,
+    *,
+    force_limit: float | None = None,
+    progress: Progress = lambda _: None,
+) -> Proposal:
+    """Propose gains that damp the vibration within a force limit, checked by simulation.
+
+    Parameters
+    ----------
+    scenario : Scenario, str or Path
+        The scenario, its name or its path; its gains are not used.
+    belt_speed : float or tuple, optional
+        One belt speed, or lowest and highest, m/s. By default within 10 % of the scenario's.
+    force_limit : float, optional
+        Largest force, N. By default this is the scenario's.
+    progress : callable, optional
+        Receives the share that is done, 0 to 1.
+
+    Returns
+    -------
+    Proposal
+        The gains with their margins and checks, or the reason why there are none.
+
+    Raises
+    ------
+    InvalidInputError
+        If an argument is not allowed.
+
+    Examples
+    --------
+    >>> import stickslip_ros as ss
+    >>> found = ss.design("feed_drive", belt_speed=0.04, force_limit=200)
+    >>> found.scenario.washout_controller.force_limit
+    200.0
+    """
+    chosen = as_scenario(scenario)
+    if force_limit is not None:
+        chosen = chosen.overridden([override("washout_controller.force_limit", force_limit)])
+    task = designing.Task.from_scenario(chosen, _range(belt_speed))
+    return Proposal(designing.design(task, progress))
+
+
+def _range(belt_speed: Any) -> tuple[float, float] | None:
+    if belt_speed is None:
+        return None
+    try:
+        low, high = belt_speed if isinstance(belt_speed, tuple | list) else (belt_speed, belt_speed)
+        return float(low), float(high)
+    except (TypeError, ValueError):
+        raise InvalidInputError(
+            f"belt_speed = {shown(belt_speed)} is refused: must be one speed or (lowest, highest)"
+        ) from None

@@ -1,0 +1,105 @@
+"""The table of measures: their labels and units, side by side for several runs."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from stickslip_ros.physics.measures.cycle_measures import Regime, with_trend
+from stickslip_ros.plots.units import NOISE, SI, Units
+from stickslip_ros.tables import TextTable
+
+LABELS: dict[str, tuple[str, str]] = {
+    "regime": ("regime", ""),
+    "amplitude": ("amplitude", "m"),
+    "velocity_amplitude": ("velocity amplitude", "m/s"),
+    "midpoint": ("midpoint", "m"),
+    "period": ("period", "s"),
+    "frequency": ("frequency", "Hz"),
+    "stick_fraction": ("stick fraction", ""),
+    "cycles": ("cycles measured", ""),
+    "multipliers": ("Floquet multipliers", ""),
+    "peak_force": ("peak control force", "N"),
+    "peak_applied_force": ("peak control force acting", "N"),
+    "resting_force": ("control force at the end", "N"),
+    "resting_applied_force": ("control force acting at the end", "N"),
+    "samples": ("samples", ""),
+    "lost_samples": ("lost samples", ""),
+    "late_forces": ("late forces", ""),
+    "dropped_forces": ("dropped forces", ""),
+    "missed_deadlines": ("missed deadlines", ""),
+    "steps_per_second": ("steps per second", ""),
+    "duration": ("duration", "s"),
+    "complete": ("bag complete", ""),
+    "bag": ("bag", ""),
+}
+"""Label and unit of each measure and count, by its name in JSON."""
+
+_SENT = {
+    "peak_force": ("peak_applied_force", "peak control force sent"),
+    "resting_force": ("resting_applied_force", "control force sent at the end"),
+}
+"""What of a force that was sent acted, and what it is called where that is not the same."""
+
+_SAME_SCALE = {
+    "amplitude": "midpoint",
+    "midpoint": "amplitude",
+    "resting_force": "peak_force",
+    "resting_applied_force": "peak_applied_force",
+}
+"""Which other quantity tells how large one is that may be rounding."""
+
+_ALL_SI: Mapping[str, Units] = {}
+
+
+def measure_table(
+    title: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, Units] = _ALL_SI
+) -> TextTable:
+    """Return measures by name as a table with one column for each of `columns`.
+
+    Rows are the measures that any of the columns has. `units` are those of each column, by its
+    name; the default is SI.
+    """
+    rows = {
+        name: [label, *_row(name, unit, columns, units)]
+        for name, (label, unit) in LABELS.items()
+        if any(name in figures for figures in columns.values())
+    }
+    _tell_apart(rows, columns)
+    return TextTable(title, ["", *columns], list(rows.values()))
+
+
+def _tell_apart(rows: dict[str, list[str]], columns: Mapping[str, Mapping[str, Any]]) -> None:
+    """Leave out what acted where it is not known or is what was sent, and drops without any."""
+    for sent, (applied, label) in _SENT.items():
+        known = [figures.get(applied) is not None for figures in columns.values()]
+        cells = zip(known, rows.get(sent, [])[1:], rows.get(applied, [])[1:], strict=False)
+        if any(is_known and of_sent != of_applied for is_known, of_sent, of_applied in cells):
+            rows[sent][0] = label
+        else:
+            rows.pop(applied, None)
+    if not any(figures.get("dropped_forces") for figures in columns.values()):
+        rows.pop("dropped_forces", None)
+
+
+def _row(
+    name: str, unit: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, Units]
+) -> list[str]:
+    """Return the cells of one figure; columns in the same units have the same prefix."""
+    cells: dict[str, str] = {}
+    for shown_in in {units.get(column, SI) for column in columns}:
+        own = [column for column in columns if units.get(column, SI) == shown_in]
+        values = [_shown(name, columns[column]) for column in own]
+        others = [columns[column].get(_SAME_SCALE.get(name, "")) for column in own]
+        largest = max((abs(value) for value in others if value is not None), default=0.0)
+        cells |= zip(own, shown_in.texts(values, unit, largest=largest), strict=True)
+    return [cells[column] for column in columns]
+
+
+def _shown(name: str, figures: Mapping[str, Any]) -> Any:
+    """Return what is shown of a figure: of a regime also whether it is steady."""
+    value = figures.get(name)
+    if name == "regime":
+        return with_trend(Regime.label(value), figures.get("trend"))
+    if name == "velocity_amplitude" and value is not None:
+        amplitude, midpoint = figures.get("amplitude") or 0.0, figures.get("midpoint") or 0.0
+        return 0.0 if amplitude <= NOISE * abs(midpoint) else value  # what is left is rounding
+    return value

@@ -1,0 +1,76 @@
+"""What `import stickslip_ros as ss` offers, and what it costs."""
+
+import ast
+import importlib.metadata
+import subprocess
+import sys
+import warnings
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import stickslip_ros as ss
+
+SOURCE = Path(__file__).parents[2]
+HEAVY = {"numpy", "scipy", "heyoka", "matplotlib", "rclpy", "pydantic", "pandas", "xarray", "yaml"}
+
+
+def loaded_after(code: str) -> set[str]:
+    """Return the packages that a fresh process has loaded after running `code`."""
+    script = f"{code}\nimport sys; print(*{{name.partition('.')[0] for name in sys.modules}})"
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=SOURCE, capture_output=True, text=True, check=True
+    )
+    return set(done.stdout.split())
+
+
+@pytest.mark.process
+def test_importing_the_package_loads_nothing_heavy() -> None:
+    code = "import stickslip_ros as ss; dir(ss); ss.__all__; ss.__version__"
+    assert not HEAVY & loaded_after(code)
+
+
+@pytest.mark.process
+def test_results_load_what_draws_and_tabulates_when_asked() -> None:
+    loaded = loaded_after("import stickslip_ros as ss; ss.simulate('paper', duration=1)")
+    assert not {"matplotlib", "rclpy", "pandas", "xarray"} & loaded
+    assert "heyoka" in loaded
+
+
+def test_every_name_is_there_and_listed() -> None:
+    for name in ss.__all__:
+        assert getattr(ss, name) is getattr(ss, name)
+        assert name in dir(ss)
+    assert ss.__version__ == importlib.metadata.version("stickslip_ros")
+
+
+def test_a_type_checker_sees_the_same_names_from_the_same_places() -> None:
+    tree = ast.parse((SOURCE / "stickslip_ros" / "__init__.py").read_text(encoding="utf-8"))
+    (block,) = (node for node in tree.body if isinstance(node, ast.If) and "TYPE" in ast.dump(node))
+    seen = {"__version__"}
+    for node in block.body:
+        if isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                assert getattr(import_module(node.module or ""), alias.name) is getattr(
+                    ss, alias.name
+                )
+                seen.add(alias.name)
+    assert seen == set(ss.__all__)
+
+
+def test_what_is_not_there_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="'stickslip_ros' has no attribute 'nothing'"):
+        _ = ss.nothing  # pyright: ignore
+
+
+def test_the_old_package_of_that_name_does_not_hide_the_function() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import_module("stickslip_ros.scenario.files")
+    try:
+        assert ss.scenario("paper", belt_speed=0.2).plant.belt_speed == 0.2
+    finally:
+        vars(ss).pop("scenario", None)
+        for name in ("stickslip_ros.scenario.files", "stickslip_ros.scenario"):
+            sys.modules.pop(name)

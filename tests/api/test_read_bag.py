@@ -1,0 +1,68 @@
+"""Recorded runs as objects."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import stickslip_ros as ss
+from stickslip_ros.bags.reader import Recording
+from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.errors import BagError, InvalidInputError
+
+REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
+
+
+def test_a_bag_is_read_twice_the_same() -> None:
+    report = report_of_bag(REFERENCE)
+    with Recording(REFERENCE) as recording:
+        states, forces = recording.joint_states, recording.control_forces
+    for found in (ss.read_bag(REFERENCE), ss.read_bag(str(REFERENCE))):
+        assert found.report == report
+        assert found.measures.amplitude == report["amplitude"]
+        assert found.missing == []
+        for name, column in vars(states).items():
+            assert np.array_equal(getattr(found.samples, name), column)
+        assert np.array_equal(found.forces.stamp, forces.stamp)
+        assert np.array_equal(found.forces.force, forces.force)
+        assert found.drive == ss.scenario("feed_drive").plant.as_drive()
+
+
+def test_its_table_has_the_columns_of_a_simulated_run() -> None:
+    found = ss.read_bag(REFERENCE)
+    frame = found.to_pandas()
+    simulated = ss.simulate("feed_drive", duration=0.1).to_pandas()
+    assert list(frame.columns) == [*simulated.columns, "stamp"]
+    assert frame.index.name == "time"
+    assert frame.index[-1] == 3.0
+    assert np.array_equal(frame["position"], found.samples.position)
+    answered = frame["control_force"].notna().to_numpy()
+    assert np.array_equal(found.samples.stamp[answered], found.forces.stamp)
+    assert np.array_equal(frame["control_force"][answered], found.forces.force)
+    data = found.to_xarray()
+    assert np.array_equal(data["velocity"], found.samples.velocity)
+    assert data["stamp"].attrs["units"] == "ns"
+
+
+def test_a_part_is_that_of_the_report() -> None:
+    found = ss.read_bag(REFERENCE, start=1.0, end=2.0)
+    assert found.report == report_of_bag(REFERENCE, start=1.0, end=2.0)
+    assert len(found.samples) == 1000
+    assert len(found.forces) == 1000
+    with pytest.raises(InvalidInputError, match="is empty"):
+        ss.read_bag(REFERENCE, start=2.0, end=1.0)
+
+
+def test_it_prints_and_plots() -> None:
+    found = ss.read_bag(REFERENCE)
+    assert repr(found).splitlines()[0] == str(REFERENCE)
+    assert "325.8 µm" in repr(found)
+    assert "325.8 µm" in found._repr_html_()  # pyright: ignore
+    for _ in range(2):
+        assert isinstance(found.plot(), Figure)
+
+
+def test_what_is_no_bag_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BagError, match="does not exist"):
+        ss.read_bag(tmp_path / "none")

@@ -1,0 +1,143 @@
+"""Scenarios from names, paths, texts and keywords."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stickslip_ros as ss
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.scenarios.keywords import keyword_of, overrides_of, parameter_of
+from stickslip_ros.scenarios.parameter_field import known_parameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.studies.columns import COLUMNS
+
+EVERY = [
+    f"{node}.{name}" for node, model in NODE_PARAMETERS.items() for name in known_parameters(model)
+]
+SHIPPED = Path(__file__).parents[2] / "config"
+SHARED = {"autostart", "wait_for", "use_sim_time"}
+
+
+def test_a_keyword_is_the_text_that_it_stands_for() -> None:
+    by_text = load_scenario(
+        "paper",
+        [
+            "plant.belt_speed=0.2",
+            "plant.friction.law=linear",
+            "plant.initial.position=0.1",
+            "analyzer.window=5",
+            "washout_controller.linear_gain=-2",
+            "plant.expects_control=false",
+        ],
+    )
+    keywords = {
+        "belt_speed": 0.2,
+        "friction_law": "linear",
+        "initial_position": 0.1,
+        "window": 5,
+        "linear_gain": -2,
+        "expects_control": False,
+    }
+    for _ in range(2):
+        found = ss.scenario("paper", **keywords)
+        assert found == by_text
+        assert found.given == by_text.given
+
+
+@pytest.mark.parametrize("parameter", EVERY)
+def test_every_parameter_has_a_keyword_of_its_own(parameter: str) -> None:
+    keyword = keyword_of(parameter)
+    assert keyword.isidentifier()
+    assert keyword not in COLUMNS
+    if keyword in SHARED:
+        with pytest.raises(
+            InvalidInputError, match=r"several nodes .*; write plant.* or .*analyzer"
+        ):
+            parameter_of(keyword)
+    else:
+        assert parameter_of(keyword) == parameter
+
+
+@pytest.mark.parametrize("parameter", [name for name in EVERY if keyword_of(name) not in SHARED])
+def test_every_default_can_be_given_by_keyword(parameter: str) -> None:
+    scenario = load_scenario("paper")
+    node, _, name = parameter.partition(".")
+    value = scenario.as_dict()[node][name]
+    assert ss.scenario("paper", **{keyword_of(parameter): value}).as_dict() == scenario.as_dict()
+
+
+@pytest.mark.parametrize(
+    ("keyword", "value", "meant"),
+    [
+        ("belt_sped", 0.1, "belt_sped: no node has such a parameter; did you mean belt_speed?"),
+        ("static", 0.1, "did you mean friction_static?"),
+        ("friction__static", 0.1, "did you mean friction_static?"),
+        ("autostart", True, "write plant.autostart or washout_controller.autostart or analyzer."),
+        ("belt_speed", "fast", "belt_speed = 'fast' is refused: must be a finite number"),
+        ("belt_speed", (1, 2), "must be a finite number"),
+        ("mass", -1.0, "mass = -1.0 is refused: must be a finite number above 0"),
+        ("window", 2.5, "window = 2.5 is refused: must be a whole number"),
+        ("friction_law", "lienar", "friction.law = 'lienar' is refused"),
+        ("bag", "a: b", None),
+        ("bag", "true", None),
+        ("bag", "2.0", None),
+        ("bag", "with\nlines 机", None),
+    ],
+)
+def test_refusals_are_one_sentence(keyword: str, value: object, meant: str | None) -> None:
+    if meant is None:
+        assert ss.scenario("paper", **{keyword: value}).analyzer.bag == value
+        return
+    with pytest.raises(InvalidInputError) as refusal:
+        ss.scenario("paper", **{keyword: value})
+    assert meant in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    found = ss.scenario("paper", belt_speed=np.float64(0.1), window=np.int64(7), mass=2)
+    assert (found.plant.belt_speed, found.analyzer.window, found.plant.mass) == (0.1, 7, 2.0)
+    assert found.overrides == ("plant.belt_speed=0.1", "analyzer.window=7", "plant.mass=2")
+    assert overrides_of({"force_limit": float("inf")}) == ["washout_controller.force_limit=inf"]
+
+
+def test_a_scenario_can_be_changed_again() -> None:
+    first = ss.scenario("feed_drive", belt_speed=0.03)
+    second = ss.scenario(first, "plant.damping=100", belt_speed=0.02)
+    assert second == ss.scenario(
+        "feed_drive", "plant.belt_speed=0.03", "plant.damping=100", belt_speed=0.02
+    )
+    assert first == ss.scenario("feed_drive", belt_speed=0.03)
+
+
+def test_a_path_and_a_base(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("/**/plant:\n  ros__parameters:\n    damping: 100.0\n")
+    found = ss.scenario(file, base="feed_drive")
+    assert (found.plant.damping, found.plant.mass) == (100.0, 100.0)
+    assert ss.scenario(file, base=SHIPPED / "feed_drive.yaml") == found
+    assert ss.scenario(str(file)).plant.mass == 1.0
+    with pytest.raises(InvalidInputError, match="mine is loaded, and needs no base"):
+        ss.scenario(found, base="paper")
+    with pytest.raises(InvalidInputError, match="did you mean feed_drive"):
+        ss.scenario("feeddrive")
+
+
+def test_it_prints_as_what_it_is() -> None:
+    found = ss.scenario("feed_drive", belt_speed=0.03)
+    lines = repr(found).splitlines()
+    assert lines[0] == "scenario feed_drive plant.belt_speed=0.03"
+    assert any(line.split() == ["plant.belt_speed", "0.03", "m/s"] for line in lines)
+    assert not any("m/s" in line for line in repr(ss.scenario("paper")).splitlines())
+    assert "default" not in repr(found)
+    assert "<td" in found._repr_html_()  # pyright: ignore
+
+
+def test_it_says_what_is_left_to_defaults(tmp_path: Path) -> None:
+    file = tmp_path / "short.yaml"
+    file.write_text("/**/plant:\n  ros__parameters:\n    mass: 2.0\n")
+    rows = [line.split() for line in repr(ss.scenario(file)).splitlines()]
+    assert ["plant.mass", "2", "kg"] in rows
+    assert ["plant.stiffness", "1", "N/m", "default"] in rows

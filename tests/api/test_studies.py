@@ -1,0 +1,230 @@
+"""Sweeps and basins as objects: columns, figures, tables."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import stickslip_ros as ss
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.studies.basin import Basins
+from stickslip_ros.studies.columns import COLUMNS, compute_columns
+from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.plan import Axis, Carry
+from stickslip_ros.studies.runner import run
+from stickslip_ros.studies.study import MEASURES
+from stickslip_ros.studies.sweep import sweep_study
+
+FREE = ss.scenario("paper", expects_control=False)
+SHORT: dict[str, Any] = {"transient": 20.0, "cycles": 2}
+
+
+def test_a_sweep_is_that_of_the_command_twice() -> None:
+    study = sweep_study(
+        load_scenario("paper", ["plant.expects_control=false"]),
+        [Axis("plant.belt_speed", 0.3, 0.5, 5)],
+    )
+    expected = compute_columns(study)
+    for found in (
+        ss.sweep(FREE, belt_speed=(0.3, 0.5, 5)),
+        ss.sweep(FREE, "plant.belt_speed=0.3:0.5:5"),
+    ):
+        assert found.scenario is FREE
+        for name in MEASURES:
+            ours, theirs = getattr(found.columns, name), getattr(expected, name)
+            assert np.array_equal(ours, theirs, equal_nan=name != "regime"), name
+        assert found.columns.turning_points == expected.turning_points
+
+
+def test_columns_yield_the_points_they_were_made_of() -> None:
+    study = ss.sweep(FREE, "plant.belt_speed=-0.2:0.5:4", **SHORT).study
+    with Journal(study) as journal:
+        run(journal)
+        assert list(compute_columns(study).points()) == list(journal.points())
+
+
+def test_a_sweep_prints_plots_and_knows_its_transitions() -> None:
+    found = ss.sweep(FREE, belt_speed=(0.3, 0.5, 5), **SHORT)
+    assert repr(found).splitlines()[0] == "paper, 5 points"
+    assert "stick-slip" in repr(found)
+    assert "<table>" in found._repr_html_()  # pyright: ignore
+    assert list(found.transitions) == ["Hopf point", "limit of sticking"]
+    for _ in range(2):
+        assert isinstance(found.plot(), Figure)
+    with pytest.raises(InvalidInputError, match="is for maps"):
+        found.plot("amplitude")
+
+
+@pytest.mark.usefixtures("coarse_maps")
+def test_a_map_has_two_dimensions() -> None:
+    found = ss.sweep(FREE, belt_speed=(0.3, 0.5, 3), damping=(0.01, 0.1, 2, "log"), **SHORT)
+    assert found.transitions == {}
+    assert isinstance(found.plot("amplitude"), Figure)
+    with pytest.raises(InvalidInputError, match="must be one of regime, amplitude, stick_fraction"):
+        found.plot("velocity")  # pyright: ignore
+    data = found.to_xarray()
+    assert data["amplitude"].dims == ("belt_speed", "damping")
+    assert np.array_equal(data["amplitude"].to_numpy().ravel(), found.columns.amplitude)
+    assert data["damping"].to_numpy() == pytest.approx([0.01, 0.1])
+    assert data["belt_speed"].attrs["long_name"].startswith("Speed of the belt")
+    frame = found.to_pandas()
+    assert list(frame.columns) == ["belt_speed", "damping", *COLUMNS]
+    assert len(frame) == 6
+    assert frame["damping"].tolist() == pytest.approx(3 * [0.01, 0.1])
+
+
+@pytest.mark.parametrize("carry", [None, "up", "down", "both"])
+def test_the_tables_have_what_the_columns_have(carry: str | None) -> None:
+    found = ss.sweep(FREE, belt_speed=(0.35, 0.45, 3), carry=carry, **SHORT)
+    columns = found.columns
+    frame, data = found.to_pandas(), found.to_xarray()
+    directions = {None: [], "both": ["up", "down"]}.get(carry, [carry])
+    for name in MEASURES:
+        if name != "regime":
+            assert np.array_equal(frame[name], getattr(columns, name), equal_nan=True)
+            assert np.array_equal(
+                data[name].to_numpy().ravel(), getattr(columns, name), equal_nan=True
+            )
+    assert frame["regime"].tolist() == [str(regime) for regime in columns.regime]
+    assert data["regime"].to_numpy().ravel().tolist() == frame["regime"].tolist()
+    assert frame["turning_points"].tolist() == list(columns.turning_points)
+    assert frame["belt_speed"].tolist() == columns.values["plant.belt_speed"].tolist()
+    rows = data["turning_points"].to_numpy().reshape(len(frame), -1)
+    for row, points in zip(rows, columns.turning_points, strict=True):
+        assert tuple(row[~np.isnan(row)]) == points
+    if directions:
+        assert data["direction"].to_numpy().tolist() == directions
+        assert frame["direction"].tolist() == [each for each in directions for _ in range(3)]
+        assert data["amplitude"].dims == ("direction", "belt_speed")
+    assert data["amplitude"].attrs["units"] == "1"
+    assert "units" not in data["regime"].attrs
+    assert found.study.plan.carried == (carry is not None)
+
+
+def test_points_without_a_result_are_nan_and_none() -> None:
+    found = ss.sweep(ss.scenario(FREE, rate=1.0), friction_static=(0.2, 0.4, 3), **SHORT)
+    frame = found.to_pandas()
+    assert frame["reason"].notna().tolist() == [True, False, False]
+    assert frame["regime"].isna().tolist() == [True, False, False]
+    assert np.isnan(frame["amplitude"][0])
+    assert found.to_xarray()["regime"].to_numpy()[0] == ""
+    assert "must not exceed" in repr(found)
+
+
+def test_units_are_those_of_the_drive() -> None:
+    drive = ss.scenario("feed_drive", expects_control=False)
+    data = ss.sweep(drive, belt_speed=(0.02, 0.03, 2), **SHORT).to_xarray()
+    assert data["belt_speed"].attrs["units"] == "m/s"
+    assert data["turning_points"].attrs["units"] == "m"
+
+
+@pytest.mark.parametrize(
+    ("axes", "options", "meant"),
+    [
+        ({"belt_sped": (0.1, 0.2, 3)}, {}, "did you mean belt_speed?"),
+        (
+            {"belt_speed": (0.1, 0.2)},
+            {},
+            "must be (first, last, count) or (first, last, count, 'log')",
+        ),
+        ({"belt_speed": (0.1, 0.2, 3, "lin")}, {}, "must be (first, last, count)"),
+        ({"belt_speed": 0.1}, {}, "belt_speed = 0.1 is refused"),
+        ({"belt_speed": "abc"}, {}, "belt_speed = 'abc' is refused"),
+        ({"belt_speed": (0.1, 0.2, 2.5)}, {}, "must be (first, last, count)"),
+        ({"belt_speed": (0.1, 0.1, 3)}, {}, "two different finite numbers"),
+        ({"mass": (-1.0, 1.0, 3)}, {}, "mass = -1.0 is refused"),
+        ({"window": (1, 3, 3)}, {}, "analyzer"),
+        ({"friction_law": (1, 3, 3)}, {}, "plant.friction.law: is no"),
+        ({"linear_gain": (-2, 0, 3)}, {}, "without control there is no controller"),
+        ({}, {}, "0 parameters: a sweep is over one or two"),
+        ({"belt_speed": (0.1, 0.2, 3)}, {"carry": "left"}, "carry = 'left' is refused"),
+        ({"belt_speed": (0.1, 0.2, 3)}, {"workers": 0}, "0 workers"),
+        ({"belt_speed": (0.1, 0.2, 3)}, {"cycles": 0}, "0 cycles to measure"),
+        ({"autostart": (0, 1, 2)}, {}, "several nodes"),
+    ],
+)
+def test_refusals(axes: dict[str, Any], options: dict[str, Any], meant: str) -> None:
+    with pytest.raises(InvalidInputError) as refusal:
+        ss.sweep(FREE, **axes, **options)
+    assert meant in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_controlled_and_continuous() -> None:
+    controlled = ss.scenario("paper", rate=20.0)
+    sampled = ss.sweep(controlled, linear_gain=(-2.0, 0.0, 2), **SHORT)
+    continuous = ss.sweep(controlled, linear_gain=(-2.0, 0.0, 2), continuous=True, **SHORT)
+    assert sampled.study.continuous is False
+    assert continuous.study.continuous is True
+    assert list(sampled.transitions) != list(continuous.transitions)
+    assert continuous.columns.amplitude != pytest.approx(sampled.columns.amplitude, rel=1e-12)
+
+
+def test_progress_and_a_journal(tmp_path: Any) -> None:
+    seen: list[int] = []
+    journal = tmp_path / "sweep.part"
+    found = ss.sweep(FREE, belt_speed=(0.3, 0.5, 3), journal=journal, progress=seen.append, **SHORT)
+    assert all(one <= other for one, other in pairwise(seen))
+    assert seen[-1] == 3
+    again: list[int] = []
+    same = ss.sweep(FREE, belt_speed=(0.3, 0.5, 3), journal=journal, progress=again.append, **SHORT)
+    assert again == [3]
+    assert same.columns.turning_points == found.columns.turning_points
+
+
+@pytest.mark.process
+def test_workers_find_the_same() -> None:
+    one = ss.sweep(FREE, belt_speed=(0.3, 0.5, 4), **SHORT)
+    two = ss.sweep(FREE, belt_speed=(0.3, 0.5, 4), workers=2, **SHORT)
+    assert one.columns.turning_points == two.columns.turning_points
+
+
+def test_a_basin_twice() -> None:
+    options: dict[str, Any] = {"position": (-1.0, 1.0, 3), "velocity": (-1.0, 1.0, 2)}
+    one, other = ss.basin(FREE, **options), ss.basin(FREE, **options)
+    assert one.attractors == other.attractors
+    (attractor,) = one.attractors
+    assert attractor.regime is Regime.STICK_SLIP
+    assert one.basins == Basins.from_points(one.columns.points())
+    assert repr(one).splitlines()[0] == "paper, 6 starts"
+    assert isinstance(one.plot(), Figure)
+    frame, data = one.to_pandas(), one.to_xarray()
+    assert frame["attractor"].tolist() == [0] * 6
+    assert frame["initial_position"].tolist() == [-1.0, -1.0, 0.0, 0.0, 1.0, 1.0]
+    assert data["attractor"].dims == ("initial_position", "initial_velocity")
+
+
+def test_a_basin_of_random_starts() -> None:
+    options: dict[str, Any] = {"position": (-1.0, 1.0), "sample": 4, "seed": 2}
+    one, other = ss.basin(FREE, **options), ss.basin(FREE, **options)
+    starts = one.columns.values["plant.initial.position"]
+    assert np.array_equal(starts, other.columns.values["plant.initial.position"])
+    assert np.abs(starts).max() <= 1.0
+    data = one.to_xarray()
+    assert data["initial_position"].dims == ("point",)
+    assert data.sizes["point"] == 4
+    assert isinstance(one.plot(), Figure)
+
+
+@pytest.mark.parametrize(
+    ("options", "meant"),
+    [
+        ({"position": (0.0, 1.0)}, "position = (0.0, 1.0) is refused"),
+        ({"velocity": 1.0}, "velocity = 1.0 is refused"),
+        ({"velocity": 1.0, "sample": 3}, "velocity = 1.0 is refused"),
+        ({"sample": 0}, "0 points"),
+        ({"sample": 3, "seed": -1}, "seed -1"),
+    ],
+)
+def test_refusals_of_a_basin(options: dict[str, Any], meant: str) -> None:
+    with pytest.raises(InvalidInputError) as refusal:
+        ss.basin(FREE, **options)
+    assert meant in str(refusal.value)
+
+
+def test_carry_takes_what_the_command_takes() -> None:
+    assert [str(carry) for carry in Carry] == ["up", "down", "both"]
