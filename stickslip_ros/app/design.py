@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app.arguments import (
     add_json,
@@ -19,13 +19,15 @@ from stickslip_ros.app.arguments import (
     write_picture,
     writing,
 )
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import finite, print_json, print_table, progress_bar
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.theory.stability_map import StabilityMap
-from stickslip_ros.plots.units import Units
-from stickslip_ros.studies.design import Design, Task, design
-from stickslip_ros.studies.design_task import OWN_SPEED_RANGE
+from stickslip_ros.studies.options import OWN_SPEED_RANGE
 from stickslip_ros.text import printable
+
+if TYPE_CHECKING:
+    from stickslip_ros.plots.units import Units
+    from stickslip_ros.studies.design import Design
 
 HELP = "propose corner frequency and gains that damp the vibration within a force limit"
 
@@ -82,6 +84,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.studies.design import Task, design
     scenario = scenario_of(arguments, unused=_PROPOSED)
     if not scenario.plant.expects_control:
         raise InvalidInputError("plant.expects_control = False: without control there are no gains")
@@ -121,7 +125,7 @@ def _belt_speeds(text: str | None) -> tuple[float, float] | None:
     return speeds[0], speeds[-1]
 
 
-def _write(path: Path, found: Design) -> None:
+def _write(path: Path, found: "Design") -> None:
     if found.parameter_file is None:
         _leave_out(f"--out {path}: not written")
         return
@@ -131,8 +135,8 @@ def _write(path: Path, found: Design) -> None:
     print(f"{printable(str(path))} is written: `{printable(command)}` runs it", file=sys.stderr)
 
 
-def _draw(path: Path, found: Design) -> None:
-    # Half as long again to import as everything else.
+def _draw(path: Path, found: "Design") -> None:
+    from stickslip_ros.physics.theory.stability_map import StabilityMap
     from stickslip_ros.plots.stability_map import stability_figure
 
     if found.slowest is None or found.controller is None:
@@ -146,7 +150,7 @@ def _leave_out(what: str) -> None:
     print(f"stickslip design: {what}, for there is nothing to propose", file=sys.stderr)
 
 
-def _as_dict(found: Design) -> dict[str, Any]:
+def _as_dict(found: "Design") -> dict[str, Any]:
     controller, slowest, task = found.controller, found.slowest, found.task
     values = asdict(controller) if controller else dict.fromkeys(_CONTROLLER)
     checks = [asdict(check) for check in found.checks]
@@ -169,12 +173,14 @@ def _largest(values: Iterable[float | None]) -> float | None:
 
 
 def _rows(
-    figures: Mapping[str, Any], labels: Mapping[str, tuple[str, str]], units: Units
+    figures: Mapping[str, Any], labels: Mapping[str, tuple[str, str]], units: "Units"
 ) -> list[list[str]]:
     return [[label, units.text(figures[key], unit)] for key, (label, unit) in labels.items()]
 
 
-def _print(name: str, found: Design) -> None:
+def _print(name: str, found: "Design") -> None:
+    from stickslip_ros.plots.units import Units
+
     units = Units.for_drive(found.task.drive)
     speeds = units.texts(sorted({*found.task.belt_speeds}), "m/s")
     task = f"{name}, belt speed {' to '.join(speeds)}"

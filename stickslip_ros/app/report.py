@@ -2,24 +2,20 @@
 
 import argparse
 import json
-from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app.arguments import add_json, add_plot, check_picture, seconds, write_picture
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_figures, print_json
 from stickslip_ros.app.why_no_cycle import why_no_cycle
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.run_history import RunHistory
-from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.parameter_field import known_parameters
-from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.text import printable
 from stickslip_ros.versions import versions
+
+if TYPE_CHECKING:
+    from stickslip_ros.physics.model.drive import Drive
+    from stickslip_ros.plots.run_history import RunHistory
 
 HELP = "measure a recorded run, or set several side by side"
 
@@ -59,6 +55,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.bags.report import report_of_bag
+        from stickslip_ros.plots.run_history import RunHistory
+        from stickslip_ros.plots.units import Units
     plot: Path | None = arguments.plot
     bags: list[Path] = arguments.bags
     check_picture(plot)
@@ -101,9 +101,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _draw(
-    path: Path, bag: Path, drive: Drive | None, history: RunHistory, report: dict[str, Any]
+    path: Path, bag: Path, drive: "Drive | None", history: "RunHistory", report: dict[str, Any]
 ) -> None:
-    # Half as long again to import as everything else.
+    from dataclasses import fields
+
+    from stickslip_ros.physics.measures.cycle_measures import Measures
     from stickslip_ros.plots.run_figure import run_figure
 
     notes = [*report["missing"], *report["notes"]]
@@ -113,8 +115,12 @@ def _draw(
     write_picture(path, run_figure(history, measures, drive, title=str(bag), notes=notes))
 
 
-def _drive_of(bag: Path, namespace: str | None) -> Drive | None:
+def _drive_of(bag: Path, namespace: str | None) -> "Drive | None":
     """Return the drive whose parameters were recorded, None where they are not or not all."""
+    from stickslip_ros.bags.reader import Recording
+    from stickslip_ros.scenarios.parameter_field import known_parameters
+    from stickslip_ros.scenarios.parameters import PlantParameters
+
     with Recording(bag, namespace) as recording:
         texts = recording.metadata("stickslip_ros/plant") or {}
     try:

@@ -3,6 +3,7 @@
 import argparse
 from math import isfinite
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
     add_json,
@@ -15,15 +16,14 @@ from stickslip_ros.app.arguments import (
     seconds,
     write_picture,
 )
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.app.why_no_cycle import why_no_cycle
-from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.physics.model.disturbance import DisturbanceKind
-from stickslip_ros.plots.run_history import RunHistory
-from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.settling import check_continuous
-from stickslip_ros.studies.simulate import simulate
+
+if TYPE_CHECKING:
+    from stickslip_ros.physics.measures.cycle_measures import Measures
+    from stickslip_ros.plots.run_history import RunHistory
+    from stickslip_ros.scenarios.files import Scenario
 
 HELP = "run a scenario without ROS and measure its motion"
 
@@ -51,6 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.plots.run_history import RunHistory
+        from stickslip_ros.plots.units import Units
+        from stickslip_ros.studies.settling import check_continuous
+        from stickslip_ros.studies.simulate import simulate
     scenario = scenario_of(arguments)
     duration = arguments.duration
     if duration is None and isfinite(scenario.plant.duration):
@@ -85,8 +90,8 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _draw(path: Path, scenario: Scenario, history: RunHistory, measures: Measures) -> None:
-    # Half as long again to import as everything else.
+def _draw(path: Path, scenario: "Scenario", history: "RunHistory", measures: "Measures") -> None:
+    from stickslip_ros.physics.model.disturbance import DisturbanceKind
     from stickslip_ros.plots.run_figure import run_figure
 
     disturbed = scenario.plant.disturbance.kind is not DisturbanceKind.NONE
