@@ -5,7 +5,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -123,6 +123,10 @@ class _Supervisor:
             self._controller = f"{self._namespace.rstrip('/')}/washout_controller"
         if self._user_controller is not None:
             nodes.remove("washout_controller")
+        # A client that exists when the node appears is found along with the rest of this process;
+        # one that is created later may take a second or two.
+        for node in nodes:
+            self._client(node)
         try:
             # It is gone once the nodes have read it: a run that is killed cannot remove it.
             with tempfile.TemporaryDirectory(prefix="stickslip_ros_") as directory:
@@ -177,9 +181,8 @@ class _Supervisor:
         command = [executable, *in_namespace, *files, "--", *further]
         self._processes[executable] = start_child(command, guarded=True)
 
-    def _bring_up(self, nodes: Iterable[str]) -> None:
-        for node in nodes:
-            self._take_through(node, Transition.TRANSITION_CONFIGURE)
+    def _bring_up(self, nodes: Collection[str]) -> None:
+        self._configure(nodes)
         if self._user_controller is not None:
             self._connect_user_controller(self._user_controller)
         for node in nodes:
@@ -189,13 +192,33 @@ class _Supervisor:
                 self._spinner.spin_for(0.3)
             self._take_through(node, Transition.TRANSITION_ACTIVATE)
 
+    def _configure(self, nodes: Iterable[str]) -> None:
+        """Configure all nodes at the same time, and again those that were not ready for it."""
+        clients = [self._client(node) for node in nodes]
+        for client in clients:
+            client.start_change(Transition.TRANSITION_CONFIGURE)
+
+        def unanswered() -> list[str]:
+            return [client.name for client in clients if not client.change_ended()]
+
+        if not self._spinner.spin_until(lambda: not unanswered(), _READY_TIMEOUT):
+            self._fail_unready(unanswered())
+            return
+        for client in clients:
+            if not client.changed:
+                self._take_through(client.name, Transition.TRANSITION_CONFIGURE)
+
     def _take_through(self, node: str, transition: int) -> None:
         """Take a node through a transition, again and again while it is not ready for it."""
         ready = self._spinner.spin_until(
             lambda: self._change_state(node, transition), _READY_TIMEOUT, period=0.02
         )
-        if not ready and not self._is_ended():
-            self._fail(f"{node} did not become ready within {_READY_TIMEOUT:g} s")
+        if not ready:
+            self._fail_unready([node])
+
+    def _fail_unready(self, nodes: Iterable[str]) -> None:
+        if not self._is_ended():
+            self._fail(f"{', '.join(nodes)} did not become ready within {_READY_TIMEOUT:g} s")
 
     def _connect_user_controller(self, command: Sequence[str]) -> None:
         """Wait for the user's controller, and have ours activated only when connected with it.

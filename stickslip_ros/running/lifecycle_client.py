@@ -44,10 +44,23 @@ class LifecycleClient:
         return answer.current_state.label if answer is not None else ""
 
     def change_state(self, transition: int) -> bool:
-        """Ask for a transition; return whether the node has made it."""
-        request = ChangeState.Request(transition=Transition(id=transition))
-        answer = self._spinner.ask(self._change_state, request, self._timeout)
+        """Request a transition; return whether the node has made it."""
+        self._spinner.ask(self._change_state, _request(transition), self._timeout)
+        return self.changed
+
+    def start_change(self, transition: int) -> None:
+        """Request a transition and do not wait for the answer: see `change_ended`."""
+        self._change_state.start(_request(transition))
+
+    @property
+    def changed(self) -> bool:
+        """Whether the node has made the last transition requested."""
+        answer = self._change_state.answer
         return answer is not None and answer.success
+
+    def change_ended(self) -> bool:
+        """Send the request if that is due; return whether it was answered."""
+        return self._change_state.pursue()
 
     def bring_up(self, timeout: float, check: Callable[[], None]) -> None:
         """Configure and activate the node unless it does so by itself.
@@ -70,3 +83,7 @@ class LifecycleClient:
             ):
                 asked.append(state)
                 self.change_state(NEXT_TRANSITION[state])
+
+
+def _request(transition: int) -> ChangeState.Request:
+    return ChangeState.Request(transition=Transition(id=transition))

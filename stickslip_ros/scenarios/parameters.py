@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable
 from dataclasses import fields
 from math import isinf, pi, sqrt
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import AfterValidator, model_validator
 
@@ -17,11 +17,13 @@ from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
-from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.scenarios.pace import Pace
 from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field
 from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import shown
+
+if TYPE_CHECKING:
+    from stickslip_ros.physics.motion.motion import Motion
 
 _SHORTEST = 1e-3
 """Shortest time, s, that a node looks at the clock for."""
@@ -219,7 +221,7 @@ class PlantParameters(NodeParameters):
 
     def as_loop(
         self,
-        motion: Motion,
+        motion: "Motion",
         start: int = LOCKSTEP_START,
         *,
         hold_late: bool = False,

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import heyoka
 import numpy as np
 
 from stickslip_ros.physics.model.friction.base import FrictionLaw
@@ -34,6 +33,8 @@ class Exponential(FrictionLaw):
 
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
         """Return mu(v_r)."""
+        import heyoka  # what computes with no expressions does not load it
+
         speed = relative_speed * sign
         exponent = -speed / self.decay_speed
         symbolic = isinstance(exponent, heyoka.expression)
