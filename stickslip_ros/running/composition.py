@@ -1,4 +1,4 @@
-"""Our nodes of a closed loop: what they are, their parameters, and all of them in this process."""
+"""The nodes of a closed loop: their classes, their parameters, and all of them in one process."""
 
 import sys
 from collections.abc import Callable, Mapping
@@ -30,7 +30,7 @@ LOOP_NODES: dict[str, Callable[..., ManagedNode[Any]]] = {
 def node_parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
     """Return the parameters of the nodes that a scenario needs, in the order of activation.
 
-    Somebody else is to activate them, and they record to `bag`.
+    The nodes do not activate themselves, and record to `bag`.
     """
     values = scenario.as_dict()
     values["analyzer"]["bag"] = str(bag)
@@ -42,11 +42,11 @@ def node_parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
 
 
 class Composition:
-    """Plant, analyzer and perhaps our controller, configured, on one executor."""
+    """Plant, analyzer and optionally our controller, configured, on one executor."""
 
     def __init__(self, context: Context, parameters: Mapping[str, Mapping[str, Any]]) -> None:
-        """Make the nodes of these parameters, by node and flat name; RunError if one refuses."""
-        with redirect_stderr(sys.__stderr__):  # it asks for a file, which pytest may not have there
+        """Make nodes with these parameters, by node and flat name; RunError if one refuses."""
+        with redirect_stderr(sys.__stderr__):  # pytest may have replaced it
             self.spinner = Spinner(context)
         self.nodes: dict[str, Any] = {}
         """By name, in the order of activation."""
@@ -65,14 +65,14 @@ class Composition:
         self.plant: PlantNode = self.nodes["plant"]
 
     def activate(self, node: ManagedNode[Any], timeout: float = 0.0) -> None:
-        """Activate a node, within so much wall time (s) in which those it waits for may come."""
+        """Activate a node; wait up to `timeout` (s, wall time) for the nodes that it needs."""
         done = TransitionCallbackReturn.SUCCESS
         if not self.spinner.spin_until(lambda: node.trigger_activate() is done, timeout):
             reason = node.missing_peers() or "its log says why"
             raise RunError(f"{node.get_name()} could not be activated: {reason}")
 
     def set_parameters(self, node: ManagedNode[Any], values: Mapping[str, Any]) -> None:
-        """Set parameters of a node by their flat names; raises InvalidInputError if it refuses."""
+        """Set parameters of a node by flat name; raises InvalidInputError if it refuses them."""
         changes = [Parameter(name, value=value) for name, value in values.items()]
         result = node.set_parameters_atomically(changes)
         if not result.successful:

@@ -15,8 +15,10 @@ ROOT = Path(__file__).parents[2]
 
 HEAVY = {"heyoka", "matplotlib", "mcap", "numpy", "pydantic", "rclpy", "rich", "scipy", "yaml"}
 """Packages that take long to import, each more than a tenth of what Python itself takes."""
-COMPUTING = {"heyoka", "numpy", "pydantic", "yaml"}
-"""What a simulation cannot do without."""
+READING = {"mcap", "numpy", "pydantic", "yaml"}
+"""What the report of a bag needs."""
+INTEGRATING = {"heyoka", "numpy", "pydantic", "yaml"}
+"""What a simulation needs."""
 
 PROGRAM = """
 import sys
@@ -38,15 +40,20 @@ SHOW = """from contextlib import suppress
 """Defines a function that shows the help of a command."""
 
 
-def loaded(code: str, *arguments: str) -> set[str]:
-    """Run code in a process of its own; return which of the heavy packages it has loaded."""
-    done = subprocess.run(
+def start(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run code in a process of its own; its last line on standard error is what it has loaded."""
+    return subprocess.run(
         [sys.executable, "-c", PROGRAM.format(code=code, heavy=sorted(HEAVY)), *arguments],
         cwd=ROOT,
         capture_output=True,
         text=True,
         timeout=PATIENCE,
     )
+
+
+def loaded(code: str, *arguments: str) -> set[str]:
+    """Run code in a process of its own; return which of the heavy packages it has loaded."""
+    done = start(code, *arguments)
     assert done.returncode == 0, done.stderr
     return set(done.stderr.splitlines()[-1].split()[1:])
 
@@ -66,9 +73,28 @@ def test_the_help_of_each_command_loads_nothing_heavy() -> None:
 
 
 @pytest.mark.parametrize(
-    "arguments", [("simulate", "paper", "--duration", "1"), ("report", "bags/reference")]
+    ("arguments", "needed"),
+    [
+        (("simulate", "paper", "--duration", "1"), INTEGRATING),
+        (("report", "bags/reference"), READING),
+    ],
 )
-def test_a_short_command_loads_what_it_computes_with_and_no_more(
-    arguments: tuple[str, ...],
+def test_a_short_command_loads_what_it_computes_with(
+    arguments: tuple[str, ...], needed: set[str]
 ) -> None:
-    assert loaded(MAIN, *arguments) - {"mcap", "rich"} == COMPUTING
+    assert loaded(MAIN, *arguments) - {"rich"} == needed
+
+
+@pytest.mark.parametrize("node", ["analyzer", "washout_controller"])
+def test_a_node_without_a_motion_loads_no_integrator(node: str) -> None:
+    assert loaded(f"import stickslip_ros.nodes.{node}") & {"heyoka", "matplotlib", "scipy"} == set()
+
+
+def test_a_run_says_what_it_starts_before_it_loads_ros(tmp_path: Path) -> None:
+    without_ros = f"sys.modules['rclpy'] = None; {MAIN}"
+    bag = str(tmp_path / "bag")
+    done = start(without_ros, "run", "paper", "--duration", "5", "--bag", bag, "--json")
+    assert done.returncode == 1
+    started = "paper: lockstep, duration 5; starting the nodes in processes of their own"
+    assert done.stderr.startswith(f"{started}; recording to {bag}")
+    assert done.stdout == ""
