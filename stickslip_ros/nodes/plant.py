@@ -22,6 +22,7 @@ from stickslip_ros.messages.topics import (
 )
 from stickslip_ros.nodes.base.duplicate_publishers import duplicate_publishers
 from stickslip_ros.nodes.base.managed import ERROR, OK, Diagnosis, ManagedNode, diagnosis
+from stickslip_ros.nodes.base.plant_keys import FAILURE, FINISHED, NEWEST_STAMP
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.lateness_warning import Punctuality
 from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer
@@ -30,13 +31,6 @@ from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import Pace, PlantParameters
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
-
-NEWEST_STAMP = "newest_stamp"
-"""Key of the stamp of the newest sample, ns, in the diagnostics."""
-FAILURE = "failure"
-"""Key of the reason why the plant could not continue, if it could not."""
-FINISHED = "finished"
-"""Key of whether the plant has paused by itself, not on request."""
 
 
 class PlantNode(ManagedNode[PlantParameters]):

@@ -5,10 +5,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import rclpy
 from lifecycle_msgs.msg import Transition
@@ -21,9 +22,9 @@ from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.child_process import GUARD_TIMEOUT, how_it_ended, start_child
 from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, initialise, stop_on_signals
 from stickslip_ros.nodes.base.service_call import ServiceCall
-from stickslip_ros.running.composition import LOOP_NODES, node_parameters
 from stickslip_ros.running.controller_search import ControllerSearch
 from stickslip_ros.running.lifecycle_client import ACTIVE, NEXT_TRANSITION, LifecycleClient
+from stickslip_ros.running.loop_nodes import node_parameters
 from stickslip_ros.running.namespace_lock import lock_namespace
 from stickslip_ros.running.run_monitor import Notify, OnSimulatedTime, RunMonitor
 from stickslip_ros.running.spinner import Spinner
@@ -123,25 +124,21 @@ class _Supervisor:
             self._controller = f"{self._namespace.rstrip('/')}/washout_controller"
         if self._user_controller is not None:
             nodes.remove("washout_controller")
-        # A client that exists when the node appears is found along with the rest of this process;
-        # one that is created later may take a second or two.
-        for node in nodes:
-            self._client(node)
         try:
             # It is removed once the nodes have read it: a killed run could not remove it later.
             with tempfile.TemporaryDirectory(prefix="stickslip_ros_") as directory:
                 file = Path(directory, "parameters.yaml")
                 file.write_text(parameter_file(parameters), encoding="utf-8")
                 if composed:
-                    for name in nodes:
-                        make = LOOP_NODES[name]
-                        self._spinner.add(
-                            make(namespace=self._namespace, overrides=parameters[name])
-                        )
+                    self._compose({name: parameters[name] for name in nodes})
                 else:
                     self._spawn(nodes, file)
                 if self._user_controller:
                     self._start_user_controller(self._user_controller, file)
+                # A client that exists before the node appears is discovered along with the rest of
+                # this process; one that is created later may take a second or two.
+                for node in nodes:
+                    self._client(node)
                 self._bring_up(nodes)
             self._spinner.spin_until(lambda: self._monitor.finished, period=0.03)
         finally:
@@ -158,11 +155,17 @@ class _Supervisor:
     def _is_ended(self) -> bool:
         return self._stop.done() or self._failure is not None
 
+    def _compose(self, parameters: Mapping[str, Mapping[str, Any]]) -> None:
+        from stickslip_ros.running.composition import NODE_CLASSES  # loads what the nodes need
+
+        for name, values in parameters.items():
+            self._spinner.add(NODE_CLASSES[name](namespace=self._namespace, overrides=values))
+
     def _spawn(self, nodes: Iterable[str], file: Path) -> None:
         self._signal_handlers[signal.SIGTSTP] = signal.signal(signal.SIGTSTP, self._suspend)
         arguments = [*ROS_ARGUMENTS, "--params-file", str(file), "-r", f"__ns:={self._namespace}"]
         for name in nodes:
-            module = LOOP_NODES[name].__module__
+            module = f"stickslip_ros.nodes.{name}"
             self._processes[name] = start_child([sys.executable, "-m", module, *arguments])
 
     def _suspend(self, *_: object) -> None:

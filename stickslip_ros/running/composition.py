@@ -1,9 +1,8 @@
-"""The nodes of a closed loop: their classes, their parameters, and all of them in one process."""
+"""The nodes of a closed loop in one process."""
 
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import redirect_stderr
-from pathlib import Path
 from typing import Any
 
 from rclpy.context import Context
@@ -17,28 +16,13 @@ from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.running.spinner import Spinner
-from stickslip_ros.scenarios.files import Scenario
 
-LOOP_NODES: dict[str, Callable[..., ManagedNode[Any]]] = {
+NODE_CLASSES: dict[str, Callable[..., ManagedNode[Any]]] = {
     "analyzer": AnalyzerNode,
     "washout_controller": WashoutControllerNode,
     "plant": PlantNode,
 }
-"""Every node by its name, in the order of activation."""
-
-
-def node_parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
-    """Return the parameters of the nodes that a scenario needs, in the order of activation.
-
-    The nodes do not activate themselves, and record to `bag`.
-    """
-    values = scenario.as_dict()
-    values["analyzer"]["bag"] = str(bag)
-    return {
-        node: {**values[node], "autostart": False}
-        for node in LOOP_NODES
-        if node != "washout_controller" or scenario.plant.expects_control
-    }
+"""Class of each node of `LOOP_NODES`, by name."""
 
 
 class Composition:
@@ -52,7 +36,7 @@ class Composition:
         """By name, in the order of activation."""
         try:
             for name, values in parameters.items():
-                node = LOOP_NODES[name](context=context, overrides=values)
+                node = NODE_CLASSES[name](context=context, overrides=values)
                 node.get_logger().set_level(LoggingSeverity.WARN)
                 self.nodes[name] = node
                 self.spinner.add(node)

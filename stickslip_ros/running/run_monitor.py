@@ -8,8 +8,8 @@ from std_msgs.msg import Header
 
 from stickslip_ros.messages.topics import DIAGNOSTICS, RECORDED
 from stickslip_ros.nodes.base.managed import STATE
+from stickslip_ros.nodes.base.plant_keys import FAILURE, FINISHED, NEWEST_STAMP
 from stickslip_ros.nodes.base.ros_topics import qos_profile
-from stickslip_ros.nodes.plant import FAILURE, FINISHED, NEWEST_STAMP
 from stickslip_ros.running.lifecycle_client import ACTIVE, NEXT_TRANSITION
 from stickslip_ros.stamps import NANOSECONDS
 
