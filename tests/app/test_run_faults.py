@@ -143,7 +143,7 @@ def test_a_run_that_is_stopped_says_that_its_nodes_go_on(
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
-    assert "stopped, and the nodes go on" in errors
+    assert "suspended: the nodes continue" in errors
     assert "interrupted: the bag bag is closed; the nodes have ended" in errors
 
 
