@@ -85,9 +85,11 @@ def test_a_short_command_loads_what_it_computes_with(
     assert loaded(MAIN, *arguments) - {"rich"} == needed
 
 
-@pytest.mark.parametrize("node", ["analyzer", "washout_controller"])
-def test_a_node_without_a_motion_loads_no_integrator(node: str) -> None:
-    assert loaded(f"import stickslip_ros.nodes.{node}") & {"heyoka", "matplotlib", "scipy"} == set()
+@pytest.mark.parametrize(
+    "module", ["nodes.analyzer", "nodes.washout_controller", "running.bringup"]
+)
+def test_what_has_no_motion_loads_no_integrator(module: str) -> None:
+    assert loaded(f"import stickslip_ros.{module}") & {"heyoka", "matplotlib", "scipy"} == set()
 
 
 def test_a_run_says_what_it_starts_before_it_loads_ros(tmp_path: Path) -> None:
