@@ -13,6 +13,7 @@ from benchmarks.slices import LACKING, Row, table
 from stickslip_ros.versions import versions
 
 NAMES = (
+    "start",
     "motion",
     "bifurcation",
     "sweep",

@@ -31,7 +31,7 @@ from stickslip_ros.nodes.base.process import spin
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.replaying.player import Message
 from stickslip_ros.running.domain import domain_variables, own_domain
-from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE
+from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE
 from stickslip_ros.stamps import NANOSECONDS
 
 SAMPLES = 30_000

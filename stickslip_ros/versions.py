@@ -1,11 +1,11 @@
 """Versions of the software that computed a result."""
 
-import platform
-from importlib import metadata
-
 
 def versions() -> dict[str, str]:
     """Return the versions of Python, this package and the packages that its results depend on."""
+    import platform  # these two take longer to import than the start of a command should take
+    from importlib import metadata
+
     found = {"python": platform.python_version()}
     for package in ("stickslip_ros", "heyoka", "numpy", "mcap", "rclpy"):
         try:

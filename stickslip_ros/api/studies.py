@@ -28,7 +28,6 @@ from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.keywords import parameter_of
 from stickslip_ros.studies import transitions as theory
 from stickslip_ros.studies.basin import (
-    COUNT,
     POSITION,
     VELOCITY,
     Attractor,
@@ -36,7 +35,6 @@ from stickslip_ros.studies.basin import (
     basin_study,
     default_axes,
 )
-from stickslip_ros.studies.basin import COURSE as BASIN_COURSE
 from stickslip_ros.studies.columns import COLUMNS, Columns, compute_columns
 from stickslip_ros.studies.plan import Axis, Carry, Grid, RandomSample
 from stickslip_ros.studies.runner import CountPoints
@@ -378,7 +376,7 @@ def basin(
     [1.0]
     """
     chosen = as_scenario(scenario)
-    axes = list(default_axes(chosen, COUNT))
+    axes = list(default_axes(chosen, BASIN_COUNT))
     starts: list[tuple[str, str, Any]] = [
         ("position", POSITION, position),
         ("velocity", VELOCITY, velocity),

@@ -9,20 +9,16 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.scenarios.files import (
-    DEFAULT_NAMESPACE,
-    LONGEST_NAMESPACE,
-    Scenario,
-    load_scenario,
-)
-from stickslip_ros.scenarios.parameter_field import known_parameters
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.text import printable, shown
 from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from stickslip_ros.scenarios.files import Scenario
 
 _PICTURES = (".png", ".svg", ".pdf")
 
@@ -143,11 +139,15 @@ def scenario_of(
     namespace: str = DEFAULT_NAMESPACE,
     other_nodes: bool = False,
     unused: Collection[str] = (),
-) -> Scenario:
+) -> "Scenario":
     """Return the scenario that was asked for, `overrides` applied after those given.
 
     Of what is left to defaults a person is told, but for what is `unused` (NODE.PARAMETER).
     """
+    with interrupts_kept():
+        from stickslip_ros.scenarios.files import load_scenario
+        from stickslip_ros.scenarios.parameter_field import known_parameters
+        from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
     control = ["plant.expects_control=false"] if arguments.no_control else []
     asked = [*arguments.overrides, *control, *overrides]
     scenario = load_scenario(
@@ -169,7 +169,7 @@ def scenario_of(
     return scenario
 
 
-def made_of(scenario: Scenario) -> dict[str, Any]:
+def made_of(scenario: "Scenario") -> dict[str, Any]:
     """Return what a result was made from, for its JSON."""
     return {
         "scenario": {"name": scenario.name, **scenario.as_dict()},

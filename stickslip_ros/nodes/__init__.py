@@ -1,4 +1,4 @@
-"""The ROS 2 nodes: thin shells around the physics; importing this package loads no ROS."""
+"""The ROS 2 nodes: thin shells around the physics. Importing this package does not load ROS."""
 
 import sys
 

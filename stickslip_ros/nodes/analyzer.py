@@ -51,11 +51,11 @@ from stickslip_ros.versions import versions
 ColumnsT = TypeVar("ColumnsT")
 
 VERDICT_TIME = 0.05
-"""Time, s, in which a plant that has dropped forces says so of the last ones, too."""
+"""Time, s, in which a plant that has dropped forces reports the last ones, too."""
 
 
 class _Message(NamedTuple):
-    """A message that was taken."""
+    """A received message."""
 
     topic: Topic[Any]
     stamp: int
@@ -63,23 +63,23 @@ class _Message(NamedTuple):
 
 
 class AnalyzerNode(ManagedNode[AnalyzerParameters]):
-    """Listens to joint_states and control_force; writes a bag, publishes limit_cycle/*."""
+    """Subscribes to joint_states and control_force; writes a bag, publishes limit_cycle/*."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("analyzer", AnalyzerParameters, **options)
         self._bags_opened = 0
 
     def connect(self) -> None:
-        """Refuse a bag that cannot be; publish what is measured."""
+        """Refuse a bag that cannot be written; publish the measures."""
         if self.parameters.bag:
             check_new_bag(self._next_bag())
         self._limit_cycle = [self.advertise(t) for t in (AMPLITUDE, STICK_FRACTION, FREQUENCY)]
         self._channels: dict[str, int] = {}
-        # Messages gather that long: one by one each would wake a thread and find cold caches.
-        self._tick = min(0.02, self.parameters.flush_period / 2.0)
+        # Messages are taken in batches: single ones would each wake a thread and find cold caches.
+        self._batch_period = min(0.02, self.parameters.flush_period / 2.0)
 
     def start(self) -> None:
-        """Open a bag, start to measure, and then listen: who is heard is not lost."""
+        """Open a bag, start to measure, and subscribe last, so that no message is lost."""
         self._meter = RunMeter(self.parameters.window)
         self._cycles = self._newest_recorded = 0
         self._logged = ""
@@ -88,7 +88,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._flushed_at = time.monotonic()
         if self.parameters.bag:
             self._open_bag()
-        # It exists while there is a recorder to wait for, and the plant sees by it that there is.
+        # The plant waits for the recorder while this publisher exists.
         self._recorded = self.advertise(RECORDED)
         self._parameter_calls = [
             parameters_call(self, node, list(known_parameters(model)), partial(self._keep, node))
@@ -105,12 +105,12 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             for topic in RECORDED_TOPICS
         }
         self._periodic = [
-            self.keep(self.every(self._tick, partial(self._if_active, self._take_in))),
+            self.keep(self.every(self._batch_period, partial(self._if_active, self._take_in))),
             self.keep(self.every(0.1, partial(self._if_active, self._measure))),
         ]
 
     def stop(self) -> None:
-        """Measure what is left, close the bag with its report, and log the report."""
+        """Measure the remaining samples, close the bag with its report, and log the report."""
         self._take_in()
         if self._meter.dropped:
             time.sleep(VERDICT_TIME)
@@ -125,13 +125,13 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._keep("report", report)
         self._record(Recorder.close)
         self._recorder = None
-        if self._bag_failure:  # then it is nowhere else
+        if self._bag_failure:  # then the report is in no bag
             self.get_logger().warning(f"report: {json.dumps(report)}")
         else:
             self.get_logger().info(f"report: {json.dumps(report)}")
 
     def publishing_nodes(self) -> set[str]:
-        """Return who writes what will be recorded."""
+        """Return the nodes that publish the recorded topics."""
         return {
             writer.node_name
             for topic in RECORDED_TOPICS
@@ -139,7 +139,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         }
 
     def diagnose(self) -> Diagnosis:
-        """Return regime and steadiness, counts of samples, and what is wrong with them."""
+        """Return regime and steadiness, counts of samples, and problems with them."""
         if not self.active:
             return OK, "", {}
         report = self._meter.report()
@@ -159,9 +159,9 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             callback()
 
     def _take_in(self) -> None:
-        """Record what has come since the last time, and keep it to be measured."""
+        """Record the messages received since the last call, and keep them for the measures."""
         taken = {topic: self._take(topic) for topic in RECORDED_TOPICS}
-        # Only where a plant tells of them the bag has their topic: without it, they are not known.
+        # The bag has this topic only if the plant publishes it: otherwise drops are unknown.
         if not self._meter.dropped_known and (
             taken[DROPPED_FORCE] or self._listening[DROPPED_FORCE].get_publisher_count() > 0
         ):
@@ -172,16 +172,16 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self._newest_recorded = states[-1].stamp
             self._recorded.publish(pack_header(self._newest_recorded))
         self._write(heapq.merge(*taken.values(), key=attrgetter("stamp")))
-        # Flush if that would be too late at the next tick.
+        # Flush now if the next call would be too late.
         now = time.monotonic()
-        if now + self._tick >= self._flushed_at + self.parameters.flush_period:
+        if now + self._batch_period >= self._flushed_at + self.parameters.flush_period:
             self._flushed_at = now
             self._record(Recorder.flush)
 
     def _take(self, topic: Topic[Any]) -> list[_Message]:
-        """Take the messages of a topic that wait; one without a proper stamp is dropped."""
+        """Take the waiting messages of a topic; drop those without a valid stamp."""
         taken: list[_Message] = []
-        # Whoever sends faster than this can take must not keep it from all else.
+        # A publisher that sends faster than this must not block all other work.
         for data in islice(waiting_messages(self._listening[topic]), DEEP):
             try:
                 stamp = unpack_header(data)
@@ -213,7 +213,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             call.pursue()
 
     def _log_measures(self) -> None:
-        """Log what the last window of cycles was, unless it reads as the one before."""
+        """Log the measures of the last window of cycles, unless the text is unchanged."""
         measures = self._meter.motion.measures()
         if measures.amplitude is None or measures.frequency is None:
             text = f"{measures.regime}"
@@ -230,7 +230,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def _columns(
         self, topic: Topic[Any], decode: Callable[[Sequence[bytes]], tuple[ColumnsT, Refused]]
     ) -> ColumnsT:
-        """Return what is to be measured of a topic; a message that is unreadable is dropped."""
+        """Return the values of a topic to measure; drop unreadable messages."""
         messages, self._to_measure[topic] = self._to_measure[topic], []
         columns, refused = decode(messages)
         if refused.number > 0:
@@ -252,7 +252,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             for topic in RECORDED_TOPICS:
                 if topic is not DROPPED_FORCE:
                     self._add_topic(recorder, topic)
-        except BagError:  # on a full disk; another attempt may follow at once
+        except BagError:  # on a full disk; another attempt may follow immediately
             shutil.rmtree(recorder.directory, ignore_errors=True)
             raise
         self._bags_opened += 1
@@ -266,7 +266,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._channels[topic.name] = recorder.add_topic(name, topic.type_name, qos)
 
     def _keep(self, name: str, values: Mapping[str, Any]) -> None:
-        """Put a table into the bag that says how the recording came about, or what it gave."""
+        """Put a table of metadata into the bag: origin or results of the recording."""
         texts = {key: json.dumps(value) for key, value in values.items()}
         self._record(lambda recorder: recorder.add_metadata(f"stickslip_ros/{name}", texts))
 
@@ -278,7 +278,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._record(write)
 
     def _record(self, act: Callable[[Recorder], None]) -> None:
-        """Do it with the bag, if there is one; go on without one that cannot be written."""
+        """Apply `act` to the bag, if any; continue without the bag if it cannot be written."""
         if self._recorder is None:
             return
         try:

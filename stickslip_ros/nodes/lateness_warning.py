@@ -1,13 +1,13 @@
-"""Whether forces and samples are in time: the share of those that were late lately, and why."""
+"""Check whether forces and samples are in time, from the share of recent late ones."""
 
 from collections import deque
 
 _WINDOW = 10
-"""Looks over which shares are taken."""
+"""Number of calls over which shares are computed."""
 
 
 class Punctuality:
-    """Looks at the counts of a segment every now and then, and says what is wrong with them."""
+    """Checks the counts of a segment regularly, and reports problems."""
 
     def __init__(self) -> None:
         self._counts = deque([(0, 0, 0)], maxlen=_WINDOW + 1)
@@ -15,19 +15,19 @@ class Punctuality:
     def look(
         self, samples: int, late_forces: int, missed_deadlines: int, *, controlled: bool
     ) -> str:
-        """Return what there is to complain of in the last looks, if anything.
+        """Return a complaint about the last calls, or an empty string.
 
-        While there is no controller, be it that none is expected, no force can be late.
+        Without a controller, expected or not, no force can be late.
         """
         counts = samples, late_forces, missed_deadlines
-        if not controlled:  # from when there is one again its own forces count
+        if not controlled:  # only forces after its return count
             self._counts = deque(
                 ((n, late_forces, missed) for n, _, missed in self._counts), maxlen=_WINDOW + 1
             )
         before = self._counts[0]
         self._counts.append(counts)
         number, late, missed = (now - then for now, then in zip(counts, before, strict=True))
-        if number < 100:  # too few for a share of them to say anything
+        if number < 100:  # too few for a meaningful share
             return ""
         found = [
             f"{100.0 * count / number:.2g} % of the latest {what}"
@@ -40,6 +40,6 @@ class Punctuality:
         if not found:
             return ""
         return (
-            f"{' and '.join(found)}: lower rate or real_time_factor, close what else is busy here, "
+            f"{' and '.join(found)}: lower rate or real_time_factor, close other busy programs, "
             "or set pace to lockstep"
         )

@@ -1,4 +1,4 @@
-"""What lets a node go on to its next sample: the clock, an answer, or how far a recorder is."""
+"""Pace a node from sample to sample, by the clock, by answers, or by a recorder."""
 
 import ctypes
 import gc
@@ -19,19 +19,19 @@ from stickslip_ros.scenarios.parameters import PlantParameters
 Publish = Callable[[Sample], None]
 
 _LONG_WAIT = 0.05
-"""Wait, s, from which on it must be possible to be interrupted."""
+"""Wait, s, above which the wait must be interruptible."""
 
-NO_FORCE = "no control force comes: going on without"
+NO_FORCE = "no control force arrives: continuing without"
 
 
 class Sleeper:
-    """Sleeps until absolute times of the monotonic clock, unless it is woken before."""
+    """Sleeps until absolute times of the monotonic clock, or until it is woken."""
 
     def __init__(self) -> None:
         self._woken = Event()
 
     def sleep_until(self, deadline: float) -> None:
-        """Return at the deadline, s, or earlier because of `wake`."""
+        """Return at the deadline, s, or on `wake`."""
         wait = deadline - time.monotonic()
         if wait > _LONG_WAIT:
             if self._woken.wait(min(wait - _LONG_WAIT, TIMEOUT_MAX)):
@@ -42,38 +42,38 @@ class Sleeper:
             time.sleep(wait)
 
     def wake(self) -> None:
-        """End a long sleep, the next one if there is none now; from any thread."""
+        """End the current long sleep, or else the next one. Any thread may call this."""
         self._woken.set()
 
 
 class FlowWindow:
-    """Bounds how many joint states may be on their way to the recorder that reads them.
+    """Bounds the number of joint states that are sent and not yet recorded.
 
-    A recorder that has gone or is silent for too long is not waited for until it speaks again.
+    If the recorder has gone or is silent for too long, it is ignored until it publishes again.
     """
 
     def __init__(self, size: int, recorder_exists: Callable[[], bool]) -> None:
-        """Bound them to `size` samples."""
+        """Allow `size` samples."""
         self._recorder_exists = recorder_exists
         self._recorder_present = recorder_exists()
         self._under_way: deque[int] = deque(maxlen=size)
 
     @property
     def under_way(self) -> int:
-        """Samples that the recorder may not hold yet; 0 if none is waited for."""
+        """Samples that the recorder may not have yet; 0 without a recorder to wait for."""
         return len(self._under_way) if self._recorder_present else 0
 
     @property
     def full(self) -> bool:
-        """Whether the recorder has to come further before a further sample is sent."""
+        """Whether the recorder must progress before the next sample is sent."""
         return self.under_way == self._under_way.maxlen
 
     def sent(self, stamp: int) -> None:
-        """Say that the sample of that stamp (ns) was sent."""
+        """Note that the sample with this stamp (ns) was sent."""
         self._under_way.append(stamp)
 
     def recorded(self, stamp: int) -> None:
-        """Say that the recorder holds everything up to the last sample of that stamp (ns)."""
+        """Note that the recorder has everything up to the last sample with this stamp (ns)."""
         self._recorder_present = True
         newest_first = enumerate(reversed(self._under_way))
         left = next((number for number, sent in newest_first if sent == stamp), None)
@@ -81,25 +81,25 @@ class FlowWindow:
             self._under_way.popleft()
 
     def give_up(self, patience_ends: bool) -> str:
-        """Wait no longer if the recorder has gone or patience ends; return what is wrong then."""
+        """Stop waiting if the recorder has gone or patience ends; return the problem, if any."""
         if self._recorder_exists() and not patience_ends:
             return ""
         self._recorder_present = False
-        return "the recorder has gone or is silent: not waited for any more"
+        return "the recorder has gone or is silent: no longer waiting for it"
 
 
 class Pacer:
-    """Drives a loop from sample to sample; `publish` gets each, `end` is called at the last."""
+    """Drives a loop from sample to sample; calls `publish` for each and `end` at the last."""
 
     complaint = ""
-    """What is wrong, in words."""
+    """Current problem, in words; empty if there is none."""
     failure = ""
-    """Why it could not go on, in words."""
+    """Why it could not continue, in words."""
     finished = False
-    """Whether it has stopped by itself: at the last sample, or because it could not go on."""
+    """Whether it has stopped by itself: at the last sample, or because it could not continue."""
     missed_deadlines = 0
     largest_lateness = 0.0
-    """Time by which a sample was published after its deadline, s."""
+    """Largest delay of a sample after its deadline, s."""
 
     def __init__(self, loop: SampledLoop, publish: Publish, end: Callable[[], None]) -> None:
         self._loop = loop
@@ -110,14 +110,14 @@ class Pacer:
         self._started = self._stopped = time.monotonic()
 
     def start(self, last: int) -> None:
-        """Publish sample 0 and go on, up to sample `last`."""
+        """Publish sample 0 and continue up to sample `last`."""
         self._last = last
         self._running = True
         self._started = time.monotonic()
         self._publish(self._loop.sample)
 
     def stop(self) -> None:
-        """Publish no further sample."""
+        """Publish no more samples."""
         if self._running:
             self._stopped = time.monotonic()
         self._running = False
@@ -133,16 +133,16 @@ class Pacer:
         return self._loop.sample_number / max(until - self._started, 1e-9)
 
     def force_came(self) -> None:
-        """Say that a force was offered to the loop."""
+        """Note that a force was offered to the loop."""
 
     def recorder_came_to(self, stamp: int) -> None:
-        """Say that the recorder holds everything up to the sample of that stamp (ns)."""
+        """Note that the recorder has everything up to the sample with this stamp (ns)."""
 
 
 class LockstepPacer(Pacer):
-    """Goes on as soon as the force has come, and not too far ahead of the recorder.
+    """Continues as soon as the force has arrived, but not too far ahead of the recorder.
 
-    Whoever is silent for `reply_timeout` is not waited for until it speaks again.
+    A controller or recorder that is silent for `reply_timeout` is ignored until it publishes again.
     """
 
     def __init__(
@@ -165,13 +165,13 @@ class LockstepPacer(Pacer):
         self._watchdog = node.every(min(0.1, self._reply_timeout / 10.0), self._watch)
 
     def start(self, last: int) -> None:
-        """Publish sample 0 and go on, once the node is active, when it is answered."""
+        """Publish sample 0 and, once the node is active, continue when it is answered."""
         super().start(last)
         self._flow.sent(self._loop.sample.stamp)
         self._schedule()
 
     def stop(self) -> None:
-        """Publish no further sample."""
+        """Publish no more samples."""
         super().stop()
         self._node.destroy_timer(self._watchdog)
 
@@ -180,19 +180,19 @@ class LockstepPacer(Pacer):
         super()._finish()
 
     def force_came(self) -> None:
-        """Go on if the force was the one waited for."""
+        """Continue if the force was the expected one."""
         if self._loop.answered:
             self._proceed()
 
     def recorder_came_to(self, stamp: int) -> None:
-        """Go on if the recorder has caught up."""
+        """Continue if the recorder has caught up."""
         self._flow.recorded(stamp)
         self.complaint = ""
         self._proceed()
 
     def _proceed(self) -> None:
         loop = self._loop
-        for _ in range(100):  # further ones behind the callbacks that have come meanwhile
+        for _ in range(100):  # more of them after the callbacks that are due by then
             if not self._running:
                 return
             held_up = self._awaits_force or self._flow.full
@@ -212,7 +212,7 @@ class LockstepPacer(Pacer):
         self._schedule()
 
     def _schedule(self) -> None:
-        """Go on behind the callbacks that are due."""
+        """Continue after the callbacks that are due."""
         if not self._scheduled:
             self._scheduled = True
             self._node.call_soon(self._proceed_scheduled)
@@ -226,7 +226,7 @@ class LockstepPacer(Pacer):
         return self._loop.controller_present and not self._loop.answered
 
     def _watch(self) -> None:
-        """Give up whoever has held up the loop for too long."""
+        """Stop waiting for a controller or recorder that has held up the loop for too long."""
         now = time.monotonic()
         if self._loop.sample_number != self._seen:
             self._seen, self._seen_at = self._loop.sample_number, now
@@ -265,25 +265,25 @@ class RealtimePacer(Pacer):
         self._thread = Thread(target=self._run, name="pacer", daemon=True)
 
     def start(self, last: int) -> None:
-        """Publish sample 0 now; every further one is due an interval after the one before."""
+        """Publish sample 0 now; each following sample is due one interval later."""
         super().start(last)
         self._thread.start()
 
     def stop(self) -> None:
-        """Publish no further sample."""
+        """Publish no more samples."""
         super().stop()
         self._sleeper.wake()
         self._thread.join()
 
     def deadline(self, number: int) -> float:
-        """Return when the sample of that number is due, s of the monotonic clock."""
+        """Return when a sample is due, s of the monotonic clock."""
         return self._started + number * self._interval
 
     def _run(self) -> None:
         try:
             _be_prompt()
             self._keep_deadlines()
-        except Exception as error:  # it would end the thread without a word
+        except Exception as error:  # it would end the thread silently
             known = isinstance(error, StickslipError)
             self.failure = str(error) if known else f"{type(error).__name__}: {error}"
             self._finish()
@@ -308,8 +308,8 @@ class RealtimePacer(Pacer):
 
 
 def _be_prompt() -> None:
-    """Let this thread go on soon after it could; the defaults favour throughput."""
-    if sys.platform == "linux":  # otherwise it sleeps up to 50 us longer than asked
+    """Reduce wake-up delays of this thread; the defaults favour throughput."""
+    if sys.platform == "linux":  # otherwise a sleep may last 50 us longer
         ctypes.CDLL(None).prctl(29, 1)  # PR_SET_TIMERSLACK
     sys.setswitchinterval(1e-4)
-    gc.freeze()  # what the imports have made takes tens of ms to go through
+    gc.freeze()  # objects made by imports take tens of ms to traverse

@@ -22,6 +22,7 @@ from stickslip_ros.messages.topics import (
 )
 from stickslip_ros.nodes.base.duplicate_publishers import duplicate_publishers
 from stickslip_ros.nodes.base.managed import ERROR, OK, Diagnosis, ManagedNode, diagnosis
+from stickslip_ros.nodes.base.plant_keys import FAILURE, FINISHED, NEWEST_STAMP
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.lateness_warning import Punctuality
 from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer
@@ -31,16 +32,9 @@ from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import Pace, PlantParameters
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 
-NEWEST_STAMP = "newest_stamp"
-"""Key under which the diagnostics tell the stamp of the newest sample, ns."""
-FAILURE = "failure"
-"""Key under which they tell why the plant could not go on, if so."""
-FINISHED = "finished"
-"""Key under which they tell whether it has paused by itself, and not because somebody asked."""
-
 
 class PlantNode(ManagedNode[PlantParameters]):
-    """Publishes joint_states and takes control_force; one sampled loop, driven by a pacer."""
+    """Publishes joint_states and receives control_force; a pacer drives one sampled loop."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("plant", PlantParameters, **options)
@@ -50,7 +44,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         """Simulated time, s, before the last pause that counts as part of the duration."""
 
     def connect(self) -> None:
-        """Compile the motion; publish the state, listen to forces and to the recorder."""
+        """Compile the motion; publish the state, subscribe to forces and to the recorder."""
         initial = self.parameters.initial
         self._motion = Motion(self.parameters.as_drive(), initial.position, initial.velocity)
         self._moved = False
@@ -69,9 +63,9 @@ class PlantNode(ManagedNode[PlantParameters]):
         self.keep(self.create_service(Trigger, "~/reset", self._on_reset))
 
     def start(self) -> None:
-        """Begin a segment: sample 0 now, further ones as the pacer lets them come."""
+        """Start a segment: sample 0 now, the following ones as the pacer advances."""
         self._punctuality = Punctuality()
-        if self._disturbance:  # whoever records the new segment has not heard of it
+        if self._disturbance:  # the recorder of the new segment has not received it
             self._disturbance = nan
         parameters = self.parameters
         realtime = parameters.pace is Pace.REALTIME
@@ -85,7 +79,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         stampable = self._loop.number(latest) - 1
         if stampable < 0:
             raise InvalidInputError(
-                f"no stamps are left behind {latest // NANOSECONDS} s: start the node anew"
+                f"no stamps are left after {latest // NANOSECONDS} s: restart the node"
             )
         if realtime:
             self._pacer = RealtimePacer(
@@ -106,7 +100,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._pacer.start(last)
 
     def stop(self) -> None:
-        """Pause the motion, once the states sent have arrived."""
+        """Pause the motion once the states sent have arrived."""
         self._pacer.stop()
         self._moved = True
         done = self._loop.sample_number * self._loop.period
@@ -116,7 +110,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         super().stop()
 
     def apply_parameters(self) -> None:
-        """Go on with the new drive and disturbance from the next sample on."""
+        """Use the new drive and disturbance from the next sample on."""
         if self.active:
             with self._lock:
                 self._loop.change_drive(self.parameters.as_drive())
@@ -144,7 +138,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             **{f"dropped: {reason}": count for reason, count in loop.dropped.items()},
         }
         if loop.unbounded:
-            return ERROR, "the motion runs away (regime unbounded)", figures
+            return ERROR, "the motion diverges (regime unbounded)", figures
         if pacer.failure:
             return ERROR, pacer.failure, {**figures, FAILURE: pacer.failure}
         complaints = [pacer.complaint]
@@ -182,11 +176,11 @@ class PlantNode(ManagedNode[PlantParameters]):
             self._clock_time.publish(clock)
 
     def _end(self) -> None:
-        """Pause by itself: the last sample was reached, or the motion cannot go on."""
-        if not self._pacer.finished:  # it was that of a segment before, and came too late
+        """Pause: the last sample was reached, or the motion cannot continue."""
+        if not self._pacer.finished:  # this call belongs to an earlier segment
             return
         if self._loop.unbounded:
-            self.get_logger().error("the motion runs away (regime unbounded): plant deactivated")
+            self.get_logger().error("the motion diverges (regime unbounded): plant deactivated")
         elif self._pacer.failure:
             self.get_logger().error(f"{self._pacer.failure}: plant deactivated")
         else:

@@ -1,7 +1,7 @@
-"""Replay node: publishes the messages of a bag again, unchanged and spaced as they were.
+"""Replay node: publishes the messages of a bag again, unchanged and with their recorded spacing.
 
-It begins when one of its topics has a reader and, for half a second, no other reader has come. With
-wait_for it begins when the nodes named there read what it publishes.
+It starts when one of its topics has a reader and no new reader has appeared for half a second. With
+wait_for it starts when the nodes named there read its topics.
 """
 
 import sys
@@ -27,15 +27,15 @@ from stickslip_ros.scenarios.parameters import PlantParameters, ReplayParameters
 from stickslip_ros.stamps import NANOSECONDS
 
 _FLOW_WINDOW = PlantParameters().flow_window
-"""Joint states that may be on their way to a recorder."""
+"""Joint states that may be sent and not yet recorded."""
 _SETTLED = 0.5
-"""Time, s, without a new reader after which those that are there count as all."""
+"""Time, s, without a new reader after which the readers count as complete."""
 _SILENCE = 3.0
-"""Time, s, after which it is said what is waited for."""
+"""Time, s, after which the node logs what it waits for."""
 
 
 class ReplayNode(ManagedNode[ReplayParameters]):
-    """Publishes the topics of a bag under the names they were recorded under."""
+    """Publishes the topics of a bag under their recorded names."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("replay", ReplayParameters, **options)
@@ -43,7 +43,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         self._waiting_for = ""
 
     def connect(self) -> None:
-        """Refuse what cannot be replayed; offer the topics."""
+        """Refuse what cannot be replayed; create the publishers."""
         self._selection = Selection(self.parameters, self.get_fully_qualified_name())
         for sentence in self._selection.left_out:
             self.get_logger().warning(sentence)
@@ -65,7 +65,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         self.keep(self.every(0.05, self._look_for_readers))
 
     def start(self) -> None:
-        """Publish the first message now, further ones when they are due."""
+        """Publish the first message now, the others when they are due."""
         self._clock_time: int | None = None
         self._player = Player(
             self._messages,
@@ -84,13 +84,13 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         self._player.start()
 
     def stop(self) -> None:
-        """Fall silent, once the messages sent have arrived."""
+        """Stop once the messages sent have arrived."""
         if self._player is not None:
             self._player.stop()
         super().stop()
 
     def diagnose(self) -> Diagnosis:
-        """Return how far the replay has come and how late it was, or what it waits for."""
+        """Return the progress and lateness of the replay, or what it waits for."""
         player = self._player
         if player is None:
             return OK, self._waiting_for, {}
@@ -106,7 +106,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
 
     @property
     def _position(self) -> float:
-        """Recorded time from the bag's first message to the last one that was sent, s."""
+        """Recorded time from the first message of the bag to the last one sent, s."""
         if self._player is None or self._player.sent == 0:
             return 0.0
         return (self._player.recorded_time - self._selection.first) * 1e-9
@@ -130,7 +130,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         return all(writer.wait_for_all_acked(Duration()) for writer in self._writers.values())
 
     def _end(self) -> None:
-        """Pause by itself: the bag has come to its end, or cannot be read any further."""
+        """Pause: the bag has ended, or cannot be read further."""
         player = self._player
         if player is not None and player.failure is not None:
             self.get_logger().error(f"the replay ended early: {player.failure}")
@@ -140,10 +140,10 @@ class ReplayNode(ManagedNode[ReplayParameters]):
             self.trigger_deactivate()
 
     def missing_peers(self) -> str:
-        """Return what is missing of the readers: those named or, if none are, any."""
+        """Return what is missing of the named readers or, if none are named, of any."""
         missing = super().missing_peers()
         if not missing and not any(self._readers):
-            missing = f"nobody reads {', '.join(self._writers)}"
+            missing = f"no node reads {', '.join(self._writers)}"
         now = time.monotonic()
         if missing and missing != self._waiting_for and now - self._connected_at > _SILENCE:
             self.get_logger().warning(f"waiting: {missing}")
@@ -151,7 +151,9 @@ class ReplayNode(ManagedNode[ReplayParameters]):
         if missing:
             return missing
         self._waiting_for = ""
-        return "readers are still coming" if now - self._readers_changed_at < _SETTLED else ""
+        return (
+            "new readers are still appearing" if now - self._readers_changed_at < _SETTLED else ""
+        )
 
     def _look_for_readers(self) -> None:
         readers = [writer.get_subscription_count() for writer in self._writers.values()]
@@ -159,7 +161,7 @@ class ReplayNode(ManagedNode[ReplayParameters]):
             self._readers, self._readers_changed_at = readers, time.monotonic()
 
     def _listen_to_recorder(self, topic: str, writer: Publisher) -> str:
-        """Listen to the recorder that may be among a topic's readers; return what it speaks on."""
+        """Subscribe to a recorder that may read the topic; return the name of its own topic."""
         name = f"{writer.topic_name.rpartition('/')[0]}/{RECORDED.name}"
         self.subscribe(replace(RECORDED, name=name), partial(self._on_recorded, topic))
         return name

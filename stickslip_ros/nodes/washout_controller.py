@@ -15,13 +15,13 @@ from stickslip_ros.scenarios.parameters import WashoutControllerParameters
 
 
 class WashoutControllerNode(ManagedNode[WashoutControllerParameters]):
-    """Subscribes to joint_states and publishes control_force, stamped with what it answers."""
+    """Subscribes to joint_states and publishes control_force with the stamp of each sample."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("washout_controller", WashoutControllerParameters, **options)
 
     def connect(self) -> None:
-        """Publish forces; take the newest joint state only."""
+        """Publish forces; subscribe to the newest joint state only."""
         self._force = self.advertise(CONTROL_FORCE)
         self.subscribe(JOINT_STATES, self._on_joint_state, depth=1)
 
@@ -36,7 +36,7 @@ class WashoutControllerNode(ManagedNode[WashoutControllerParameters]):
             self._washout.parameters = self.parameters.as_washout()
 
     def diagnose(self) -> Diagnosis:
-        """Return how many joint states were answered, and what is wrong with others."""
+        """Return how many joint states were answered, and problems with the others."""
         if not self.active:
             return OK, "", {}
         return diagnosis(

@@ -1,1 +1,1 @@
-"""Starting the nodes of a loop, composed or in processes."""
+"""Start and stop the nodes of a loop, composed in one process or each in its own."""

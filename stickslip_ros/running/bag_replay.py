@@ -1,4 +1,4 @@
-"""Replaying one bag in this process."""
+"""Replay one bag in this process."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -16,11 +16,12 @@ def replay_bag(
     offering: Callable[[Sequence[str]], None],
     progress: Callable[[float], None],
 ) -> bool:
-    """Replay a bag in this process; return whether a signal ended it before the bag did.
+    """Replay a bag in this process; return whether a signal ended the replay before the bag did.
 
-    `parameters` are those of the node by name. `offering` is told the topics when they are offered,
-    `progress` now and then which share of the recorded time is done. Raises InvalidInputError for
-    what is refused, BagError where the bag cannot be read on, and RunError where all else fails.
+    `parameters` are those of the node, by name. `offering` receives the topics when the node
+    publishes them, and `progress` receives the share of the recorded time that is done. Raises
+    InvalidInputError for refused parameters, BagError if the bag cannot be read further, and
+    RunError for other failures.
     """
     initialise()
     try:
@@ -32,7 +33,7 @@ def replay_bag(
 
 
 class _OneReplay(ReplayNode):
-    """Runs until the bag or a signal ends it, and says how far it has come."""
+    """A replay that runs until the bag or a signal ends it, and reports its progress."""
 
     def __init__(
         self,
@@ -44,7 +45,7 @@ class _OneReplay(ReplayNode):
         self._offering = offering
         self._progress = progress
         self.ended = False
-        """Whether the bag has ended it."""
+        """Whether the replay reached the end of the bag."""
         self.every(0.1, self._tell_progress)
 
     def connect(self) -> None:

@@ -1,4 +1,4 @@
-"""Bringing the nodes up and down: as processes or composed in one, activated in order."""
+"""Start the nodes of a run, as processes or composed in one, and stop them in order."""
 
 import os
 import signal
@@ -6,10 +6,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import rclpy
 from lifecycle_msgs.msg import Transition
@@ -22,9 +23,9 @@ from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.child_process import GUARD_TIMEOUT, how_it_ended, start_child
 from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, initialise, stop_on_signals
 from stickslip_ros.nodes.base.service_call import ServiceCall
-from stickslip_ros.running.composition import LOOP_NODES, node_parameters
 from stickslip_ros.running.controller_search import ControllerSearch
 from stickslip_ros.running.lifecycle_client import ACTIVE, NEXT_TRANSITION, LifecycleClient
+from stickslip_ros.running.loop_nodes import node_parameters
 from stickslip_ros.running.namespace_lock import lock_namespace
 from stickslip_ros.running.run_monitor import Notify, OnSimulatedTime, RunMonitor
 from stickslip_ros.running.spinner import Spinner
@@ -34,18 +35,18 @@ from stickslip_ros.scenarios.sections import section_matches
 _READY_TIMEOUT = 30.0
 _EXIT_TIMEOUT = 2.0 * GUARD_TIMEOUT + 2.0
 _DISCOVERY_TIME = 3.0
-"""Time, s, for which something must stand before it is no longer a matter of discovery."""
+"""Time, s, after which a problem is reported: a shorter one may be due to discovery."""
 _WATCH_PERIOD = 0.1
 
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """What a run came to."""
+    """Result of a run."""
 
     interrupted: bool
     """Whether SIGINT, SIGTERM or SIGHUP ended it."""
     plant: dict[str, str]
-    """The plant's last figures, as in its diagnostics."""
+    """The plant's last values, as in its diagnostics."""
     controller: str | None
     """Full name of the node that was the controller."""
 
@@ -60,16 +61,16 @@ def run_nodes(
     on_simulated_time: OnSimulatedTime = lambda _: None,
     notify: Notify = lambda _: None,
 ) -> RunOutcome:
-    """Run the scenario's nodes until the plant has finished or a signal comes.
+    """Run the scenario's nodes until the plant has finished or a signal arrives.
 
-    A plant that somebody deactivates is waited for until it is activated again.
+    If the plant is deactivated from outside, the run continues when it is activated again.
 
-    `controller` is the command, executable and arguments, of one in place of ours, which is
-    configured and activated if it is a managed (lifecycle) node. If the command is empty, somebody
-    else starts one, and the plant waits for it.
-    Every node is deactivated, and the bag closed, before this returns or raises RunError (a node
-    died, or did not become ready). Raises InvalidInputError if another run is in the namespace, or
-    ROS does not take what the environment says.
+    `controller` is the command (executable and arguments) of a user's controller that replaces
+    ours; a managed (lifecycle) node is configured and activated. If the command is empty, the
+    plant waits for a controller that is started elsewhere.
+    Every node is deactivated, and the bag is closed, before this returns or raises RunError (a node
+    died, or did not become ready). Raises InvalidInputError if the namespace has another run, or
+    ROS refuses the settings of the environment.
     """
     initialise()
     try:
@@ -82,7 +83,7 @@ def run_nodes(
 
 
 class _Supervisor:
-    """Starts the nodes of a run, takes them through their states, watches and ends them."""
+    """Starts the nodes of a run, changes their states, monitors them and ends them."""
 
     def __init__(
         self,
@@ -117,7 +118,7 @@ class _Supervisor:
     def run(self, bag: Path, composed: bool) -> RunOutcome:
         parameters = node_parameters(self._scenario, bag)
         nodes = list(parameters)
-        # The analyzer only listens until it is active; it is matched by those that write to it.
+        # The analyzer subscribes when it becomes active; its writers check that it is matched.
         for node in nodes[1:]:
             parameters[node]["wait_for"] = [other for other in nodes if other != node]
         if "washout_controller" in nodes:
@@ -125,20 +126,20 @@ class _Supervisor:
         if self._user_controller is not None:
             nodes.remove("washout_controller")
         try:
-            # It is gone once the nodes have read it: a run that is killed cannot remove it.
+            # It is removed once the nodes have read it: a killed run could not remove it later.
             with tempfile.TemporaryDirectory(prefix="stickslip_ros_") as directory:
                 file = Path(directory, "parameters.yaml")
                 file.write_text(parameter_file(parameters), encoding="utf-8")
                 if composed:
-                    for name in nodes:
-                        make = LOOP_NODES[name]
-                        self._spinner.add(
-                            make(namespace=self._namespace, overrides=parameters[name])
-                        )
+                    self._compose({name: parameters[name] for name in nodes})
                 else:
                     self._spawn(nodes, file)
                 if self._user_controller:
                     self._start_user_controller(self._user_controller, file)
+                # A client that exists before the node appears is discovered along with the rest of
+                # this process; one that is created later may take a second or two.
+                for node in nodes:
+                    self._client(node)
                 self._bring_up(nodes)
             self._spinner.spin_until(lambda: self._monitor.finished, period=0.03)
         finally:
@@ -155,54 +156,77 @@ class _Supervisor:
     def _is_ended(self) -> bool:
         return self._stop.done() or self._failure is not None
 
+    def _compose(self, parameters: Mapping[str, Mapping[str, Any]]) -> None:
+        from stickslip_ros.running.composition import NODE_CLASSES  # loads what the nodes need
+
+        for name, values in parameters.items():
+            self._spinner.add(NODE_CLASSES[name](namespace=self._namespace, overrides=values))
+
     def _spawn(self, nodes: Iterable[str], file: Path) -> None:
         self._signal_handlers[signal.SIGTSTP] = signal.signal(signal.SIGTSTP, self._suspend)
         arguments = [*ROS_ARGUMENTS, "--params-file", str(file), "-r", f"__ns:={self._namespace}"]
         for name in nodes:
-            module = LOOP_NODES[name].__module__
+            module = f"stickslip_ros.nodes.{name}"
             self._processes[name] = start_child([sys.executable, "-m", module, *arguments])
 
     def _suspend(self, *_: object) -> None:
-        """Stop, as by Ctrl-Z, which does not reach the nodes."""
-        self._notify(
-            "stopped, and the nodes go on without being watched: fg takes the run up again"
-        )
+        """Stop this process on Ctrl-Z; the signal does not reach the nodes."""
+        self._notify("suspended: the nodes continue, but are not monitored; fg resumes the run")
         signal.raise_signal(signal.SIGSTOP)
 
     def _start_user_controller(self, command: Sequence[str], file: Path) -> None:
         executable, *further = command
         in_namespace = ["--ros-args", "-r", f"__ns:={self._namespace}"]
-        # Its own parameters may stand in the scenario; overrides are in the other file. What was
-        # given with the command comes last, and so has the last word.
+        # The scenario may contain parameters of its own; overrides are in the other file. The
+        # user's arguments come last, so they take precedence.
         files = ["--params-file", str(self._scenario.path), "--params-file", str(file)]
         interpreter = [] if os.access(executable, os.X_OK) else [sys.executable]
         command = [*interpreter, executable, *in_namespace, *files, "--", *further]
         self._processes[executable] = start_child(command, guarded=True)
 
-    def _bring_up(self, nodes: Iterable[str]) -> None:
-        for node in nodes:
-            self._take_through(node, Transition.TRANSITION_CONFIGURE)
+    def _bring_up(self, nodes: Collection[str]) -> None:
+        self._configure(nodes)
         if self._user_controller is not None:
             self._connect_user_controller(self._user_controller)
         for node in nodes:
             if node == "plant" and self._user_controller is not None:
                 self._await_controller(active=True)
-                # For it to match our readers, too: on our side nothing tells that it has.
+                # It has to match our readers, too, and our side is not notified of that.
                 self._spinner.spin_for(0.3)
             self._take_through(node, Transition.TRANSITION_ACTIVATE)
 
+    def _configure(self, nodes: Iterable[str]) -> None:
+        """Configure all nodes at the same time, and again those that were not ready for it."""
+        clients = [self._client(node) for node in nodes]
+        for client in clients:
+            client.start_change(Transition.TRANSITION_CONFIGURE)
+
+        def unanswered() -> list[str]:
+            return [client.name for client in clients if not client.change_ended()]
+
+        if not self._spinner.spin_until(lambda: not unanswered(), _READY_TIMEOUT):
+            self._fail_unready(unanswered())
+            return
+        for client in clients:
+            if not client.changed:
+                self._take_through(client.name, Transition.TRANSITION_CONFIGURE)
+
     def _take_through(self, node: str, transition: int) -> None:
-        """Take a node through a transition, again and again while it is not ready for it."""
+        """Take a node through a transition; repeat the request until the node is ready for it."""
         ready = self._spinner.spin_until(
             lambda: self._change_state(node, transition), _READY_TIMEOUT, period=0.02
         )
-        if not ready and not self._is_ended():
-            self._fail(f"{node} did not become ready within {_READY_TIMEOUT:g} s")
+        if not ready:
+            self._fail_unready([node])
+
+    def _fail_unready(self, nodes: Iterable[str]) -> None:
+        if not self._is_ended():
+            self._fail(f"{', '.join(nodes)} did not become ready within {_READY_TIMEOUT:g} s")
 
     def _connect_user_controller(self, command: Sequence[str]) -> None:
-        """Wait for the user's controller, and have ours activated only when connected with it.
+        """Wait for the user's controller; our nodes are activated once connected to it.
 
-        Nothing is recorded yet: it may take long, and end with Ctrl-C.
+        Nothing is recorded yet: the wait may take long, and Ctrl-C ends it.
         """
         if not command:
             self._notify(f"waiting for a controller: a node that {self._search.task}")
@@ -220,25 +244,25 @@ class _Supervisor:
                 self._notify(f"{self._scenario.path}: section {section} matches no node")
 
     def _await_controller(self, *, active: bool) -> str | None:
-        """Return the controller when it is there, or at work; None if the run ends before.
+        """Wait for the controller, or for it to be active; return None if the run ends first.
 
-        The user is told what is amiss for long. A controller that was started here has to be ready
-        in time.
+        Problems that persist are reported to the user. A controller that this run started must be
+        ready in time.
         """
         started = time.monotonic()
-        amiss_since: dict[str, float] = {}
+        problem_since: dict[str, float] = {}
         while not self._is_ended():
-            self._controller, amiss = self._look_for_controller(active)
+            self._controller, problems = self._look_for_controller(active)
             if self._controller is not None:
                 return self._controller
             now = time.monotonic()
-            amiss_since = {what: amiss_since.get(what, now) for what in amiss}
-            for what, since in amiss_since.items():
+            problem_since = {what: problem_since.get(what, now) for what in problems}
+            for what, since in problem_since.items():
                 if now - since > _DISCOVERY_TIME and what not in self._notified:
                     self._notified.add(what)
                     self._notify(what)
             if self._user_controller and now - started > _READY_TIMEOUT:
-                why = "; ".join([f"there is no active node that {self._search.task}", *amiss])
+                why = "; ".join([f"there is no active node that {self._search.task}", *problems])
                 self._fail(
                     f"{self._user_controller[0]} was not ready within {_READY_TIMEOUT:g} s: {why}"
                 )
@@ -246,15 +270,15 @@ class _Supervisor:
         return None
 
     def _look_for_controller(self, active: bool) -> tuple[str | None, list[str]]:
-        """Return the controller, and in a sentence each what is amiss.
+        """Return the controller and one sentence for each problem.
 
-        A managed one that was started here is taken a step on towards its being active.
+        A managed controller that this run started takes one step towards its active state.
         """
         found, managed = self._search.controllers(), self._search.managed()
-        # Before it is configured, it may have nothing to be found by but its namespace.
+        # Before it is configured, it may have no topics: only its namespace identifies it.
         namespace = self._namespace.rstrip("/")
         candidates = [node for node in managed if node.rpartition("/")[0] == namespace]
-        amiss = list(self._search.near_misses())
+        problems = list(self._search.near_misses())
         for node in dict.fromkeys([*found, *candidates]):
             if node in found and not (active and node in managed):
                 return node, []
@@ -263,10 +287,10 @@ class _Supervisor:
                 if node in found:
                     return node, []
                 continue
-            amiss.append(f"the managed node {node} is {state or 'silent'}")
+            problems.append(f"the managed node {node} is {state or 'silent'}")
             if self._user_controller and state in NEXT_TRANSITION:
                 self._change_state(node, NEXT_TRANSITION[state])
-        return None, amiss
+        return None, problems
 
     def _set_wait_for(self, node: str, others: list[str]) -> None:
         call = ServiceCall(self._node, SetParameters, f"{node}/set_parameters")
@@ -275,9 +299,9 @@ class _Supervisor:
         self._spinner.spin_until(call.pursue)
 
     def _bring_down(self) -> None:
-        """Deactivate what is active, the analyzer last, and end the processes.
+        """Deactivate the active nodes, the analyzer last, and end the processes.
 
-        Who is in a hurry, and says so by a second signal, does not wait for any answer.
+        After a second signal, no answer is waited for.
         """
         self._monitor.ending = True
         self._spinner.is_cut_short = self._hurry.done
@@ -301,7 +325,7 @@ class _Supervisor:
                 process.wait()
 
     def _let_the_analyzer_catch_up(self) -> None:
-        """Wait until it holds the plant's last sample; fail if it stops short of that."""
+        """Wait until the analyzer has the plant's last sample; fail if it makes no progress."""
         while self._monitor.unrecorded > 0.0 and not self._is_dead("analyzer"):
             before = self._monitor.unrecorded
             goes_on = self._spinner.spin_until(
@@ -310,11 +334,11 @@ class _Supervisor:
             )
             if not goes_on:
                 if not self._hurry.done():
-                    self._fail(f"the analyzer did not take in the last {before:g} s of samples")
+                    self._fail(f"the analyzer did not receive the last {before:g} s of samples")
                 return
 
     def _deactivate(self, node: str) -> None:
-        """Deactivate a node, unless somebody else has: rclpy leaves that request unanswered."""
+        """Deactivate a node if it is active: rclpy does not answer an invalid request."""
         state = self._client(node).state()
         if state == ACTIVE:
             self._change_state(node, Transition.TRANSITION_DEACTIVATE)
@@ -339,7 +363,7 @@ class _Supervisor:
         for name, process in self._processes.items():
             status = process.poll()
             if name == "plant" and status == 0 and self._monitor.plant_stopped:
-                self._monitor.finished = True  # somebody has ended it in order
+                self._monitor.finished = True  # it was ended in order from outside
             elif status is not None:
                 self._fail(f"the node {name} died ({how_it_ended(status)})")
 

@@ -1,9 +1,8 @@
-"""Our nodes of a closed loop: what they are, their parameters, and all of them in this process."""
+"""The nodes of a closed loop in one process."""
 
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import redirect_stderr
-from pathlib import Path
 from typing import Any
 
 from rclpy.context import Context
@@ -17,42 +16,27 @@ from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.running.spinner import Spinner
-from stickslip_ros.scenarios.files import Scenario
 
-LOOP_NODES: dict[str, Callable[..., ManagedNode[Any]]] = {
+NODE_CLASSES: dict[str, Callable[..., ManagedNode[Any]]] = {
     "analyzer": AnalyzerNode,
     "washout_controller": WashoutControllerNode,
     "plant": PlantNode,
 }
-"""Every node by its name, in the order of activation."""
-
-
-def node_parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
-    """Return the parameters of the nodes that a scenario needs, in the order of activation.
-
-    Somebody else is to activate them, and they record to `bag`.
-    """
-    values = scenario.as_dict()
-    values["analyzer"]["bag"] = str(bag)
-    return {
-        node: {**values[node], "autostart": False}
-        for node in LOOP_NODES
-        if node != "washout_controller" or scenario.plant.expects_control
-    }
+"""Class of each node of `LOOP_NODES`, by name."""
 
 
 class Composition:
-    """Plant, analyzer and perhaps our controller, configured, on one executor."""
+    """Plant, analyzer and optionally our controller, configured, on one executor."""
 
     def __init__(self, context: Context, parameters: Mapping[str, Mapping[str, Any]]) -> None:
-        """Make the nodes of these parameters, by node and flat name; RunError if one refuses."""
-        with redirect_stderr(sys.__stderr__):  # it asks for a file, which pytest may not have there
+        """Make nodes with these parameters, by node and flat name; RunError if one refuses."""
+        with redirect_stderr(sys.__stderr__):  # pytest may have replaced it
             self.spinner = Spinner(context)
         self.nodes: dict[str, Any] = {}
         """By name, in the order of activation."""
         try:
             for name, values in parameters.items():
-                node = LOOP_NODES[name](context=context, overrides=values)
+                node = NODE_CLASSES[name](context=context, overrides=values)
                 node.get_logger().set_level(LoggingSeverity.WARN)
                 self.nodes[name] = node
                 self.spinner.add(node)
@@ -65,14 +49,14 @@ class Composition:
         self.plant: PlantNode = self.nodes["plant"]
 
     def activate(self, node: ManagedNode[Any], timeout: float = 0.0) -> None:
-        """Activate a node, within so much wall time (s) in which those it waits for may come."""
+        """Activate a node; wait up to `timeout` (s, wall time) for the nodes that it needs."""
         done = TransitionCallbackReturn.SUCCESS
         if not self.spinner.spin_until(lambda: node.trigger_activate() is done, timeout):
             reason = node.missing_peers() or "its log says why"
             raise RunError(f"{node.get_name()} could not be activated: {reason}")
 
     def set_parameters(self, node: ManagedNode[Any], values: Mapping[str, Any]) -> None:
-        """Set parameters of a node by their flat names; raises InvalidInputError if it refuses."""
+        """Set parameters of a node by flat name; raises InvalidInputError if it refuses them."""
         changes = [Parameter(name, value=value) for name, value in values.items()]
         result = node.set_parameters_atomically(changes)
         if not result.successful:

@@ -1,4 +1,4 @@
-"""Controllers in the ROS graph: which nodes close the loop, and which ones nearly do."""
+"""Find controllers in the ROS graph: nodes that close the loop, and nodes that nearly do."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -11,16 +11,16 @@ from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.base.ros_topics import mismatch, qos_profile
 
 DASHBOARD = "dashboard"
-"""Name of a node that reads joint_states and yet is meant to be no controller."""
+"""Name of a node that reads joint_states but is not meant to be a controller."""
 
 
 class ControllerSearch:
-    """Looks for the controller of a loop, which is a node of somebody else's."""
+    """Looks for the controller of a loop among the nodes of others."""
 
     def __init__(self, observer: Node, namespace: str, ours: Iterable[str]) -> None:
-        """Look, with an `observer` in the loop's namespace, for nodes that are not `ours`.
+        """Search through `observer`, a node in the loop's namespace.
 
-        Those are given by their names relative to the namespace.
+        `ours` are the names, relative to the namespace, of nodes that are no candidates.
         """
         self._observer = observer
         self._namespace = namespace.rstrip("/")
@@ -30,13 +30,13 @@ class ControllerSearch:
 
     @property
     def task(self) -> str:
-        """What a controller does, in words."""
+        """Description of what a controller does."""
         return f"reads {self._joint_states} and publishes {self._control_force}"
 
     def controllers(self) -> list[str]:
         """Return the full names of the nodes that read joint_states and publish control_force.
 
-        Type and quality of service are such that the plant's writer and reader match.
+        Their types and quality of service match those of the plant.
         """
         readers = self._observer.get_subscriptions_info_by_topic(JOINT_STATES.name)
         writers = self._observer.get_publishers_info_by_topic(CONTROL_FORCE.name)
@@ -46,14 +46,14 @@ class ControllerSearch:
         """Return the full names of all managed (lifecycle) nodes but ours."""
         names: list[str] = []
         for name, namespace in self._observer.get_node_names_and_namespaces():
-            with suppress(NodeNameNonExistentError):  # it has gone meanwhile
+            with suppress(NodeNameNonExistentError):  # it has left meanwhile
                 services = self._observer.get_service_names_and_types_by_node(name, namespace)
                 if any("lifecycle_msgs/srv/ChangeState" in types for _, types in services):
                     names.append(f"{namespace.rstrip('/')}/{name}")
         return [name for name in names if name not in self._ours]
 
     def near_misses(self) -> Iterator[str]:
-        """Say in a sentence each why nodes that look like controllers are none."""
+        """Yield one sentence for each node that looks like a controller but is none."""
         joint_states, control_force = self._joint_states, self._control_force
         readers = self._observer.get_subscriptions_info_by_topic(JOINT_STATES.name)
         writers = self._observer.get_publishers_info_by_topic(CONTROL_FORCE.name)
@@ -67,11 +67,11 @@ class ControllerSearch:
                 yield f"{_full_name(info)} cannot read {joint_states}: {misfit}"
         for info in writers:
             if misfit := _misfit(info):
-                yield f"nobody can read {control_force} of {_full_name(info)}: {misfit}"
+                yield f"the plant cannot read {control_force} of {_full_name(info)}: {misfit}"
         yield from self._near_misses_elsewhere()
 
     def _near_misses_elsewhere(self) -> Iterator[str]:
-        """Say who uses topics of these names in a namespace in which no plant is."""
+        """Yield one sentence for each node that uses these topics in a namespace without plant."""
         here = self._joint_states.rpartition("/")[0]
         for topic, _ in self._observer.get_topic_names_and_types():
             namespace, _, name = topic.rpartition("/")
@@ -88,7 +88,7 @@ class ControllerSearch:
 
 
 def _named(endpoints: Iterable[TopicEndpointInfo]) -> set[str]:
-    """Return the names of the nodes of endpoints, as far as they are known already."""
+    """Return the names of the nodes of endpoints, as far as they are known yet."""
     return {_full_name(info) for info in endpoints if not info.node_name.startswith("_")}
 
 
@@ -97,7 +97,7 @@ def _full_name(info: TopicEndpointInfo) -> str:
 
 
 def _misfit(info: TopicEndpointInfo) -> str:
-    """Return why an endpoint and the plant's do not match, or nothing."""
+    """Return why an endpoint does not match that of the plant, or an empty string."""
     reads = info.endpoint_type == TopicEndpointTypeEnum.SUBSCRIPTION
     topic = JOINT_STATES if reads else CONTROL_FORCE
     if info.topic_type != topic.type_name:

@@ -1,4 +1,4 @@
-"""A ROS domain that nobody else on this machine uses, and ROS in it."""
+"""A ROS domain that no other process on this machine uses, and ROS in it."""
 
 import gc
 import os
@@ -18,13 +18,13 @@ from stickslip_ros.nodes.base.network import this_machine_only
 from stickslip_ros.nodes.base.process import initialise
 
 DOMAINS = range(1, 102)
-"""Domains all ports of which are below those that the system gives away."""
+"""Domains whose ports are all below the ephemeral ports of the system."""
 
 _DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _NO_PEERS = {"ROS_STATIC_PEERS": ""}
 
 _NO_LOGS_ELSEWHERE = ("--disable-external-lib-logs", "--disable-rosout-logs")
-"""No files in the home directory; and no topic, of which a process has one for each node name."""
+"""No log files in the home directory, and no /rosout topic, of which each node name has one."""
 
 _initialising = Lock()
 
@@ -55,11 +55,11 @@ def own_domain() -> Generator[int]:
     """
     for domain in DOMAINS:
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as held:
-            try:  # a port that DDS leaves alone, as it does those of TCP
+            try:  # a port that DDS does not use; it uses no TCP ports at all
                 held.bind(("127.0.0.1", port(domain, 5)))
             except OSError:
                 continue
-            # What DDS listens on in every process of a domain, and in the first few.
+            # The ports that DDS uses in all processes of a domain, and in the first few.
             if all(is_free(port(domain, number)) for number in (0, 10, 12, 14, 16)):
                 yield domain
                 return
@@ -67,16 +67,15 @@ def own_domain() -> Generator[int]:
 
 
 def domain_variables(domain: int) -> dict[str, str]:
-    """Return the environment variables of a process that is to be in a domain, on this machine."""
+    """Return the environment variables of a process for a domain, loopback only."""
     return {**this_machine_only(), **_NO_PEERS, "ROS_DOMAIN_ID": str(domain)}
 
 
 @contextmanager
 def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
-    """Initialise ROS in a domain, on this machine only, with these global arguments.
+    """Initialise ROS in a domain, loopback only, with these global arguments.
 
-    That is rclpy's default context, so that nodes which name none are in it, unless that is in
-    use already.
+    This uses rclpy's default context, so that nodes need not name it, unless it is already in use.
     """
     _collect_before_forks()
     with _initialising:
@@ -86,25 +85,25 @@ def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
     try:
         yield context
     finally:
-        # With no context named, the default one can be initialised again.
+        # Only without a named context can the default one be initialised again.
         rclpy.try_shutdown(context=None if context is rclpy.get_default_context() else context)
-        # What rclpy's destroyed nodes still hold, threads, sockets and shared memory of the
-        # middleware, goes with the last of them, and they refer to each other.
+        # Destroyed nodes of rclpy refer to each other, and hold threads, sockets and shared memory
+        # of the middleware until they are collected.
         gc.collect()
 
 
 @cache
 def _collect_before_forks() -> None:
-    """Leave no nodes for a forked child to collect: it lacks the threads that they end with."""
+    """Collect nodes before a fork: a forked child lacks the threads that their end needs."""
     os.register_at_fork(before=gc.collect)
 
 
 @cache
 def _this_process_only_here() -> Mapping[str, str]:
-    """Return the environment variables that keep ROS in this process on this machine.
+    """Return the environment variables that restrict ROS in this process to the loopback.
 
-    Fast DDS reads a profile once per process. Where ROS was in use before ours could be read, it
-    listens on every address, and LOCALHOST, which takes shared memory, has to do.
+    Fast DDS reads a profile once per process. If ROS was in use before ours could be read, it
+    listens on every address; then LOCALHOST, which uses shared memory, is the best available.
     """
     variables = this_machine_only()
     context = Context()

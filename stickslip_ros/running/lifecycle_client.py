@@ -1,4 +1,4 @@
-"""Managed (lifecycle) nodes, in whatever process they run: their states and transitions."""
+"""States and transitions of managed (lifecycle) nodes, in any process."""
 
 from collections.abc import Callable
 from math import inf
@@ -18,42 +18,55 @@ NEXT_TRANSITION = {
     "unconfigured": Transition.TRANSITION_CONFIGURE,
     "inactive": Transition.TRANSITION_ACTIVATE,
 }
-"""The way from a state to the active one."""
+"""The next transition from a state towards the active one."""
 
 _PARTICIPLE = {"unconfigured": "configured", "inactive": "activated"}
 
 
 class LifecycleClient:
-    """Asks a managed node for its state, and for transitions."""
+    """Requests the state of a managed node, and transitions."""
 
     def __init__(self, spinner: Spinner, node: Node, name: str, answer_timeout: float) -> None:
-        """Prepare to ask the managed node of that name, by `node`, which the spinner runs.
+        """Prepare requests to the managed node `name`, through `node`, which the spinner runs.
 
-        `answer_timeout` is how much wall time (s) it has for each answer.
+        `answer_timeout` is the wall time (s) for each answer.
         """
         self.name = name
         self._spinner = spinner
         self._timeout = answer_timeout
-        # No second request: a transition that is under way would make it an impossible one.
+        # No second request: it would be invalid while the transition is in progress.
         self._get_state = ServiceCall(node, GetState, f"{name}/get_state", answer_time=inf)
         self._change_state = ServiceCall(node, ChangeState, f"{name}/change_state", answer_time=inf)
 
     def state(self) -> str:
-        """Return the name of the node's state, nothing if it does not answer."""
+        """Return the name of the node's state, empty if it does not answer."""
         answer = self._spinner.ask(self._get_state, GetState.Request(), self._timeout)
         return answer.current_state.label if answer is not None else ""
 
     def change_state(self, transition: int) -> bool:
-        """Ask for a transition; return whether the node has made it."""
-        request = ChangeState.Request(transition=Transition(id=transition))
-        answer = self._spinner.ask(self._change_state, request, self._timeout)
+        """Request a transition; return whether the node has made it."""
+        self._spinner.ask(self._change_state, _request(transition), self._timeout)
+        return self.changed
+
+    def start_change(self, transition: int) -> None:
+        """Request a transition and do not wait for the answer: see `change_ended`."""
+        self._change_state.start(_request(transition))
+
+    @property
+    def changed(self) -> bool:
+        """Whether the node has made the last transition requested."""
+        answer = self._change_state.answer
         return answer is not None and answer.success
+
+    def change_ended(self) -> bool:
+        """Send the request if that is due; return whether it was answered."""
+        return self._change_state.pursue()
 
     def bring_up(self, timeout: float, check: Callable[[], None]) -> None:
         """Configure and activate the node unless it does so by itself.
 
-        Raises RunError if it refuses or is not active within so much wall time (s), and what
-        `check` raises, which is called again and again meanwhile.
+        `check` is called repeatedly meanwhile; its exceptions propagate. Raises RunError if the
+        node refuses, or is not active within `timeout` (s, wall time).
         """
         deadline = monotonic() + timeout
         asked: list[str] = []
@@ -64,9 +77,13 @@ class LifecycleClient:
                 raise RunError(f"the controller {self.name} could not be {done}; its log says why")
             if monotonic() >= deadline:
                 raise RunError(f"the controller {self.name} was not active within {timeout:g} s")
-            # It may go on to its next state by itself.
+            # It may proceed to its next state by itself.
             if state in NEXT_TRANSITION and not self._spinner.spin_until(
                 lambda before=state: self.state() != before, timeout=1.0
             ):
                 asked.append(state)
                 self.change_state(NEXT_TRANSITION[state])
+
+
+def _request(transition: int) -> ChangeState.Request:
+    return ChangeState.Request(transition=Transition(id=transition))

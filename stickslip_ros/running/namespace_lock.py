@@ -1,4 +1,4 @@
-"""One run in a namespace at a time: two plants on one topic would spoil both."""
+"""Allow one run in a namespace at a time: two plants on one topic would disturb each other."""
 
 import socket
 import struct
@@ -17,15 +17,15 @@ class NamespaceInUseError(InvalidInputError):
 
 @contextmanager
 def lock_namespace(namespace: str, domain: int) -> Generator[None]:
-    """Hold a namespace of a ROS domain on this machine; it is free when this process ends.
+    """Hold a namespace of a ROS domain on this machine; the end of this process frees it.
 
-    Raises NamespaceInUseError if another process of any user holds it. Linux only; elsewhere, and
-    where a sandbox refuses such addresses, it does nothing.
+    Raises NamespaceInUseError if another process of any user holds it. Linux only; on other
+    systems, and in a sandbox that refuses such addresses, this does nothing.
     """
     if sys.platform != "linux":
         yield
         return
-    # An abstract address: no file is left behind, and containers share it if they share a network.
+    # An abstract address leaves no file behind; containers share it if they share a network.
     address = f"\0stickslip_ros {sha256(f'{domain} {namespace}'.encode()).hexdigest()}"
     with socket.socket(socket.AF_UNIX) as held:
         try:
@@ -41,7 +41,7 @@ def lock_namespace(namespace: str, domain: int) -> Generator[None]:
 
 
 def _holder(address: str) -> str:
-    """Return which process holds an address, in words, as far as that can be found out."""
+    """Return the process that holds an address, in words; empty if it is unknown."""
     with socket.socket(socket.AF_UNIX) as asking, suppress(OSError):
         asking.settimeout(1.0)
         asking.connect(address)
@@ -49,6 +49,6 @@ def _holder(address: str) -> str:
         length = struct.calcsize(layout)
         credentials = asking.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, length)
         process, _, _ = struct.unpack(layout, credentials)
-        if process:  # otherwise it is none of this container
+        if process:  # otherwise it is in another container
             return f" (process {process})"
     return ""

@@ -1,4 +1,4 @@
-"""What the nodes of a run tell of it while it goes on."""
+"""Progress and state of a run, from what its nodes publish."""
 
 from collections.abc import Callable
 
@@ -8,20 +8,20 @@ from std_msgs.msg import Header
 
 from stickslip_ros.messages.topics import DIAGNOSTICS, RECORDED
 from stickslip_ros.nodes.base.managed import STATE
+from stickslip_ros.nodes.base.plant_keys import FAILURE, FINISHED, NEWEST_STAMP
 from stickslip_ros.nodes.base.ros_topics import qos_profile
-from stickslip_ros.nodes.plant import FAILURE, FINISHED, NEWEST_STAMP
 from stickslip_ros.running.lifecycle_client import ACTIVE, NEXT_TRANSITION
 from stickslip_ros.stamps import NANOSECONDS
 
 OnSimulatedTime = Callable[[float], None]
-"""Called now and then with the time that has been simulated so far, s."""
+"""Called repeatedly with the simulated time so far, s."""
 
 Notify = Callable[[str], None]
-"""Called with what a person should know meanwhile, in a sentence."""
+"""Called with messages to the user, one sentence each."""
 
 
 class RunMonitor:
-    """Listens to the plant's diagnostics, and to how far the recording has come."""
+    """Subscribes to the plant's diagnostics and to the progress of the recording."""
 
     def __init__(
         self,
@@ -31,17 +31,17 @@ class RunMonitor:
         notify: Notify,
         on_simulated_time: OnSimulatedTime,
     ) -> None:
-        """Listen by a node in the run's namespace; `fail` is called when the plant gives up."""
+        """Subscribe through a node in the run's namespace; call `fail` if the plant fails."""
         self.plant: dict[str, str] = {}
-        """The plant's last figures, as in its diagnostics."""
+        """The plant's last values, as in its diagnostics."""
         self.finished = False
-        """Whether the plant has come to its end, or was ended by somebody."""
+        """Whether the plant has reached its end, or was ended from outside."""
         self.plant_stopped = False
-        """Whether the plant has told its last figures, being active no more."""
+        """Whether the plant is no longer active and has published its last values."""
         self.newest_recorded = 0
-        """Stamp of the newest sample that the analyzer has taken in, ns."""
+        """Stamp of the newest sample that the analyzer has received, ns."""
         self.ending = False
-        """Whether the run is being ended: then a plant that stops was not paused."""
+        """Whether the run is ending: a plant that stops then is not paused."""
         self._fail, self._notify, self._on_simulated_time = fail, notify, on_simulated_time
         self._plant_name = f"{node.get_namespace().rstrip('/')}/plant"
         self._paused = False
@@ -53,7 +53,7 @@ class RunMonitor:
 
     @property
     def unrecorded(self) -> float:
-        """Time from the newest sample that the analyzer has taken in to the plant's last, s."""
+        """Time from the newest sample that the analyzer has received to the plant's last, s."""
         return (int(self.plant.get(NEWEST_STAMP, 0)) - self.newest_recorded) * 1e-9
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
@@ -64,10 +64,10 @@ class RunMonitor:
 
     def _follow_plant(self, state: str | None) -> None:
         if FAILURE in self.plant:
-            self._fail(f"the plant could not go on: {self.plant[FAILURE]}")
+            self._fail(f"the plant could not continue: {self.plant[FAILURE]}")
         if state == ACTIVE:
             if self._paused:
-                self._notify("the plant goes on")
+                self._notify("the plant continues")
             self._paused = self.plant_stopped = False
         elif NEWEST_STAMP in self.plant:
             self.plant_stopped = True
@@ -76,7 +76,7 @@ class RunMonitor:
             elif state in NEXT_TRANSITION and not (self._paused or self.ending):
                 self._paused = True
                 self._notify(
-                    "the plant is paused: activate it to go on, or end the run with Ctrl-C"
+                    "the plant is paused: activate it to continue, or end the run with Ctrl-C"
                 )
 
     def _on_recorded(self, message: Header) -> None:

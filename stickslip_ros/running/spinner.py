@@ -1,4 +1,4 @@
-"""Nodes on one executor, run only while somebody waits for something."""
+"""Nodes on one executor that runs only while the caller waits."""
 
 import time
 from collections.abc import Callable
@@ -17,26 +17,26 @@ from stickslip_ros.nodes.base.service_call import ServiceCall
 
 
 class Spinner:
-    """Runs its nodes until a condition holds, time is over, or waiting is cut short."""
+    """Runs its nodes until a condition holds, a timeout ends, or the wait is cut short."""
 
     def __init__(self, context: Context | None = None) -> None:
         self.executor: Executor = EventsExecutor(context=context)
         self.is_cut_short: Callable[[], bool] = lambda: False
-        """Whether nothing is to be waited for at present."""
+        """Whether to stop waiting now."""
         self._nodes: list[Node] = []
         self._clock = Clock(clock_type=ClockType.STEADY_TIME)
 
     def add(self, node: Node) -> None:
-        """Run a node, too; `close` destroys it."""
+        """Add a node; `close` destroys it."""
         self._nodes.append(node)
         self.executor.add_node(node)
 
     def spin_until(
         self, condition: Callable[[], bool], timeout: float = inf, period: float = 0.005
     ) -> bool:
-        """Run the nodes until the condition holds, for so much wall time (s); return if it does.
+        """Run the nodes until the condition holds, up to `timeout` (s, wall time).
 
-        The condition is looked at every `period` (s).
+        Return whether it holds. The condition is checked every `period` (s).
         """
         deadline = time.monotonic() + timeout
         due = Future()
@@ -60,13 +60,13 @@ class Spinner:
             self._nodes[0].destroy_timer(timer)
 
     def spin_for(self, duration: float) -> None:
-        """Run the nodes for so much wall time (s)."""
+        """Run the nodes for `duration` (s, wall time)."""
         self.spin_until(lambda: False, duration)
 
     def ask(self, call: ServiceCall, request: Any, timeout: float) -> Any:
         """Call a service and return its answer.
 
-        None if it is not there, or does not answer, within so much wall time (s) each.
+        Return None if the service does not appear, or does not answer, within `timeout` (s) each.
         """
         call.start(request)
         if self.spin_until(lambda: call.pursue() or call.sent, timeout):

@@ -1,4 +1,4 @@
-"""Controllers of a user's, kept running: a node in a thread, or a command in a process."""
+"""Run a user's controller: a node in a thread, or a command in a process."""
 
 import shlex
 import shutil
@@ -17,16 +17,16 @@ _END_TIMEOUT = 5.0
 
 
 class ControllerThread:
-    """A node on an executor of its own in a thread of its own.
+    """A node on its own executor, in its own thread.
 
-    On an executor of the usual kind, that is, which runs every kind of callback. A managed
-    (lifecycle) node that is not active is configured and activated.
+    The executor is of the usual kind, which runs every kind of callback. A managed (lifecycle)
+    node that is not active is configured and activated.
     """
 
     def __init__(self, node: Node) -> None:
         self.node = node
         self.unreported = False
-        """Whether the node has failed and nobody was told."""
+        """Whether the node has failed and the failure was not reported yet."""
         self._failure: BaseException | None = None
         self._idle = Event()
         self._closing = False
@@ -35,13 +35,13 @@ class ControllerThread:
         self._thread = Thread(target=self._run, name=node.get_name(), daemon=True)
 
     def start(self) -> None:
-        """Bring the node up and run it; raises RunError if it refuses."""
+        """Activate the node if it is managed, and run it; raises RunError if it refuses."""
         if isinstance(self.node, LifecycleNode):
             for transition, name in (
                 (self.node.trigger_configure, "configured"),
                 (self.node.trigger_activate, "activated"),
             ):
-                with suppress(RuntimeError):  # rcl: not possible in the state it has come to itself
+                with suppress(RuntimeError):  # the node has changed its state by itself
                     result = transition()
                     if result is not TransitionCallbackReturn.SUCCESS:
                         raise RunError(
@@ -51,7 +51,7 @@ class ControllerThread:
         self._thread.start()
 
     def check(self) -> None:
-        """Raise RunError if the node runs no more."""
+        """Raise RunError if the node has stopped."""
         if self._failure is not None:
             self.unreported = False
             kind = type(self._failure).__name__
@@ -60,14 +60,14 @@ class ControllerThread:
             ) from self._failure
 
     def settle(self) -> None:
-        """Wait, within bounds, until the callback under way is over."""
+        """Wait, for 1 s at most, until the current callback has ended."""
         self._idle.clear()
         if self._failure is None:
             self._executor.create_task(self._idle.set)
             self._idle.wait(timeout=1.0)
 
     def close(self) -> None:
-        """End the thread and destroy the node; raises RunError if it does not come back."""
+        """End the thread and destroy the node; raises RunError if a callback does not return."""
         self._closing = True
         self._executor.shutdown(timeout_sec=0.0)
         if self._thread.ident is not None:
@@ -75,7 +75,7 @@ class ControllerThread:
         if self._thread.is_alive():
             raise RunError(
                 f"the controller {self.node.get_name()} is still in a callback, {_END_TIMEOUT:g} s "
-                "after it was to end: its thread is left behind"
+                "after the request to end: its thread continues"
             )
         self.node.destroy_node()
 
@@ -93,12 +93,12 @@ class ControllerThread:
 
 
 class ControllerProcess:
-    """A command and what it starts, ended together, at the latest when this process ends."""
+    """A command and its children, ended together, at the latest when this process ends."""
 
     def __init__(self, command: Sequence[str], variables: Mapping[str, str]) -> None:
-        """Start the command with environment variables of its own.
+        """Start the command with additional environment variables.
 
-        Raises InvalidInputError if there is no such command.
+        Raises InvalidInputError if the command does not exist.
         """
         self._name = shlex.join(command)
         if shutil.which(command[0]) is None:
@@ -107,12 +107,12 @@ class ControllerProcess:
         self._process = start_child(["env", *setting, *command], guarded=True)
 
     def check(self) -> None:
-        """Raise RunError if the process is no more."""
+        """Raise RunError if the process has ended."""
         status = self._process.poll()
         if status is not None:
             raise RunError(f"the controller {self._name} has ended ({how_it_ended(status)})")
 
     def close(self) -> None:
-        """End the process, and what it has started."""
+        """End the process and its children."""
         self._process.terminate()
         self._process.wait()

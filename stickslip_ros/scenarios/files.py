@@ -9,6 +9,7 @@ from typing import Any, Self
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.installed_packages import prefixes
 from stickslip_ros.scenarios import ros_yaml
+from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE
 from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import (
     NODE_PARAMETERS,
@@ -19,10 +20,6 @@ from stickslip_ros.scenarios.parameters import (
 from stickslip_ros.scenarios.sections import PARAMETERS_KEY, ScenarioFile, read_file
 from stickslip_ros.tables import TextTable
 from stickslip_ros.text import did_you_mean
-
-DEFAULT_NAMESPACE = "/feed_drive"
-LONGEST_NAMESPACE = 200
-"""Characters of a namespace with which all topic and service names are short enough for ROS."""
 
 _NAMED_BY_PATH = "a file is given by its path ending in .yaml"
 

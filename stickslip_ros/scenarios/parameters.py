@@ -7,9 +7,8 @@ models. The nested field `friction.static` is the ROS parameter of that name.
 import re
 from collections.abc import Callable
 from dataclasses import fields
-from enum import StrEnum
 from math import isinf, pi, sqrt
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import AfterValidator, model_validator
 
@@ -18,10 +17,13 @@ from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.scenarios.pace import Pace
 from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field
 from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import shown
+
+if TYPE_CHECKING:
+    from stickslip_ros.physics.motion.motion import Motion
 
 _SHORTEST = 1e-3
 """Shortest time-out or period of a node, s."""
@@ -29,13 +31,6 @@ _OF_DRIVE = [each.name for each in fields(Drive) if each.name != "friction"]
 """Parameters of the plant that the drive takes unchanged."""
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
-
-
-class Pace(StrEnum):
-    """What the plant waits for between samples: the clock, or the answer to the last sample."""
-
-    REALTIME = "realtime"
-    LOCKSTEP = "lockstep"
 
 
 def _known_law(name: str) -> str:
@@ -237,7 +232,7 @@ class PlantParameters(NodeParameters):
 
     def as_loop(
         self,
-        motion: Motion,
+        motion: "Motion",
         start: int = LOCKSTEP_START,
         *,
         hold_late: bool = False,

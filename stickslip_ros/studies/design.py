@@ -123,7 +123,7 @@ def design(task: Task, progress: Progress = lambda _: None) -> Design:
     found = _design(task, progress)
     if task.scenario is None or task.scenario.plant.force_jitter == 0.0:
         return found
-    no_jitter = "force_jitter is left out: the delay of the force is constant here"
+    no_jitter = "force_jitter is omitted: the delay of the force is constant here"
     return replace(found, remark="; ".join(filter(None, (found.remark, no_jitter))))
 
 

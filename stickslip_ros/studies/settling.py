@@ -16,14 +16,12 @@ from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.studies.options import LONGEST, SettlingCourse
 
 CYCLES = (Regime.STICK_SLIP, Regime.PURE_SLIP)
 """Regimes of a limit cycle, which has an amplitude."""
 
 _RESTS = (Regime.EQUILIBRIUM, Regime.STUCK)
-
-LONGEST = 1e6
-"""Largest number of natural periods or cycles of one motion."""
 
 
 @dataclass(frozen=True)
@@ -36,40 +34,6 @@ class MotionState:
     """Velocity, m/s."""
     low_passed: float | None = None
     """Low-pass state of the washout filter, m/s; None: equal to the velocity, no output."""
-
-
-@dataclass(frozen=True)
-class SettlingCourse:
-    """How long a motion is simulated until it is measured.
-
-    Raises
-    ------
-    InvalidInputError
-        If a value is out of range.
-
-    Examples
-    --------
-    >>> SettlingCourse(transient=50.0, patience=80)
-    SettlingCourse(transient=50.0, cycles=4, patience=80)
-    """
-
-    transient: float = 200.0
-    """Transient that is skipped, in natural periods, 0 to 1e6. The first loading of the spring by a
-    slow belt and, under control, `start_after` are added to it."""
-    cycles: int = 4
-    """Number of whole cycles that are then measured, if there are any, 1 to 1e6."""
-    patience: int = 1
-    """Largest number of repetitions of both, 1 to 1e6. They end when the motion is steady and two
-    results are the same: near an unstable cycle a motion may seem steady for a while."""
-
-    def __post_init__(self) -> None:
-        for shown, value, least in (
-            (f"a transient of {self.transient:g} natural periods", self.transient, 0),
-            (f"{self.cycles} cycles to measure", self.cycles, 1),
-            (f"a patience of {self.patience} transients", self.patience, 1),
-        ):
-            if not least <= value <= LONGEST:
-                raise InvalidInputError(f"{shown}: must be from {least} to {LONGEST:g}")
 
 
 @dataclass(frozen=True)

@@ -19,17 +19,14 @@ from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.analyzer import VERDICT_TIME
 from stickslip_ros.nodes.base.managed import ERROR
 from stickslip_ros.nodes.base.service_call import parameters_call
-from stickslip_ros.running.composition import Composition, node_parameters
+from stickslip_ros.running.composition import Composition
 from stickslip_ros.running.controller_search import ControllerSearch
 from stickslip_ros.running.domain import domain_variables, own_domain, ros_context
 from stickslip_ros.running.lifecycle_client import LifecycleClient
+from stickslip_ros.running.loop_nodes import node_parameters
 from stickslip_ros.running.user_controller import ControllerProcess, ControllerThread
-from stickslip_ros.scenarios.files import (
-    DEFAULT_NAMESPACE,
-    LONGEST_NAMESPACE,
-    Scenario,
-    load_scenario,
-)
+from stickslip_ros.scenarios.files import Scenario, load_scenario
+from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.testing.result import Diagnostics, RunResult, result_of
 from stickslip_ros.text import shown
 

@@ -61,7 +61,7 @@ def test_no_proposal_is_a_result_with_a_reason(
     stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     once = cache(design)
-    monkeypatch.setattr("stickslip_ros.app.design.design", lambda task, _: once(task))
+    monkeypatch.setattr("stickslip_ros.studies.design.design", lambda task, _: once(task))
     limit = ("-p", "washout_controller.force_limit=5", "--belt-speed", "0.04")
     done = stickslip("design", "feed_drive", *limit, "--out", "gains.yaml", "--plot", "map.png")
     assert done.returncode == 0, done.stderr
@@ -119,7 +119,7 @@ def test_what_cannot_be_written_in_the_end_costs_no_result(
         (tmp_path / "below").rmdir()
         return design(task, progress)
 
-    monkeypatch.setattr("stickslip_ros.app.design.design", design_while_the_directory_goes)
+    monkeypatch.setattr("stickslip_ros.studies.design.design", design_while_the_directory_goes)
     where = ("--belt-speed", "0.04")
     done = stickslip("design", "feed_drive", *where, "--json", option, f"below/{file}")
     assert done.returncode == 2

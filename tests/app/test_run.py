@@ -163,7 +163,7 @@ def test_a_plant_that_is_deactivated_pauses_the_run(
         process.send_signal(signal.SIGINT)
     output, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == (0 if duration else 130), errors
-    assert errors.count("the plant is paused") == errors.count("the plant goes on") == 1
+    assert errors.count("the plant is paused") == errors.count("the plant continues") == 1
     result = json.loads(output)
     assert result["report"]["complete"]
     assert result["lost_samples"] == 0 or pace == "realtime"

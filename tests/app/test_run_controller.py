@@ -266,7 +266,7 @@ def test_a_controller_that_never_answers(stickslip: Run, install: Install) -> No
     impatient = ("-p", "plant.reply_timeout=0.5", "--duration", "3", "--json")
     done = stickslip("run", "paper", *impatient, "--controller", install(damper("Mute")))
     assert done.returncode == 0, done.stderr
-    assert done.stderr.count("no control force comes") == 1
+    assert done.stderr.count("no control force arrives") == 1
     result = json.loads(done.stdout)
     assert (result["samples"], result["late_forces"]) == (301, 300)
 
@@ -374,7 +374,7 @@ def test_an_external_controller_may_die_and_return(
     process = start_stickslip("run", "paper", "--external-controller", "--bag", "bag", *impatient)
     wait_for_samples(process, tmp_path / "bag")
     first.kill()
-    assert "going on without" in read_until(process, "no control force comes")
+    assert "continuing without" in read_until(process, "no control force arrives")
     graph.wait_until(lambda: "no control" in words_of_plant(health), "it is diagnosed")
     start_damper()
     graph.wait_until(lambda: "no control" not in words_of_plant(health), "it is taken back")
@@ -382,7 +382,7 @@ def test_an_external_controller_may_die_and_return(
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
-    assert "no control force comes" not in errors
+    assert "no control force arrives" not in errors
 
 
 def words_of_plant(health: list[DiagnosticArray]) -> str:

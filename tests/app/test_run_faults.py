@@ -54,7 +54,7 @@ def test_a_plant_that_gives_up_is_reported_and_its_bag_is_closed(
     stiff = ("--composed", "--bag", "bag", "-p", "plant.damping=1e12")
     done = stickslip("run", "paper", *stiff)
     assert done.returncode == 1
-    assert "the plant could not go on: the motion is too stiff to be followed" in done.stderr
+    assert "the plant could not continue: the motion is too stiff to be followed" in done.stderr
     assert done.stderr.endswith("the bag bag is closed\n")
     with Recording(tmp_path / "bag") as recording:
         assert recording.complete
@@ -143,7 +143,7 @@ def test_a_run_that_is_stopped_says_that_its_nodes_go_on(
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
-    assert "stopped, and the nodes go on" in errors
+    assert "suspended: the nodes continue" in errors
     assert "interrupted: the bag bag is closed; the nodes have ended" in errors
 
 

@@ -346,7 +346,7 @@ def test_a_loopback_interface_that_is_down_is_reported(
         ),
         ("network.keep_on_this_machine(network=False)", {"ROS_LOCALHOST_ONLY": "1"}),
         (
-            "network.prefer_prompt_middleware() or 'kept on this machine'",
+            "network.prefer_prompt_middleware() or 'loopback only'",
             {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
         ),
     ],
@@ -367,5 +367,5 @@ def test_loopback_only_nodes_listen_on_the_loopback_only(
         text=True,
     ).stdout
     said, _, table = output.partition("\n")
-    assert said == "kept on this machine"
+    assert said == "loopback only"
     assert addresses_in(table) == {LOOPBACK, GROUP}

@@ -105,7 +105,7 @@ def test_a_node_says_once_what_it_is_and_whom_it_waits_for(
     plant = graph.add(PlantNode, wait_for=["observer", "nobody"], expects_control=False)
     graph.wait_until(lambda: logged("configured"), "it is configured")
     graph.run_for(1.0)
-    assert logged("waiting for observer, nobody: not there: nobody, observer") == 1
+    assert logged("waiting for observer, nobody: missing: nobody, observer") == 1
     graph.listen(JOINT_STATES, raw=True)
     plant.set_parameters([Parameter("wait_for", value=["observer"])])
     plant.set_parameters([Parameter("duration", value=1.0)])

@@ -187,4 +187,4 @@ def test_full_shared_memory_is_a_sentence(
     )  # fmt: skip
     assert done.returncode == 1
     (line,) = done.stderr.splitlines()
-    assert "shared memory is full: /dev/shm has 0 bytes free, and to be loaded ROS needs" in line
+    assert "shared memory is full: /dev/shm has 0 bytes free, and ROS needs" in line

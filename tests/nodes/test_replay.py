@@ -54,7 +54,7 @@ def test_a_reader_that_comes_late_gets_the_first_message(
     monkeypatch.setattr(replay, "_SILENCE", 0.0)
     bag = record_states(tmp_path / "bag", 10)
     node = graph.add(ReplayNode, bag=bag, rate=FAST)
-    graph.wait_until(lambda: "nobody reads" in node.diagnose()[1], "the node says what it lacks")
+    graph.wait_until(lambda: "no node reads" in node.diagnose()[1], "the node says what it lacks")
     assert STATES in node.diagnose()[1]
     assert not node.active
     heard = graph.listen(CONTROL_FORCE, raw=True)

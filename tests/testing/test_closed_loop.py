@@ -262,7 +262,7 @@ def test_without_an_answer_the_run_goes_on() -> None:
         result = loop.run(1.0)
     assert (len(result.states.stamp), len(result.forces.stamp)) == (101, 0)
     assert result.late_forces == 100
-    assert "no control force comes" in result.diagnostics["plant"].message
+    assert "no control force arrives" in result.diagnostics["plant"].message
 
 
 def test_a_run_that_takes_too_long_is_ended() -> None:

@@ -1,1 +1,1 @@
-"""What the nodes share."""
+"""What all nodes have in common."""

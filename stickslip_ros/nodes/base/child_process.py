@@ -1,8 +1,7 @@
-"""Processes that end with the one that has started them, whatever ends that.
+"""Child processes that end with their parent, however the parent ends.
 
-As a program (`python -m stickslip_ros.nodes.base.child_process COMMAND …`) it stands guard over a
-command that knows nothing of this, and over all that the command starts. It needs no ROS, to be
-quick.
+As a program (`python -m stickslip_ros.nodes.base.child_process COMMAND …`) this module guards an
+arbitrary command and all its children. It does not load ROS, so that it starts quickly.
 """
 
 import ctypes
@@ -14,7 +13,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 GUARD_TIMEOUT = 3.0
-"""Time, s, that a guarded command has to end after SIGINT, and again after SIGTERM."""
+"""Time, s, for a guarded command to end after SIGINT, and again after SIGTERM."""
 
 _PARENT_VARIABLE = "STICKSLIP_ROS_PARENT"
 
@@ -22,16 +21,16 @@ _PARENT_VARIABLE = "STICKSLIP_ROS_PARENT"
 def start_child(command: Sequence[str], *, guarded: bool = False) -> subprocess.Popen[bytes]:
     """Start a command that ends with this process; its output goes to standard error.
 
-    Either the command calls `die_with_parent`, or it is guarded: then SIGTERM to the process
-    returned ends the command, and what it has started, by SIGINT, SIGTERM and SIGKILL in turn.
+    Either the command calls `die_with_parent`, or it is guarded: then SIGTERM to the returned
+    process ends the command and its children by SIGINT, SIGTERM and SIGKILL in turn.
     """
     guard = [sys.executable, "-m", __name__] if guarded else []
     return subprocess.Popen(
         [*guard, *command],
         env=os.environ | {_PARENT_VARIABLE: str(os.getpid())},
         stdin=subprocess.DEVNULL,
-        stdout=2,  # not sys.stderr: what stands in for it need not be a file
-        start_new_session=True,  # Ctrl-C is for this process, which ends them in order
+        stdout=2,  # not sys.stderr, which may be replaced by an object that is no file
+        start_new_session=True,  # Ctrl-C reaches this process only, which ends them in order
     )
 
 
@@ -41,9 +40,9 @@ def how_it_ended(status: int) -> str:
 
 
 def die_with_parent() -> None:
-    """Let SIGTERM be sent to this process when the one that started it by `start_child` ends.
+    """Have SIGTERM sent to this process when the parent that used `start_child` ends.
 
-    Linux only; elsewhere it does nothing.
+    Linux only; on other systems this does nothing.
     """
     parent = os.environ.pop(_PARENT_VARIABLE, "")
     if not parent or sys.platform != "linux":
@@ -54,9 +53,9 @@ def die_with_parent() -> None:
 
 
 def main() -> None:
-    """Run the command of the arguments; end as it ends, or end it on SIGTERM."""
+    """Run the command in the arguments; end with its status, or end it on SIGTERM."""
     die_with_parent()
-    # The command may be of another Python environment, which has to find its own libraries.
+    # The command may belong to another Python environment, which must find its own libraries.
     os.environ.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
     awaited = {signal.SIGTERM, signal.SIGCHLD}
     signal.pthread_sigmask(signal.SIG_BLOCK, awaited)
@@ -73,11 +72,11 @@ def main() -> None:
     while child.poll() is None:
         if signal.sigwait(awaited) == signal.SIGTERM:
             _end(child)
-    with suppress(ProcessLookupError):  # what it has left behind
+    with suppress(ProcessLookupError):  # children that it left behind
         os.killpg(child.pid, signal.SIGKILL)
     if child.returncode < 0:
         number = -child.returncode
-        with suppress(OSError):  # SIGKILL, which nobody handles
+        with suppress(OSError):  # SIGKILL has no handler
             signal.signal(number, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {number})
         os.kill(os.getpid(), number)

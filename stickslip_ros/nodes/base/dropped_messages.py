@@ -1,4 +1,4 @@
-"""What a node did not take of what it heard."""
+"""Messages that a node received and dropped."""
 
 import time
 from math import inf
@@ -8,17 +8,17 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 
 
 class DroppedMessages:
-    """Messages that a node dropped: how many, and why the last one; for 15 s a complaint."""
+    """Counts dropped messages and keeps the last reason, which is a complaint for 15 s."""
 
     def __init__(self, logger: RcutilsLogger) -> None:
-        """Count from now on; what is dropped after a quiet time is logged."""
+        """Start counting; the first message dropped after a pause is logged."""
         self._logger = logger
         self._number = 0
         self._last = ""
         self._complaint_ends = -inf
 
     def add(self, reason: str, number: int = 1) -> None:
-        """Count messages, dropped for a reason that is a sentence on the last of them."""
+        """Count `number` dropped messages; `reason` is a sentence about the last of them."""
         now = time.monotonic()
         if now > self._complaint_ends:
             self._logger.warning(reason)
@@ -28,12 +28,12 @@ class DroppedMessages:
 
     @property
     def complaint(self) -> str:
-        """What to say of it at present, if anything."""
+        """Current complaint; empty if there is none."""
         if time.monotonic() > self._complaint_ends:
             return ""
         return f"{self._number} messages dropped so far, the last: {self._last}"
 
     @property
     def figures(self) -> dict[str, Any]:
-        """Number and last reason, if there is one, for the diagnostics."""
+        """Number and last reason, for the diagnostics."""
         return {"dropped_messages": self._number, "last_dropped": self._last or "none"}

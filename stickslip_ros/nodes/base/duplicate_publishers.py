@@ -1,4 +1,4 @@
-"""Publishers of a topic that is meant to have one."""
+"""Topics that should have one publisher, but have several."""
 
 from collections import Counter
 from typing import Any
@@ -9,9 +9,9 @@ from stickslip_ros.messages.topics import Topic
 
 
 def duplicate_publishers(node: Node, *topics: Topic[Any]) -> list[str]:
-    """Return a sentence for each topic that several publishers share, with all their nodes.
+    """Return a sentence for each topic with several publishers, with the names of their nodes.
 
-    One that was killed counts until the middleware gives it up.
+    A killed publisher counts until its lease in the middleware ends.
     """
     sentences: list[str] = []
     for topic in topics:

@@ -1,4 +1,4 @@
-"""What ROS needs of this machine: a domain with free ports, the clock, the loopback, memory."""
+"""Check what ROS needs from this machine: free ports, the clock, the loopback, memory."""
 
 import errno
 import os
@@ -13,31 +13,31 @@ from stickslip_ros.nodes.base.shared_memory import SHARED_MEMORY, free_shared_me
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 
 FIRST_PROCESS = 10
-"""Number of the port in its domain that is the first process's own; each has two."""
+"""Number in the domain of the first port that belongs to one process; each process has two."""
 
 _DOMAIN = "ROS_DOMAIN_ID"
 _LARGEST_DOMAIN = 232
 _DECIMAL = re.compile(r"0|[1-9][0-9]{0,20}")
 _LEAST_SHARED_MEMORY = 1 << 20
-"""Bytes that a process of Fast DDS takes at most, rounded up."""
+"""Bytes that a process of Fast DDS uses at most, rounded up."""
 
 
 def check_machine(domain: int) -> None:
-    """Raise InvalidInputError where nodes could not live: for the clock, the network, the domain.
+    """Raise InvalidInputError if nodes cannot run because of the clock, the network or the domain.
 
-    What the middleware itself says of these is no sentence, or nothing.
+    The middleware reports these problems unclearly or not at all.
     """
     now = time.time_ns()
     if not 0 < now < END_OF_TIME:
         year = datetime.fromtimestamp(now / NANOSECONDS, UTC).year
         raise InvalidInputError(
-            f"the clock of this machine says {year}: the stamps of ROS messages reach from 1970 "
+            f"the clock of this machine says {year}: the stamps of ROS messages range from 1970 "
             "to January 2038"
         )
     if is_kept_on_loopback() and not _reaches_itself():
         raise InvalidInputError(
-            "the loopback interface of this machine is down, and nodes that are kept on it need "
-            "that: ip link set lo up"
+            "the loopback interface of this machine is down, and the nodes need it: "
+            "ip link set lo up"
         )
     if is_fast_dds():
         _check_ports(domain)
@@ -50,7 +50,7 @@ def port(domain: int, number: int) -> int:
 
 
 def is_free(taken: int, address: str = "", *, shared: bool = False) -> bool:
-    """Return whether a UDP port can be listened on, or be `shared` with those who share it."""
+    """Return whether a UDP port is free, or can be `shared` with the processes that share it."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, shared)
         try:
@@ -62,14 +62,14 @@ def is_free(taken: int, address: str = "", *, shared: bool = False) -> bool:
 
 def _check_ports(domain: int) -> None:
     shared = port(domain, 0)
-    # On these two Fast DDS listens where it is kept on this machine.
+    # Fast DDS listens on these two addresses if it uses the loopback only.
     for address in ("127.0.0.1", "239.255.0.1") if is_kept_on_loopback() else ("",):
         if not is_free(shared, address, shared=True):
             raise InvalidInputError(
                 f"UDP port {shared}, by which the nodes of {_DOMAIN} = {domain} find each other, "
-                "is taken by another program: end that, or choose another domain"
+                "is in use by another program: end that program, or choose another domain"
             )
-    # Fast DDS looks for ports for no more than 100 processes.
+    # Fast DDS tries the ports of 100 processes at most.
     own = range(port(domain, FIRST_PROCESS), 65_535, 2)[:100]
     if not any(is_free(first) and is_free(first + 1) for first in own):
         raise InvalidInputError(
@@ -86,15 +86,15 @@ def _check_shared_memory() -> None:
     if free < _LEAST_SHARED_MEMORY:
         raise InvalidInputError(
             f"{TRANSPORTS} = {transports} lets Fast DDS use shared memory, and {SHARED_MEMORY} "
-            f"has {free} bytes free, less than {_LEAST_SHARED_MEMORY}: unset it, or remove what is "
-            "left there"
+            f"has {free} bytes free, less than {_LEAST_SHARED_MEMORY}: unset it, or remove unused "
+            "files there"
         )
 
 
 def domain_of_environment() -> int:
-    """Return the domain that the environment says, without which it is 0.
+    """Return the domain that the environment sets, by default 0.
 
-    rcl would take -1 for 0, 1.5 for 1 and 010 for 8. Raises InvalidInputError.
+    rcl itself reads -1 as 0, 1.5 as 1 and 010 as 8. Raises InvalidInputError.
     """
     text = os.environ.get(_DOMAIN, "").strip() or "0"
     if _DECIMAL.fullmatch(text) and int(text) <= _LARGEST_DOMAIN:

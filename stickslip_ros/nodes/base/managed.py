@@ -1,4 +1,4 @@
-"""What every node of this package has: life cycle, topics, diagnostics."""
+"""Base class of the nodes: life cycle, topics, diagnostics."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
@@ -36,16 +36,16 @@ WARN: Level = DiagnosticStatus.WARN
 ERROR: Level = DiagnosticStatus.ERROR
 
 Diagnosis = tuple[Level, str, dict[str, Any]]
-"""How a node is, a sentence on it, and figures."""
+"""Level, message and values of a node's diagnostics."""
 
 STATE = "state"
-"""Key under which a node's diagnostics say in which state of its life cycle it is."""
+"""Key of a node's life-cycle state in its diagnostics."""
 
 _DIAGNOSTICS_PERIOD = 1.0
 
 
 def diagnosis(complaints: Iterable[str], figures: dict[str, Any]) -> Diagnosis:
-    """Return what a node that works says of itself: a warning where there is a complaint."""
+    """Return the diagnosis of a working node: a warning if there is a complaint, else OK."""
     complaint = "; ".join(filter(None, complaints))
     return WARN if complaint else OK, complaint, figures
 
@@ -53,19 +53,28 @@ def diagnosis(complaints: Iterable[str], figures: dict[str, Any]) -> Diagnosis:
 class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
     """A managed (lifecycle) node whose parameters come from one validated model.
 
-    A subclass says in `connect`, and maybe in `start` and `stop`, what it does when it is
-    configured, activated and deactivated; what they raise is logged and fails the transition.
+    A subclass defines in `connect`, and optionally in `start` and `stop`, what it does when it is
+    configured, activated and deactivated. An exception there is logged, and the transition fails.
+
+    Parameters
+    ----------
+    name : str
+        Name of the node.
+    model : type
+        Class of the parameters, in `stickslip_ros.scenarios.parameters`.
+    **options
+        Options of `ParameterNode`: `context`, `namespace` and `overrides`.
     """
 
     def __init__(self, name: str, model: type[ParametersT], **options: Any) -> None:
-        """Make the node with the options of a ParameterNode."""
+        """Make the node; see the class."""
         super().__init__(name, model, **options)
         self.stopped = Future()
-        """Done when the node's process may end; carries the error that was the reason, if any."""
+        """Done when the node's process may end; its result is the error that caused it, or None."""
         self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
-        """Wall time, whatever simulated time does."""
+        """Wall time, independent of simulated time."""
         self.dropped = DroppedMessages(self.get_logger())
-        """Messages that the node did not take since it was activated."""
+        """Messages that the node has dropped since it was activated."""
         self._kept: list[Any] = []
         self._last_refusal = ""
         self._waiting = False
@@ -79,45 +88,69 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
 
     @abstractmethod
     def connect(self) -> None:
-        """Make publishers and subscriptions and prepare what takes time (configure)."""
+        """Create publishers and subscriptions, and do slow preparations (configure)."""
 
     def start(self) -> None:
-        """Begin to work (activate)."""
+        """Start to work (activate)."""
 
     def stop(self) -> None:
-        """Stop working (deactivate), once the messages sent have arrived."""
+        """Stop working (deactivate) once the messages sent have arrived."""
         for publisher in self._kept:
             if isinstance(publisher, Publisher):
                 publisher.wait_for_all_acked(Duration(seconds=1))
 
     def diagnose(self) -> Diagnosis:
-        """Return the node's health; by default what it tells of dropped messages."""
+        """Return the node's health; by default based on dropped messages."""
         if not self.active:
             return OK, "", {}
         return diagnosis([self.dropped.complaint], self.dropped.figures)
 
     def publishing_nodes(self) -> set[str]:
-        """Return the names of those that publish what it needs; of its readers it knows."""
+        """Return the names of nodes that publish what this node needs; its readers are known."""
         return set()
 
     def every(self, period: float, callback: Callable[[], None]) -> Timer:
-        """Call back every `period` seconds of wall time."""
+        """Call back at a fixed period of wall time.
+
+        Parameters
+        ----------
+        period : float
+            Period, s.
+        callback : callable
+            Function without arguments.
+
+        Returns
+        -------
+        rclpy.timer.Timer
+            The timer.
+        """
         return self.create_timer(period, callback, clock=self.steady_clock)
 
     def call_soon(self, callback: Callable[[], None]) -> None:
-        """Call back from the executor, behind what it has to do already; from any thread."""
+        """Call back from the executor, after its pending work. Any thread may call this."""
         if self.executor is not None:
             self.executor.create_task(callback)
 
     def keep(self, thing: ThingT) -> ThingT:
-        """Return a publisher, timer or whatever has a `destroy`, to be destroyed at clean-up."""
+        """Destroy a publisher, subscription, service or timer when the node is cleaned up.
+
+        Parameters
+        ----------
+        thing
+            Any object with a method `destroy`.
+
+        Returns
+        -------
+        thing
+            The same object.
+        """
         self._kept.append(thing)
         return thing
 
     def release(self, thing: Any) -> None:
-        """Destroy what is kept before the node is cleaned up."""
+        """Destroy an object of `keep` now."""
         self._kept.remove(thing)
-        # The node has to let go of it, too: what is only destroyed by itself goes on to be heard.
+        # The node must release it, too: an object that only destroys itself still gets messages.
         for destroy in (
             self.destroy_publisher,
             self.destroy_subscription,
@@ -129,7 +162,18 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         thing.destroy()
 
     def advertise(self, topic: Topic[Any]) -> Publisher:
-        """Publish a topic until the node is cleaned up."""
+        """Create a publisher of a topic, which lasts until the node is cleaned up.
+
+        Parameters
+        ----------
+        topic : Topic
+            A topic of `stickslip_ros.messages.topics`.
+
+        Returns
+        -------
+        rclpy.publisher.Publisher
+            The publisher; it takes messages of the topic's type, or their serialized bytes.
+        """
         kind = message_class(topic.type_name)
         return self.keep(self.create_publisher(kind, topic.name, qos_profile(topic)))
 
@@ -141,10 +185,25 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         depth: int | None = None,
         while_active: bool = True,
     ) -> Subscription:
-        """Pass the messages of a topic, decoded, to `callback` until the node is cleaned up.
+        """Pass the decoded messages of a topic to `callback` until the node is cleaned up.
 
-        One that cannot be decoded, or answered, by a BagError, counts as dropped. `while_active`
-        leaves out what comes while the node is not active.
+        A message counts as dropped if it cannot be decoded, or `callback` raises BagError.
+
+        Parameters
+        ----------
+        topic : Topic
+            A topic of `stickslip_ros.messages.topics`.
+        callback : callable
+            Receives what the decoder of the topic returns, or the ROS message if it has none.
+        depth : int, optional
+            Length of the queue; by default that of the topic.
+        while_active : bool
+            Whether to ignore messages while the node is not active.
+
+        Returns
+        -------
+        rclpy.subscription.Subscription
+            The subscription.
         """
         decode = topic.decode or partial(
             deserialize_message, message_type=message_class(topic.type_name)
@@ -163,7 +222,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
     def subscribe_serialized(
         self, topic: Topic[Any], callback: Callable[[bytes], None], depth: int | None = None
     ) -> Subscription:
-        """Pass the messages of a topic, as they are, to `callback` until the node is cleaned up."""
+        """Pass the serialized messages of a topic to `callback` until the node is cleaned up."""
         kind, qos = message_class(topic.type_name), qos_profile(topic, depth)
         return self.keep(self.create_subscription(kind, topic.name, callback, qos, raw=True))
 
@@ -184,7 +243,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         self._diagnostics.publish(array)
 
     def end_process(self, reason: StickslipError | None) -> None:
-        """End the process that the node runs in, for that reason if there is one."""
+        """End the process of the node; `reason` is the error that causes this, or None."""
         if not self.stopped.done():
             self.stopped.set_result(reason)
 
@@ -194,7 +253,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         return self._transition(self.connect, "configured")
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Start, if those waited for are there."""
+        """Start, if the nodes in wait_for are connected."""
         if self._is_waiting():
             return TransitionCallbackReturn.FAILURE
         self._waiting = False
@@ -233,17 +292,17 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
             self.release(thing)
 
     def _transition(self, action: Callable[[], None], done: str = "") -> TransitionCallbackReturn:
-        """Do what a transition asks for, and log what the node is then."""
+        """Run the action of a transition, and log the new state."""
         try:
             action()
         except InvalidInputError as error:
             if self._autostart_timer is not None:
                 self.end_process(error)
-            elif str(error) != self._last_refusal:  # whoever brings us up may try again and again
+            elif str(error) != self._last_refusal:  # the request may be repeated many times
                 self._last_refusal = str(error)
                 self.get_logger().error(self._last_refusal)
             return TransitionCallbackReturn.FAILURE
-        except Exception as error:  # rclpy would swallow it without a word
+        except Exception as error:  # rclpy would ignore it silently
             self.get_logger().error(f"{type(error).__name__}: {error}")
             self._end_autostart()
             return TransitionCallbackReturn.ERROR
@@ -252,7 +311,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         return TransitionCallbackReturn.SUCCESS
 
     def _is_waiting(self) -> bool:
-        """Return whether somebody is missing, and log whom, once until the node is active."""
+        """Return whether a node is missing; log its name, once until this node is active."""
         missing = self.missing_peers()
         if missing and not self._waiting:
             self._waiting = True
@@ -261,10 +320,10 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         return bool(missing)
 
     def _autostart(self) -> None:
-        """Configure, then try to activate until those waited for are there."""
+        """Configure, then try to activate until the nodes in wait_for are connected."""
         if not self.configured:
             self.trigger_configure()
-        # In one go, if nobody is missing: a plant may take whoever is there for one that answers.
+        # In the same step, if no node is missing: a plant expects a connected node to answer.
         if self.lifecycle_state == "inactive" and not self._is_waiting():
             self.trigger_activate()
         if self.active or self.stopped.done():
@@ -276,7 +335,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
             self._autostart_timer = None
 
     def missing_peers(self) -> str:
-        """Return what is missing of the nodes waited for, or nothing."""
+        """Return what is missing of the nodes in wait_for, or an empty string."""
         waiting_for = {name.rsplit("/", 1)[-1] for name in self.parameters.wait_for}
         if not waiting_for:
             return ""
@@ -293,4 +352,4 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
             if not matched:
                 return f"{end.topic_name} is not yet matched"
         absent = waiting_for - found
-        return f"not there: {', '.join(sorted(absent))}" if absent else ""
+        return f"missing: {', '.join(sorted(absent))}" if absent else ""

@@ -1,4 +1,4 @@
-"""Which network ROS uses: as the environment says, or by the profiles beside this file."""
+"""Network that ROS uses: set by the environment, or by the profiles beside this file."""
 
 import os
 from pathlib import Path
@@ -11,16 +11,16 @@ TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 _PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _LOCALHOST_ONLY = "ROS_LOCALHOST_ONLY"
-"""The range's predecessor, which overrules it."""
+"""Predecessor of the range; it takes precedence."""
 
 
 def keep_on_this_machine(network: bool) -> str:
-    """Restrict ROS to this machine, or open it; return in words what holds.
+    """Restrict ROS to this machine, or open it to the network; return the result in words.
 
-    To be called before ROS is initialised. What the environment says holds, unless `network` asks
-    for more.
+    Call this before ROS is initialised. Settings of the environment take precedence, unless
+    `network` asks for more.
     """
-    _heed_predecessor()
+    _translate_predecessor()
     names = [_DISCOVERY_RANGE, *(["ROS_DISCOVERY_SERVER", _PROFILES] if is_fast_dds() else [])]
     said = [f"{name}={os.environ[name]}" for name in names if os.environ.get(name)]
     if network:
@@ -31,31 +31,31 @@ def keep_on_this_machine(network: bool) -> str:
     if network:
         return "open to the network"
     if this_machine_only().items() <= os.environ.items():
-        return "kept on this machine"
+        return "loopback only"
     return f"as the environment says: {' '.join(said)}"
 
 
 def this_machine_only() -> dict[str, str]:
-    """Return the environment variables that restrict ROS to this machine."""
+    """Return the environment variables that restrict ROS to the loopback."""
     if not is_fast_dds():
         return {_DISCOVERY_RANGE: "LOCALHOST", _LOCALHOST_ONLY: ""}
     return {
-        # LOCALHOST, of either name, would overrule the profile, and take shared memory.
+        # LOCALHOST, by either name, would override the profile and use shared memory.
         _DISCOVERY_RANGE: "SYSTEM_DEFAULT",
         _LOCALHOST_ONLY: "",
         _PROFILES: _profile("loopback"),
-        # Profiles of the working directory would overrule this one.
+        # Profiles in the working directory would override this one.
         "SKIP_DEFAULT_XML_FILE": "1",
     }
 
 
 def prefer_prompt_middleware() -> None:
-    """Let Fast DDS do without shared memory and send soon again, if the environment says nothing.
+    """Make Fast DDS use no shared memory and resend quickly, unless the environment sets it up.
 
-    In shared memory a reader that is stopped or killed delays everybody who publishes to it, by
-    half a millisecond each time and by seconds now and then.
+    In shared memory, a reader that is stopped or killed delays all its writers, by half a
+    millisecond each time and sometimes by seconds.
     """
-    _heed_predecessor()
+    _translate_predecessor()
     if any(os.environ.get(name) for name in (_PROFILES, TRANSPORTS)):
         return
     if os.environ.get(_DISCOVERY_RANGE) == "LOCALHOST":
@@ -65,7 +65,7 @@ def prefer_prompt_middleware() -> None:
 
 
 def is_kept_on_loopback() -> bool:
-    """Return whether the environment says what `this_machine_only` does to Fast DDS."""
+    """Return whether the environment has the settings of `this_machine_only` for Fast DDS."""
     return os.environ.get(_PROFILES) == _profile("loopback")
 
 
@@ -74,8 +74,8 @@ def is_fast_dds() -> bool:
     return "fastrtps" in rclpy.get_rmw_implementation_identifier()
 
 
-def _heed_predecessor() -> None:
-    """Put what the environment says by the range's predecessor in terms of the range."""
+def _translate_predecessor() -> None:
+    """Translate a setting of the range's predecessor into the range."""
     if os.environ.get(_LOCALHOST_ONLY) == "1":
         os.environ.update({_DISCOVERY_RANGE: "LOCALHOST", _LOCALHOST_ONLY: ""})
 

@@ -1,4 +1,4 @@
-"""ROS parameters of a node, from one model that validates them."""
+"""ROS parameters of a node, from one validating model."""
 
 from collections.abc import Mapping
 from typing import Any, Generic, TypeVar, cast
@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.base.ros_errors import RCLError, first_line
-from stickslip_ros.scenarios.files import LONGEST_NAMESPACE
+from stickslip_ros.scenarios.namespace import LONGEST_NAMESPACE
 from stickslip_ros.scenarios.parameter_field import Fixed, known_parameters
 from stickslip_ros.scenarios.parameter_field import Parameter as ModelParameter
 from stickslip_ros.scenarios.parameters import NodeParameters
@@ -36,7 +36,7 @@ _ROS_TYPES = {
 
 
 class ParameterNode(LifecycleNode, Generic[ParametersT]):
-    """A lifecycle node whose parameters are those of a model, and fixed where that says so."""
+    """A lifecycle node with the parameters of a model, fixed in the states that it defines."""
 
     def __init__(
         self,
@@ -47,7 +47,7 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
         namespace: str | None = None,
         overrides: Mapping[str, Any] | None = None,
     ) -> None:
-        """Declare the parameters: those of the command line, then `overrides` by flat name.
+        """Declare the parameters: values of the command line, then `overrides` by flat name.
 
         Raises InvalidInputError for a parameter that is refused.
         """
@@ -62,19 +62,19 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
             )
         except (ParameterException, ValueError) as error:  # an empty list, for one
             raise InvalidInputError(
-                f"{name}: ROS refuses a parameter (an empty list is to be left out): {error}"
+                f"{name}: ROS refuses a parameter (omit an empty list): {error}"
             ) from None
         except (NameValidationException, RCLError) as error:
             raise InvalidInputError(
-                f"{name}: ROS refuses to make the node, maybe because its namespace has more than "
-                f"{LONGEST_NAMESPACE} characters: {first_line(error)}"
+                f"{name}: ROS refuses to make the node, possibly because its namespace has more "
+                f"than {LONGEST_NAMESPACE} characters: {first_line(error)}"
             ) from None
         self.active = False
         """Whether the node is in the state active."""
         self._model = model
         self._known = known_parameters(model)
         self.parameters = self._declare()
-        """The parameters in force."""
+        """The parameters in effect."""
 
     @property
     def lifecycle_state(self) -> str:
@@ -87,18 +87,18 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
         return self.lifecycle_state != "unconfigured"
 
     def apply_parameters(self) -> None:
-        """Act on `self.parameters` having changed while the node lives."""
+        """Use the new `self.parameters` after a change."""
 
     def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
         """Set each parameter by itself."""
         return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """Set all parameters or none; what is refused is named, with what is allowed.
+        """Set all parameters or none; a refusal names the parameter and what is allowed.
 
-        Whole numbers are taken where numbers are declared, as parameter files and -p do, and text
-        that is a number: `ros2 param load` sends inf and 1e-05 in no other way. It also sends back
-        what ROS keeps to itself, which may be as it is.
+        Integers are accepted for numbers, as in parameter files and with -p, and so is text that is
+        a number: `ros2 param load` sends inf and 1e-05 in this way. It also sends the parameters
+        that ROS itself declares; these are accepted if unchanged.
         """
         given = {parameter.name: parameter for parameter in parameter_list}
         owned = [
@@ -140,7 +140,7 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
         return validated
 
     def _check_fixed(self, values: Mapping[str, Any], source: str) -> None:
-        """Refuse to change what must stay in the present state."""
+        """Refuse changes of parameters that are fixed in the present state."""
         present = self.parameters.flat()
         states = {Fixed.NEVER: False, Fixed.ACTIVE: self.active, Fixed.CONFIGURED: self.configured}
         for name, value in values.items():
@@ -170,7 +170,7 @@ def _descriptor(parameter: ModelParameter) -> ParameterDescriptor:
         description=parameter.meaning + unit,
         additional_constraints=parameter.bounds,
     )
-    # rqt_reconfigure makes a slider of a range, which fails with an infinite end or a long integer.
+    # rqt_reconfigure makes a slider for a range; it fails for infinite ends and long integers.
     if parameter.range is not None and parameter.kind is float:
         least, largest = parameter.range
         descriptor.floating_point_range = [FloatingPointRange(from_value=least, to_value=largest)]

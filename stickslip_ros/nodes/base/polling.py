@@ -1,4 +1,4 @@
-"""Subscriptions whose messages wait until the node takes them."""
+"""Subscriptions whose messages wait in the queue until the node takes them."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -12,21 +12,21 @@ from stickslip_ros.nodes.base.ros_topics import message_class
 
 
 class PollingNode(Node):
-    """A node that lets messages wait: no thread is woken for each of them."""
+    """A node that polls for messages: no thread wakes for each of them."""
 
     def create_polled_subscription(self, topic: Topic[Any], qos: QoSProfile) -> Subscription:
-        """Let the serialized messages of a topic wait for `waiting_messages`."""
+        """Subscribe to a topic whose serialized messages wait for `waiting_messages`."""
         kind = message_class(topic.type_name)
         return self.create_subscription(kind, topic.name, _never_called, qos, raw=True)
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
-        """The subscriptions whose messages an executor is to pass on as they come."""
+        """The subscriptions that the executor serves: those that are not polled."""
         return (s for s in super().subscriptions if s.callback is not _never_called)
 
 
 def waiting_messages(subscription: Subscription) -> Iterator[bytes]:
-    """Take the serialized messages that wait, and yield them in order."""
+    """Take the waiting serialized messages and yield them in order."""
     with subscription.handle:
         while taken := subscription.handle.take_message(subscription.msg_type, True):
             yield taken[0]

@@ -1,4 +1,4 @@
-"""Running nodes: one as a process, and the spinning that every executor here needs."""
+"""Run one node as a process, and spin the executors of this package."""
 
 import argparse
 import signal
@@ -26,7 +26,7 @@ from stickslip_ros.scenarios.parameters import NodeParameters
 from stickslip_ros.standard_streams import open_closed_streams
 
 ROS_ARGUMENTS = ["--ros-args", "--log-level", "warn", "--disable-external-lib-logs"]
-"""Of the commands: they say on standard error what there is to say, and need no home directory."""
+"""ROS arguments of the commands, which use standard error and need no home directory."""
 
 
 def initialise(
@@ -35,10 +35,10 @@ def initialise(
     context: Context | None = None,
     domain: int | None = None,
 ) -> None:
-    """Initialise ROS for whoever handles the signals itself.
+    """Initialise ROS without its signal handlers.
 
-    In the default context and the domain that the environment says, unless others are given.
-    Raises InvalidInputError where nodes could not live, and for arguments that ROS refuses.
+    This uses the default context and the domain of the environment, unless others are given.
+    Raises InvalidInputError if nodes cannot run here, or ROS refuses the arguments.
     """
     check_machine(domain_of_environment() if domain is None else domain)
     try:
@@ -48,14 +48,25 @@ def initialise(
             domain_id=domain,
             signal_handler_options=SignalHandlerOptions.NO,
         )
-    except Exception as error:  # its first line names what rcl could not parse
+    except Exception as error:  # its first line names the argument
         raise InvalidInputError(first_line(error)) from None
 
 
 def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) -> int:
-    """Run one node as a process, until SIGINT, SIGTERM or SIGHUP; return the exit status.
+    """Run one node as a process, until SIGINT, SIGTERM or SIGHUP.
 
-    Status 2 says that a parameter or an argument was refused, with the reason on standard error.
+    Parameters
+    ----------
+    make : callable
+        Makes the node; its class, as a rule. The docstring of its module is the text of `--help`.
+    model : type
+        Class of the node's parameters, which `--help` lists.
+
+    Returns
+    -------
+    int
+        Exit status: 0 done, 1 the node failed, 2 a parameter or an argument was refused. The
+        reason is printed on standard error.
     """
     open_closed_streams()
     parser = argparse.ArgumentParser(
@@ -87,7 +98,7 @@ def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) 
 
 
 def run_until_stopped(node: ManagedNode[Any]) -> None:
-    """Run a node until a signal or it itself ends that; raise what it was stopped with."""
+    """Run a node until a signal or the node ends this; raise the error that stopped it."""
     executor = EventsExecutor()
     executor.add_node(node)
     stop_on_signals(executor, node.stopped)
@@ -105,7 +116,7 @@ def run_until_stopped(node: ManagedNode[Any]) -> None:
 def stop_on_signals(executor: Executor, *stopped: Future) -> dict[signal.Signals, Any]:
     """Let each SIGINT, SIGTERM or SIGHUP complete the next of `stopped` with None.
 
-    Where SIGHUP is ignored, as under nohup, it still is. Return the handlers there were.
+    SIGHUP stays ignored if it is, as under nohup. Return the previous handlers.
     """
 
     def stop(*_: object) -> None:
@@ -121,11 +132,11 @@ def stop_on_signals(executor: Executor, *stopped: Future) -> dict[signal.Signals
 
 
 def spin(executor: Executor, until: Future) -> None:
-    """Run callbacks until the future is done; one that raises is logged, and the rest go on."""
+    """Run callbacks until the future is done; log exceptions of callbacks and continue."""
     while not until.done():
         try:
             executor.spin_until_future_complete(until, timeout_sec=0.2)
-        except Exception as error:  # an impossible request from outside ends up here, too
+        except Exception as error:  # an invalid request from outside ends here, too
             get_logger("stickslip_ros").error(f"{type(error).__name__}: {error}")
 
 

@@ -1,4 +1,4 @@
-"""What ROS raises."""
+"""Exceptions of ROS."""
 
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
@@ -6,5 +6,5 @@ RCLError: type[Exception] = rclpy_implementation.RCLError
 
 
 def first_line(error: Exception) -> str:
-    """Return what an exception of ROS's says, without where in its code and what follows."""
+    """Return the message of a ROS exception without the place in its source code."""
     return str(error).strip().split("\n", 1)[0].split(", at ", 1)[0].rstrip(":")

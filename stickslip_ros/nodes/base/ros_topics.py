@@ -1,4 +1,4 @@
-"""Message class and quality of service of a topic, as rclpy takes them, and who matches it."""
+"""Message class and quality of service of a topic for rclpy, and its matching endpoints."""
 
 from functools import cache
 from importlib import import_module
@@ -21,7 +21,7 @@ from stickslip_ros.messages.topics import Topic
 
 
 def qos_profile(topic: Topic[Any], depth: int | None = None) -> QoSProfile:
-    """Return the quality of service of a topic, the history `depth` messages deep."""
+    """Return the quality of service of a topic, with a history of `depth` messages."""
     return QoSProfile(
         reliability=ReliabilityPolicy.RELIABLE,
         history=HistoryPolicy.KEEP_LAST,
@@ -40,13 +40,13 @@ def message_class(type_name: str) -> Any:
 
 
 def mismatch(writer: QoSProfile, reader: QoSProfile) -> str:
-    """Return why a reader cannot hear a writer, or nothing."""
+    """Return why a reader cannot receive from a writer, or an empty string."""
     compatibility, reason = qos_check_compatible(_explicit(writer), _explicit(reader))
     return reason if compatibility == QoSCompatibility.ERROR else ""
 
 
 def matching_readers(node: Node, writer: Publisher) -> list[TopicEndpointInfo]:
-    """Return those in the graph that can read what a node's publisher writes."""
+    """Return the readers in the graph that match a publisher of the node."""
     return [
         reader
         for reader in node.get_subscriptions_info_by_topic(writer.topic_name)
@@ -55,7 +55,7 @@ def matching_readers(node: Node, writer: Publisher) -> list[TopicEndpointInfo]:
 
 
 def matching_writers(node: Node, reader: Subscription) -> list[TopicEndpointInfo]:
-    """Return those in the graph that write what a node's subscription can read."""
+    """Return the writers in the graph that match a subscription of the node."""
     return [
         writer
         for writer in node.get_publishers_info_by_topic(reader.topic_name)
@@ -70,7 +70,7 @@ def _same_type(other: TopicEndpointInfo, ours: Publisher | Subscription) -> bool
 
 
 def _explicit(profile: QoSProfile) -> QoSProfile:
-    """Return the profile as the graph tells it: there what is not set is infinite."""
+    """Return the profile as the graph reports it: unset durations are infinite."""
 
     def explicit(duration: Duration) -> Duration:
         return duration if duration.nanoseconds > 0 else Infinite

@@ -1,4 +1,4 @@
-"""Calling a service of another node, where the middleware may not do its part at once."""
+"""Call a service of another node, even if the middleware is slow or loses messages."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -11,20 +11,20 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 
 ANSWER_TIME = 1.0
-"""Time, s, that a client has to match a service that is there, and then to get its answer."""
+"""Time, s, for a client to match an existing service, and then to get its answer."""
 
 
 class ServiceCall:
-    """Calls a service as soon as it is there, until it has answered.
+    """Calls a service as soon as it exists, until it has answered.
 
-    A client may never match a service that is there, and an answer may be lost: then another client
-    asks, and has twice the time. So the service may be asked more than once.
+    A client may never match an existing service, and an answer may be lost. Then a new client
+    repeats the request, and has twice the time. So the service may get the request more than once.
     """
 
     def __init__(
         self, node: Node, kind: Any, service: str, *, answer_time: float = ANSWER_TIME
     ) -> None:
-        """Prepare to call a service for a node; it has `answer_time` (s) for its first answer."""
+        """Prepare to call a service through `node`; the first answer may take `answer_time` (s)."""
         self._node = node
         self._kind = kind
         self._service = service
@@ -33,22 +33,22 @@ class ServiceCall:
         self._pending: Future | None = None
 
     def start(self, request: Any, on_answer: Callable[[Any], None] = lambda _: None) -> None:
-        """Ask this from now on, in place of what was asked before."""
+        """Send this request from now on, in place of an earlier one."""
         self._request = request
         self._on_answer = on_answer
         self.answer: Any = None
-        """The answer, once it has come."""
+        """The answer; None until it arrives."""
         self._pending = None
         self._attempt_ends: float | None = None
         self._factor = 1.0
 
     @property
     def sent(self) -> bool:
-        """Whether the service was asked."""
+        """Whether the request was sent."""
         return self._pending is not None
 
     def pursue(self) -> bool:
-        """Do what is due, to be called again and again; return whether the answer has come."""
+        """Do the next step; call this repeatedly. Return whether the answer has arrived."""
         if self.answer is not None:
             return True
         if not self._node.count_services(self._service):
@@ -67,7 +67,7 @@ class ServiceCall:
         return False
 
     def close(self) -> None:
-        """Ask no more; an answer that still comes is ignored."""
+        """Stop; ignore an answer that still arrives."""
         self._pending = None
         self._node.destroy_client(self._client)
 
@@ -84,7 +84,7 @@ class ServiceCall:
 def parameters_call(
     node: Node, other: str, names: Sequence[str], on_answer: Callable[[dict[str, Any]], None]
 ) -> ServiceCall:
-    """Return a call that asks the node `other` for its parameters of these names."""
+    """Return a call that requests the named parameters of the node `other`."""
 
     def take(response: Any) -> None:
         values = [parameter_value_to_python(value) for value in response.values]

@@ -1,1 +1,1 @@
-"""What the replay node plays, and how."""
+"""Content and timing of a replay."""

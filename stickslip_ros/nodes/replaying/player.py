@@ -1,4 +1,4 @@
-"""Sending recorded messages once more: each when it is due, from a thread of its own."""
+"""Send recorded messages again, each when it is due, from a separate thread."""
 
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -11,7 +11,7 @@ from stickslip_ros.nodes.pacing import FlowWindow, Sleeper
 from stickslip_ros.nodes.replaying.timeline import Timeline
 
 _PATIENCE = 10.0
-"""Wall time, s, that is waited for a silent recorder, and in the end for the readers."""
+"""Wall time, s, to wait for a silent recorder, and at the end for the readers."""
 _LOOK_AGAIN = 0.02
 
 Message = tuple[str, int, bytes]
@@ -19,7 +19,7 @@ Message = tuple[str, int, bytes]
 
 
 class Player:
-    """Sends messages when they are due; after a stall what is overdue follows at once, in order."""
+    """Sends messages when they are due; after a stall, overdue ones follow immediately in order."""
 
     def __init__(
         self,
@@ -32,21 +32,21 @@ class Player:
         loop: bool,
         windows: Mapping[str, FlowWindow],
     ) -> None:
-        """Send what `messages` gives, over and over if `loop`; call `end` when all is `delivered`.
+        """Send the `messages`, repeatedly if `loop`; call `end` when all are `delivered`.
 
-        `send` gets each message and the recorded time, ns; `windows` bounds by topic how many may
-        be under way. All of these are called from the player's thread.
+        `send` gets each message and the recorded time, ns. `windows` bounds, by topic, how many
+        messages may be on their way. All functions are called from the player's thread.
         """
         self.sent = 0
         """Messages sent."""
         self.recorded_time = 0
-        """Log time, ns, that the messages sent have come to."""
+        """Log time, ns, of the newest message sent."""
         self.worst_lateness = 0.0
-        """Longest time, s, by which a message was sent behind its deadline."""
+        """Largest delay of a message after its deadline, s."""
         self.complaint = ""
-        """What is wrong, in words."""
+        """Current problem, in words; empty if there is none."""
         self.failure: StickslipError | None = None
-        """What ended it before its time."""
+        """The error that ended the replay early."""
         self._messages = messages
         self._send = send
         self._end = end
@@ -61,7 +61,7 @@ class Player:
 
     @property
     def paused(self) -> bool:
-        """Whether it sends nothing until it is resumed."""
+        """Whether it is paused."""
         return self._timeline.paused
 
     def start(self) -> None:
@@ -69,7 +69,7 @@ class Player:
         self._thread.start()
 
     def stop(self) -> None:
-        """Send no further message."""
+        """Send no more messages."""
         with self._changed:
             self._running = False
             self._changed.notify()
@@ -77,18 +77,18 @@ class Player:
         self._thread.join()
 
     def pause(self) -> None:
-        """Send nothing from now on."""
+        """Pause now."""
         with self._changed:
             self._timeline.pause(time.monotonic())
 
     def resume(self) -> None:
-        """Go on where it was paused."""
+        """Continue after a pause."""
         with self._changed:
             self._timeline.resume(time.monotonic())
             self._changed.notify()
 
     def recorder_came_to(self, topic: str, stamp: int) -> None:
-        """Say that the recorder holds what was sent on a topic up to that stamp (ns)."""
+        """Note that the recorder has the messages of a topic up to this stamp (ns)."""
         with self._changed:
             self._windows[topic].recorded(stamp)
             self.complaint = ""
@@ -99,14 +99,14 @@ class Player:
             self._play()
         except StickslipError as error:
             self.failure = error
-        except Exception as error:  # it would end the thread without a word
+        except Exception as error:  # it would end the thread silently
             self.failure = RunError(f"the replay failed: {type(error).__name__}: {error}")
         if self._running:
             self._end()
 
     def _play(self) -> None:
         while True:
-            # The next message is fetched before its deadline is slept for.
+            # The next message is fetched before the sleep until its deadline.
             for message in self._messages():
                 with self._changed:
                     self._timeline.go_to(message[1], time.monotonic())
@@ -129,7 +129,7 @@ class Player:
                     window.give_up(patience_ends=False)
                 self._changed.wait(_LOOK_AGAIN)
             if self._running:
-                self.complaint = "not every reader has taken in all that was sent"
+                self.complaint = "not every reader has received all messages"
 
     def _send_when_due(self, message: Message) -> None:
         topic, _, data = message
@@ -154,7 +154,7 @@ class Player:
                 self.sent += 1
                 self.worst_lateness = max(self.worst_lateness, lateness)
                 if window is not None:
-                    with suppress(MessageError):  # without a stamp that a recorder could name
+                    with suppress(MessageError):  # without a stamp, the recorder cannot name it
                         window.sent(unpack_header(data))
                 return
 

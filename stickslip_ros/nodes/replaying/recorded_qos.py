@@ -1,4 +1,4 @@
-"""How a recorded topic is published again: its message class and its quality of service."""
+"""Message class and quality of service with which a recorded topic is published again."""
 
 from collections.abc import Mapping
 from typing import Any, TypeVar
@@ -28,7 +28,7 @@ def installed_message_class(type_name: str) -> Any:
 
     Raises BagError for a type that is not installed.
     """
-    message_definition(type_name)  # what has none is no message, and must not be imported
+    message_definition(type_name)  # what has no definition must not be imported
     try:
         return message_class(type_name)
     except (ImportError, AttributeError) as error:
@@ -38,15 +38,15 @@ def installed_message_class(type_name: str) -> Any:
 
 
 def recorded_profile(recorded: str) -> QoSProfile:
-    """Return the quality of service with which a topic was offered, from YAML as rosbag2 keeps it.
+    """Return the quality of service with which a topic was published, from the YAML of rosbag2.
 
-    History is no matter between writer and reader: it is deep, but for a topic that latches, of
-    which a late reader gets as many messages as were kept. Where nothing is recorded, or publishers
-    differed, the topic is reliable.
+    Writer and reader need not agree on the history. It is deep, except for a latched topic: a late
+    reader gets as many messages as the recorded history held. The topic is reliable if nothing was
+    recorded, or its publishers differed.
     """
     try:
         profiles = [_profile(values) for values in offered_profiles(recorded)]
-    except Exception:  # there is no end to what may stand in a file of others
+    except Exception:  # the file may contain anything
         profiles = []
     if profiles and all(profile == profiles[0] for profile in profiles):
         return profiles[0]
@@ -71,7 +71,7 @@ def _profile(values: Mapping[str, Any]) -> QoSProfile:
 
 
 def _policy(default: PolicyT, recorded: str | int | None) -> PolicyT:
-    """Return the policy of that name or number; the default if it is none to offer."""
+    """Return the policy of this name or number; the default if it cannot be offered."""
     kind = type(default)
     if recorded is None:
         return default

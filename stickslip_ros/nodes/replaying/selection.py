@@ -1,4 +1,4 @@
-"""What of a bag is to be replayed: which topics, how they are published, and which messages."""
+"""The part of a bag to replay: topics, how they are published, and messages."""
 
 from collections.abc import Iterator
 from math import inf
@@ -21,26 +21,26 @@ from stickslip_ros.text import printable
 
 
 class Selection:
-    """The part of a bag that is to be replayed.
+    """The part of a bag to replay.
 
-    Its start and duration count recorded time as it passes in the replay, from the bag's first
-    message on. What was logged earlier than messages before it belongs to the time of its log time,
-    at the begin of the bag to its begin; where log times go back by more than JITTER, recorded time
-    goes on behind what came before. A part without start and duration is the whole bag.
+    Start and duration count the recorded time as it passes in the replay, from the first message of
+    the bag. A message that was logged earlier than the messages before it belongs to its own log
+    time, or to the start of the bag. If log times go back by more than JITTER, recorded time
+    continues from there. Without start and duration, the part is the whole bag.
     """
 
     def __init__(self, parameters: ReplayParameters, source: str) -> None:
-        """Look into the bag.
+        """Read the topics of the bag.
 
-        Raises BagError for what is no bag or holds nothing that can be replayed, and
-        InvalidInputError that names `source` and the parameter that asks for what the bag has not.
+        Raises BagError if it is no bag or contains nothing that can be replayed, and
+        InvalidInputError, with `source` and the parameter, for a request that the bag cannot meet.
         """
         self.topics: dict[str, tuple[Any, QoSProfile]] = {}
-        """How each is published, by name: message class and quality of service."""
+        """Message class and quality of service of each topic, by name."""
         self.left_out: list[str] = []
         """Topics that cannot be replayed, and why, in sentences."""
         self.lacking: list[str] = []
-        """What the bag lacks, in sentences, as far as it was read."""
+        """What is missing from the bag, in sentences, as far as it was read."""
         self._source = source
         self._parameters = parameters
         if not parameters.bag:
@@ -54,10 +54,10 @@ class Selection:
             self._find_topics(recording)
             self._check_part(recording)
             self.length = self._known_length(recording)
-            """Recorded time from start to end, s; infinite where no account of the bag tells it."""
+            """Recorded time from start to end, s; infinite if the bag does not record it."""
 
     def messages(self) -> Iterator[Message]:
-        """Yield the messages to replay as recorded in turn; raises BagError where reading fails."""
+        """Yield the messages to replay in recorded order; raises BagError if reading fails."""
         with Recording(Path(self._parameters.bag)) as recording:
             yield from self._part(recording)
             self.lacking = recording.missing
@@ -68,12 +68,12 @@ class Selection:
         for (topic, log_time, data), elapsed, newest in self._timed(recording, *self.topics):
             if newest >= end + JITTER:
                 return
-            # An empty message cannot be delivered, and Fast DDS would hold back what follows it.
+            # Fast DDS cannot deliver an empty message, and would hold back those after it.
             if begin <= elapsed < end and data:
                 yield topic, log_time, data
 
     def _timed(self, recording: Recording, *topics: str) -> Iterator[tuple[Message, int, int]]:
-        """Yield each message with its recorded time, ns, and the newest one up to there."""
+        """Yield each message with its recorded time, ns, and the newest time so far."""
         timeline = Timeline()
         timeline.go_to(self.first)
         for message in recording.messages(*topics):
@@ -94,7 +94,7 @@ class Selection:
                 kind = installed_message_class(recording.topics[topic])
             except (BagError, InvalidTopicNameException) as error:
                 reason = str(error).splitlines()[0]
-                self.left_out.append(printable(f"{topic} is left out: {reason}"))
+                self.left_out.append(printable(f"{topic} is omitted: {reason}"))
             else:
                 self.topics[topic] = kind, recorded_profile(recording.offered_qos(topic))
         if not self.topics:
@@ -102,7 +102,7 @@ class Selection:
             raise BagError(f"no topic of the bag {recording.path} can be replayed: {reasons}")
 
     def _worth_replaying(self, recording: Recording) -> list[str]:
-        """Leave out what a recorder said to the plant of its time, and a second clock."""
+        """Omit what a recorder sent to its plant, and a second clock."""
         states = [topic for topic in recording.topics if topic.endswith(f"/{JOINT_STATES.name}")]
         live = {topic.removesuffix(JOINT_STATES.name) + RECORDED.name for topic in states}
         if self._parameters.clock:

@@ -1,16 +1,16 @@
-"""When recorded messages are due again."""
+"""Deadlines of recorded messages in a replay."""
 
 from stickslip_ros.stamps import NANOSECONDS
 
 JITTER = NANOSECONDS
-"""Time, ns, by which log times may go back without a new segment beginning there."""
+"""Time, ns, by which log times may go back without starting a new segment."""
 
 
 class Timeline:
-    """Turns log times into absolute deadlines: none drifts, however late the one before was met.
+    """Turns log times into absolute deadlines, which do not drift after a late message.
 
-    Nothing waits for the past: what was logged before what came earlier is due along with it. Where
-    log times go back by more than JITTER a new segment begins, one interval behind the old one.
+    A message that was logged before an earlier one is due at the same time as that. If log times go
+    back by more than JITTER, a new segment starts, one interval after the old one.
     """
 
     def __init__(self, rate: float = 1.0) -> None:
@@ -26,20 +26,20 @@ class Timeline:
 
     @property
     def deadline(self) -> float:
-        """When what `go_to` went to is due, s of the clock that its `now` was read from."""
+        """When the message of the last `go_to` is due, s of the clock of its `now`."""
         return self._origin + self.elapsed_at(self.now) * self._seconds
 
     @property
     def paused(self) -> bool:
-        """Whether time stands still."""
+        """Whether the time is stopped."""
         return self._paused_at is not None
 
     def elapsed_at(self, log_time: int) -> int:
-        """Return the recorded time, ns, from what was first of all to a log time of the segment."""
+        """Return the recorded time, ns, from the first message to a log time of the segment."""
         return log_time - (self._zero or 0)
 
     def go_to(self, log_time: int, now: float = 0.0) -> None:
-        """Go on to what was logged at that time (ns); what is first of all is due `now` (s)."""
+        """Proceed to a log time (ns); the very first message is due `now` (s)."""
         if self._zero is None:
             self._origin = now
             self._zero = self.now = log_time
@@ -52,16 +52,16 @@ class Timeline:
         self._segment_starts = False
 
     def start_segment(self) -> None:
-        """Take what comes next for the begin of a new segment."""
+        """Start a new segment with the next message."""
         self._segment_starts = True
 
     def pause(self, now: float) -> None:
-        """Let time stand still from `now` (s) on."""
+        """Stop the time at `now` (s)."""
         if self._paused_at is None:
             self._paused_at = now
 
     def resume(self, now: float) -> None:
-        """Let time go on `now` (s); every deadline moves by the length of the pause."""
+        """Continue the time at `now` (s); deadlines move by the length of the pause."""
         if self._paused_at is not None:
             self._origin += now - self._paused_at
             self._paused_at = None

@@ -10,12 +10,15 @@ from enum import StrEnum
 from fractions import Fraction
 from math import floor, isfinite
 from random import Random
+from typing import TYPE_CHECKING
 
 from stickslip_ros.physics.model.disturbance import Disturbance
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.samples import Sample
 from stickslip_ros.stamps import NANOSECONDS
+
+if TYPE_CHECKING:  # a node without a motion needs no heyoka
+    from stickslip_ros.physics.motion.motion import Motion
 
 LOCKSTEP_START = NANOSECONDS
 """Stamp of the first sample if no clock gives one, ns; ROS uses zero for "not set"."""
@@ -98,7 +101,7 @@ class SampledLoop:
 
     def __init__(
         self,
-        motion: Motion,
+        motion: "Motion",
         rate: float,
         start: int,
         *,

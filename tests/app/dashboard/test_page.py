@@ -237,7 +237,7 @@ def test_a_long_event_is_wrapped_within_its_box(
     served = Served(start_stickslip("dashboard", "--namespace", "/test"))
     page.goto(served.url)
     processes.node("plant", pace="realtime", rate=200.0)
-    event = page.locator(".nicegui-log").get_by_text("no control force comes: going on without")
+    event = page.locator(".nicegui-log").get_by_text("no control force arrives: continuing without")
     expect(event).to_be_visible()
     box = page.locator(".nicegui-log .q-scrollarea__container")
     widths = box.evaluate("box => [box.scrollWidth, box.clientWidth]")

@@ -114,8 +114,8 @@ def test_what_cannot_be_published_is_left_out_with_the_reason(tmp_path: Path) ->
     assert part.topics.keys() == {STATES}
     assert [topic for topic, _, _ in part.messages()] == [STATES]
     thing, name = sorted(part.left_out, reverse=True)
-    assert "/thing is left out: the message type 'nosuch_msgs/msg/Thing' is not installed" in thing
-    assert "/a b is left out" in name
+    assert "/thing is omitted: the message type 'nosuch_msgs/msg/Thing' is not installed" in thing
+    assert "/a b is omitted" in name
     del types[STATES]
     with pytest.raises(BagError, match=r"no topic of the bag .* can be replayed: .*nosuch_msgs"):
         selection(foreign_bag(tmp_path / "other.mcap", types))

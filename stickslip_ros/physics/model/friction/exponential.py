@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import heyoka
 import numpy as np
 
 from stickslip_ros.physics.model.friction.base import FrictionLaw
@@ -54,6 +53,8 @@ class Exponential(FrictionLaw):
         float, array or expression
             Coefficient, dimensionless.
         """
+        import heyoka  # what computes with no expressions does not load it
+
         speed = relative_speed * sign
         exponent = -speed / self.decay_speed
         symbolic = isinstance(exponent, heyoka.expression)
