@@ -8,10 +8,14 @@ import sys
 import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from importlib.abc import Loader
+else:  # at run time the base class adds nothing, and its import takes as long as all else here
+    Loader = object
 
 _MODEL = "stickslip_ros.physics.model"
 _LOOP = "stickslip_ros.physics.loop"
@@ -94,7 +98,7 @@ def _warn(old: str, new: str) -> None:
     )
 
 
-class _MovedModules(MetaPathFinder, Loader):
+class _MovedModules(Loader):
     """Finds the modules of `MOVED` that are no more."""
 
     def find_spec(
@@ -104,6 +108,9 @@ class _MovedModules(MetaPathFinder, Loader):
             return None
         is_package = any(name.startswith(f"{fullname}.") for name in MOVED)
         return ModuleSpec(fullname, self, is_package=is_package)
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        """Leave the making of the module to the import system."""
 
     def exec_module(self, module: ModuleType) -> None:
         vars(module)["__getattr__"] = moved_from(module.__name__)

@@ -2,41 +2,34 @@
 
 import argparse
 from dataclasses import asdict
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
     add_scenario,
-    check_picture,
+    check_figure,
     scenario_of,
-    write_picture,
+    write_figure,
 )
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_table
 from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.basin import (
-    COURSE,
-    POSITION,
-    VELOCITY,
-    Attractor,
-    Basins,
-    basin_study,
-    default_axes,
-)
-from stickslip_ros.studies.columns import Columns
-from stickslip_ros.studies.journal import Journal
-from stickslip_ros.studies.plan import Axis, Grid, Plan, RandomSample
+from stickslip_ros.studies.options import BASIN_COURSE
+
+if TYPE_CHECKING:
+    from stickslip_ros.plots.units import Units
+    from stickslip_ros.scenarios.files import Scenario
+    from stickslip_ros.studies.basin import Attractor, Basins
+    from stickslip_ros.studies.journal import Journal
+    from stickslip_ros.studies.plan import Plan
 
 HELP = "find which motion each start leads to, and the share of starts that each motion gets"
 
 _DESCRIPTION = f"""{HELP} (basin stability), over a grid of starts or a random sample. A start is a
 displacement and a velocity of the slide; the washout filter is at rest. Each motion is followed
-until it is steady, for {COURSE.patience} transients at most."""
+until it is steady, for {BASIN_COURSE.patience} transients at most."""
 
 _COUNT = 40
 """Positions and velocities of the grid."""
@@ -63,21 +56,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=int, metavar="SEED", help="which sample it is, 0 or more (default: 0)"
     )
-    add_running(parser, COURSE)
+    add_running(parser, BASIN_COURSE)
     add_plot(parser, "which motion each start leads to")
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.plots.units import Units
+        from stickslip_ros.studies.basin import Basins, basin_study
     scenario = scenario_of(arguments)
     study = basin_study(
         scenario,
         _plan(arguments, scenario),
-        course=course_of(arguments, COURSE),
+        course=course_of(arguments, BASIN_COURSE),
         continuous=arguments.continuous_control,
     )
-    check_picture(arguments.plot)
+    check_figure(arguments)
     label = f"basins of {scenario.name}, {study.plan.size} starts"
     with computed(arguments, study, label) as journal:
         basins = Basins.from_points(journal.points())
@@ -91,7 +87,10 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _plan(arguments: argparse.Namespace, scenario: Scenario) -> Plan:
+def _plan(arguments: argparse.Namespace, scenario: "Scenario") -> "Plan":
+    from stickslip_ros.studies.basin import POSITION, VELOCITY, default_axes
+    from stickslip_ros.studies.plan import Axis, Grid, RandomSample
+
     if arguments.seed is not None and arguments.sample is None:
         raise InvalidInputError(f"--seed {arguments.seed}: is for a random --sample")
     if arguments.seed is not None and arguments.seed < 0:
@@ -113,7 +112,7 @@ def _plan(arguments: argparse.Namespace, scenario: Scenario) -> Plan:
     return RandomSample(tuple(axes), arguments.sample, arguments.seed or 0)
 
 
-def _print(title: str, basins: Basins, units: Units) -> None:
+def _print(title: str, basins: "Basins", units: "Units") -> None:
     rows = [
         [
             _name(attractor),
@@ -129,14 +128,21 @@ def _print(title: str, basins: Basins, units: Units) -> None:
     print_table(title, headings, rows)
 
 
-def _name(attractor: Attractor) -> str:
+def _name(attractor: "Attractor") -> str:
+    from stickslip_ros.physics.measures.cycle_measures import Regime
+
     name = Regime.label(attractor.regime)
     return name if attractor.steady or attractor.regime is None else f"{name}, not steady"
 
 
-def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> None:
-    # Half as long again to import as everything else.
+def _draw(arguments: argparse.Namespace, journal: "Journal", basins: "Basins") -> None:
+    import numpy as np
+
     from stickslip_ros.plots.basin_picture import basin_figure
+    from stickslip_ros.plots.units import Units
+    from stickslip_ros.studies.basin import POSITION, VELOCITY
+    from stickslip_ros.studies.columns import Columns
+    from stickslip_ros.studies.plan import Grid
 
     plan, scenario = journal.study.plan, journal.study.scenario
     drive = scenario.plant.as_drive()
@@ -154,10 +160,10 @@ def _draw(arguments: argparse.Namespace, journal: Journal, basins: Basins) -> No
         units=units,
         title=" ".join([scenario.name, *scenario.overrides]),
     )
-    write_picture(arguments.plot, figure)
+    write_figure(arguments, figure)
 
 
-def _label(attractor: Attractor, units: Units) -> str:
+def _label(attractor: "Attractor", units: "Units") -> str:
     amplitude = ""
     if attractor.amplitude is not None:
         amplitude = f", amplitude {units.text(attractor.amplitude, 'm')}"

@@ -6,26 +6,28 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
     add_scenario,
+    check_figure,
     check_new,
-    check_picture,
     made_of,
     scenario_of,
-    write_picture,
+    write_figure,
     writing,
 )
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import finite, print_json, print_table, progress_bar
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.theory.stability_map import StabilityMap
-from stickslip_ros.plots.units import Units
-from stickslip_ros.studies.design import Design, Task, design
-from stickslip_ros.studies.design_task import OWN_SPEED_RANGE
+from stickslip_ros.studies.options import OWN_SPEED_RANGE
 from stickslip_ros.text import printable
+
+if TYPE_CHECKING:
+    from stickslip_ros.plots.units import Units
+    from stickslip_ros.studies.design import Design
 
 HELP = "propose corner frequency and gains that damp the vibration within a force limit"
 
@@ -82,13 +84,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.studies.design import Task, design
     scenario = scenario_of(arguments, unused=_PROPOSED)
     if not scenario.plant.expects_control:
         raise InvalidInputError("plant.expects_control = False: without control there are no gains")
     task = Task.from_scenario(scenario, _belt_speeds(arguments.belt_speed))
     if arguments.out is not None:
         check_new("--out", arguments.out)
-    check_picture(arguments.plot)
+    check_figure(arguments)
     with progress_bar(f"designing for {scenario.name}", 1.0) as progress:
         found = design(task, progress)
     if scenario.plant.force_jitter > 0.0:
@@ -105,7 +109,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.out is not None:
         _write(arguments.out, found)
     if arguments.plot is not None:
-        _draw(arguments.plot, found)
+        _draw(arguments, found)
     return 0
 
 
@@ -121,7 +125,7 @@ def _belt_speeds(text: str | None) -> tuple[float, float] | None:
     return speeds[0], speeds[-1]
 
 
-def _write(path: Path, found: Design) -> None:
+def _write(path: Path, found: "Design") -> None:
     if found.parameter_file is None:
         _leave_out(f"--out {path}: not written")
         return
@@ -131,22 +135,22 @@ def _write(path: Path, found: Design) -> None:
     print(f"{printable(str(path))} is written: `{printable(command)}` runs it", file=sys.stderr)
 
 
-def _draw(path: Path, found: Design) -> None:
-    # Half as long again to import as everything else.
+def _draw(arguments: argparse.Namespace, found: "Design") -> None:
+    from stickslip_ros.physics.theory.stability_map import StabilityMap
     from stickslip_ros.plots.stability_map import stability_figure
 
     if found.slowest is None or found.controller is None:
-        _leave_out(f"--plot {path}: not drawn")
+        _leave_out(f"--plot {arguments.plot}: not drawn")
         return
     map_around = StabilityMap.around(found.slowest, found.controller.gains)
-    write_picture(path, stability_figure(map_around, None))
+    write_figure(arguments, stability_figure(map_around, None))
 
 
 def _leave_out(what: str) -> None:
     print(f"stickslip design: {what}, for there is nothing to propose", file=sys.stderr)
 
 
-def _as_dict(found: Design) -> dict[str, Any]:
+def _as_dict(found: "Design") -> dict[str, Any]:
     controller, slowest, task = found.controller, found.slowest, found.task
     values = asdict(controller) if controller else dict.fromkeys(_CONTROLLER)
     checks = [asdict(check) for check in found.checks]
@@ -169,12 +173,14 @@ def _largest(values: Iterable[float | None]) -> float | None:
 
 
 def _rows(
-    figures: Mapping[str, Any], labels: Mapping[str, tuple[str, str]], units: Units
+    figures: Mapping[str, Any], labels: Mapping[str, tuple[str, str]], units: "Units"
 ) -> list[list[str]]:
     return [[label, units.text(figures[key], unit)] for key, (label, unit) in labels.items()]
 
 
-def _print(name: str, found: Design) -> None:
+def _print(name: str, found: "Design") -> None:
+    from stickslip_ros.plots.units import Units
+
     units = Units.for_drive(found.task.drive)
     speeds = units.texts(sorted({*found.task.belt_speeds}), "m/s")
     task = f"{name}, belt speed {' to '.join(speeds)}"

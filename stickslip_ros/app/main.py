@@ -7,8 +7,10 @@ import re
 import sys
 from collections.abc import Sequence
 from types import ModuleType
+from typing import NoReturn
 
 from stickslip_ros.app import INTERRUPTED
+from stickslip_ros.app.commands import COMMANDS, EXAMPLES, overview
 from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.interrupts import raise_interrupts
@@ -16,23 +18,9 @@ from stickslip_ros.standard_streams import nowhere, open_closed_streams
 from stickslip_ros.text import did_you_mean
 from stickslip_ros.versions import versions
 
-_COMMANDS = (
-    "run",
-    "dashboard",
-    "simulate",
-    "stability",
-    "design",
-    "sweep",
-    "basin",
-    "report",
-    "repair",
-    "replay",
-    "paper",
-)
-
 
 def _load(name: str) -> ModuleType:
-    """Import a command, which some do for seconds, when it is asked for."""
+    """Import the module of a command: its arguments, and a `run` that imports what it needs."""
     match name:
         case "run":
             from stickslip_ros.app import run as command
@@ -56,6 +44,18 @@ def _load(name: str) -> ModuleType:
             from stickslip_ros.app import replay as command
         case "paper":
             from stickslip_ros.app import paper as command
+        case "set":
+            from stickslip_ros.app import set as command
+        case "list":
+            from stickslip_ros.app import list as command
+        case "show":
+            from stickslip_ros.app import show as command
+        case "new":
+            from stickslip_ros.app import new as command
+        case "schema":
+            from stickslip_ros.app import schema as command
+        case "completion":
+            from stickslip_ros.app import completion as command
         case _:
             raise AssertionError(name)
     return command
@@ -78,9 +78,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
         raise_interrupts()
+        if not given or given[0] in ("-h", "--help"):
+            print(overview(), flush=True)
+            sys.exit()
         parser = _parser(given)
-        if command and not command.startswith("-") and command not in _COMMANDS:
-            parser.error(f"unknown command {command!r:.80}; {did_you_mean(command, _COMMANDS)}")
+        if command and not command.startswith("-") and command not in COMMANDS:
+            parser.error(f"unknown command {command!r:.80}; {did_you_mean(command, COMMANDS)}")
         chosen, unknown = parser.parse_known_args(given, argparse.Namespace(further=further))
         if unknown:
             chosen.parser.error(_unrecognized(unknown, chosen.parser.format_usage()))
@@ -130,21 +133,40 @@ def _reason(error: OSError) -> str:
 
 
 def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
-    """Return the parser of the command that was given, or of all if none was."""
+    """Return the parser of all commands; only the given one gets its arguments, and is imported."""
     parser = argparse.ArgumentParser(
         prog="stickslip",
         description="Stick-slip vibration of a feed drive: run, simulate and measure it.",
     )
-    version = ", ".join(f"{name} {version}" for name, version in versions().items())
-    parser.add_argument("--version", action="version", version=version)
+    parser.add_argument(
+        "--version", action=_ShowVersions, nargs=0, help="show the version numbers and exit"
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name in [name for name in _COMMANDS if name in given[:1]] or _COMMANDS:
-        with interrupts_kept():
-            command = _load(name)
-        subparser = commands.add_parser(name, help=command.HELP, description=command.HELP)
-        command.add_arguments(subparser)
-        subparser.set_defaults(run=command.run, parser=subparser)
+    chosen = next((word for word in given if not word.startswith("-")), "")
+    for name, (_, line) in COMMANDS.items():
+        example = f"example: {EXAMPLES[name]}" if name in EXAMPLES else None
+        subparser = commands.add_parser(name, help=line, description=line, epilog=example)
+        if name == chosen:
+            with interrupts_kept():
+                command = _load(name)
+            command.add_arguments(subparser)
+            subparser.set_defaults(run=command.run, parser=subparser)
     return parser
+
+
+def command_parser(name: str) -> argparse.ArgumentParser:
+    """Return the parser of a command alone."""
+    parser = argparse.ArgumentParser(prog=f"stickslip {name}", description=COMMANDS[name][1])
+    _load(name).add_arguments(parser)
+    return parser
+
+
+class _ShowVersions(argparse.Action):
+    """Look the version numbers up when they are asked for: that takes longer than all else."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        print(", ".join(f"{name} {version}" for name, version in versions().items()))
+        parser.exit()
 
 
 if __name__ == "__main__":

@@ -4,17 +4,14 @@ import json
 import sys
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rich.cells import cell_len, set_cell_size
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.table import Table
-from rich.text import Text
-
-from stickslip_ros.physics.measures.cycle_measures import Regime, with_trend
-from stickslip_ros.plots.units import NOISE, SI, Units
 from stickslip_ros.text import printable
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from stickslip_ros.plots.units import Units
 
 _LABELS: dict[str, tuple[str, str]] = {
     "regime": ("regime", ""),
@@ -47,14 +44,6 @@ _SENT = {
 }
 """What of a force that was sent acted, and what it is called where that is not the same."""
 
-_STYLES: dict[str, str] = {
-    Regime.label(Regime.EQUILIBRIUM): "green",
-    Regime.label(Regime.STICK_SLIP): "yellow",
-    Regime.label(Regime.PURE_SLIP): "yellow",
-    Regime.label(Regime.UNBOUNDED): "red",
-}
-"""Of what stands out on a terminal."""
-
 _SAME_SCALE = {
     "amplitude": "midpoint",
     "midpoint": "amplitude",
@@ -63,7 +52,7 @@ _SAME_SCALE = {
 }
 """Which other quantity tells how large one is that may be rounding."""
 
-_ALL_SI: Mapping[str, Units] = {}
+_ALL_SI: Mapping[str, "Units"] = {}
 
 _FRAME = 3
 """Characters that the frame of a column takes, beside one for the whole table."""
@@ -87,7 +76,7 @@ def finite(value: Any) -> Any:
 
 
 def print_figures(
-    title: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, Units] = _ALL_SI
+    title: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, "Units"] = _ALL_SI
 ) -> None:
     """Print figures by name, one column for each of `columns`, those that nobody has left out.
 
@@ -116,9 +105,11 @@ def _tell_apart(rows: dict[str, list[str]], columns: Mapping[str, Mapping[str, A
 
 
 def _row(
-    name: str, unit: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, Units]
+    name: str, unit: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, "Units"]
 ) -> list[str]:
     """Return the cells of one figure; columns in the same units have the same prefix."""
+    from stickslip_ros.plots.units import SI
+
     cells: dict[str, str] = {}
     for shown_in in {units.get(column, SI) for column in columns}:
         own = [column for column in columns if units.get(column, SI) == shown_in]
@@ -131,6 +122,9 @@ def _row(
 
 def _shown(name: str, figures: Mapping[str, Any]) -> Any:
     """Return what is shown of a figure: of a regime also whether it is steady."""
+    from stickslip_ros.physics.measures.cycle_measures import Regime, with_trend
+    from stickslip_ros.plots.units import NOISE
+
     value = figures.get(name)
     if name == "regime":
         return with_trend(Regime.label(value), figures.get("trend"))
@@ -147,8 +141,12 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
     """
     shown = [[printable(cell) for cell in row] for row in (headings, *rows)]
     if sys.stdout.isatty():
+        from rich.console import Console
+
         _print_framed(Console(), printable(title), shown[0], shown[1:])
         return
+    from rich.cells import cell_len, set_cell_size
+
     if title:
         print(printable(title))
     lines = shown if any(headings) else shown[1:]
@@ -161,22 +159,36 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
 @contextmanager
 def progress_bar(label: str, total: float | None) -> Generator[Callable[[float], None]]:
     """Show progress towards `total` on standard error while a person looks at it."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
+    if not sys.stderr.isatty():
         yield lambda done: None
         return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
     text = TextColumn("{task.description}", markup=False)
     columns = (text, BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(printable(label), total=total)
         yield lambda done: bar.update(task, completed=done)
 
 
-def _print_framed(console: Console, title: str, headings: list[str], rows: list[list[str]]) -> None:
+def _print_framed(
+    console: "Console", title: str, headings: list[str], rows: list[list[str]]
+) -> None:
     """Print a table with its first column to the left and the others to the right.
 
     Where figures side by side would not fit, each row becomes a table of its own.
     """
+    from rich.cells import cell_len
+    from rich.table import Table
+    from rich.text import Text
+
     if title:
         console.print(Text(title, "table.title"), soft_wrap=True)
     labels, *columns = zip(headings, *rows, strict=True)
@@ -196,6 +208,19 @@ def _print_framed(console: Console, title: str, headings: list[str], rows: list[
             fields = [list(field) for field in zip(headings[1:], cells, strict=True)]
             _print_framed(console, f"{headings[0]} {label}".strip(), ["", ""], fields)
         return
+    styles = _styles()
     for row in rows:
-        table.add_row(*(Text(cell, _STYLES.get(cell.partition(",")[0], "")) for cell in row))
+        table.add_row(*(Text(cell, styles.get(cell.partition(",")[0], "")) for cell in row))
     console.print(table)
+
+
+def _styles() -> dict[str, str]:
+    """Return the style of each cell that is highlighted on a terminal."""
+    from stickslip_ros.physics.measures.cycle_measures import Regime
+
+    return {
+        Regime.label(Regime.EQUILIBRIUM): "green",
+        Regime.label(Regime.STICK_SLIP): "yellow",
+        Regime.label(Regime.PURE_SLIP): "yellow",
+        Regime.label(Regime.UNBOUNDED): "red",
+    }

@@ -2,18 +2,17 @@
 
 import argparse
 import json
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import add_json, writing
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_json, print_table, progress_bar
-from stickslip_ros.paper.claims import CLAIMS, Evidence, Finding
-from stickslip_ros.paper.figures import NUMBERS, BifurcationFigure, PaperFigure, compute_figure
-from stickslip_ros.paper.pictures import draw_paper_figure
-from stickslip_ros.paper.report import as_markdown, report, verdict_counts
-from stickslip_ros.paper.transition_marks import transition_marks
 from stickslip_ros.versions import versions
+
+if TYPE_CHECKING:
+    from stickslip_ros.paper.claims import Finding
+    from stickslip_ros.paper.figures import PaperFigure
 
 HELP = "reproduce the paper: its figures 2 to 13, and a report on every number and claim"
 
@@ -35,6 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.paper.figures import NUMBERS
+        from stickslip_ros.paper.report import as_markdown, report, verdict_counts
     out: Path = arguments.out
     pictures = out / _REPORT
     with writing("--out", out):
@@ -59,7 +61,12 @@ def _name(number: int) -> str:
     return f"figure_{number:02}.png"
 
 
-def _draw_figures(folder: Path) -> dict[int, PaperFigure]:
+def _draw_figures(folder: Path) -> "dict[int, PaperFigure]":
+    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from multiprocessing import get_context
+
+    from stickslip_ros.paper.figures import NUMBERS
+
     figures: dict[int, PaperFigure] = {}
     # Not forked: heyoka's compiler has threads, which a fork would lose.
     with (
@@ -77,14 +84,20 @@ def _draw_figures(folder: Path) -> dict[int, PaperFigure]:
     return figures
 
 
-def _draw(number: int, path: Path) -> PaperFigure:
+def _draw(number: int, path: Path) -> "PaperFigure":
+    from stickslip_ros.paper.figures import BifurcationFigure, compute_figure
+    from stickslip_ros.paper.pictures import draw_paper_figure
+    from stickslip_ros.paper.transition_marks import transition_marks
+
     figure = compute_figure(number)
     transitions = transition_marks(figure) if isinstance(figure, BifurcationFigure) else {}
     draw_paper_figure(path, figure, transitions)
     return figure
 
 
-def _judge(figures: dict[int, PaperFigure]) -> dict[str, Finding]:
+def _judge(figures: "dict[int, PaperFigure]") -> "dict[str, Finding]":
+    from stickslip_ros.paper.claims import CLAIMS, Evidence
+
     evidence = Evidence(figures.__getitem__)
     findings: dict[str, Finding] = {}
     with progress_bar("claims", len(CLAIMS)) as progress:

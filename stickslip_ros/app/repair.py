@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from stickslip_ros.app.arguments import add_json
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_json, print_table, progress_bar
-from stickslip_ros.bags.repair import repair
 from stickslip_ros.versions import versions
 
 HELP = "write a sound bag from one that is cut off or damaged"
@@ -28,6 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.bags.repair import repair
     with progress_bar(f"repairing {arguments.bag}", None) as progress:
         repaired = repair(arguments.bag, arguments.out, progress)
     if arguments.json:

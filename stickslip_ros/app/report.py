@@ -2,26 +2,26 @@
 
 import argparse
 import json
-from dataclasses import fields
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.arguments import add_json, add_plot, check_picture, seconds, write_picture
+from stickslip_ros.app.arguments import add_json, add_plot, check_figure, seconds, write_figure
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_figures, print_json
 from stickslip_ros.app.why_no_cycle import why_no_cycle
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.run_history import RunHistory
-from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.parameter_field import known_parameters
-from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.text import printable
 from stickslip_ros.versions import versions
 
+if TYPE_CHECKING:
+    from stickslip_ros.physics.model.drive import Drive
+    from stickslip_ros.plots.run_history import RunHistory
+
 HELP = "measure a recorded run, or set several side by side"
+
+_MOST_DRAWN = 6
+"""Bags that a figure can show, each in its own colour."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,31 +53,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--namespace", metavar="NS", help="ROS namespace of the drive, where a bag holds several"
     )
-    add_plot(parser, "motion, force, cycles and friction law of the one bag")
+    add_plot(
+        parser,
+        "motion, force, cycles and friction law of a bag; of several bags motion and force side by "
+        "side, their cycles and phase portraits in the same panels",
+    )
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.bags.report import report_of_bag
+        from stickslip_ros.plots.run_history import RunHistory
+        from stickslip_ros.plots.units import Units
     plot: Path | None = arguments.plot
     bags: list[Path] = arguments.bags
-    check_picture(plot)
-    if plot is not None and len(bags) > 1:
-        raise InvalidInputError(f"--plot {plot}: draws one bag, and {len(bags)} were given")
-    history = None if plot is None else RunHistory()
+    check_figure(arguments)
+    if plot is not None and len({*bags}) > _MOST_DRAWN:
+        raise InvalidInputError(
+            f"--plot {plot}: draws at most {_MOST_DRAWN} bags, and {len({*bags})} were given"
+        )
+    histories = {} if plot is None else {str(bag): RunHistory() for bag in bags}
     reports = {
         str(bag): report_of_bag(
             bag,
             start=arguments.start,
             end=arguments.end,
             namespace=arguments.namespace,
-            observer=history,
+            observer=histories.get(str(bag)),
         )
-        for bag in bags
+        for bag in dict.fromkeys(bags)
     }
-    if plot is not None and history is not None:
-        drive = _drive_of(bags[0], arguments.namespace)
-        _draw(plot, bags[0], drive, history, reports[str(bags[0])])
+    if plot is not None:
+        _draw(arguments, histories, reports)
     if arguments.json:
         results = [{**report, "bag": bag} for bag, report in reports.items()]
         result = results[0] if len(results) == 1 else {"reports": results}
@@ -101,20 +110,42 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _draw(
-    path: Path, bag: Path, drive: Drive | None, history: RunHistory, report: dict[str, Any]
+    arguments: argparse.Namespace,
+    histories: Mapping[str, "RunHistory"],
+    reports: Mapping[str, Mapping[str, Any]],
 ) -> None:
-    # Half as long again to import as everything else.
-    from stickslip_ros.plots.run_figure import run_figure
+    from dataclasses import fields
 
+    from stickslip_ros.physics.measures.cycle_measures import Measures
+    from stickslip_ros.plots.run_figure import run_figure
+    from stickslip_ros.plots.runs_figure import DrawnRun, runs_figure
+
+    runs: list[DrawnRun] = []
+    for bag, report in reports.items():
+        measures = Measures(**{field.name: report[field.name] for field in fields(Measures)})
+        drive = _drive_of(Path(bag), arguments.namespace)
+        runs.append(DrawnRun(bag, histories[bag], measures, drive))
+    if len(runs) > 1:
+        notes = [
+            f"{bag}: {sentence}"
+            for bag, report in reports.items()
+            for sentence in [*report["missing"], *report["notes"]]
+        ]
+        write_figure(arguments, runs_figure(runs, notes=notes))
+        return
+    (bag, history, measures, drive), report = runs[0], reports[runs[0].name]
     notes = [*report["missing"], *report["notes"]]
     if drive is None:
         notes.append("the bag does not say what drive it was: no equilibrium, no friction law")
-    measures = Measures(**{field.name: report[field.name] for field in fields(Measures)})
-    write_picture(path, run_figure(history, measures, drive, title=str(bag), notes=notes))
+    write_figure(arguments, run_figure(history, measures, drive, title=bag, notes=notes))
 
 
-def _drive_of(bag: Path, namespace: str | None) -> Drive | None:
+def _drive_of(bag: Path, namespace: str | None) -> "Drive | None":
     """Return the drive whose parameters were recorded, None where they are not or not all."""
+    from stickslip_ros.bags.reader import Recording
+    from stickslip_ros.scenarios.parameter_field import known_parameters
+    from stickslip_ros.scenarios.parameters import PlantParameters
+
     with Recording(bag, namespace) as recording:
         texts = recording.metadata("stickslip_ros/plant") or {}
     try:

@@ -3,27 +3,27 @@
 import argparse
 from math import isfinite
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
     add_scenario,
-    check_picture,
+    check_figure,
     made_of,
     naming,
     scenario_of,
     seconds,
-    write_picture,
+    write_figure,
 )
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.app.why_no_cycle import why_no_cycle
-from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.physics.model.disturbance import DisturbanceKind
-from stickslip_ros.plots.run_history import RunHistory
-from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.settling import check_continuous
-from stickslip_ros.studies.simulate import simulate
+
+if TYPE_CHECKING:
+    from stickslip_ros.physics.measures.cycle_measures import Measures
+    from stickslip_ros.plots.run_history import RunHistory
+    from stickslip_ros.scenarios.files import Scenario
 
 HELP = "run a scenario without ROS and measure its motion"
 
@@ -51,6 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.plots.run_history import RunHistory
+        from stickslip_ros.plots.units import Units
+        from stickslip_ros.studies.settling import check_continuous
+        from stickslip_ros.studies.simulate import simulate
     scenario = scenario_of(arguments)
     duration = arguments.duration
     if duration is None and isfinite(scenario.plant.duration):
@@ -58,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     elif duration is None:
         duration = _DEFAULT_PERIODS * scenario.plant.as_drive().natural_period
     plot: Path | None = arguments.plot
-    check_picture(plot)
+    check_figure(arguments)
     if arguments.continuous_control:
         with naming("--continuous-control:"):
             check_continuous(scenario)
@@ -74,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
             observer=history,
         )
     if plot is not None and history is not None:
-        _draw(plot, scenario, history, measures)
+        _draw(arguments, scenario, history, measures)
     if arguments.json:
         print_json({**measures.as_dict(), "duration": duration, **made_of(scenario)})
     else:
@@ -85,12 +90,18 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _draw(path: Path, scenario: Scenario, history: RunHistory, measures: Measures) -> None:
-    # Half as long again to import as everything else.
+def _draw(
+    arguments: argparse.Namespace,
+    scenario: "Scenario",
+    history: "RunHistory",
+    measures: "Measures",
+) -> None:
+    from stickslip_ros.physics.model.disturbance import DisturbanceKind
     from stickslip_ros.plots.run_figure import run_figure
 
     disturbed = scenario.plant.disturbance.kind is not DisturbanceKind.NONE
     title = " ".join([scenario.name, *scenario.overrides])
     force = "control force and disturbance" if disturbed else "control force"
     drive = scenario.plant.as_drive()
-    write_picture(path, run_figure(history, measures, drive, title=title, force=force))
+    figure = run_figure(history, measures, drive, title=title, force=force)
+    write_figure(arguments, figure)

@@ -1,28 +1,25 @@
 """`stickslip stability`: what theory says of a scenario, without running it."""
 
 import argparse
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
     add_scenario,
-    check_picture,
+    check_figure,
     made_of,
     scenario_of,
-    write_picture,
+    write_figure,
 )
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_figures, print_json, print_table, progress_bar
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.stability import (
-    Notes,
-    Section,
-    stability,
-    stability_map,
-    why_no_stability_map,
-)
+
+if TYPE_CHECKING:
+    from stickslip_ros.plots.units import Units
+    from stickslip_ros.scenarios.files import Scenario
+    from stickslip_ros.studies.stability import Notes, Section
 
 HELP = "equilibrium, Hopf speeds, limit cycles and critical gains of a scenario, by theory"
 
@@ -76,9 +73,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.studies.stability import stability, stability_map, why_no_stability_map
     scenario = scenario_of(arguments)
+    check_figure(arguments)
     if arguments.plot is not None:
-        check_picture(arguments.plot)
         reason = why_no_stability_map(scenario)
         if reason is not None:
             raise InvalidInputError(f"--plot {arguments.plot}: there is nothing to draw: {reason}")
@@ -86,10 +85,9 @@ def run(arguments: argparse.Namespace) -> int:
         found, notes = stability(scenario)
     if arguments.plot is not None:
         with progress_bar("drawing", None):
-            # Half as long again to import as everything else.
             from stickslip_ros.plots.stability_map import stability_figure
 
-            write_picture(arguments.plot, stability_figure(*stability_map(scenario)))
+            write_figure(arguments, stability_figure(*stability_map(scenario)))
     if arguments.json:
         print_json({**found, "notes": notes, **made_of(scenario)})
     else:
@@ -97,7 +95,9 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _print(scenario: Scenario, found: Section, notes: Notes) -> None:
+def _print(scenario: "Scenario", found: "Section", notes: "Notes") -> None:
+    from stickslip_ros.plots.units import Units
+
     units = Units.for_drive(scenario.plant.as_drive())
     rows: list[list[str]] = []
     for section, labels in _LABELS.items():
@@ -123,7 +123,7 @@ def _print(scenario: Scenario, found: Section, notes: Notes) -> None:
         print(f"{place.replace('_', ' ').replace('.', ', ')}: {reason}")
 
 
-def _shown(name: str, value: Any, unit: str, units: Units) -> str:
+def _shown(name: str, value: Any, unit: str, units: "Units") -> str:
     if value is None or not isinstance(value, list):
         return units.texts([value], unit, digits=8 if name == "spectral_radius" else 4)[0]
     items = cast(list[Any], value)

@@ -7,17 +7,18 @@ from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app.arguments import check_new, made_of, naming, writing
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import finite, progress_bar
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.studies.columns import ExtraColumns, write_csv, write_json
-from stickslip_ros.studies.dask_cluster import DaskError, dask_executor
-from stickslip_ros.studies.journal import Journal
-from stickslip_ros.studies.runner import run, run_here
-from stickslip_ros.studies.settling import SettlingCourse
-from stickslip_ros.studies.study import Study
+from stickslip_ros.studies.options import SettlingCourse
+
+if TYPE_CHECKING:
+    from stickslip_ros.studies.columns import ExtraColumns
+    from stickslip_ros.studies.journal import Journal
+    from stickslip_ros.studies.study import Study
 
 _TABLES = (".csv", ".json")
 
@@ -74,8 +75,12 @@ def course_of(arguments: argparse.Namespace, default: SettlingCourse) -> Settlin
 
 
 @contextmanager
-def computed(arguments: argparse.Namespace, study: Study, label: str) -> Generator[Journal]:
+def computed(arguments: argparse.Namespace, study: "Study", label: str) -> "Generator[Journal]":
     """Compute what is missing of the study, and provide its journal, complete."""
+    with interrupts_kept():
+        from stickslip_ros.studies.dask_cluster import DaskError, dask_executor
+        from stickslip_ros.studies.journal import Journal
+        from stickslip_ros.studies.runner import run, run_here
     out: Path | None = arguments.out
     if out is not None:
         if out.suffix.lower() not in _TABLES:
@@ -110,12 +115,17 @@ def computed(arguments: argparse.Namespace, study: Study, label: str) -> Generat
 
 
 def write_results(
-    arguments: argparse.Namespace, journal: Journal, further: ExtraColumns, made: Mapping[str, Any]
+    arguments: argparse.Namespace,
+    journal: "Journal",
+    further: "ExtraColumns",
+    made: Mapping[str, Any],
 ) -> None:
     """Write the table of a complete journal to where it was asked for, a file or as JSON.
 
     As JSON it also holds what was `made` of all points together.
     """
+    from stickslip_ros.studies.columns import write_json
+
     head = finite({**made_of(journal.study.scenario), **made})
     if arguments.out is not None:
         _write_table(arguments.out, journal, further, head)
@@ -124,9 +134,11 @@ def write_results(
 
 
 def _write_table(
-    path: Path, journal: Journal, further: ExtraColumns, head: Mapping[str, Any]
+    path: Path, journal: "Journal", further: "ExtraColumns", head: Mapping[str, Any]
 ) -> None:
     """Write the table of a journal, which need not be kept any more then."""
+    from stickslip_ros.studies.columns import write_csv, write_json
+
     new = path.with_name(f"{path.name}.new")
     with writing("--out", path), new.open("w", encoding="utf-8", newline="") as stream:
         if path.suffix.lower() == ".csv":

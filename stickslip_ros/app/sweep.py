@@ -4,28 +4,29 @@ import argparse
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from itertools import groupby, islice
+from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
     add_scenario,
-    check_picture,
+    check_figure,
     naming,
     scenario_of,
-    write_picture,
+    write_figure,
 )
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_table
 from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.plots.units import Units
-from stickslip_ros.studies.columns import Columns, ExtraColumns
-from stickslip_ros.studies.journal import Journal
-from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settling import SettlingCourse
-from stickslip_ros.studies.study import Point
-from stickslip_ros.studies.sweep import sweep_study
-from stickslip_ros.studies.transitions import transitions
+from stickslip_ros.studies.options import Carry, SettlingCourse
+
+if TYPE_CHECKING:
+    from stickslip_ros.plots.units import Units
+    from stickslip_ros.studies.columns import ExtraColumns
+    from stickslip_ros.studies.journal import Journal
+    from stickslip_ros.studies.plan import Grid
+    from stickslip_ros.studies.study import Point
 
 HELP = "measure what a scenario settles on, over the values of one parameter or two"
 
@@ -70,6 +71,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.plots.units import Units
+        from stickslip_ros.studies.plan import Axis, Grid
+        from stickslip_ros.studies.sweep import sweep_study
+        from stickslip_ros.studies.transitions import transitions
     with naming("--over"):
         axes = [Axis.parse(text) for text in arguments.over]
     if len(axes) == 1 and arguments.colour != "regime":
@@ -81,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
         course=course_of(arguments, SettlingCourse()),
         continuous=arguments.continuous_control,
     )
-    check_picture(arguments.plot)
+    check_figure(arguments)
     plan = study.plan
     assert isinstance(plan, Grid)
     label = f"sweep of {study.scenario.name}, {plan.size} points"
@@ -102,26 +108,28 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _draw(arguments: argparse.Namespace, journal: Journal) -> None:
-    # Half as long again to import as everything else.
+def _draw(arguments: argparse.Namespace, journal: "Journal") -> None:
     from stickslip_ros.plots.sweep_picture import diagram_figure, map_figure
+    from stickslip_ros.studies.columns import Columns
 
     columns, study = Columns.from_journal(journal), journal.study
     if len(arguments.over) == 1:
-        write_picture(arguments.plot, diagram_figure(columns, study))
+        write_figure(arguments, diagram_figure(columns, study))
     else:
-        write_picture(arguments.plot, map_figure(columns, study, arguments.colour))
+        write_figure(arguments, map_figure(columns, study, arguments.colour))
 
 
-def _direction_and_regime(point: Point, plan: Grid) -> str:
+def _direction_and_regime(point: "Point", plan: "Grid") -> str:
     """Return what the points of a row of the table on the screen have in common."""
+    from stickslip_ros.physics.measures.cycle_measures import Regime
+
     regime = point.reason or Regime.label(point.measures.regime)
     if point.reason is None and not point.steady:
         regime += ", not steady"
     return f"{plan.direction(point.number) or ''} {regime}".lstrip()
 
 
-def _print(journal: Journal, plan: Grid, units: Units) -> None:
+def _print(journal: "Journal", plan: "Grid", units: "Units") -> None:
     """Print in which ranges of the parameter there is which regime; of a map, how often."""
     title = f"{journal.study.scenario.name}, {journal.count} points"
     if len(plan.axes) == 1:
@@ -135,7 +143,7 @@ def _print(journal: Journal, plan: Grid, units: Units) -> None:
     print_table(title, ["regime", "points"], rows)
 
 
-def _ranges(journal: Journal, plan: Grid, units: Units) -> Iterator[list[str]]:
+def _ranges(journal: "Journal", plan: "Grid", units: "Units") -> Iterator[list[str]]:
     largest = max((point.measures.amplitude or 0.0 for point in journal.points()), default=0.0)
     for kind, points in groupby(journal.points(), lambda point: _direction_and_regime(point, plan)):
         measured = [
@@ -152,7 +160,7 @@ def _ranges(journal: Journal, plan: Grid, units: Units) -> Iterator[list[str]]:
         ]
 
 
-def _range(values: Iterable[float | None], unit: str, units: Units, largest: float = 0.0) -> str:
+def _range(values: Iterable[float | None], unit: str, units: "Units", largest: float = 0.0) -> str:
     known = [value for value in values if value is not None]
     if not known:
         return "-"

@@ -1,17 +1,21 @@
 """Why there is nothing to measure in a motion."""
 
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.units import Units
-from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from stickslip_ros.physics.model.drive import Drive
 
 _FAR = 10.0
 """Ratio of belt speed and Hopf speed from which on another unit may have been meant."""
 
 
-def why_no_cycle(regime: str | None, duration: float, drive: Drive | None) -> str | None:
+def why_no_cycle(regime: str | None, duration: float, drive: "Drive | None") -> str | None:
     """Return why a motion over `duration` (s) has no regime; None if it has one."""
     if regime is not None:
         return None
+    from stickslip_ros.plots.units import Units
+    from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
+
     units = Units.for_drive(drive)
     said = f"no whole cycle was completed in {duration:g} {units.of_unit('s')}".rstrip()
     if drive is None:

@@ -9,6 +9,7 @@ from typing import Any, Self
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.installed_packages import prefixes
 from stickslip_ros.scenarios import ros_yaml
+from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE
 from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import (
     NODE_PARAMETERS,
@@ -19,9 +20,8 @@ from stickslip_ros.scenarios.parameters import (
 from stickslip_ros.scenarios.sections import PARAMETERS_KEY, ScenarioFile, read_file
 from stickslip_ros.text import did_you_mean
 
-DEFAULT_NAMESPACE = "/feed_drive"
-LONGEST_NAMESPACE = 200
-"""Characters with which the names of all topics and services are short enough for ROS."""
+FILE, BASE, OVERRIDE, DEFAULT = "file", "base", "override", "default"
+"""Where the value of a parameter comes from."""
 
 _NAMED_BY_PATH = "a file is given by its path ending in .yaml"
 
@@ -39,8 +39,11 @@ class Scenario:
     """The scenario file."""
     other_sections: tuple[str, ...] = ()
     """Sections of the file that match none of these nodes: parameters of a user's own node."""
-    given: frozenset[str] = field(default=frozenset(), compare=False, repr=False)
-    """NODE.PARAMETER of what the file, its base or an override gives."""
+    sources: Mapping[str, str] = field(default_factory=dict[str, str], compare=False, repr=False)
+    """Where each value comes from, by NODE.PARAMETER: `FILE`, `BASE` or `OVERRIDE`; a default is
+    not listed."""
+    bases: tuple[Path, ...] = field(default=(), compare=False, repr=False)
+    """The files that complete the scenario file, the nearest first."""
 
     @property
     def left_to_defaults(self) -> list[str]:
@@ -48,7 +51,7 @@ class Scenario:
         names = [f"plant.{name}" for name in (*self.plant.drive_names(), "rate")]
         if self.plant.expects_control:
             names += [f"washout_controller.{name}" for name in self.washout_controller.law_names()]
-        return [name for name in names if name not in self.given]
+        return [name for name in names if name not in self.sources]
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
         """Return every node's parameters by node and flat name."""
@@ -113,15 +116,22 @@ def load_scenario(
         files.append(read_file(below, namespace))
         below = _path_of_base(files[-1])
     values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
+    sources: dict[str, str] = {}
     other_sections: list[str] = []
     for file in files[::-1]:
-        other_sections = file.apply(values, namespace, other_nodes=other_nodes)
+        of_file: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
+        other_sections = file.apply(of_file, namespace, other_nodes=other_nodes)
+        source = FILE if file is files[0] else BASE
+        for node, parameters in of_file.items():
+            values[node] |= parameters
+            sources |= {f"{node}.{name}": source for name in parameters}
     for node, parameters in values.items():
         NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
     given = dict.fromkeys(NODE_PARAMETERS, "")
     for override in overrides:
-        node, parameter, value = _parse_override(override)
+        node, parameter, value = parse_override(override)
         values[node][parameter] = value
+        sources[f"{node}.{parameter}"] = OVERRIDE
         given[node] += f" {override:.80}"
     models: dict[str, Any] = {
         node: NODE_PARAMETERS[node].validated(
@@ -134,7 +144,8 @@ def load_scenario(
         overrides=tuple(overrides),
         path=path,
         other_sections=tuple(other_sections),
-        given=frozenset(f"{node}.{name}" for node in values for name in values[node]),
+        sources=sources,
+        bases=tuple(file.path for file in files[1:]),
         **models,
     )
 
@@ -146,6 +157,12 @@ def config_directories() -> list[Path]:
     return [directory for directory in [source_tree, *installed] if directory.is_dir()]
 
 
+def shipped_scenarios() -> dict[str, Path]:
+    """Return the files of the scenarios that are found by name, by that name."""
+    found = {path.stem: path for d in config_directories()[::-1] for path in d.glob("*.yaml")}
+    return dict(sorted(found.items()))
+
+
 def _find(name_or_path: str) -> Path:
     """Return the file of that path, or else of that name, with or without .yaml."""
     path = Path(name_or_path)
@@ -155,7 +172,7 @@ def _find(name_or_path: str) -> Path:
         return path
     if "/" in name_or_path:
         raise InvalidInputError(f"no scenario file {name_or_path}")
-    shipped = {path.stem: path for d in config_directories()[::-1] for path in d.glob("*.yaml")}
+    shipped = shipped_scenarios()
     if name in shipped:
         return shipped[name]
     missing, otherwise = f"no scenario file {name_or_path}", _NAMED_BY_PATH
@@ -178,7 +195,11 @@ def _path_of_base(file: ScenarioFile) -> Path | None:
         raise InvalidInputError(f"{file.path}: base: {error}") from None
 
 
-def _parse_override(override: str) -> tuple[str, str, Any]:
+def parse_override(override: str) -> tuple[str, str, Any]:
+    """Return node, parameter and value of a text NODE.PARAMETER=VALUE.
+
+    The value is not checked. Raises InvalidInputError for an unknown node or parameter.
+    """
     target, equals, text = override.partition("=")
     node, _, parameter = target.partition(".")
     known = [

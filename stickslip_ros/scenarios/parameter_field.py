@@ -70,6 +70,8 @@ class Parameter:
     """Whether a number must be finite."""
     range: tuple[float, float] | None
     """Least and largest value of a number, if it has both and they are not those of any."""
+    least: float | None
+    largest: float | None
 
 
 def parameters_of(model: type[BaseModel], prefix: str = "") -> Iterator[Parameter]:
@@ -112,6 +114,8 @@ def _parameter(name: str, info: FieldInfo) -> Parameter:
         limits=one_of or _in_words(limits),
         finite=not any(getattr(each, "allow_inf_nan", False) for each in info.metadata),
         range=(limits["ge"], limits["le"]) if told and len(limits) == 2 else None,
+        least=limits.get("ge"),
+        largest=limits.get("le"),
     )
 
 

@@ -7,7 +7,6 @@ models. A nested field `friction.static` is the ROS parameter of that name.
 import re
 from collections.abc import Callable
 from dataclasses import fields
-from enum import StrEnum
 from math import isinf, pi, sqrt
 from typing import Annotated, Literal, Self
 
@@ -19,6 +18,7 @@ from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
 from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.scenarios.pace import Pace
 from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field
 from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import shown
@@ -29,13 +29,6 @@ _OF_DRIVE = [each.name for each in fields(Drive) if each.name != "friction"]
 """Parameters of the plant that are those of the drive as they stand."""
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
-
-
-class Pace(StrEnum):
-    """What the plant waits for between samples: the clock, or the answer to the last one."""
-
-    REALTIME = "realtime"
-    LOCKSTEP = "lockstep"
 
 
 def _known_law(name: str) -> str:

@@ -16,7 +16,7 @@ from stickslip_ros.text import did_you_mean, shown
 PARAMETERS_KEY = "ros__parameters"
 _LARGEST = 1_000_000
 """Characters of a scenario file."""
-_SCENARIO = "scenario"
+BASE_SECTION = "scenario"
 """Last part of the name of the section that is for no node, but says what completes the file."""
 
 
@@ -63,8 +63,8 @@ def read_file(path: Path, namespace: str) -> ScenarioFile:
     sections: list[tuple[str, Mapping[str, Any]]] = []
     base: str | None = None
     for pattern, parameters in _sections(path):
-        own = section_matches(pattern, f"{namespace.rstrip('/')}/{_SCENARIO}")
-        if own and pattern.endswith(f"/{_SCENARIO}"):
+        own = section_matches(pattern, f"{namespace.rstrip('/')}/{BASE_SECTION}")
+        if own and pattern.endswith(f"/{BASE_SECTION}"):
             base = _base_of(path, pattern, parameters)
         else:
             sections.append((pattern, parameters))
@@ -140,3 +140,18 @@ def _walk(tree: Any, name: str, path: Path) -> Iterator[tuple[str, Mapping[str, 
             yield name, dict(flattened(cast(dict[Any, Any], below)))
         else:
             raise InvalidInputError(f"{path}: {name}: {PARAMETERS_KEY} must be names and values")
+
+
+def leading_comment(path: Path) -> str:
+    """Return the first sentence of the comment at the top of a scenario file.
+
+    Empty for a file without one.
+    """
+    comment: list[str] = []
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for line in file:
+            if not line.startswith("#"):
+                break
+            comment.append(line.strip("# \n"))
+    sentence, _, _ = " ".join(comment).partition(". ")
+    return sentence.rstrip(".")

@@ -9,15 +9,13 @@ from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.studies.options import BASIN_COURSE, SettlingCourse
 from stickslip_ros.studies.plan import Axis, Plan
-from stickslip_ros.studies.settling import CYCLES, SettlingCourse
+from stickslip_ros.studies.settling import CYCLES
 from stickslip_ros.studies.study import Point, Study
 
 POSITION, VELOCITY = "plant.initial.position", "plant.initial.velocity"
 """What a start is made of; the washout filter is at rest."""
-
-COURSE = SettlingCourse(transient=50.0, patience=80)
-"""How long a motion is followed, unless told otherwise: most are steady soon."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +114,7 @@ def basin_study(
         raise InvalidInputError(
             f"a basin is over {POSITION} and {VELOCITY}, not {', '.join(plan.parameters)}"
         )
-    study = Study(scenario, plan, course or COURSE, continuous)
+    study = Study(scenario, plan, course or BASIN_COURSE, continuous)
     study.check()
     return study
 

@@ -10,9 +10,7 @@ from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.scenarios.files import Scenario
-
-OWN_SPEED_RANGE = 0.1
-"""Share of a scenario's belt speed by which the range goes below and above it by default."""
+from stickslip_ros.studies.options import OWN_SPEED_RANGE
 
 
 @dataclass(frozen=True)

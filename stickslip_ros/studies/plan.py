@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from itertools import product
 from math import isfinite, prod
 from typing import ClassVar, Self
@@ -14,28 +13,13 @@ from stickslip_ros.deprecated_names import moved_from
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.parameter_field import Parameter, known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.studies.options import Carry
 from stickslip_ros.text import did_you_mean
 
 MOST_POINTS = 1_000_000_000
 """Points of a study: what is to be kept of them has to go into a file."""
 
 _NODES = ("plant", "washout_controller")
-
-
-class Carry(StrEnum):
-    """In which order along an axis each point begins where its neighbour ended."""
-
-    UP = "up"
-    """From the first value of the axis to the last."""
-    DOWN = "down"
-    """From the last value to the first."""
-    BOTH = "both"
-    """Up, and then down from the values' end anew: where the two differ there is hysteresis."""
-
-    @property
-    def directions(self) -> tuple["Carry", ...]:
-        """UP, DOWN, or the two."""
-        return (Carry.UP, Carry.DOWN) if self is Carry.BOTH else (self,)
 
 
 @dataclass(frozen=True)

@@ -16,14 +16,12 @@ from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.studies.options import LONGEST, SettlingCourse
 
 CYCLES = (Regime.STICK_SLIP, Regime.PURE_SLIP)
 """Regimes that have an amplitude to be steady."""
 
 _RESTS = (Regime.EQUILIBRIUM, Regime.STUCK)
-
-LONGEST = 1e6
-"""Natural periods or cycles that a motion is followed for at most."""
 
 
 @dataclass(frozen=True)
@@ -34,29 +32,6 @@ class MotionState:
     velocity: float
     low_passed: float | None = None
     """What the washout filter holds back of the speed, m/s; None: all of it, the filter rests."""
-
-
-@dataclass(frozen=True)
-class SettlingCourse:
-    """How long a motion is followed."""
-
-    transient: float = 200.0
-    """Natural periods that are passed over, besides the time in which a slow belt loads the spring
-    at first, and, under control, `start_after`."""
-    cycles: int = 4
-    """Whole cycles that are then measured, where there are any."""
-    patience: int = 1
-    """How often both may be done, one after the other, until the motion is steady and what is
-    measured twice the same: near an unstable cycle it may seem steady for a while."""
-
-    def __post_init__(self) -> None:
-        for shown, value, least in (
-            (f"a transient of {self.transient:g} natural periods", self.transient, 0),
-            (f"{self.cycles} cycles to measure", self.cycles, 1),
-            (f"a patience of {self.patience} transients", self.patience, 1),
-        ):
-            if not least <= value <= LONGEST:
-                raise InvalidInputError(f"{shown}: must be from {least} to {LONGEST:g}")
 
 
 @dataclass(frozen=True)

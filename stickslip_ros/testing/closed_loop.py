@@ -24,12 +24,8 @@ from stickslip_ros.running.controller_search import ControllerSearch
 from stickslip_ros.running.domain import domain_variables, own_domain, ros_context
 from stickslip_ros.running.lifecycle_client import LifecycleClient
 from stickslip_ros.running.user_controller import ControllerProcess, ControllerThread
-from stickslip_ros.scenarios.files import (
-    DEFAULT_NAMESPACE,
-    LONGEST_NAMESPACE,
-    Scenario,
-    load_scenario,
-)
+from stickslip_ros.scenarios.files import Scenario, load_scenario
+from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.testing.result import Diagnostics, RunResult, result_of
 from stickslip_ros.text import shown
 

@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.base.ros_errors import RCLError, first_line
-from stickslip_ros.scenarios.files import LONGEST_NAMESPACE
+from stickslip_ros.scenarios.namespace import LONGEST_NAMESPACE
 from stickslip_ros.scenarios.parameter_field import Fixed, known_parameters
 from stickslip_ros.scenarios.parameter_field import Parameter as ModelParameter
 from stickslip_ros.scenarios.parameters import NodeParameters
