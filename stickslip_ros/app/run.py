@@ -8,8 +8,9 @@ from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from datetime import UTC, datetime
 from itertools import count
+from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.arguments import (
@@ -23,21 +24,18 @@ from stickslip_ros.app.arguments import (
     scenario_of,
     seconds,
 )
-from stickslip_ros.app.optional_dependencies import check_dashboard, loading_ros
+from stickslip_ros.app.optional_dependencies import check_dashboard, interrupts_kept, loading_ros
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.app.why_no_cycle import why_no_cycle
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.recorder import check_new_bag
-from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed_packages import find_executable
-from stickslip_ros.plots.units import Units
 from stickslip_ros.running.namespace_lock import NamespaceInUseError
-from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, Scenario
-from stickslip_ros.scenarios.parameters import Pace, WashoutControllerParameters
+from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE
+from stickslip_ros.scenarios.pace import Pace
 from stickslip_ros.text import printable
 
-_LAW_OF_OURS = [f"washout_controller.{name}" for name in WashoutControllerParameters.law_names()]
+if TYPE_CHECKING:
+    from stickslip_ros.scenarios.files import Scenario
 
 HELP = "run a scenario as ROS 2 nodes, record it and report"
 
@@ -87,6 +85,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.bags.recorder import check_new_bag
+        from stickslip_ros.plots.units import Units
+        from stickslip_ros.scenarios.parameters import WashoutControllerParameters
     overrides: list[str] = []
     if arguments.pace is not None:
         overrides.append(f"plant.pace={arguments.pace}")
@@ -94,12 +96,13 @@ def run(arguments: argparse.Namespace) -> int:
         overrides.append(f"plant.duration={arguments.duration!r}")
     namespace = namespace_of(arguments.namespace)
     controller = _other_controller(arguments)
+    law_of_ours = [f"washout_controller.{name}" for name in WashoutControllerParameters.law_names()]
     scenario = scenario_of(
         arguments,
         *overrides,
         namespace=namespace,
         other_nodes=controller is not None,
-        unused=[] if controller is None else _LAW_OF_OURS,
+        unused=[] if controller is None else law_of_ours,
     )
     if controller is not None and not scenario.plant.expects_control:
         raise InvalidInputError(
@@ -109,10 +112,12 @@ def run(arguments: argparse.Namespace) -> int:
     check_new_bag(bag)
     if arguments.dashboard:
         check_dashboard()
+    # Before ROS is loaded, which takes a while.
+    _tell(_announcement(scenario, bag, composed=arguments.composed))
     with loading_ros():
         from stickslip_ros.nodes.base.network import keep_on_this_machine
     reach = keep_on_this_machine(arguments.network)
-    _tell(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}")
+    _tell(f"nodes in {namespace}, {reach}")
     with _dashboard(namespace) if arguments.dashboard else nullcontext():
         figures, interrupted = record(
             scenario, bag, namespace=namespace, composed=arguments.composed, controller=controller
@@ -134,8 +139,24 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _announcement(scenario: "Scenario", bag: Path, *, composed: bool) -> str:
+    """Return in one line what is started."""
+    from stickslip_ros.plots.units import Units
+
+    plant = scenario.plant
+    pace = "lockstep" if plant.pace is Pace.LOCKSTEP else "real time"
+    if plant.pace is Pace.REALTIME and plant.real_time_factor != 1.0:
+        pace += f" x {plant.real_time_factor:g}"
+    duration = "until Ctrl-C"
+    if isfinite(plant.duration):
+        unit = Units.for_drive(plant.as_drive()).of_unit("s")
+        duration = f"duration {plant.duration:g} {unit}".rstrip()
+    where = "in this process" if composed else "in processes of their own"
+    return f"{scenario.name}: {pace}, {duration}; starting the nodes {where}; recording to {bag}"
+
+
 def record(
-    scenario: Scenario,
+    scenario: "Scenario",
     bag: Path,
     *,
     namespace: str = DEFAULT_NAMESPACE,
@@ -200,7 +221,7 @@ def default_bag(scenario: str) -> Path:
     return next(path for path in candidates if not path.exists())
 
 
-def _bag_of(scenario: Scenario) -> Path | None:
+def _bag_of(scenario: "Scenario") -> Path | None:
     """Return where the scenario says to record to; a file, unlike -p, says it of this directory."""
     name = scenario.analyzer.bag
     if not name or any(given.startswith("analyzer.bag=") for given in scenario.overrides):
@@ -231,6 +252,8 @@ def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
 
 
 def _figures(bag: Path, controller: str | None, plant: Mapping[str, str]) -> dict[str, Any]:
+    from stickslip_ros.bags.report import report_of_bag
+
     report = report_of_bag(bag)
     return {
         "bag": str(bag),
@@ -252,6 +275,8 @@ def _tell(sentence: str) -> None:
 
 def _state_of(bag: Path) -> str:
     """Say what a run that failed has left."""
+    from stickslip_ros.bags.reader import Recording
+
     try:
         with Recording(bag) as recording:
             if recording.complete:

@@ -1,0 +1,74 @@
+"""What a start of the command line loads, and what it leaves for later: speed, without a clock."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from stickslip_ros.app.commands import COMMANDS
+from tests.nodes.graph import PATIENCE
+
+pytestmark = pytest.mark.process
+
+ROOT = Path(__file__).parents[2]
+
+HEAVY = {"heyoka", "matplotlib", "mcap", "numpy", "pydantic", "rclpy", "rich", "scipy", "yaml"}
+"""Packages that take long to import, each more than a tenth of what Python itself takes."""
+COMPUTING = {"heyoka", "numpy", "pydantic", "yaml"}
+"""What a simulation cannot do without."""
+
+PROGRAM = """
+import sys
+sys.argv[0] = "stickslip"
+try:
+    {code}
+finally:
+    print("loaded:", *(set(sys.modules) & set({heavy!r})), file=sys.stderr)
+"""
+MAIN = "from stickslip_ros.app.main import main; main()"
+
+
+SHOW = """from contextlib import suppress
+    from stickslip_ros.app.main import main
+    def show(name):
+        with suppress(SystemExit):
+            main([name, "--help"])
+    """
+"""Defines a function that shows the help of a command."""
+
+
+def loaded(code: str, *arguments: str) -> set[str]:
+    """Run code in a process of its own; return which of the heavy packages it has loaded."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM.format(code=code, heavy=sorted(HEAVY)), *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert done.returncode == 0, done.stderr
+    return set(done.stderr.splitlines()[-1].split()[1:])
+
+
+def test_importing_the_package_loads_nothing_heavy() -> None:
+    assert loaded("import stickslip_ros") == set()
+
+
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_help_and_version_load_nothing_heavy(option: str) -> None:
+    assert loaded(MAIN, option) == set()
+
+
+def test_the_help_of_each_command_loads_nothing_heavy() -> None:
+    each = "\n    ".join(f"show({name!r})" for name in COMMANDS)
+    assert loaded(f"{SHOW}{each}") == set()
+
+
+@pytest.mark.parametrize(
+    "arguments", [("simulate", "paper", "--duration", "1"), ("report", "bags/reference")]
+)
+def test_a_short_command_loads_what_it_computes_with_and_no_more(
+    arguments: tuple[str, ...],
+) -> None:
+    assert loaded(MAIN, *arguments) - {"mcap", "rich"} == COMPUTING
