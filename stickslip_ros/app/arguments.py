@@ -95,7 +95,7 @@ def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
         "--size",
         type=_size,
         metavar="WxH",
-        help="width and height of the figure, inches, as in --size 6x4 (default: what suits it)",
+        help="width and height of the figure, inches, as in --size 6x4",
     )
     parser.add_argument(
         "--dpi", type=_dpi, metavar="N", help="dots per inch of the figure (default: 130)"
@@ -172,7 +172,7 @@ def _dpi(text: str) -> int:
 def check_new(option: str, path: Path) -> None:
     """Refuse `path`, given with `option`, where there is a file, or none can be written."""
     if path.exists():
-        raise InvalidInputError(f"{option} {path}: exists already, and is left as it is")
+        raise InvalidInputError(f"{option} {path}: exists already; it is not overwritten")
     _check_writable(option, path)
 
 
@@ -214,7 +214,8 @@ def scenario_of(
 ) -> "Scenario":
     """Return the scenario that was asked for, `overrides` applied after those given.
 
-    Of what is left to defaults a person is told, but for what is `unused` (NODE.PARAMETER).
+    A sentence on standard error names the values that are left to their defaults, except those that
+    are `unused` (NODE.PARAMETER).
     """
     with interrupts_kept():
         from stickslip_ros.scenarios.files import load_scenario
@@ -235,7 +236,7 @@ def scenario_of(
     if defaults:
         sentence = (
             f"{scenario.path} does not give {', '.join(defaults)}: these are the defaults; "
-            "--base SCENARIO takes what is left out from another scenario"
+            "--base SCENARIO takes omitted values from another scenario"
         )
         print(printable(sentence), file=sys.stderr)
     return scenario

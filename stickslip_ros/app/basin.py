@@ -25,11 +25,10 @@ if TYPE_CHECKING:
     from stickslip_ros.studies.journal import Journal
     from stickslip_ros.studies.plan import Plan
 
-HELP = "find which motion each start leads to, and the share of starts that each motion gets"
-
-_DESCRIPTION = f"""{HELP} (basin stability), over a grid of starts or a random sample. A start is a
+_DESCRIPTION = f"""Find the motion that each initial state leads to, and the share of initial
+states for each motion (basin stability), over a grid or a random sample. An initial state is a
 displacement and a velocity of the slide; the washout filter is at rest. Each motion is followed
-until it is steady, for {BASIN_COURSE.patience} transients at most."""
+until it is steady, for at most {BASIN_COURSE.patience} transients."""
 
 _COUNT = 40
 """Positions and velocities of the grid."""
@@ -43,21 +42,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             f"--{name}",
             metavar="A:B:COUNT",
-            help=f"{what} of the grid, {unit}, as in --{name} -2:2:{_COUNT} (of a --sample A:B "
-            f"will do; default: {_COUNT}, twice as far to either side as a vibration goes, about)",
+            help=f"{what} of the grid, {unit}, as in --{name} -2:2:{_COUNT}; A:B is enough for a "
+            f"--sample (default: {_COUNT} values over about twice the range of a vibration)",
         )
     parser.add_argument(
         "--sample",
         type=int,
         metavar="COUNT",
-        help="so many random starts, uniformly distributed between the ends of --position and "
-        "--velocity, instead of the grid",
+        help="use COUNT random initial states instead of the grid, uniformly distributed between "
+        "the ends of --position and --velocity",
     )
     parser.add_argument(
-        "--seed", type=int, metavar="SEED", help="which sample it is, 0 or more (default: 0)"
+        "--seed", type=int, metavar="SEED", help="seed of the random sample, 0 or more (default: 0)"
     )
     add_running(parser, BASIN_COURSE)
-    add_plot(parser, "which motion each start leads to")
+    add_plot(parser, "the motion that each initial state leads to")
     add_json(parser)
 
 

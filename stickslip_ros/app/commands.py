@@ -40,7 +40,7 @@ EXAMPLES: dict[str, str] = {
     "paper": "stickslip paper --out reproduction",
     "completion": 'eval "$(stickslip completion bash)"',
 }
-"""What the help of each command ends with: a call of it."""
+"""An example of each command, at the end of its help."""
 
 _OPTIONS = {
     "-h, --help": "show this help, or that of a command: stickslip COMMAND --help",

@@ -1,4 +1,4 @@
-"""`stickslip completion`: what a shell needs to complete commands, options and values."""
+"""`stickslip completion`: the completion script of a shell."""
 
 import argparse
 from collections.abc import Iterable
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from stickslip_ros.app.commands import COMMANDS
 
 _FILES = ("BAG", "DIR", "FILE", "OUT")
-"""Metavars of what is a file or a directory."""
+"""Metavars of files and directories."""
 
 _PARAMETERS = ("NODE.PARAMETER=VALUE", "NODE.PARAMETER=A:B:COUNT")
 
@@ -68,7 +68,7 @@ complete@NOSPACE@ -F _stickslip stickslip
 """
 
 _SPACE_OF_ZSH = """\
-    # zsh has no compopt: there a space is part of what one follows.
+    # zsh has no compopt: the space after a word is part of it.
     [[ -z $kind || $kind == options ]] && COMPREPLY=("${COMPREPLY[@]/%/ }")
 """
 
@@ -92,7 +92,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _script(shell: str) -> str:
-    # The values that are completed; to import what has them takes longer than a start should.
     from stickslip_ros.scenarios.files import shipped_scenarios
     from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
     from stickslip_ros.scenarios.template import own_first

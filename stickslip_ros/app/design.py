@@ -1,4 +1,4 @@
-"""`stickslip design`: gains for a drive, tried out by simulation."""
+"""`stickslip design`: controller gains for a drive, verified by simulation."""
 
 import argparse
 import shlex
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
     from stickslip_ros.plots.units import Units
     from stickslip_ros.studies.design import Design
 
-HELP = "propose corner frequency and gains that damp the vibration within a force limit"
-
-_DESCRIPTION = f"""{HELP}. The drive, rate and force_delay are the scenario's, the force limit is
-washout_controller.force_limit (-p washout_controller.force_limit=200). Its gains do not matter.
-What is proposed was simulated: the vibration is caught at several belt speeds and phases."""
+_DESCRIPTION = """Propose a cutoff frequency and gains that suppress the vibration within a force
+limit. The scenario gives the drive, rate and force_delay; the force limit is
+washout_controller.force_limit (-p washout_controller.force_limit=200). The gains of the scenario
+are not used. The proposal is verified by simulation, at several belt speeds and phases of the
+vibration."""
 
 _CONTROLLER = {
-    "corner_frequency": ("corner frequency", "rad/s"),
+    "corner_frequency": ("cutoff frequency", "rad/s"),
     "linear_gain": ("linear gain", "N s/m"),
     "cubic_gain": ("cubic gain", "N s^3/m^3"),
     "force_limit": ("force limit", "N"),
@@ -48,12 +48,12 @@ _PROPOSED = [f"washout_controller.{name}" for name in _CONTROLLER if name != "fo
 _MARGINS = {
     "gain_down": ("unstable below this share of the linear gain", ""),
     "gain_up": ("unstable above this multiple of it", ""),
-    "delay": ("unstable with this further delay", "s"),
+    "delay": ("delay margin", "s"),
 }
 _WORST = {
-    "predicted_settling_time": ("settles in", "s"),
+    "predicted_settling_time": ("1 % settling time, predicted", "s"),
     "settling_time": ("simulated", "s"),
-    "predicted_peak_force": ("peak force", "N"),
+    "predicted_peak_force": ("peak force, predicted", "N"),
     "peak_force": ("simulated", "N"),
 }
 _CHECKS = {"belt_speed": ("belt speed", "m/s"), "vibrates": ("vibrates", "")} | _WORST
@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--belt-speed",
         metavar="LOW:HIGH",
         help="range of belt speeds to design for, m/s, both above zero; one number for a single "
-        f"speed (default: the scenario's belt speed, give or take {OWN_SPEED_RANGE:.0%})".replace(
+        f"speed (default: the scenario's belt speed, plus or minus {OWN_SPEED_RANGE:.0%})".replace(
             "%", "%%"
         ),
     )
@@ -75,10 +75,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FILE",
-        help="write the scenario there, complete, with what is proposed; an existing file is left "
-        "alone",
+        help="write a complete scenario with the proposed gains; an existing file is refused",
     )
-    add_plot(parser, "the decay rate over corner frequency and linear gain")
+    add_plot(parser, "the decay rate over cutoff frequency and linear gain")
     add_json(parser)
 
 
@@ -96,7 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
     with progress_bar(f"designing for {scenario.name}", 1.0) as progress:
         found = design(task, progress)
     if scenario.plant.force_jitter > 0.0:
-        no_jitter = "force_jitter is left out: the delay of the force is constant here"
+        no_jitter = "force_jitter is ignored: the delay of the force is constant here"
         found = replace(found, remark="; ".join(filter(None, (found.remark, no_jitter))))
     if arguments.json:
         print_json({**_as_dict(found), **made_of(scenario)})
@@ -104,7 +103,7 @@ def run(arguments: argparse.Namespace) -> int:
         _print(scenario.name, found)
         if found.parameter_file is not None and arguments.out is None:
             print(
-                "--out FILE writes the scenario with these gains, --json has it as parameter_file"
+                "--out FILE writes the scenario with these gains, --json prints it: parameter_file"
             )
     if arguments.out is not None:
         _write(arguments.out, found)
@@ -127,7 +126,7 @@ def _belt_speeds(text: str | None) -> tuple[float, float] | None:
 
 def _write(path: Path, found: "Design") -> None:
     if found.parameter_file is None:
-        _leave_out(f"--out {path}: not written")
+        _report_omitted(f"--out {path}: not written")
         return
     with writing("--out", path), path.open("x", encoding="utf-8") as file:
         file.write(found.parameter_file)
@@ -140,14 +139,14 @@ def _draw(arguments: argparse.Namespace, found: "Design") -> None:
     from stickslip_ros.plots.stability_map import stability_figure
 
     if found.slowest is None or found.controller is None:
-        _leave_out(f"--plot {arguments.plot}: not drawn")
+        _report_omitted(f"--plot {arguments.plot}: not drawn")
         return
     map_around = StabilityMap.around(found.slowest, found.controller.gains)
     write_figure(arguments, stability_figure(map_around, None))
 
 
-def _leave_out(what: str) -> None:
-    print(f"stickslip design: {what}, for there is nothing to propose", file=sys.stderr)
+def _report_omitted(what: str) -> None:
+    print(f"stickslip design: {what}, because there is nothing to propose", file=sys.stderr)
 
 
 def _as_dict(found: "Design") -> dict[str, Any]:
@@ -173,9 +172,9 @@ def _largest(values: Iterable[float | None]) -> float | None:
 
 
 def _rows(
-    figures: Mapping[str, Any], labels: Mapping[str, tuple[str, str]], units: "Units"
+    values: Mapping[str, Any], labels: Mapping[str, tuple[str, str]], units: "Units"
 ) -> list[list[str]]:
-    return [[label, units.text(figures[key], unit)] for key, (label, unit) in labels.items()]
+    return [[label, units.text(values[key], unit)] for key, (label, unit) in labels.items()]
 
 
 def _print(name: str, found: "Design") -> None:
@@ -191,13 +190,13 @@ def _print(name: str, found: "Design") -> None:
         print_table(task, ["proposal", ""], proposed)
         if found.margins is not None:
             margins = _rows(asdict(found.margins), _MARGINS, units)
-            print_table("to instability at any of these belt speeds", ["margins", ""], margins)
+            print_table("margins at the worst of these belt speeds", ["margins", ""], margins)
         checks = [asdict(check) for check in found.checks]
         columns = [
             units.texts([check[key] for check in checks], unit)
             for key, (_, unit) in _CHECKS.items()
         ]
         headings = [label for label, _ in _CHECKS.values()]
-        print_table("while it catches the vibration", headings, zip(*columns, strict=True))
+        print_table("verification", headings, zip(*columns, strict=True))
     if found.remark is not None:
         print(found.remark)

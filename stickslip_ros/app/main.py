@@ -64,7 +64,7 @@ def _load(name: str) -> ModuleType:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit with its status.
 
-    0 done; 1 the run failed; 2 what came in is refused; 130 interrupted.
+    0 done; 1 the run failed; 2 the input is refused; 130 interrupted.
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
     command = " ".join(given[:1])
@@ -95,10 +95,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt as error:
         print(": ".join([f"stickslip {command}: interrupted", *error.args]), file=sys.stderr)
         status = INTERRUPTED
-    except BrokenPipeError:  # whoever read our output has seen enough
+    except BrokenPipeError:  # the reader of our output has closed it
         sys.stdout = nowhere()
         status = 0
-    except OSError as error:  # the disk that standard output goes to is full, for one
+    except OSError as error:  # such as a full disk below standard output
         sys.stdout = nowhere()
         print(f"stickslip {command}: {_reason(error)}", file=sys.stderr)
         status = 1
@@ -106,14 +106,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _unrecognized(arguments: Sequence[str], usage: str) -> str:
-    """Return what is wrong with arguments that no parser has taken, and what they may stand for."""
+    """Return the message about unknown arguments, with the options that may be meant."""
     option = next((text for text in arguments if text.startswith("--")), "").partition("=")[0]
     meant = did_you_mean(option, set(re.findall(r"--[a-z][\w-]*", usage)), "")
     return "; ".join(filter(None, [f"unrecognized arguments: {' '.join(arguments)}", meant]))
 
 
 def _with_negative_values(given: Sequence[str]) -> list[str]:
-    """Join what begins with a negative number to its option: argparse takes it for another."""
+    """Join a value that begins with a negative number to its option: argparse reads an option."""
     joined: list[str] = []
     for word in given:
         negative = re.match(r"-(\.?\d|inf)", word)

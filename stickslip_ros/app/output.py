@@ -1,4 +1,4 @@
-"""How figures are shown to a person: tables on standard output, SI with sensible prefixes."""
+"""How values are printed: tables on standard output, in SI units with suitable prefixes."""
 
 import json
 import sys
@@ -25,8 +25,8 @@ _LABELS: dict[str, tuple[str, str]] = {
     "multipliers": ("Floquet multipliers", ""),
     "peak_force": ("peak control force", "N"),
     "peak_applied_force": ("peak control force acting", "N"),
-    "resting_force": ("control force at the end", "N"),
-    "resting_applied_force": ("control force acting at the end", "N"),
+    "resting_force": ("final control force", "N"),
+    "resting_applied_force": ("final control force acting", "N"),
     "samples": ("samples", ""),
     "lost_samples": ("lost samples", ""),
     "late_forces": ("late forces", ""),
@@ -40,9 +40,9 @@ _LABELS: dict[str, tuple[str, str]] = {
 
 _SENT = {
     "peak_force": ("peak_applied_force", "peak control force sent"),
-    "resting_force": ("resting_applied_force", "control force sent at the end"),
+    "resting_force": ("resting_applied_force", "final control force sent"),
 }
-"""What of a force that was sent acted, and what it is called where that is not the same."""
+"""The measure of the force that acted, and the label of the sent force where the two differ."""
 
 _SAME_SCALE = {
     "amplitude": "midpoint",
@@ -50,7 +50,7 @@ _SAME_SCALE = {
     "resting_force": "peak_force",
     "resting_applied_force": "peak_applied_force",
 }
-"""Which other quantity tells how large one is that may be rounding."""
+"""The quantity with which a value is compared to see whether it is rounding error."""
 
 _ALL_SI: Mapping[str, "Units"] = {}
 
@@ -59,7 +59,7 @@ _FRAME = 3
 
 
 def print_json(values: Mapping[str, Any]) -> None:
-    """Print one JSON object, of what `finite` makes of the values."""
+    """Print one JSON object, with null for what is not finite."""
     json.dump(finite(values), sys.stdout, indent=2, allow_nan=False)
     print()
 
@@ -78,36 +78,36 @@ def finite(value: Any) -> Any:
 def print_figures(
     title: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, "Units"] = _ALL_SI
 ) -> None:
-    """Print figures by name, one column for each of `columns`, those that nobody has left out.
+    """Print values by name, one column for each of `columns`.
 
     `units` are those of each column, by its name; without it is in SI.
     """
     rows = {
         name: [label, *_row(name, unit, columns, units)]
         for name, (label, unit) in _LABELS.items()
-        if any(name in figures for figures in columns.values())
+        if any(name in values for values in columns.values())
     }
     _tell_apart(rows, columns)
     print_table(title, ["", *columns], rows.values())
 
 
 def _tell_apart(rows: dict[str, list[str]], columns: Mapping[str, Mapping[str, Any]]) -> None:
-    """Leave out what acted where it is not known or is what was sent, and drops without any."""
+    """Omit the force that acted if it is unknown or equals the sent one, and drops without any."""
     for sent, (applied, label) in _SENT.items():
-        known = [figures.get(applied) is not None for figures in columns.values()]
+        known = [values.get(applied) is not None for values in columns.values()]
         cells = zip(known, rows.get(sent, [])[1:], rows.get(applied, [])[1:], strict=False)
         if any(is_known and of_sent != of_applied for is_known, of_sent, of_applied in cells):
             rows[sent][0] = label
         else:
             rows.pop(applied, None)
-    if not any(figures.get("dropped_forces") for figures in columns.values()):
+    if not any(values.get("dropped_forces") for values in columns.values()):
         rows.pop("dropped_forces", None)
 
 
 def _row(
     name: str, unit: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, "Units"]
 ) -> list[str]:
-    """Return the cells of one figure; columns in the same units have the same prefix."""
+    """Return the cells of one row; columns in the same units have the same prefix."""
     from stickslip_ros.plots.units import SI
 
     cells: dict[str, str] = {}
@@ -120,22 +120,24 @@ def _row(
     return [cells[column] for column in columns]
 
 
-def _shown(name: str, figures: Mapping[str, Any]) -> Any:
-    """Return what is shown of a figure: of a regime also whether it is steady."""
+def _shown(name: str, values: Mapping[str, Any]) -> Any:
+    """Return the value to print; for a regime also whether it is steady."""
     from stickslip_ros.physics.measures.cycle_measures import Regime, with_trend
     from stickslip_ros.plots.units import NOISE
 
-    value = figures.get(name)
+    value = values.get(name)
     if name == "regime":
-        return with_trend(Regime.label(value), figures.get("trend"))
+        return with_trend(Regime.label(value), values.get("trend"))
     if name == "velocity_amplitude" and value is not None:
-        amplitude, midpoint = figures.get("amplitude") or 0.0, figures.get("midpoint") or 0.0
-        return 0.0 if amplitude <= NOISE * abs(midpoint) else value  # what is left is rounding
+        amplitude, midpoint = values.get("amplitude") or 0.0, values.get("midpoint") or 0.0
+        return (
+            0.0 if amplitude <= NOISE * abs(midpoint) else value
+        )  # the remainder is rounding error
     return value
 
 
 def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table: framed where a person looks, aligned plain text into a pipe or a file.
+    """Print a table: framed on a terminal, aligned plain text into a pipe or a file.
 
     In plain text each row is one line whatever its length, the columns two spaces or more apart.
     """
@@ -158,7 +160,7 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
 
 @contextmanager
 def progress_bar(label: str, total: float | None) -> Generator[Callable[[float], None]]:
-    """Show progress towards `total` on standard error while a person looks at it."""
+    """Show progress towards `total` on standard error if that is a terminal."""
     if not sys.stderr.isatty():
         yield lambda done: None
         return
@@ -183,7 +185,7 @@ def _print_framed(
 ) -> None:
     """Print a table with its first column to the left and the others to the right.
 
-    Where figures side by side would not fit, each row becomes a table of its own.
+    Where the columns would not fit, each row becomes a table of its own.
     """
     from rich.cells import cell_len
     from rich.table import Table

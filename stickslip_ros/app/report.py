@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from stickslip_ros.physics.model.drive import Drive
     from stickslip_ros.plots.run_history import RunHistory
 
-HELP = "measure a recorded run, or set several side by side"
-
 _MOST_DRAWN = 6
 """Bags that a figure can show, each in its own colour."""
 
@@ -31,8 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="BAG",
         nargs="+",
         type=Path,
-        help="bag directory, or one .mcap file; also one that is still recorded, cut off or "
-        "damaged: what is left of it is measured, and what is missing said",
+        help="bag directory, or one .mcap file; also one that is being recorded, cut off or "
+        "damaged: the readable part is measured, and a sentence names what is missing",
     )
     parser.add_argument(
         "--from",
@@ -40,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=0.0,
         metavar="S",
-        help="leave out what is before, s from the first sample of each bag (default: 0)",
+        help="start of the measured part, s from the first sample of each bag (default: 0)",
     )
     parser.add_argument(
         "--to",
@@ -48,10 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=float("inf"),
         metavar="S",
-        help="leave out what is after, s from the first sample of each bag (default: the end)",
+        help="end of the measured part, s from the first sample of each bag (default: the end)",
     )
     parser.add_argument(
-        "--namespace", metavar="NS", help="ROS namespace of the drive, where a bag holds several"
+        "--namespace",
+        metavar="NS",
+        help="ROS namespace of the drive, if a bag holds several",
     )
     add_plot(
         parser,

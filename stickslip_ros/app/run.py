@@ -37,8 +37,6 @@ from stickslip_ros.text import printable
 if TYPE_CHECKING:
     from stickslip_ros.scenarios.files import Scenario
 
-HELP = "run a scenario as ROS 2 nodes, record it and report"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
@@ -46,13 +44,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     control.add_argument(
         "--controller",
         metavar="PACKAGE/EXECUTABLE",
-        help="start this controller, found as by `ros2 run`, in place of the washout controller; "
-        "what follows -- are arguments for it, as in -- --ros-args -p gain:=3.0",
+        help="start this controller, found as by `ros2 run`, instead of the washout controller; "
+        "arguments after -- are passed to it, as in -- --ros-args -p gain:=3.0",
     )
     control.add_argument(
         "--external-controller",
         action="store_true",
-        help="start no controller, and wait for one that somebody else starts",
+        help="start no controller, and wait for one that you start yourself",
     )
     parser.add_argument(
         "--duration", type=seconds, metavar="S", help="simulated time, s (default: until Ctrl-C)"
@@ -60,7 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--pace",
         choices=[str(pace) for pace in Pace],
-        help="keep to the clock, or go on as soon as the force has come (default: the scenario's)",
+        help="follow the clock, or continue as soon as each force has arrived (default: the "
+        "scenario's)",
     )
     parser.add_argument(
         "--composed",
@@ -77,9 +76,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dashboard",
         action="store_true",
-        help="show the run on a web page, as `stickslip dashboard` does; the page ends with it",
+        help="show the run on a web page, as `stickslip dashboard` does, until the run ends",
     )
-    add_network(parser, "let other machines see the nodes (default: they are kept on this one)")
+    add_network(parser, "let other machines see the nodes (default: loopback only)")
     add_json(parser)
 
 
@@ -119,19 +118,19 @@ def run(arguments: argparse.Namespace) -> int:
     reach = keep_on_this_machine(arguments.network)
     _tell(f"nodes in {namespace}, {reach}")
     with _dashboard(namespace) if arguments.dashboard else nullcontext():
-        figures, interrupted = record(
+        results, interrupted = record(
             scenario, bag, namespace=namespace, composed=arguments.composed, controller=controller
         )
     if arguments.json:
         command = shlex.join([arguments.controller, *arguments.further]) if controller else None
-        print_json({**figures, "controller_command": command, **made_of(scenario)})
+        print_json({**results, "controller_command": command, **made_of(scenario)})
     else:
-        report, drive = figures["report"], scenario.plant.as_drive()
-        print_figures(scenario.name, {"": {**report, **figures}}, {"": Units.for_drive(drive)})
+        report, drive = results["report"], scenario.plant.as_drive()
+        print_figures(scenario.name, {"": {**report, **results}}, {"": Units.for_drive(drive)})
         reason = why_no_cycle(report["regime"], report["duration"], drive)
         if reason is not None:
             print(reason)
-    if not figures["report"]["complete"]:
+    if not results["report"]["complete"]:
         raise RunError(f"the bag {bag} could not be written to its end")
     if interrupted:
         _tell(f"stickslip run: interrupted: the bag {bag} is closed; the nodes have ended")
@@ -163,9 +162,9 @@ def record(
     composed: bool,
     controller: Sequence[str] | None = None,
 ) -> tuple[dict[str, Any], bool]:
-    """Run the nodes into `bag`; return the figures of the run, and whether it was interrupted.
+    """Run the nodes into `bag`; return its results, and whether it was interrupted.
 
-    `controller` is the command of one in place of ours, empty for one that others start.
+    `controller` is the command of one in place of ours, empty for one that is started elsewhere.
     Raises KeyboardInterrupt where nothing was recorded before that, and RunError, with what is
     left, where the run failed.
     """
@@ -222,7 +221,7 @@ def default_bag(scenario: str) -> Path:
 
 
 def _bag_of(scenario: "Scenario") -> Path | None:
-    """Return where the scenario says to record to; a file, unlike -p, says it of this directory."""
+    """Return the bag that the scenario names; in a file it must be below this directory."""
     name = scenario.analyzer.bag
     if not name or any(given.startswith("analyzer.bag=") for given in scenario.overrides):
         return Path(name) if name else None
@@ -239,13 +238,13 @@ def _bag_of(scenario: "Scenario") -> Path | None:
 
 
 def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
-    """Return the command of the controller in place of ours, empty if somebody else starts it."""
+    """Return the command of the controller in place of ours, empty if it is started elsewhere."""
     if arguments.controller is not None:
         with naming("--controller"):
             return [str(find_executable(arguments.controller)), *arguments.further]
     if arguments.further:
         raise InvalidInputError(
-            f"-- {shlex.join(arguments.further)}: what follows -- is for --controller, "
+            f"-- {shlex.join(arguments.further)}: arguments after -- are for --controller, "
             "which is not given"
         )
     return [] if arguments.external_controller else None
@@ -274,7 +273,7 @@ def _tell(sentence: str) -> None:
 
 
 def _state_of(bag: Path) -> str:
-    """Say what a run that failed has left."""
+    """Return what a failed run has left."""
     from stickslip_ros.bags.reader import Recording
 
     try:
@@ -285,5 +284,5 @@ def _state_of(bag: Path) -> str:
         return "nothing was recorded"
     return (
         f"the bag {bag} was not closed: `stickslip report` reads what it holds, "
-        "`stickslip repair` makes a sound one of it"
+        "`stickslip repair` writes a sound bag from it"
     )

@@ -9,7 +9,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command, which has none."""
     parser.description = (
         "Print the JSON schema of scenario files. With it an editor completes the names of "
-        "parameters, shows meaning, unit and default, and marks what would be refused."
+        "parameters, shows meaning, unit and default, and marks refused values."
     )
 
 

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from stickslip_ros.plots.run_history import RunHistory
     from stickslip_ros.scenarios.files import Scenario
 
-HELP = "run a scenario without ROS and measure its motion"
-
 _DEFAULT_PERIODS = 200.0
 
 
@@ -42,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--continuous-control",
         action="store_true",
-        help="let the controller act without sampling, as in the paper's eq. 19 "
+        help="let the controller act continuously, as in the paper's eq. 19 "
         "(default: the force is held from sample to sample, as between the nodes)",
     )
     add_plot(parser, "motion, force, cycles and friction law")

@@ -1,4 +1,4 @@
-"""`stickslip stability`: what theory says of a scenario, without running it."""
+"""`stickslip stability`: the theory of a scenario, without a simulation."""
 
 import argparse
 from typing import TYPE_CHECKING, Any, cast
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from stickslip_ros.plots.units import Units
     from stickslip_ros.scenarios.files import Scenario
     from stickslip_ros.studies.stability import Notes, Section
-
-HELP = "equilibrium, Hopf speeds, limit cycles and critical gains of a scenario, by theory"
 
 _LABELS: dict[str, dict[str, tuple[str, str]]] = {
     "": {"equilibrium_position": ("equilibrium position", "m")},
@@ -52,12 +50,12 @@ _LABELS: dict[str, dict[str, tuple[str, str]]] = {
         "spectral_radius": ("spectral radius", ""),
         "stable": ("stable", ""),
         "decay_rate": ("decay rate", "1/s"),
-        "settling_time": ("settling time, to a hundredth", "s"),
+        "settling_time": ("1 % settling time", "s"),
         "critical_linear_gain": ("critical linear gain", "N s/m"),
         "stable_linear_gains": ("stable linear gains", "N s/m"),
     },
 }
-"""What the figures of each section are called in the table, and their unit."""
+"""Label and unit of each value in the table, by section."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -65,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_scenario(parser)
     add_plot(
         parser,
-        "where the sampled loop is stable and how fast it comes to rest, over corner frequency and "
+        "where the sampled loop is stable and how fast it settles, over cutoff frequency and "
         "linear gain, and the critical gain over the delay of the force",
     )
     add_json(parser)
@@ -101,11 +99,11 @@ def _print(scenario: "Scenario", found: "Section", notes: "Notes") -> None:
     units = Units.for_drive(scenario.plant.as_drive())
     rows: list[list[str]] = []
     for section, labels in _LABELS.items():
-        figures = found[section] if section else found
+        values = found[section] if section else found
         if section:
             rows.append([section.replace("_", " "), ""])
         for name, (label, unit) in labels.items():
-            shown = _shown(name, figures[name], unit, units)
+            shown = _shown(name, values[name], unit, units)
             rows.append([f"  {label}" if section else label, shown])
     print_table(f"{scenario.name}, by theory", ["", ""], rows)
     for loop in ("open_loop", "closed_loop"):

@@ -1,4 +1,4 @@
-"""`stickslip sweep`: what a scenario settles on over the values of one parameter or two."""
+"""`stickslip sweep`: the settled motion of a scenario over one parameter or two."""
 
 import argparse
 from collections import Counter
@@ -28,14 +28,12 @@ if TYPE_CHECKING:
     from stickslip_ros.studies.plan import Grid
     from stickslip_ros.studies.study import Point
 
-HELP = "measure what a scenario settles on, over the values of one parameter or two"
-
-_DESCRIPTION = f"""{HELP}: amplitude, regime, stick fraction and the turning points of the settled
-motion, for a bifurcation diagram (one parameter) or a map (two). A point that fails or runs away
-is a row of the table, with the reason."""
+_DESCRIPTION = """Measure the settled motion of a scenario over the values of one parameter or two:
+amplitude, regime, stick fraction and turning points, for a bifurcation diagram (one parameter) or a
+map (two). A point that fails or diverges is a row of the table, with the reason."""
 
 _MOST_RANGES = 60
-"""Rows of the table on the screen; where there are more, only their regimes are counted."""
+"""Most rows of the printed table; beyond that only the points of each regime are counted."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,14 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NODE.PARAMETER=A:B:COUNT",
         help="COUNT values from A to B of a parameter of plant or washout_controller, SI units, as "
         "in --over plant.belt_speed=0.02:0.6:1000; A:B:COUNT:log for a geometric sequence. A "
-        "second --over makes it a map",
+        "second --over gives a map",
     )
     parser.add_argument(
         "--carry",
         choices=[str(carry) for carry in Carry],
-        help="begin each point where its neighbour ended, filter included, along the (last) "
-        "parameter up, down or both ways, which shows hysteresis (default: every point begins in "
-        "the scenario's initial state)",
+        help="start each point in the final state of its neighbour, filter included, with the "
+        "(last) parameter going up, down or both, which shows hysteresis (default: start every "
+        "point in the scenario's initial state)",
     )
     add_running(parser, SettlingCourse())
     add_plot(parser, "the bifurcation diagram, or the map")
@@ -64,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--colour",
         choices=("regime", "amplitude", "stick_fraction"),
         default="regime",
-        help="what the map shows (default: %(default)s)",
+        help="quantity that the map shows (default: %(default)s)",
     )
     add_json(parser)
 
@@ -120,7 +118,7 @@ def _draw(arguments: argparse.Namespace, journal: "Journal") -> None:
 
 
 def _direction_and_regime(point: "Point", plan: "Grid") -> str:
-    """Return what the points of a row of the table on the screen have in common."""
+    """Return what the points in a row of the printed table have in common."""
     from stickslip_ros.physics.measures.cycle_measures import Regime
 
     regime = point.reason or Regime.label(point.measures.regime)

@@ -137,7 +137,7 @@ def test_parameters_that_are_none_are_no_drive(command, tmp_path, parameters):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["report", "bag", "bag", "--plot", "out.png"], "draws one bag, and 2 were given"),
+        (["report", *"abcdefg", "--plot", "out.png"], "draws at most 6 bags, and 7 were given"),
         (["report", "bag", "--plot", "out.gif"], "must end in one of .png, .svg, .pdf"),
         (["report", "bag", "--plot", "none/out.png"], "there is no directory none"),
         (["report", "empty", "--plot", "out.png"], "holds no .mcap file"),
@@ -215,7 +215,7 @@ def test_of_forces_that_were_all_refused_none_acted(command, tmp_path, pace):
     figures = {row[0].strip(): row[-1].strip() for row in rows}
     assert figures["peak control force sent"] == "128.6 N"
     assert figures["peak control force acting"] == "0 N"
-    assert figures["control force acting at the end"] == "0 N"
+    assert figures["final control force acting"] == "0 N"
     assert figures["dropped forces"] == str(report["dropped_forces"])
 
 
@@ -234,7 +234,7 @@ def test_forces_that_all_acted_are_told_once(command, tmp_path):
     rows = command("report", tmp_path / "bag")[1].splitlines()
     assert [row.split("  ")[0] for row in rows if "control force" in row] == [
         "peak control force",
-        "control force at the end",
+        "final control force",
     ]
 
 
@@ -246,5 +246,5 @@ def test_a_bag_that_does_not_tell_what_was_dropped_claims_nothing_of_what_acted(
     rows = command("report", REFERENCE)[1].splitlines()
     assert [row.split("  ")[0] for row in rows if "control force" in row] == [
         "peak control force",
-        "control force at the end",
+        "final control force",
     ]
