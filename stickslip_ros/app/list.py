@@ -6,11 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from stickslip_ros.app.arguments import add_json
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_json, print_table
-from stickslip_ros.physics.model.friction import LAWS
-from stickslip_ros.scenarios.files import shipped_scenarios
-from stickslip_ros.scenarios.parameters import WashoutControllerParameters
-from stickslip_ros.scenarios.sections import leading_comment
 from stickslip_ros.versions import versions
 
 
@@ -25,6 +22,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.physics.model.friction import LAWS
+        from stickslip_ros.scenarios.files import shipped_scenarios
+        from stickslip_ros.scenarios.parameters import WashoutControllerParameters
     scenarios = [_scenario(name, path) for name, path in shipped_scenarios().items()]
     friction_laws: list[dict[str, Any]] = [
         {
@@ -61,6 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _scenario(name: str, path: Path) -> dict[str, str]:
+    from stickslip_ros.scenarios.sections import leading_comment
+
     return {"name": name, "description": leading_comment(path), "path": str(path)}
 
 

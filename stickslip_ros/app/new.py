@@ -5,8 +5,8 @@ import shlex
 from pathlib import Path
 
 from stickslip_ros.app.arguments import check_new, writing
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.text import printable
 
 _ENDINGS = (".yaml", ".yml")
@@ -34,8 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    from stickslip_ros.scenarios.template import commented_file
-
+    with interrupts_kept():
+        from stickslip_ros.scenarios.files import load_scenario
+        from stickslip_ros.scenarios.template import commented_file
     path: Path = arguments.file
     if path.suffix not in _ENDINGS:
         raise InvalidInputError(f"{path}: must end in {' or '.join(_ENDINGS)}")

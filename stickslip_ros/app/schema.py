@@ -2,6 +2,7 @@
 
 import argparse
 
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_json
 
 
@@ -15,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    from stickslip_ros.scenarios.schema import scenario_schema
-
+    with interrupts_kept():
+        from stickslip_ros.scenarios.schema import scenario_schema
     print_json(scenario_schema())
     return 0

@@ -4,7 +4,7 @@ import argparse
 from typing import Any
 
 from stickslip_ros.app.arguments import add_namespace, add_network, namespace_of
-from stickslip_ros.app.optional_dependencies import loading_ros
+from stickslip_ros.app.optional_dependencies import interrupts_kept, loading_ros
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.text import printable, shown
 
@@ -28,10 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    from stickslip_ros.scenarios.files import parse_override
-    from stickslip_ros.scenarios.parameter_field import known_parameters
-    from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
-
+    with interrupts_kept():
+        from stickslip_ros.scenarios.files import parse_override
+        from stickslip_ros.scenarios.parameter_field import known_parameters
+        from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
     namespace = namespace_of(arguments.namespace)
     given: dict[str, dict[str, Any]] = {}
     for assignment in arguments.assignments:

@@ -1,16 +1,16 @@
 """`stickslip show`: every parameter of a scenario, and where its value comes from."""
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app.arguments import add_json, add_scenario_file
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_json, print_table
-from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.files import BASE, DEFAULT, OVERRIDE, Scenario, load_scenario
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
-from stickslip_ros.scenarios.template import own_first
 from stickslip_ros.text import printable
 from stickslip_ros.versions import versions
+
+if TYPE_CHECKING:
+    from stickslip_ros.scenarios.files import Scenario
 
 _OF_THE_LOOP = ("plant", "washout_controller")
 """Nodes whose parameters have no unit where the drive is dimensionless."""
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.description = (
         "Show every parameter of a scenario with its value and unit. The last column says where "
-        f"the value comes from: the file, its {BASE}, an {OVERRIDE} (-p), or the {DEFAULT}."
+        "the value comes from: the file, its base, an override (-p), or the default."
     )
     add_scenario_file(parser)
     add_json(parser)
@@ -28,6 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.plots.units import Units
+        from stickslip_ros.scenarios.files import load_scenario
+        from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
     scenario = load_scenario(
         arguments.scenario, arguments.overrides, base=arguments.base, other_nodes=True
     )
@@ -61,7 +65,11 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _parameters(scenario: Scenario, node: str) -> dict[str, dict[str, Any]]:
+def _parameters(scenario: "Scenario", node: str) -> dict[str, dict[str, Any]]:
+    from stickslip_ros.scenarios.files import DEFAULT
+    from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+    from stickslip_ros.scenarios.template import own_first
+
     values = scenario.as_dict()[node]
     return {
         parameter.name: {
