@@ -80,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         raise_interrupts()
         if not given or given[0] in ("-h", "--help"):
             print(overview(), flush=True)
-            sys.exit()
+            sys.exit(0)
         parser = _parser(given)
         if command and not command.startswith("-") and command not in COMMANDS:
             parser.error(f"unknown command {command!r:.80}; {did_you_mean(command, COMMANDS)}")

@@ -135,7 +135,9 @@ class _Picture:
         axes.set_title("phase portrait of the last cycles")
         axes.set_xlabel(self._length[1])
         axes.set_ylabel(self._speed[1])
-        for run, motion, look in zip(self._runs, self._motions, self._looks, strict=True):
+        for run, motion, look, marker in zip(
+            self._runs, self._motions, self._looks, _MARKERS, strict=False
+        ):
             if not len(motion.time):
                 continue
             rows = run.history.end(end_duration(motion, run.measures, run.drive))
@@ -146,6 +148,11 @@ class _Picture:
                 position / self._length[0],
                 velocity / self._speed[0],
                 rasterized=len(time) > MANY,
+                marker=marker,
+                ms=4.0,
+                markevery=[
+                    len(time) - 1
+                ],  # where it ends, which is all there is of a slide at rest
                 **look,
             )
         axes.set_xlim(widened(*axes.get_xlim()))
