@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _FIGURE_FILES = (".png", ".svg", ".pdf")
 
-_SMALLEST, _LARGEST = 1, 50
+_SMALLEST, _LARGEST = 2, 50
 """Width and height of a figure, inches."""
 _DPI = 20, 600
 _MOST_PIXELS = 2e8

@@ -289,11 +289,11 @@ def test_a_figure_has_no_title_if_none_is_wanted(command, tmp_path):
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        (("--size", "6"), "'6' is not WIDTHxHEIGHT in inches, each from 1 to 50"),
+        (("--size", "6"), "'6' is not WIDTHxHEIGHT in inches, each from 2 to 50"),
         (("--size", "0x4"), "'0x4' is not"),
         (("--size", "nanx4"), "'nanx4' is not"),
         (("--size", "6x4x2"), "'6x4x2' is not"),
-        (("--size", "1x1"), "--size 1x1: is too small for this figure"),
+        (("--size", "2x2"), "--size 2x2: is too small for this figure"),
         (("--dpi", "0"), "'0' is not a whole number of dots per inch from 20 to 600"),
         (("--dpi", "1e3"), "'1e3' is not"),
         (("--size", "50x50", "--dpi", "600"), "--size 50x50 --dpi 600: would be 9e+08 pixels"),
