@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--bag",
         type=Path,
         metavar="DIR",
-        help="directory to record to; must not exist (default: bags/<scenario>-<UTC time>)",
+        help="directory to record to; must not exist (default: a new one in bags/)",
     )
     add_namespace(parser)
     parser.add_argument(
