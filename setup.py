@@ -89,6 +89,7 @@ setup(
             *DASHBOARD,
             "distributed",
             "hypothesis",
+            "jsonschema",  # checks scenarios with the schema that editors use
             "markdown-it-py",  # finds the blocks of code in the docs
             "playwright",  # drives the browser of the system: no download of its own
             "pytest",

@@ -118,8 +118,7 @@ class _Picture:
             position.set_title(
                 f"{pane.title}\n{measures_text(run.measures, self._units)}", fontsize=8.0, wrap=True
             )
-            force.set_xlabel(time_label)
-            force.xaxis.set_major_formatter(lambda value, _: f"{value / scale:.10g}")
+            _label_time(force, scale, time_label)
             if not len(rows.time):
                 say(position, "no motion is known")
         for row, label in zip(panels, (self._length[1], force_label), strict=True):
@@ -184,5 +183,9 @@ class _Picture:
         stick_fraction.set_ylim(0.0, 1.1 * largest[1] or 1.0)
         scale, label = self._units.axis("time", "s", *(motion.time for motion in self._motions))
         for axes in (amplitude, stick_fraction):
-            axes.set_xlabel(label)
-            axes.xaxis.set_major_formatter(lambda value, _: f"{value / scale:.10g}")
+            _label_time(axes, scale, label)
+
+
+def _label_time(axes: Axes, scale: float, label: str) -> None:
+    axes.set_xlabel(label)
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value / scale:.10g}")

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import pytest
 import yaml
 
@@ -140,7 +141,6 @@ def test_what_is_wrong_is_refused_in_a_line(
 
 @pytest.fixture
 def schema(stickslip: Run) -> Any:
-    jsonschema = pytest.importorskip("jsonschema")
     found = json.loads(stickslip("schema").stdout)
     jsonschema.Draft7Validator.check_schema(found)
     return jsonschema.Draft7Validator(found)
