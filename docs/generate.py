@@ -72,7 +72,7 @@ def commands() -> Iterator[str]:
         yield f"## {group}\n"
         for name, (own_group, line) in COMMANDS.items():
             if own_group == group:
-                yield from _command(name, line, EXAMPLES[name])
+                yield from _command(name, line, EXAMPLES.get(name, f"stickslip {name}"))
 
 
 def _command(name: str, line: str, example: str) -> Iterator[str]:

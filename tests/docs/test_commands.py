@@ -5,7 +5,7 @@ import re
 import pytest
 
 from stickslip_ros.app.commands import COMMANDS
-from stickslip_ros.app.main import command_parser
+from stickslip_ros.app.main import _parser
 from tests.docs.page import CHECKOUT, pages, spans
 
 TARGETS = set(
@@ -20,8 +20,10 @@ def named(program: str) -> list[str]:
 @pytest.mark.parametrize("command", named("stickslip"))
 def test_stickslip_has_the_commands_and_options_that_are_named(command: str) -> None:
     names, *arguments = command.split()[1:]
-    assert set(names.split("|")) <= COMMANDS.keys()
-    known = command_parser(names.split("|")[0])._option_string_actions
+    name, *others = names.split("|")
+    assert {name, *others} <= set(COMMANDS)
+    (subparsers,) = _parser([name])._subparsers._group_actions
+    known = subparsers.choices[name]._option_string_actions
     options = {a.split("=")[0] for a in arguments if re.match("--?[a-z]", a)}
     assert options <= set(known)
 

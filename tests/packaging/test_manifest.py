@@ -14,6 +14,7 @@ KEYS = {
     "fastapi": {"python3-fastapi"},
     "heyoka": set(),
     "hypothesis": {"python3-hypothesis"},
+    "jsonschema": {"python3-jsonschema"},
     "lz4": set(),
     "markdown-it-py": set(),
     "matplotlib": {"python3-matplotlib"},

@@ -8,6 +8,8 @@ from stickslip_ros.app.arguments import add_namespace, add_network, namespace_of
 from stickslip_ros.app.optional_dependencies import check_dashboard, loading_ros
 from stickslip_ros.nodes.base.child_process import die_with_parent
 
+HELP = "show a running loop on a web page, live, and act on it"
+
 DEFAULT_PORT = 8642
 """The first that is tried where none is asked for."""
 
