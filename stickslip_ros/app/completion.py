@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 from stickslip_ros.app.commands import COMMANDS
 
-_FILES = ("BAG", "DIR", "FILE", "OUT")
+_FILES = ("BAG", "CONTROLLER", "DIR", "FILE", "OUT")
 """Metavars of files and directories."""
 
 _PARAMETERS = ("NODE.PARAMETER=VALUE", "NODE.PARAMETER=A:B:COUNT")

@@ -43,9 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     control = add_scenario(parser)
     control.add_argument(
         "--controller",
-        metavar="PACKAGE/EXECUTABLE",
-        help="start this controller, found as by `ros2 run`, instead of the washout controller; "
-        "arguments after -- are passed to it, as in -- --ros-args -p gain:=3.0",
+        metavar="CONTROLLER",
+        help="start this controller instead of the washout controller: a Python script, or "
+        "PACKAGE/EXECUTABLE as for `ros2 run`; arguments after -- are passed to it, as in "
+        "-- --ros-args -p gain:=3.0",
     )
     control.add_argument(
         "--external-controller",

@@ -17,19 +17,19 @@ from stickslip_ros.plots.style import GREY
 from stickslip_ros.plots.units import Units
 
 LAST_CYCLES = 5
-"""Cycles that are enlarged, and are in the phase portrait."""
+"""Number of cycles that are enlarged, and in the phase portrait."""
 
 PIXELS = 1000
-"""Intervals of time in the width of a panel, of about a pixel each."""
+"""Intervals of time across a panel, of about one pixel each."""
 
 LEAST_SPAN = 1e-6
-"""Of an axis, in the largest magnitude that is drawn on it: less is rounding."""
+"""Smallest span of an axis, as a share of the largest value on it: less is rounding."""
 
 _SHADE = LinearSegmentedColormap.from_list("stick", [to_rgba(GREY, 0.0), to_rgba(GREY, 0.6)])
 
 
 class Pane(NamedTuple):
-    """A part of the run over time."""
+    """A section of the run over time."""
 
     title: str
     rows: DrawnMotion
@@ -38,7 +38,7 @@ class Pane(NamedTuple):
 
     @classmethod
     def covering(cls, title: str, rows: DrawnMotion, *other: FloatArray) -> Self:
-        """Return one as long as the rows and other times last."""
+        """Return a pane that covers the rows and the other times."""
         times = [time for time in (rows.time, *other) if len(time)]
         if not times:
             return cls(title, rows, 0.0, 1.0)
@@ -60,7 +60,7 @@ def measures_text(measures: Measures, units: Units) -> str:
 
 
 def end_duration(motion: DrawnMotion, measures: Measures, drive: Drive | None) -> float:
-    """Return how much of the end is enlarged, s: a part where nothing is known of a period."""
+    """Return the duration of the enlarged end, s; a fixed share of the run without a period."""
     span = float(motion.time[-1] - motion.time[0]) if len(motion.time) else 0.0
     period = measures.period or (drive.natural_period if drive is not None else 0.0)
     return min(LAST_CYCLES * period, span) or 0.05 * span
@@ -69,33 +69,33 @@ def end_duration(motion: DrawnMotion, measures: Measures, drive: Drive | None) -
 def draw_line(
     axes: Axes, pane: Pane, trace: Sequence[FloatArray], scale: float, gap: float, **look: Any
 ) -> None:
-    """Draw a trace, of time and values, within a pane and a little beyond, with every peak."""
+    """Draw a trace of time and values across a pane and slightly beyond, with every peak."""
     time, values = trace
     first, end = np.searchsorted(time, (pane.start, pane.end), "right")
     rows = slice(max(int(first) - 1, 0), int(end) + 1)
     time, values = time[rows], values[rows]
     length = (pane.end - pane.start) / PIXELS
     drawn = peaks(intervals(time, length), values)
-    # Between rows of neighbouring intervals nothing is missing.
+    # No rows are missing between neighbouring intervals.
     time, values = broken(max(gap, 2.0 * length), time[drawn], values[drawn])
     axes.plot(time, values / scale, **look)
 
 
 def widened(low: float, high: float) -> tuple[float, float]:
-    """Return limits of an axis that span more than the rounding of what it shows."""
+    """Return limits of an axis that span more than the rounding of its values."""
     middle = (low + high) / 2.0
     half = max(high - low, LEAST_SPAN * max(abs(low), abs(high))) / 2.0
     return (low, high) if half == (high - low) / 2.0 else (middle - half, middle + half)
 
 
 def broken(gap: float, time: FloatArray, *columns: FloatArray) -> list[FloatArray]:
-    """Return the columns with a row that is no number where times are further apart than `gap`."""
+    """Return the columns with a row of NaN between times further apart than `gap`."""
     behind = np.flatnonzero(np.diff(time) > gap) + 1
     return [np.insert(column, behind, np.nan) for column in (time, *columns)]
 
 
 def shade(axes: Axes, pane: Pane) -> None:
-    """Shade each pixel's width of a pane by the share of it in which the slide sticks."""
+    """Shade each pixel column of a pane by the share of time in which the slide sticks."""
     bottom, top = axes.get_ylim()
     if len(pane.rows.time):
         edges = np.linspace(pane.start, pane.end, PIXELS + 1)

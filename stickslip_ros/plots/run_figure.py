@@ -1,4 +1,4 @@
-"""The picture of a run: motion, force, phase portrait, cycles and friction law."""
+"""Figure of a run: motion, force, phase portrait, cycles and friction law."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -63,62 +63,62 @@ def run_figure(
     notes: Sequence[str] = (),
     force: str = "control force",
 ) -> Figure:
-    """Return the picture of a run.
+    """Return the figure of a run.
 
-    The whole run and its last `LAST_CYCLES` cycles over time, shaded by the share of time that the
-    slide sticks; the phase portrait of these cycles and of the beginning; amplitude and stick
-    fraction of each cycle; the friction law with the relative speeds that there were. Without a
-    `drive` there is no equilibrium and no friction law, with a belt at rest no one equilibrium; the
-    belt speed is that at the end of the run. `notes` stand below the title, `force` is what the
-    force is called.
+    It shows the whole run and its last `LAST_CYCLES` cycles over time, shaded by the share of time
+    in which the slide sticks; the phase portrait of these cycles and of the start; amplitude and
+    stick fraction of each cycle; and the friction law with the range of relative speeds. The
+    equilibrium and the friction law need a `drive`, the equilibrium also a moving belt. The belt
+    speed is that at the end of the run. `notes` are shown below the title, and `force` is the label
+    of the force.
     """
     motion = history.motion
     if drive is not None and len(motion.time):
         drive = replace(drive, belt_speed=float(motion.belt_velocity[-1]))
     last = history.end(end_duration(motion, measures, drive))
-    picture = _Picture(history, drive, last if len(last.time) > 1 else history.end(float("inf")))
+    panels = _Panels(history, drive, last if len(last.time) > 1 else history.end(float("inf")))
     figure = Figure(figsize=(12.0, 10.0))
     if history.left_out:
-        notes = [*notes, f"not drawn: {history.left_out} samples that are no later than one before"]
-    set_title(figure, title, measures_text(measures, picture.units), *notes)
+        notes = [*notes, f"not drawn: {history.left_out} samples without an increasing time"]
+    set_title(figure, title, measures_text(measures, panels.units), *notes)
     above, below = figure.add_gridspec(2, 1, height_ratios=(3.0, 1.9))
-    picture.over_time(figure, above.subgridspec(3, 2, width_ratios=(2.0, 1.0)))
+    panels.over_time(figure, above.subgridspec(3, 2, width_ratios=(2.0, 1.0)))
     left, middle, right = below.subgridspec(1, 3)
-    picture.portrait(figure.add_subplot(left))
+    panels.portrait(figure.add_subplot(left))
     upper, lower = middle.subgridspec(2, 1)
     amplitude = figure.add_subplot(upper)
-    picture.cycles(amplitude, figure.add_subplot(lower, sharex=amplitude))
-    picture.law(figure.add_subplot(right))
+    panels.cycles(amplitude, figure.add_subplot(lower, sharex=amplitude))
+    panels.law(figure.add_subplot(right))
     handles: list[Any] = [
         Line2D([], [], **_MOTION, label="slide"),
         Line2D([], [], **_BELT, label="belt speed"),
         Patch(color=GREY, alpha=0.6, lw=0.0, label="sticks (paler: part of the time)"),
         Line2D([], [], **_CONTROL, label=force),
         Line2D([], [], **_FRICTION, label="friction force"),
-        Line2D([], [], **_EARLIER | {"lw": 4.0}, label="beginning"),
+        Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"),
     ]
     if drive is not None:
         handles.insert(2, Line2D([], [], **_POINT | _REST, label="equilibrium"))
-    if picture.holds:
-        handles.append(Line2D([], [], **_HELD, label="none came: the last one"))
-    if picture.drops:
+    if panels.holds:
+        handles.append(Line2D([], [], **_HELD, label="no new force: last one"))
+    if panels.drops:
         handles.append(Line2D([], [], **_DROPPED | {"ms": 6.0}, label="sent, did not act"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
 
 
-class _Picture:
-    """What the panels have in common, and each of them."""
+class _Panels:
+    """The panels of the figure, with their common units and data."""
 
     def __init__(self, history: RunHistory, drive: Drive | None, last: DrawnMotion) -> None:
         self.units = units = Units.for_drive(drive)
         self._history, self._drive, self._last = history, drive, last
         motion = history.motion
-        self._run = Pane.covering("the whole run", motion, *self._force_times)
+        self._run = Pane.covering("whole run", motion, *self._force_times)
         self._length = units.axis("displacement", "m", motion.position)
         self._speed = units.axis("velocity", "m/s", motion.velocity, motion.belt_velocity)
         self.holds = False
-        """Whether no force came for a while, and what is drawn is the last one."""
+        """Whether forces are missing for a while, so that the last one is drawn on."""
         self.drops = len(history.dropped.columns()[0]) > 0
         """Whether forces were sent that did not act."""
 
@@ -127,10 +127,10 @@ class _Picture:
         return [trace.columns()[0] for trace in (self._history.control, self._history.dropped)]
 
     def over_time(self, figure: Figure, parts: GridSpecFromSubplotSpec) -> None:
-        """Draw displacement, velocity and force, the whole run to the left and its end enlarged."""
+        """Draw displacement, velocity and force: the whole run, and its end enlarged."""
         history = self._history
         others = [] if len(self._last.time) else self._force_times
-        end = Pane.covering("its end, enlarged", self._last, *others)
+        end = Pane.covering("end of the run, enlarged", self._last, *others)
         traces = history.friction, history.control, history.dropped
         whole = [trace.columns() for trace in traces]
         ending = [trace.since(end.start) for trace in traces]
@@ -165,7 +165,7 @@ class _Picture:
         rows, gap = pane.rows, self._history.gap
         length, speed = self._length[0], self._speed[0]
         if self._drive is not None:
-            # On a belt at rest any place within the static friction is one.
+            # On a belt at rest any position within the static friction is an equilibrium.
             belt = np.where(rows.belt_velocity == 0.0, np.nan, rows.belt_velocity)
             rest = self._drive.friction.at_rest(belt) * self._drive.length_scale
             draw_line(position, pane, (rows.time, rest), length, gap, **_REST)
@@ -174,13 +174,13 @@ class _Picture:
         draw_line(velocity, pane, (rows.time, rows.velocity), speed, gap, **_MOTION)
 
     def portrait(self, axes: Axes) -> None:
-        """Draw the phase portrait of the last cycles, above that of the beginning."""
+        """Draw the phase portrait of the last cycles, above that of the start."""
         (length, label), (speed, speed_label) = self._length, self._speed
         axes.set_title("phase portrait")
         axes.set_xlabel(label)
         axes.set_ylabel(speed_label)
         if not len(self._last.time):
-            say(axes, "no motion is known")
+            say(axes, "no motion recorded")
             return
         for rows, look in ((self._history.beginning, _EARLIER), (self._last, _MOTION)):
             time, position, velocity, belt, stick_time = broken(
@@ -221,7 +221,7 @@ class _Picture:
         self._label_time(stick_fraction, self._run)
 
     def law(self, axes: Axes) -> None:
-        """Draw the friction law, and which relative speeds there were."""
+        """Draw the friction law, and the range of relative speeds."""
         axes.set_title("friction law, with the range of this run")
         drive, reached = self._drive, self._history.relative_speeds
         if drive is None:
@@ -249,9 +249,9 @@ class _Picture:
         axes.set_xlim(ends[0] / scale, ends[1] / scale)
         handles = [
             Line2D([], [], color="black", lw=0.8, ls="-.", label="friction law"),
-            Line2D([], [], **_MOTION | {"lw": 3.0}, label="range of the end"),
+            Line2D([], [], **_MOTION | {"lw": 3.0}, label="range of the last cycles"),
             Patch(color=LIGHT_GREY, alpha=0.4, lw=0.0, label="range of the whole run"),
-            Line2D([], [], **_BELT, label="a slide at rest"),
+            Line2D([], [], **_BELT, label="slide at rest"),
         ]
         axes.legend(handles=handles, loc="best")
 
@@ -262,7 +262,7 @@ class _Picture:
         law = self._drive.friction
         for sign, start, end in ((-1.0, least, min(largest, 0.0)), (1.0, max(least, 0.0), largest)):
             if start < end:
-                # Close together where the law may be steep.
+                # Closely spaced where the law may be steep.
                 steps = np.r_[0.0, np.geomspace(1e-6, 1.0, 400)]
                 speeds = start + (end - start) * steps
                 if sign < 0.0:
@@ -281,9 +281,9 @@ def _draw_held(
     gap: float,
     dropped: FloatArray,
 ) -> bool:
-    """Draw the forces behind which none came for a while, up to the next; return if there are.
+    """Extend forces up to the next one after a gap; return whether there are any.
 
-    Where some came and were `dropped` (s), it is not known what acted.
+    If forces were `dropped` (times in s) in the gap, the acting force is unknown and not drawn.
     """
     time, force = control
     behind = np.flatnonzero(np.diff(time) > max(gap, 2.0 * (pane.end - pane.start) / PIXELS))

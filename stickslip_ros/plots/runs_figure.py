@@ -120,7 +120,7 @@ class _Picture:
             )
             _label_time(force, scale, time_label)
             if not len(rows.time):
-                say(position, "no motion is known")
+                say(position, "no motion recorded")
         for row, label in zip(panels, (self._length[1], force_label), strict=True):
             row[0].set_ylabel(label)
             row[0].set_ylim(widened(*row[0].get_ylim()))

@@ -1,4 +1,4 @@
-"""What the pictures have in common: lines, letters and colours, and how they are written."""
+"""Common style of the figures: lines, fonts and colours, and how figures are saved."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -16,19 +16,19 @@ from PIL import Image
 from stickslip_ros.text import printable
 
 BLUE, ORANGE, GREEN, SKY_BLUE, GREY = "#0072B2", "#D55E00", "#009E73", "#56B4E9", "#999999"
-"""Of Okabe and Ito's palette, which the colour-blind can tell apart, and a grey."""
+"""Colours of Okabe and Ito's palette, which is safe for colour-blind readers, and a grey."""
 
 YELLOW, PURPLE, AMBER = "#F0E442", "#CC79A7", "#E69F00"
 """Three more of that palette."""
 
 LIGHT_GREY = "#CCCCCC"
-"""For what there is nothing to say of."""
+"""Colour of elements without information."""
 
 DASHES = ("--", ":", "-.")
-"""Of lines that mark something, one after the other: colour alone tells nothing apart."""
+"""Line styles of markers, in turn, so that colour is not the only distinction."""
 
 MANY = 5000
-"""Points or cells from which on a drawing of lines and curves has them as an image within."""
+"""Number of points or cells from which a vector figure contains them as an image."""
 
 _LOOK: dict[str, Any] = {
     "font.size": 9.0,
@@ -51,7 +51,7 @@ _LOOK: dict[str, Any] = {
 }
 
 _REPRODUCIBLE = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-"""What a file of each kind leaves out, so that the same picture is the same file."""
+"""Metadata to omit by file type, so that the same figure gives the same file."""
 
 DPI = 130.0
 """Dots per inch of a PNG."""
@@ -64,7 +64,7 @@ _R = TypeVar("_R")
 
 
 def styled(draw: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Let a function draw in the style of all pictures, whatever the user's own settings are."""
+    """Decorate a function so that it draws in the common style, not with the user's settings."""
 
     @wraps(draw)
     def drawn(*arguments: _P.args, **options: _P.kwargs) -> _R:
@@ -76,7 +76,7 @@ def styled(draw: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def set_title(figure: Figure, *lines: str) -> None:
-    """Put lines above a figure as they are, each broken where it is too long and cut if need be."""
+    """Set the title of a figure to `lines`; long lines are wrapped, and cut after three."""
     _titles[figure] = lines
     letters = round(10.0 * float(figure.get_figwidth()))  # ten per inch, on average
     broken = (fill(printable(line), letters, max_lines=3, placeholder=" ...") for line in lines)
@@ -99,8 +99,8 @@ def save(
 ) -> None:
     """Write a figure to `path`; the format follows the ending: .png, .svg or .pdf.
 
-    In drawings text stays text. So many `colours` make a PNG a third as large, for one that is kept
-    with the sources. Raises OSError if the file cannot be written.
+    Vector formats keep text as text. A limited number of `colours` makes a PNG, to be kept with the
+    sources, a third as large. Raises OSError if the file cannot be written.
     """
     ending = path.suffix.lower()
     with rc_context():

@@ -1,4 +1,4 @@
-"""Scenarios: ROS parameter files, found by name or path, with overrides."""
+"""Scenarios: ROS parameter files, loaded by name or path, with overrides."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -28,39 +28,83 @@ _NAMED_BY_PATH = "a file is given by its path ending in .yaml"
 
 @dataclass(frozen=True)
 class Scenario:
-    """What one run is made of: the parameters of every node, and where they come from."""
+    """The parameters of every node in one run, and their source.
+
+    Create a scenario with `load_scenario`, and change it with `changed`.
+
+    Examples
+    --------
+    >>> from stickslip_ros.scenarios.files import load_scenario
+    >>> scenario = load_scenario("feed_drive", ["plant.belt_speed=0.03"])
+    >>> scenario.plant.mass, scenario.plant.belt_speed
+    (100.0, 0.03)
+    >>> scenario.changed({"plant.damping": 200.0}).plant.damping
+    200.0
+
+    """
 
     name: str
+    """Name of the scenario file without its ending."""
     overrides: tuple[str, ...]
+    """Overrides, as NODE.PARAMETER=VALUE, that the values already contain."""
     plant: PlantParameters
+    """Parameters of the plant node."""
     washout_controller: WashoutControllerParameters
+    """Parameters of the washout controller node."""
     analyzer: AnalyzerParameters
+    """Parameters of the analyzer node."""
     path: Path = field(compare=False)
     """The scenario file."""
     other_sections: tuple[str, ...] = ()
-    """Sections of the file that match none of these nodes: parameters of a user's own node."""
+    """Sections of the file that match none of these nodes, such as that of a user's own node."""
     sources: Mapping[str, str] = field(default_factory=dict[str, str], compare=False, repr=False)
-    """Where each value comes from, by NODE.PARAMETER: `FILE`, `BASE` or `OVERRIDE`; a default is
-    not listed."""
+    """Source of each value, by NODE.PARAMETER: `FILE`, `BASE` or `OVERRIDE`; defaults are not
+    listed."""
     bases: tuple[Path, ...] = field(default=(), compare=False, repr=False)
     """The files that complete the scenario file, the nearest first."""
 
     @property
+    def given(self) -> frozenset[str]:
+        """NODE.PARAMETER of each parameter that the file, its base or an override sets."""
+        return frozenset(self.sources)
+
+    @property
     def left_to_defaults(self) -> list[str]:
-        """NODE.PARAMETER of the drive, its rate and its washout controller that nothing gives."""
+        """Parameters of drive, rate and controller left at their defaults, as NODE.PARAMETER."""
         names = [f"plant.{name}" for name in (*self.plant.drive_names(), "rate")]
         if self.plant.expects_control:
             names += [f"washout_controller.{name}" for name in self.washout_controller.law_names()]
         return [name for name in names if name not in self.sources]
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
-        """Return every node's parameters by node and flat name."""
+        """Return the parameters of every node.
+
+        Returns
+        -------
+        dict[str, dict[str, Any]]
+            Values by node and flat name, for example `["plant"]["friction.static"]`.
+
+        """
         return {node: getattr(self, node).flat() for node in NODE_PARAMETERS}
 
     def changed(self, values: Mapping[str, Any]) -> Self:
-        """Return the scenario with other values of parameters, by NODE.PARAMETER.
+        """Return the scenario with other values of some parameters.
 
-        Raises InvalidInputError for what is out of bounds, or does not go with the rest.
+        Parameters
+        ----------
+        values : Mapping[str, Any]
+            New values by NODE.PARAMETER, such as `{"plant.belt_speed": 0.03}`.
+
+        Returns
+        -------
+        Scenario
+            The changed copy.
+
+        Raises
+        ------
+        InvalidInputError
+            If a value is out of bounds or not compatible with the others.
+
         """
         by_node: dict[str, dict[str, Any]] = {}
         for target, value in values.items():
@@ -78,9 +122,28 @@ class Scenario:
 
 
 def parameter_file(values: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the text of a ROS parameter file with those values by node and flat name.
+    """Return the text of a ROS parameter file.
 
-    Empty lists are left out: a parameter file cannot say of what type they are.
+    Parameters
+    ----------
+    values : Mapping[str, Mapping[str, Any]]
+        Values by node and flat name, as from `Scenario.as_dict`. Empty lists are omitted, because
+        a parameter file cannot give their type.
+
+    Returns
+    -------
+    str
+        The text, in YAML.
+
+    Examples
+    --------
+    >>> print(parameter_file({"plant": {"mass": 80.0, "pace": "realtime"}}))
+    "/**/plant":
+      "ros__parameters":
+        "mass": 80.0
+        "pace": "realtime"
+    <BLANKLINE>
+
     """
     sections = {
         f"/**/{node}": {
@@ -99,20 +162,47 @@ def load_scenario(
     base: str | None = None,
     other_nodes: bool = False,
 ) -> Scenario:
-    """Load the scenario of that name in config/, or of that path.
+    """Load a scenario by its name in config/ or by its path.
 
-    What it leaves out is that of the scenario `base`, by default the one that its own section
-    `scenario` names; without one the parameters' defaults act. `overrides` are texts
-    NODE.PARAMETER=VALUE, the value written as in the file. Sections apply to the nodes in
-    `namespace` as ROS applies them. Raises InvalidInputError for anything unknown, ill-typed or out
-    of bounds; with `other_nodes`, sections of unknown nodes are left alone.
+    Parameters
+    ----------
+    name_or_path : str
+        Name of a scenario that ships, or path of a ROS parameter file ending in `.yaml`.
+    overrides : Sequence[str]
+        Texts NODE.PARAMETER=VALUE that override the file; the value is written as in the file.
+    namespace : str
+        Namespace of the nodes. Sections of the file apply to it by the rules of ROS.
+    base : str or None
+        Name or path of the scenario that supplies the parameters that the file omits. By default
+        it is the one that the file's own section `scenario` names; without a base these parameters
+        have their defaults.
+    other_nodes : bool
+        Whether sections of unknown nodes are ignored instead of refused.
+
+    Returns
+    -------
+    Scenario
+        The validated parameters of every node.
+
+    Raises
+    ------
+    InvalidInputError
+        If the file cannot be read, or if a name is unknown or a value has the wrong type or is out
+        of bounds.
+
+    Examples
+    --------
+    >>> scenario = load_scenario("paper", ["plant.belt_speed=0.2"])
+    >>> scenario.name, scenario.plant.belt_speed
+    ('paper', 0.2)
+
     """
     path = _find(name_or_path)
     files = [read_file(path, namespace)]
     below = _path_of_base(files[0]) if base is None else _find(base)
     while below is not None:
         if any(below.samefile(file.path) for file in files):
-            raise InvalidInputError(f"{path}: base {below} is a file that it completes")
+            raise InvalidInputError(f"{path}: base {below} leads back to itself")
         files.append(read_file(below, namespace))
         below = _path_of_base(files[-1])
     values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
@@ -151,7 +241,7 @@ def load_scenario(
 
 
 def config_directories() -> list[Path]:
-    """Return the existing directories in which scenarios are found by name."""
+    """Return the existing directories that contain the scenarios known by name."""
     installed = [prefix / "share/stickslip_ros/config" for prefix in prefixes()]
     source_tree = Path(__file__).parents[2] / "config"
     return [directory for directory in [source_tree, *installed] if directory.is_dir()]
@@ -164,7 +254,7 @@ def shipped_scenarios() -> dict[str, Path]:
 
 
 def _find(name_or_path: str) -> Path:
-    """Return the file of that path, or else of that name, with or without .yaml."""
+    """Return the file of that path, or otherwise of that name, with or without .yaml."""
     path = Path(name_or_path)
     name = name_or_path.removesuffix(".yaml")
     given_as_file = "/" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
@@ -178,7 +268,7 @@ def _find(name_or_path: str) -> Path:
     missing, otherwise = f"no scenario file {name_or_path}", _NAMED_BY_PATH
     if not given_as_file:
         missing = f"unknown scenario {name_or_path!r}"
-        otherwise = f"known by name are {', '.join(sorted(shipped))}; {_NAMED_BY_PATH}"
+        otherwise = f"the known names are {', '.join(sorted(shipped))}; {_NAMED_BY_PATH}"
     raise InvalidInputError(f"{missing}; {did_you_mean(name, shipped, otherwise)}")
 
 

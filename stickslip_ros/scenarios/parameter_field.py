@@ -1,4 +1,4 @@
-"""What a parameter is: unit, bounds, default, meaning, and from when on it is fixed."""
+"""The description of a parameter: unit, bounds, default, meaning, and when it can change."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ SMALLEST, LARGEST = 1e-30, 1e30
 
 _COMPARISONS = {"ge": "at least", "le": "at most"}
 _UNTOLD = (LARGEST, 2**62)
-"""Limits that only a mistake meets."""
+"""Limits that only a mistake exceeds: tables and messages omit them."""
 
 
 class Fixed(StrEnum):
-    """From which state of the node on a parameter cannot be changed."""
+    """State of the node from which a parameter cannot be changed."""
 
     NEVER = ""
     ACTIVE = "active"
@@ -26,7 +26,7 @@ class Fixed(StrEnum):
 
     @property
     def changes(self) -> str:
-        """When it can be changed, in words."""
+        """When the parameter can be changed, in words."""
         return {"": "at any time", "active": "while inactive", "configured": "before configured"}[
             self
         ]
@@ -50,7 +50,7 @@ def field(
 
 @dataclass(frozen=True)
 class Parameter:
-    """What is known of one parameter."""
+    """Description of one parameter."""
 
     name: str
     """Flat name, such as friction.static."""
@@ -61,21 +61,23 @@ class Parameter:
     meaning: str
     fixed: Fixed
     choices: tuple[str, ...]
-    """What a parameter of kind str may be; empty: anything."""
+    """Allowed values of a parameter of kind str; empty: any."""
     bounds: str
-    """What is allowed, in words, but for limits that only a mistake meets; empty: anything."""
+    """Allowed values in words, without the limits that only a mistake exceeds; empty: any."""
     limits: str
-    """What is allowed, with those."""
+    """Allowed values in words, with these limits."""
     finite: bool
     """Whether a number must be finite."""
     range: tuple[float, float] | None
-    """Least and largest value of a number, if it has both and they are not those of any."""
+    """Smallest and largest value, if the parameter has both and at least one is its own."""
     least: float | None
+    """Smallest value of a number, if it has one."""
     largest: float | None
+    """Largest value of a number, if it has one."""
 
 
 def parameters_of(model: type[BaseModel], prefix: str = "") -> Iterator[Parameter]:
-    """Yield the parameters of a node's model in the order of their definition."""
+    """Yield the parameters of a node's model in order of definition."""
     for name, info in model.model_fields.items():
         kind = info.annotation
         if isinstance(kind, type) and issubclass(kind, BaseModel):
@@ -86,7 +88,7 @@ def parameters_of(model: type[BaseModel], prefix: str = "") -> Iterator[Paramete
 
 @cache
 def known_parameters(model: type[BaseModel]) -> Mapping[str, Parameter]:
-    """Return the parameters of a node's model by their flat names."""
+    """Return the parameters of a node's model by flat name."""
     return {parameter.name: parameter for parameter in parameters_of(model)}
 
 

@@ -1,4 +1,4 @@
-"""A scenario file read: sections of node name patterns, each with parameters."""
+"""Reading a scenario file: sections of node name patterns, each with parameters."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,27 +15,27 @@ from stickslip_ros.text import did_you_mean, shown
 
 PARAMETERS_KEY = "ros__parameters"
 _LARGEST = 1_000_000
-"""Characters of a scenario file."""
+"""Largest number of characters in a scenario file."""
 BASE_SECTION = "scenario"
-"""Last part of the name of the section that is for no node, but says what completes the file."""
+"""Last part of the name of the section that names the base and belongs to no node."""
 
 
 class ScenarioFile(NamedTuple):
-    """A scenario file as it stands."""
+    """The contents of a scenario file, without those of its base."""
 
     path: Path
     sections: list[tuple[str, Mapping[str, Any]]]
-    """Node name patterns, each with parameters by flat name."""
+    """Node name patterns, each with its parameters by flat name."""
     base: str | None
-    """Name or path of the scenario that completes it."""
+    """Name or path of the scenario that supplies the omitted parameters."""
 
     def apply(
         self, values: Mapping[str, dict[str, Any]], namespace: str, *, other_nodes: bool
     ) -> list[str]:
-        """Set what it says of the nodes in `namespace` in `values`, by node and flat name.
+        """Write the parameters of the nodes in `namespace` to `values`, by node and flat name.
 
-        Return the sections of unknown nodes. Raises InvalidInputError for anything unknown; with
-        `other_nodes`, but for unknown nodes.
+        Return the sections of unknown nodes. Raises InvalidInputError for an unknown parameter
+        and, unless `other_nodes` is set, for an unknown node.
         """
         other_sections: list[str] = []
         prefix = namespace.rstrip("/")
@@ -47,7 +47,7 @@ class ScenarioFile(NamedTuple):
                 other_sections.append(pattern)
             else:
                 node = pattern.rpartition("/")[2]
-                every = f"in namespace {namespace} there are {', '.join(values)}"
+                every = f"the nodes in namespace {namespace} are {', '.join(values)}"
                 raise InvalidInputError(
                     f"{self.path}: section {pattern} matches no node; "
                     + did_you_mean(node, values.keys() - {node}, every)
@@ -56,9 +56,9 @@ class ScenarioFile(NamedTuple):
 
 
 def read_file(path: Path, namespace: str) -> ScenarioFile:
-    """Read the sections of a scenario file, and the base of what is in `namespace`.
+    """Read the sections of a scenario file, and the base that it names for `namespace`.
 
-    Raises InvalidInputError for what is no scenario file.
+    Raises InvalidInputError if the file is not a scenario file.
     """
     sections: list[tuple[str, Mapping[str, Any]]] = []
     base: str | None = None
@@ -72,7 +72,7 @@ def read_file(path: Path, namespace: str) -> ScenarioFile:
 
 
 def section_matches(pattern: str, node: str) -> bool:
-    """Return whether a section applies to the node of that full name, as ROS has it."""
+    """Return whether a section applies to the node of that full name, by the rules of ROS."""
     tokens = {"**": r"(/\w+)*", "*": r"/\w+"}
     expression = "".join(tokens.get(t, "/" + re.escape(t)) for t in pattern.split("/")[1:])
     return re.fullmatch(expression, node) is not None
@@ -82,7 +82,7 @@ def _base_of(path: Path, pattern: str, parameters: Mapping[str, Any]) -> str:
     for name in parameters:
         if name != "base":
             raise InvalidInputError(
-                f"{path}: section {pattern}: unknown parameter {name:.80}; known is base"
+                f"{path}: section {pattern}: unknown parameter {name:.80}; the only one is base"
             )
     base = parameters.get("base")
     if not isinstance(base, str) or not base:
@@ -100,21 +100,21 @@ def _apply(
     parameters: Mapping[str, Any],
     nodes: Sequence[str],
 ) -> None:
-    """Give the parameters of a section to the nodes that it matches."""
+    """Write the parameters of a section to the values of the nodes that it matches."""
     known = {node: known_parameters(NODE_PARAMETERS[node]) for node in nodes}
     for name, value in parameters.items():
         takers = [node for node in nodes if len(nodes) == 1 or name in known[node]]
         if not takers:
             raise InvalidInputError(
                 f"{path}: section {pattern}: no node has a parameter {name:.80}; "
-                + did_you_mean(name, {*chain(*known.values())}, "docs/parameters.md has them all")
+                + did_you_mean(name, {*chain(*known.values())}, "docs/parameters.md lists all")
             )
         for node in takers:
             values[node][name] = value
 
 
 def _sections(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the node name pattern and the parameters, flat, of each section of the file."""
+    """Yield the node name pattern and the parameters by flat name of each section."""
     try:
         with path.open(encoding="utf-8") as file:
             text = file.read(_LARGEST + 1)

@@ -1,4 +1,4 @@
-"""The picture of a run, and what is kept of one to draw it."""
+"""The plot of a run, and the history kept for it."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -291,12 +291,12 @@ def test_where_no_force_came_the_last_one_is_dotted() -> None:
     assert x[:2] == pytest.approx((1.0, 1.5))
     assert y[0] == pytest.approx(7.0)
     (legend,) = figure.legends
-    assert "none came: the last one" in {text.get_text() for text in legend.get_texts()}
+    assert "no new force: last one" in {text.get_text() for text in legend.get_texts()}
 
 
 def test_without_such_a_gap_the_legend_says_nothing_of_it(reference: Drawn) -> None:
     (legend,) = reference.figure.legends
-    assert "none came: the last one" not in {text.get_text() for text in legend.get_texts()}
+    assert "no new force: last one" not in {text.get_text() for text in legend.get_texts()}
 
 
 def test_rounding_is_no_wave() -> None:
@@ -311,7 +311,7 @@ def test_rounding_is_no_wave() -> None:
         assert top - bottom >= 0.9e-6 * max(abs(bottom), abs(top))
 
 
-def test_what_goes_back_in_time_is_left_out_and_said() -> None:
+def test_stamps_going_back_are_omitted_and_reported() -> None:
     history = RunHistory()
     time = np.arange(0.0, 3.0, 0.01)
     ones = np.ones(len(time))
@@ -346,7 +346,7 @@ def test_very_little_makes_a_picture_too(
     save(figure, tmp_path / "picture.png")
 
 
-def test_what_is_not_to_be_believed_is_left_out() -> None:
+def test_implausible_values_are_omitted() -> None:
     history = RunHistory()
     time = np.arange(0.0, 1.0, 0.01)
     position = np.where(np.arange(100) % 10 == 3, np.nan, 1e99)
@@ -429,4 +429,4 @@ def test_forces_that_did_not_act_are_dots() -> None:
     (legend,) = figure.legends
     texts = {text.get_text() for text in legend.get_texts()}
     assert "sent, did not act" in texts
-    assert "none came: the last one" not in texts
+    assert "no new force: last one" not in texts
