@@ -1,13 +1,18 @@
 """`stickslip list`: the scenarios, friction laws and control laws that can be named."""
 
 import argparse
+import sys
 from inspect import getdoc
+from itertools import chain, repeat
 from pathlib import Path
+from shutil import get_terminal_size
+from textwrap import wrap
 from typing import Any
 
 from stickslip_ros.app.arguments import add_json
 from stickslip_ros.app.optional_dependencies import interrupts_kept
-from stickslip_ros.app.output import print_json, print_table
+from stickslip_ros.app.output import print_json
+from stickslip_ros.text import printable
 from stickslip_ros.versions import versions
 
 
@@ -52,13 +57,31 @@ def run(arguments: argparse.Namespace) -> int:
             }
         )
         return 0
-    rows = [[scenario["name"], scenario["description"]] for scenario in scenarios]
-    print_table("", ["scenario", "description"], rows)
-    for heading, laws in (("friction law", friction_laws), ("control law", [washout])):
-        rows = [[law["name"], _short(law["parameters"]), law["description"]] for law in laws]
+    _print("scenarios", {each["name"]: [each["description"]] for each in scenarios})
+    for heading, laws in (
+        ("friction laws, plant.friction.law", friction_laws),
+        ("control laws", [washout]),
+    ):
         print()
-        print_table("", [heading, "parameters", "description"], rows)
+        _print(
+            heading, {law["name"]: [law["description"], _short(law["parameters"])] for law in laws}
+        )
     return 0
+
+
+def _print(heading: str, items: dict[str, list[str]]) -> None:
+    """Print names with lines of text beside them, wrapped on a terminal."""
+    print(f"{heading}:")
+    width = max(map(len, items)) + 4
+    columns = get_terminal_size().columns if sys.stdout.isatty() else 0
+    for name, texts in items.items():
+        lines = [
+            line
+            for text in texts
+            for line in (wrap(text, max(columns - width, 20)) if columns else [text])
+        ]
+        for lead, line in zip(chain([f"  {name}"], repeat("")), lines, strict=False):
+            print(printable(f"{lead:{width}}{line}"))
 
 
 def _scenario(name: str, path: Path) -> dict[str, str]:
@@ -68,4 +91,4 @@ def _scenario(name: str, path: Path) -> dict[str, str]:
 
 
 def _short(parameters: list[str]) -> str:
-    return ", ".join(parameter.rpartition(".")[2] for parameter in parameters)
+    return "parameters: " + ", ".join(parameter.rpartition(".")[2] for parameter in parameters)

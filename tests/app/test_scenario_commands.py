@@ -1,6 +1,7 @@
 """list, show, new and schema: what a user learns of scenarios, and the file to edit."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +18,13 @@ from tests.scenarios.conftest import read_by_ros  # noqa: F401 - a fixture used 
 def test_list_names_what_can_be_given_by_name(stickslip: Run) -> None:
     done = stickslip("list")
     assert (done.returncode, done.stderr) == (0, "")
-    lines = [line.split("  ", 1) for line in done.stdout.splitlines() if "  " in line]
-    shown = {name: text.strip() for name, text in lines}
+    lines = done.stdout.splitlines()
+    named = [line.split(maxsplit=1) for line in lines if re.match(r"  \w", line)]
+    shown = dict(named)
     assert shown["feed_drive"].startswith("The slide of a machine tool: 100 kg, 16 Hz")
-    assert shown["stribeck"].startswith("static, minimum, minimum_speed  ")
-    assert "linear_gain" in shown["washout"]
+    assert shown["stribeck"].startswith("Cubic Stribeck law")
+    assert "parameters: static, minimum, minimum_speed" in [line.strip() for line in lines]
+    assert "linear_gain" in lines[-1]
     found = json.loads(stickslip("list", "--json").stdout)
     assert [scenario["name"] for scenario in found["scenarios"]] == list(shipped_scenarios())
     assert "plant.friction.slope" in found["friction_laws"][2]["parameters"]
