@@ -88,11 +88,13 @@ def _command(name: str, line: str, example: str) -> Iterator[str]:
             positional.append(f"{value} [{value} ...]" if action.nargs == "+" else value)
         values = "" if action.nargs == 0 else f" {value}"
         names = [f"`{option}{values}`" for option in action.option_strings] or [f"`{value}`"]
+        if action.required and action.option_strings:
+            positional.append(f"{action.option_strings[0]}{values}")
         if action.dest != "help":
             rows.append([", ".join(names), formatter._expand_help(action).replace("|", "\\|")])
     yield f"### {name}\n"
-    usage = " ".join(["stickslip", name, *positional, "[OPTION ...]" if parser._optionals else ""])
-    yield f"`{usage.rstrip()}`\n"
+    usage = ["stickslip", name, *positional, *(["[OPTION ...]"] if rows else [])]
+    yield f"`{' '.join(usage)}`\n"
     description = " ".join((parser.description or line).split())
     yield f"{description[0].upper()}{description[1:].rstrip('.')}.\n"
     if rows:
