@@ -94,6 +94,7 @@ setup(
             "distributed",
             "hypothesis",
             "ipykernel",  # runs the notebooks of examples/, with nbclient
+            "jsonschema",  # checks scenarios with the schema that editors use
             "markdown-it-py",  # finds the blocks of code in the docs
             "nbclient",
             "playwright",  # drives the browser of the system: no download of its own

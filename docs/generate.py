@@ -21,7 +21,7 @@ from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters, 
 from stickslip_ros.studies.stability import stability
 
 HERE = Path(__file__).parent
-PAGES = ("parameters.md", "topics.md", "theory.md", "controllers.md")
+PAGES = ("parameters.md", "topics.md", "theory.md", "controllers.md", "command-line.md")
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -60,6 +60,45 @@ def _parameter_row(parameter: Parameter) -> list[str]:
         parameter.fixed.changes,
         parameter.meaning.removesuffix("."),
     ]
+
+
+def commands() -> Iterator[str]:
+    """Yield every command by group, with its arguments and options."""
+    from stickslip_ros.app.commands import COMMANDS, EXAMPLES
+
+    groups = dict.fromkeys(group for group, _ in COMMANDS.values())
+    for group in groups:
+        yield f"## {group}\n"
+        for name, (own_group, line) in COMMANDS.items():
+            if own_group == group:
+                yield from _command(name, line, EXAMPLES.get(name, f"stickslip {name}"))
+
+
+def _command(name: str, line: str, example: str) -> Iterator[str]:
+    from stickslip_ros.app.main import command_parser
+
+    parser = command_parser(name)
+    formatter = parser._get_formatter()
+    positional: list[str] = []
+    rows: list[list[str]] = []
+    for action in parser._actions:
+        value = str(action.metavar or f"{{{','.join(action.choices or ())}}}")
+        if not action.option_strings:
+            positional.append(f"{value} [{value} ...]" if action.nargs == "+" else value)
+        values = "" if action.nargs == 0 else f" {value}"
+        names = [f"`{option}{values}`" for option in action.option_strings] or [f"`{value}`"]
+        if action.required and action.option_strings:
+            positional.append(f"{action.option_strings[0]}{values}")
+        if action.dest != "help":
+            rows.append([", ".join(names), formatter._expand_help(action).replace("|", "\\|")])
+    yield f"### {name}\n"
+    usage = ["stickslip", name, *positional, *(["[OPTION ...]"] if rows else [])]
+    yield f"`{' '.join(usage)}`\n"
+    description = " ".join((parser.description or line).split())
+    yield f"{description[0].upper()}{description[1:].rstrip('.')}.\n"
+    if rows:
+        yield table(["argument", "meaning"], rows)
+    yield f"Example: `{example}`\n"
 
 
 def topics() -> Iterator[str]:
@@ -171,6 +210,7 @@ def _newtons(force: float | None) -> str:
 
 BLOCKS: dict[str, Callable[[], Iterator[str]]] = {
     "parameters": parameters,
+    "commands": commands,
     "topics": topics,
     "numbers": numbers,
     "comparison": comparison,

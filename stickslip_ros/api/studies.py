@@ -36,6 +36,7 @@ from stickslip_ros.studies.basin import (
     default_axes,
 )
 from stickslip_ros.studies.columns import COLUMNS, Columns, compute_columns
+from stickslip_ros.studies.options import BASIN_COUNT, BASIN_COURSE
 from stickslip_ros.studies.plan import Axis, Carry, Grid, RandomSample
 from stickslip_ros.studies.runner import CountPoints
 from stickslip_ros.studies.settling import SettlingCourse

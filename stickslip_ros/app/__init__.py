@@ -1,4 +1,4 @@
-"""Commands: what a person starts, one file each."""
+"""The commands of `stickslip`, one file each."""
 
 INTERRUPTED = 130
 """Exit status of a command that a signal has ended."""

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+import warnings
 from collections.abc import Collection, Generator
 from contextlib import contextmanager
 from math import isfinite
@@ -20,15 +21,21 @@ if TYPE_CHECKING:
 
     from stickslip_ros.scenarios.files import Scenario
 
-_PICTURES = (".png", ".svg", ".pdf")
+_FIGURE_FILES = (".png", ".svg", ".pdf")
+
+_SMALLEST, _LARGEST = 2, 50
+"""Width and height of a figure, inches."""
+_DPI = 20, 600
+_MOST_PIXELS = 2e8
 
 
-def add_scenario(parser: argparse.ArgumentParser) -> Any:
-    """Add SCENARIO and what modifies it; return the (exclusive) group of who controls."""
+def add_scenario_file(parser: argparse.ArgumentParser) -> None:
+    """Add SCENARIO and what modifies its values."""
     parser.add_argument(
         "scenario",
         metavar="SCENARIO",
-        help="name of a scenario that ships (paper, feed_drive), or path of a ROS parameter file",
+        help="name of a shipped scenario (`stickslip list` prints them), or path of a scenario "
+        "file ending in .yaml (`stickslip new` writes one)",
     )
     parser.add_argument(
         "-p",
@@ -41,11 +48,16 @@ def add_scenario(parser: argparse.ArgumentParser) -> Any:
     parser.add_argument(
         "--base",
         metavar="SCENARIO",
-        help="scenario to take from what a parameter file leaves out (default: the one that its "
-        "section /**/scenario names)",
+        help="scenario that gives the values that a scenario file omits (default: the one that "
+        "its section /**/scenario names)",
     )
+
+
+def add_scenario(parser: argparse.ArgumentParser) -> Any:
+    """Add SCENARIO, what modifies it, and --no-control; return the exclusive group of the last."""
+    add_scenario_file(parser)
     control = parser.add_mutually_exclusive_group()
-    control.add_argument("--no-control", action="store_true", help="leave the controller out")
+    control.add_argument("--no-control", action="store_true", help="run without the controller")
     return control
 
 
@@ -72,35 +84,95 @@ def add_network(parser: argparse.ArgumentParser, meaning: str) -> None:
 
 
 def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
-    """Add --plot, which draws what is `shown`."""
+    """Add --plot, which draws what is `shown`, and what the figure is to look like."""
     parser.add_argument(
         "--plot",
         type=Path,
         metavar="FILE",
-        help=f"draw {shown} ({', '.join(_PICTURES)}); an existing file is replaced",
+        help=f"draw {shown} ({', '.join(_FIGURE_FILES)}); an existing file is replaced",
     )
+    parser.add_argument(
+        "--size",
+        type=_size,
+        metavar="WxH",
+        help="width and height of the figure, inches, as in --size 6x4",
+    )
+    parser.add_argument(
+        "--dpi", type=_dpi, metavar="N", help="dots per inch of the figure (default: 130)"
+    )
+    parser.add_argument("--no-title", action="store_true", help="omit the title of the figure")
 
 
-def check_picture(path: Path | None) -> None:
-    """Refuse what no picture can be written to, before anything is computed."""
-    if path is not None:
-        if path.suffix.lower() not in _PICTURES:
-            raise InvalidInputError(f"--plot {path}: must end in one of {', '.join(_PICTURES)}")
-        _check_writable("--plot", path)
+def check_figure(arguments: argparse.Namespace) -> None:
+    """Refuse a figure that cannot be written, before anything is computed."""
+    path: Path | None = arguments.plot
+    size: tuple[float, float] | None = arguments.size
+    dpi: int | None = arguments.dpi
+    given = {
+        "--size": size is not None and f"{size[0]:g}x{size[1]:g}",
+        "--dpi": dpi,
+        "--no-title": arguments.no_title and "",
+    }
+    shown = [
+        f"{name} {value}".rstrip() for name, value in given.items() if value not in (None, False)
+    ]
+    if path is None:
+        if shown:
+            raise InvalidInputError(f"{' '.join(shown)}: needs --plot FILE, which is not given")
+        return
+    if path.suffix.lower() not in _FIGURE_FILES:
+        raise InvalidInputError(f"--plot {path}: must end in one of {', '.join(_FIGURE_FILES)}")
+    if size is not None and dpi is not None and size[0] * size[1] * dpi**2 > _MOST_PIXELS:
+        raise InvalidInputError(
+            f"{' '.join(shown[:2])}: would be {size[0] * size[1] * dpi**2:.3g} pixels, and must be "
+            f"at most {_MOST_PIXELS:g}"
+        )
+    _check_writable("--plot", path)
 
 
-def write_picture(path: Path, figure: "Figure") -> None:
-    """Write a figure to the `path` that --plot names."""
-    from stickslip_ros.plots.style import save  # half as long again to import as everything else
+def write_figure(arguments: argparse.Namespace, figure: "Figure") -> None:
+    """Write a figure to the file that --plot names."""
+    from stickslip_ros.plots.style import DPI, adapt, save
 
-    with writing("--plot", path):
-        save(figure, path)
+    adapt(figure, size=arguments.size, title=not arguments.no_title)
+    with writing("--plot", arguments.plot), warnings.catch_warnings():
+        warnings.filterwarnings("error", "constrained_layout not applied", UserWarning)
+        try:
+            save(figure, arguments.plot, dots_per_inch=arguments.dpi or DPI)
+        except UserWarning:
+            width, height = figure.get_size_inches()
+            raise InvalidInputError(
+                f"--size {width:g}x{height:g}: is too small for this figure"
+            ) from None
+
+
+def _size(text: str) -> tuple[float, float]:
+    """Parse WIDTHxHEIGHT, inches."""
+    parts = text.lower().split("x")
+    try:
+        width, height = (float(part) for part in parts)
+    except ValueError:
+        width = height = float("nan")
+    if not (_SMALLEST <= width <= _LARGEST and _SMALLEST <= height <= _LARGEST):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not WIDTHxHEIGHT in inches, each from {_SMALLEST} to {_LARGEST}, such as "
+            "6x4"
+        )
+    return width, height
+
+
+def _dpi(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and _DPI[0] <= int(text) <= _DPI[1]):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a whole number of dots per inch from {_DPI[0]} to {_DPI[1]}"
+        )
+    return int(text)
 
 
 def check_new(option: str, path: Path) -> None:
     """Refuse `path`, given with `option`, where there is a file, or none can be written."""
     if path.exists():
-        raise InvalidInputError(f"{option} {path}: exists already, and is left as it is")
+        raise InvalidInputError(f"{option} {path}: exists already; it is not overwritten")
     _check_writable(option, path)
 
 
@@ -142,7 +214,8 @@ def scenario_of(
 ) -> "Scenario":
     """Return the scenario that was asked for, `overrides` applied after those given.
 
-    Of what is left to defaults a person is told, but for what is `unused` (NODE.PARAMETER).
+    A sentence on standard error names the values that are left to their defaults, except those that
+    are `unused` (NODE.PARAMETER).
     """
     with interrupts_kept():
         from stickslip_ros.scenarios.files import load_scenario
@@ -163,7 +236,7 @@ def scenario_of(
     if defaults:
         sentence = (
             f"{scenario.path} does not give {', '.join(defaults)}: these are the defaults; "
-            "--base SCENARIO takes what is left out from another scenario"
+            "--base SCENARIO takes omitted values from another scenario"
         )
         print(printable(sentence), file=sys.stderr)
     return scenario

@@ -2,37 +2,30 @@
 
 import argparse
 from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
     add_scenario,
-    check_picture,
+    check_figure,
     scenario_of,
-    write_picture,
+    write_figure,
 )
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_table
 from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.plots.basin_table import basin_table
-from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.basin import (
-    COUNT,
-    COURSE,
-    POSITION,
-    VELOCITY,
-    Basins,
-    basin_study,
-    default_axes,
-)
-from stickslip_ros.studies.columns import Columns
-from stickslip_ros.studies.plan import Axis, Grid, Plan, RandomSample
+from stickslip_ros.studies.options import BASIN_COUNT, BASIN_COURSE
 
-HELP = "find which motion each start leads to, and the share of starts that each motion gets"
+if TYPE_CHECKING:
+    from stickslip_ros.scenarios.files import Scenario
+    from stickslip_ros.studies.plan import Plan
 
-_DESCRIPTION = f"""{HELP} (basin stability), over a grid of starts or a random sample. A start is a
+_DESCRIPTION = f"""Find the motion that each initial state leads to, and the share of initial
+states for each motion (basin stability), over a grid or a random sample. An initial state is a
 displacement and a velocity of the slide; the washout filter is at rest. Each motion is followed
-until it is steady, for {COURSE.patience} transients at most."""
+until it is steady, for at most {BASIN_COURSE.patience} transients."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,56 +36,63 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             f"--{name}",
             metavar="A:B:COUNT",
-            help=f"{what} of the grid, {unit}, as in --{name} -2:2:{COUNT} (of a --sample A:B "
-            f"will do; default: {COUNT}, twice as far to either side as a vibration goes, about)",
+            help=f"{what} of the grid, {unit}, as in --{name} -2:2:{BASIN_COUNT}; A:B is enough "
+            f"for a --sample (default: {BASIN_COUNT} values over about twice the range of a "
+            "vibration)",
         )
     parser.add_argument(
         "--sample",
         type=int,
         metavar="COUNT",
-        help="so many random starts, uniformly distributed between the ends of --position and "
-        "--velocity, instead of the grid",
+        help="use COUNT random initial states instead of the grid, uniformly distributed between "
+        "the ends of --position and --velocity",
     )
     parser.add_argument(
-        "--seed", type=int, metavar="SEED", help="which sample it is, 0 or more (default: 0)"
+        "--seed", type=int, metavar="SEED", help="seed of the random sample, 0 or more (default: 0)"
     )
-    add_running(parser, COURSE)
-    add_plot(parser, "which motion each start leads to")
+    add_running(parser, BASIN_COURSE)
+    add_plot(parser, "the motion that each initial state leads to")
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.plots.basin_table import basin_table
+        from stickslip_ros.studies.basin import Basins, basin_study
     scenario = scenario_of(arguments)
     study = basin_study(
         scenario,
         _plan(arguments, scenario),
-        course=course_of(arguments, COURSE),
+        course=course_of(arguments, BASIN_COURSE),
         continuous=arguments.continuous_control,
     )
-    check_picture(arguments.plot)
+    check_figure(arguments)
     label = f"basins of {scenario.name}, {study.plan.size} starts"
     with computed(arguments, study, label) as journal:
         basins = Basins.from_points(journal.points())
         made = {"attractors": [asdict(attractor) for attractor in basins.attractors]}
         if arguments.plot is not None:
-            # Half as long again to import as everything else.
             from stickslip_ros.plots.basin_picture import study_figure
+            from stickslip_ros.studies.columns import Columns
 
             columns = Columns.from_journal(journal)
-            write_picture(arguments.plot, study_figure(columns, basins, study))
+            write_figure(arguments, study_figure(columns, basins, study))
         write_results(arguments, journal, {"attractor": basins.place}, made)
         if not arguments.json:
             print_table(*basin_table(study, basins))
     return 0
 
 
-def _plan(arguments: argparse.Namespace, scenario: Scenario) -> Plan:
+def _plan(arguments: argparse.Namespace, scenario: "Scenario") -> "Plan":
+    from stickslip_ros.studies.basin import POSITION, VELOCITY, default_axes
+    from stickslip_ros.studies.plan import Axis, Grid, RandomSample
+
     if arguments.seed is not None and arguments.sample is None:
         raise InvalidInputError(f"--seed {arguments.seed}: is for a random --sample")
     if arguments.seed is not None and arguments.seed < 0:
         raise InvalidInputError(f"--seed {arguments.seed}: must be 0 or more")
-    axes = list(default_axes(scenario, COUNT))
+    axes = list(default_axes(scenario, BASIN_COUNT))
     for place, (option, parameter) in enumerate((("position", POSITION), ("velocity", VELOCITY))):
         text: str | None = getattr(arguments, option)
         if text is None:

@@ -12,10 +12,53 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "repair": ("Analyze", "write a sound bag from one that is cut off or damaged"),
     "stability": ("Analyze", "compute equilibrium, Hopf speeds, limit cycles and critical gains"),
     "design": ("Design", "propose controller gains that suppress the vibration"),
-    "list": ("Scenarios", "list scenarios, friction laws and nodes"),
+    "list": ("Scenarios", "list the scenarios, friction laws and control laws"),
     "show": ("Scenarios", "show every parameter of a scenario and where its value comes from"),
     "new": ("Scenarios", "write a complete, commented scenario file to edit"),
     "schema": ("Scenarios", "print the JSON schema of scenario files, for editors"),
     "paper": ("Paper", "reproduce the figures and the claims of the paper"),
     "completion": ("Shell", "print the completion script for bash or zsh"),
 }
+
+EXAMPLES: dict[str, str] = {
+    "run": "stickslip run feed_drive --duration 10 --dashboard",
+    "dashboard": "stickslip dashboard --namespace feed_drive",
+    "set": "stickslip set plant.belt_speed=0.03 washout_controller.linear_gain=-2000",
+    "replay": "stickslip replay bags/reference --rate 2",
+    "simulate": "stickslip simulate feed_drive -p plant.belt_speed=0.03 --duration 10",
+    "sweep": "stickslip sweep paper --no-control --over plant.belt_speed=0.02:0.6:300 "
+    "--plot diagram.png",
+    "basin": "stickslip basin paper --position=-2:2:20 --velocity=-2:2:20 --plot basin.png",
+    "report": "stickslip report bags/before bags/after --plot compared.png",
+    "repair": "stickslip repair bags/killed bags/sound",
+    "stability": "stickslip stability feed_drive --plot map.png",
+    "design": "stickslip design feed_drive --belt-speed 0.01:0.05 --out designed.yaml",
+    "list": "stickslip list",
+    "show": "stickslip show feed_drive",
+    "new": "stickslip new my_drive.yaml --from feed_drive",
+    "schema": "stickslip schema > scenario.schema.json",
+    "paper": "stickslip paper --out reproduction",
+    "completion": 'eval "$(stickslip completion bash)"',
+}
+"""An example of each command, at the end of its help."""
+
+_OPTIONS = {
+    "-h, --help": "show this help, or that of a command: stickslip COMMAND --help",
+    "--version": "show the versions of this package and of what it uses",
+}
+
+
+def overview() -> str:
+    """Return the help of the program: its commands by group."""
+    width = max(map(len, (*COMMANDS, *_OPTIONS))) + 2
+    groups: dict[str, list[str]] = {}
+    for name, (group, meaning) in COMMANDS.items():
+        groups.setdefault(group, []).append(f"  {name:{width}}{meaning}")
+    groups["Options"] = [f"  {name:{width}}{meaning}" for name, meaning in _OPTIONS.items()]
+    parts = [
+        "usage: stickslip COMMAND [OPTION ...]",
+        "Simulate the stick-slip vibration of a feed drive, control it and measure it.",
+        *("\n".join([f"{group}:", *lines]) for group, lines in groups.items()),
+        "A first example: stickslip simulate feed_drive",
+    ]
+    return "\n\n".join(parts)

@@ -1,4 +1,4 @@
-"""`make demo`: the washout filter kills the vibration of a feed drive, through real ROS topics."""
+"""`make demo`: the washout filter suppresses the vibration of a feed drive, over ROS topics."""
 
 import sys
 
@@ -47,7 +47,7 @@ def _demonstrate() -> None:
         f"{_DURATION:g} s of {_SCENARIO} in lockstep: plant, washout controller and analyzer as "
         f"ROS 2 nodes, {reach}; the controller acts from {switched_on:g} s on"
     )
-    figures, interrupted = record(scenario, bag, composed=True)
+    results, interrupted = record(scenario, bag, composed=True)
     if interrupted:
         raise KeyboardInterrupt
     parts = {
@@ -55,15 +55,15 @@ def _demonstrate() -> None:
         f"after ({_DURATION - switched_on:g} s)": report_of_bag(bag, start=switched_on),
     }
     print_figures(
-        f"{figures['samples']} samples, {figures['lost_samples']} lost, "
-        f"{figures['steps_per_second']:.0f} steps per second",
+        f"{results['samples']} samples, {results['lost_samples']} lost, "
+        f"{results['steps_per_second']:.0f} steps per second",
         {title: {name: part[name] for name in _FIGURES} for title, part in parts.items()},
     )
-    picture = bag.with_suffix(".png")
+    figure = bag.with_suffix(".png")
     with Recording(bag) as recording:
         states, forces = recording.joint_states, recording.control_forces
-    save(control_coming_on_figure(states, forces, switched_on, around=(0.5, 1.0)), picture)
-    print(f"bag:     {bag}\npicture: {picture}")
+    save(control_coming_on_figure(states, forces, switched_on, around=(0.5, 1.0)), figure)
+    print(f"bag:    {bag}\nfigure: {figure}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""`stickslip design`: gains for a drive, tried out by simulation."""
+"""`stickslip design`: controller gains for a drive, verified by simulation."""
 
 import argparse
 import shlex
@@ -6,33 +6,33 @@ import sys
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
     add_scenario,
+    check_figure,
     check_new,
-    check_picture,
     made_of,
     scenario_of,
-    write_picture,
+    write_figure,
     writing,
 )
-from stickslip_ros.app.output import print_json, print_table, progress_bar
+from stickslip_ros.app.optional_dependencies import interrupts_kept
+from stickslip_ros.app.output import print_json, print_parts, progress_bar
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.plots.design_table import CONTROLLER, MARGINS, WORST, design_tables
-from stickslip_ros.studies.design import Design, Task, design
-from stickslip_ros.studies.design_task import OWN_SPEED_RANGE
+from stickslip_ros.studies.options import OWN_SPEED_RANGE
 from stickslip_ros.text import printable
 
-HELP = "propose corner frequency and gains that damp the vibration within a force limit"
+if TYPE_CHECKING:
+    from stickslip_ros.studies.design import Design
 
-_DESCRIPTION = f"""{HELP}. The drive, rate and force_delay are the scenario's, the force limit is
-washout_controller.force_limit (-p washout_controller.force_limit=200). Its gains do not matter.
-What is proposed was simulated: the vibration is caught at several belt speeds and phases."""
-
-_PROPOSED = [f"washout_controller.{name}" for name in CONTROLLER if name != "force_limit"]
+_DESCRIPTION = """Propose a cutoff frequency and gains that suppress the vibration within a force
+limit. The scenario gives the drive, rate and force_delay; the force limit is
+washout_controller.force_limit (-p washout_controller.force_limit=200). The gains of the scenario
+are not used. The proposal is verified by simulation, at several belt speeds and phases of the
+vibration."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--belt-speed",
         metavar="LOW:HIGH",
         help="range of belt speeds to design for, m/s, both above zero; one number for a single "
-        f"speed (default: the scenario's belt speed, give or take {OWN_SPEED_RANGE:.0%})".replace(
+        f"speed (default: the scenario's belt speed, plus or minus {OWN_SPEED_RANGE:.0%})".replace(
             "%", "%%"
         ),
     )
@@ -51,38 +51,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FILE",
-        help="write the scenario there, complete, with what is proposed; an existing file is left "
-        "alone",
+        help="write a complete scenario with the proposed gains; an existing file is refused",
     )
-    add_plot(parser, "the decay rate over corner frequency and linear gain")
+    add_plot(parser, "the decay rate over cutoff frequency and linear gain")
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    scenario = scenario_of(arguments, unused=_PROPOSED)
+    with interrupts_kept():
+        from stickslip_ros.plots.design_table import CONTROLLER, design_tables
+        from stickslip_ros.studies.design import Task, design
+    proposed = [f"washout_controller.{name}" for name in CONTROLLER if name != "force_limit"]
+    scenario = scenario_of(arguments, unused=proposed)
     task = Task.from_scenario(scenario, _belt_speeds(arguments.belt_speed))
     if arguments.out is not None:
         check_new("--out", arguments.out)
-    check_picture(arguments.plot)
+    check_figure(arguments)
     with progress_bar(f"designing for {scenario.name}", 1.0) as progress:
         found = design(task, progress)
     if arguments.json:
         print_json({**_as_dict(found), **made_of(scenario)})
     else:
-        for part in design_tables(scenario.name, found):
-            if isinstance(part, str):
-                print(part)
-            else:
-                print_table(*part)
+        print_parts(design_tables(scenario.name, found))
         if found.parameter_file is not None and arguments.out is None:
             print(
-                "--out FILE writes the scenario with these gains, --json has it as parameter_file"
+                "--out FILE writes the scenario with these gains, --json prints it: parameter_file"
             )
     if arguments.out is not None:
         _write(arguments.out, found)
     if arguments.plot is not None:
-        _draw(arguments.plot, found)
+        _draw(arguments, found)
     return 0
 
 
@@ -98,9 +97,9 @@ def _belt_speeds(text: str | None) -> tuple[float, float] | None:
     return speeds[0], speeds[-1]
 
 
-def _write(path: Path, found: Design) -> None:
+def _write(path: Path, found: "Design") -> None:
     if found.parameter_file is None:
-        _leave_out(f"--out {path}: not written")
+        _report_omitted(f"--out {path}: not written")
         return
     with writing("--out", path), path.open("x", encoding="utf-8") as file:
         file.write(found.parameter_file)
@@ -108,22 +107,23 @@ def _write(path: Path, found: Design) -> None:
     print(f"{printable(str(path))} is written: `{printable(command)}` runs it", file=sys.stderr)
 
 
-def _draw(path: Path, found: Design) -> None:
-    # Half as long again to import as everything else.
+def _draw(arguments: argparse.Namespace, found: "Design") -> None:
     from stickslip_ros.plots.stability_map import stability_figure
 
     around = found.map_around()
     if around is None:
-        _leave_out(f"--plot {path}: not drawn")
+        _report_omitted(f"--plot {arguments.plot}: not drawn")
     else:
-        write_picture(path, stability_figure(around, None))
+        write_figure(arguments, stability_figure(around, None))
 
 
-def _leave_out(what: str) -> None:
-    print(f"stickslip design: {what}, for there is nothing to propose", file=sys.stderr)
+def _report_omitted(what: str) -> None:
+    print(f"stickslip design: {what}, because there is nothing to propose", file=sys.stderr)
 
 
-def _as_dict(found: Design) -> dict[str, Any]:
+def _as_dict(found: "Design") -> dict[str, Any]:
+    from stickslip_ros.plots.design_table import CONTROLLER, MARGINS, WORST
+
     controller, slowest, task = found.controller, found.slowest, found.task
     values = asdict(controller) if controller else dict.fromkeys(CONTROLLER)
     checks = [asdict(check) for check in found.checks]

@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import NoReturn
 
 from stickslip_ros.app import INTERRUPTED
-from stickslip_ros.app.commands import COMMANDS
+from stickslip_ros.app.commands import COMMANDS, EXAMPLES, overview
 from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.interrupts import raise_interrupts
@@ -44,6 +44,18 @@ def _load(name: str) -> ModuleType:
             from stickslip_ros.app import replay as command
         case "paper":
             from stickslip_ros.app import paper as command
+        case "set":
+            from stickslip_ros.app import set as command
+        case "list":
+            from stickslip_ros.app import list as command
+        case "show":
+            from stickslip_ros.app import show as command
+        case "new":
+            from stickslip_ros.app import new as command
+        case "schema":
+            from stickslip_ros.app import schema as command
+        case "completion":
+            from stickslip_ros.app import completion as command
         case _:
             raise AssertionError(name)
     return command
@@ -52,7 +64,7 @@ def _load(name: str) -> ModuleType:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit with its status.
 
-    0 done; 1 the run failed; 2 what came in is refused; 130 interrupted.
+    0 done; 1 the run failed; 2 the input is refused; 130 interrupted.
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
     command = " ".join(given[:1])
@@ -66,6 +78,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
         raise_interrupts()
+        if not given or given[0] in ("-h", "--help"):
+            print(overview(), flush=True)
+            sys.exit(0)
         parser = _parser(given)
         if command and not command.startswith("-") and command not in COMMANDS:
             parser.error(f"unknown command {command!r:.80}; {did_you_mean(command, COMMANDS)}")
@@ -80,10 +95,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt as error:
         print(": ".join([f"stickslip {command}: interrupted", *error.args]), file=sys.stderr)
         status = INTERRUPTED
-    except BrokenPipeError:  # whoever read our output has seen enough
+    except BrokenPipeError:  # the reader of our output has closed it
         sys.stdout = nowhere()
         status = 0
-    except OSError as error:  # the disk that standard output goes to is full, for one
+    except OSError as error:  # such as a full disk below standard output
         sys.stdout = nowhere()
         print(f"stickslip {command}: {_reason(error)}", file=sys.stderr)
         status = 1
@@ -91,14 +106,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _unrecognized(arguments: Sequence[str], usage: str) -> str:
-    """Return what is wrong with arguments that no parser has taken, and what they may stand for."""
+    """Return the message about unknown arguments, with the options that may be meant."""
     option = next((text for text in arguments if text.startswith("--")), "").partition("=")[0]
     meant = did_you_mean(option, set(re.findall(r"--[a-z][\w-]*", usage)), "")
     return "; ".join(filter(None, [f"unrecognized arguments: {' '.join(arguments)}", meant]))
 
 
 def _with_negative_values(given: Sequence[str]) -> list[str]:
-    """Join what begins with a negative number to its option: argparse takes it for another."""
+    """Join a value that begins with a negative number to its option: argparse reads an option."""
     joined: list[str] = []
     for word in given:
         negative = re.match(r"-(\.?\d|inf)", word)
@@ -129,12 +144,20 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     chosen = next((word for word in given if not word.startswith("-")), "")
     for name, (_, line) in COMMANDS.items():
-        subparser = commands.add_parser(name, help=line, description=line)
+        example = f"example: {EXAMPLES[name]}" if name in EXAMPLES else None
+        subparser = commands.add_parser(name, help=line, description=line, epilog=example)
         if name == chosen:
             with interrupts_kept():
                 command = _load(name)
             command.add_arguments(subparser)
             subparser.set_defaults(run=command.run, parser=subparser)
+    return parser
+
+
+def command_parser(name: str) -> argparse.ArgumentParser:
+    """Return the parser of a command alone."""
+    parser = argparse.ArgumentParser(prog=f"stickslip {name}", description=COMMANDS[name][1])
+    _load(name).add_arguments(parser)
     return parser
 
 

@@ -1,4 +1,4 @@
-"""What only some commands need: ROS, and what the dashboard is made with."""
+"""What only some commands need: ROS, and the packages of the dashboard."""
 
 import signal
 from collections.abc import Generator
@@ -10,7 +10,7 @@ from stickslip_ros.errors import RunError
 
 @contextmanager
 def loading_ros() -> Generator[None]:
-    """Import in it what needs ROS; raises RunError where ROS cannot be loaded."""
+    """Wrap the imports that need ROS; raises RunError if ROS cannot be loaded."""
     from stickslip_ros.nodes.base.shared_memory import check_shared_memory
 
     try:
@@ -26,7 +26,7 @@ def loading_ros() -> Generator[None]:
 
 @contextmanager
 def interrupts_kept() -> Generator[None]:
-    """Let SIGINT wait: where it meets a C extension being loaded, it becomes an ImportError."""
+    """Delay SIGINT: during the import of a C extension it would become an ImportError."""
     kept: list[int] = []
     handler = signal.signal(signal.SIGINT, lambda number, _: kept.append(number))
     try:
@@ -38,7 +38,7 @@ def interrupts_kept() -> Generator[None]:
 
 
 def check_dashboard() -> None:
-    """Raise RunError if what the dashboard is made with is not installed."""
+    """Raise RunError if the packages of the dashboard are not installed."""
     if find_spec("nicegui") is None:
         raise RunError(
             "the dashboard needs NiceGUI, which is not installed: "

@@ -1,39 +1,27 @@
-"""How figures are shown to a person: tables on standard output, SI with sensible prefixes."""
+"""How values are printed: tables on standard output, in SI units with suitable prefixes."""
 
 import json
 import sys
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rich.cells import cell_len
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.table import Table
-from rich.text import Text
-
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.plots.measure_table import measure_table
-from stickslip_ros.plots.units import Units
 from stickslip_ros.tables import TextTable
 from stickslip_ros.text import printable
 
-_STYLES: dict[str, str] = {
-    Regime.label(Regime.EQUILIBRIUM): "green",
-    Regime.label(Regime.STICK_SLIP): "yellow",
-    Regime.label(Regime.PURE_SLIP): "yellow",
-    Regime.label(Regime.UNBOUNDED): "red",
-}
-"""Of what stands out on a terminal."""
+if TYPE_CHECKING:
+    from rich.console import Console
 
-_ALL_SI: Mapping[str, Units] = {}
+    from stickslip_ros.plots.units import Units
+
+_ALL_SI: Mapping[str, "Units"] = {}
 
 _FRAME = 3
 """Characters that the frame of a column takes, beside one for the whole table."""
 
 
 def print_json(values: Mapping[str, Any]) -> None:
-    """Print one JSON object, of what `finite` makes of the values."""
+    """Print one JSON object, with null for what is not finite."""
     json.dump(finite(values), sys.stdout, indent=2, allow_nan=False)
     print()
 
@@ -50,18 +38,22 @@ def finite(value: Any) -> Any:
 
 
 def print_figures(
-    title: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, Units] = _ALL_SI
+    title: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, "Units"] = _ALL_SI
 ) -> None:
-    """Print measures by name, one column for each of `columns`, as `measure_table` has them."""
+    """Print values by name, one column for each of `columns`, as `measure_table` has them."""
+    from stickslip_ros.plots.measure_table import measure_table
+
     print_table(*measure_table(title, columns, units))
 
 
 def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table: framed where a person looks, aligned plain text into a pipe or a file.
+    """Print a table: framed on a terminal, aligned plain text into a pipe or a file.
 
     In plain text each row is one line whatever its length, the columns two spaces or more apart.
     """
     if sys.stdout.isatty():
+        from rich.console import Console
+
         shown = [[printable(cell) for cell in row] for row in (headings, *rows)]
         _print_framed(Console(), printable(title), shown[0], shown[1:])
         return
@@ -71,23 +63,37 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
 
 @contextmanager
 def progress_bar(label: str, total: float | None) -> Generator[Callable[[float], None]]:
-    """Show progress towards `total` on standard error while a person looks at it."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
+    """Show progress towards `total` on standard error if that is a terminal."""
+    if not sys.stderr.isatty():
         yield lambda done: None
         return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
     text = TextColumn("{task.description}", markup=False)
     columns = (text, BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as bar:
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(printable(label), total=total)
         yield lambda done: bar.update(task, completed=done)
 
 
-def _print_framed(console: Console, title: str, headings: list[str], rows: list[list[str]]) -> None:
+def _print_framed(
+    console: "Console", title: str, headings: list[str], rows: list[list[str]]
+) -> None:
     """Print a table with its first column to the left and the others to the right.
 
-    Where figures side by side would not fit, each row becomes a table of its own.
+    Where the columns would not fit, each row becomes a table of its own.
     """
+    from rich.cells import cell_len
+    from rich.table import Table
+    from rich.text import Text
+
     if title:
         console.print(Text(title, "table.title"), soft_wrap=True)
     labels, *columns = zip(headings, *rows, strict=True)
@@ -107,6 +113,28 @@ def _print_framed(console: Console, title: str, headings: list[str], rows: list[
             fields = [list(field) for field in zip(headings[1:], cells, strict=True)]
             _print_framed(console, f"{headings[0]} {label}".strip(), ["", ""], fields)
         return
+    styles = _styles()
     for row in rows:
-        table.add_row(*(Text(cell, _STYLES.get(cell.partition(",")[0], "")) for cell in row))
+        table.add_row(*(Text(cell, styles.get(cell.partition(",")[0], "")) for cell in row))
     console.print(table)
+
+
+def _styles() -> dict[str, str]:
+    """Return the style of each cell that is highlighted on a terminal."""
+    from stickslip_ros.physics.measures.cycle_measures import Regime
+
+    return {
+        Regime.label(Regime.EQUILIBRIUM): "green",
+        Regime.label(Regime.STICK_SLIP): "yellow",
+        Regime.label(Regime.PURE_SLIP): "yellow",
+        Regime.label(Regime.UNBOUNDED): "red",
+    }
+
+
+def print_parts(parts: Iterable[TextTable | str]) -> None:
+    """Print tables and sentences, one after the other."""
+    for part in parts:
+        if isinstance(part, str):
+            print(part)
+        else:
+            print_table(*part)

@@ -1,4 +1,4 @@
-"""`stickslip paper`: the paper's figures and claims again, from the equations."""
+"""`stickslip paper`: the figures and claims of the paper, computed from the equations."""
 
 import argparse
 import json
@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from stickslip_ros.paper.claims import Finding
     from stickslip_ros.paper.figures import PaperFigure
 
-HELP = "reproduce the paper: its figures 2 to 13, and a report on every number and claim"
-
 _REPORT = "reproduction"
 
 
@@ -26,8 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         required=True,
         type=Path,
         metavar="DIR",
-        help=f"directory for {_REPORT}.md, {_REPORT}.json and the pictures in {_REPORT}/; what an "
-        "earlier call left there is replaced",
+        help=f"directory for {_REPORT}.md, {_REPORT}.json and the figures in {_REPORT}/; files of "
+        "an earlier call are replaced",
     )
     add_json(parser)
 
@@ -38,11 +36,11 @@ def run(arguments: argparse.Namespace) -> int:
         from stickslip_ros.paper.figures import NUMBERS
         from stickslip_ros.paper.report import as_markdown, report, verdict_counts
     out: Path = arguments.out
-    pictures = out / _REPORT
+    folder = out / _REPORT
     with writing("--out", out):
-        pictures.mkdir(parents=True, exist_ok=True)
-        (pictures / _name(NUMBERS[0])).touch()
-    figures = _draw_figures(pictures)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / _name(NUMBERS[0])).touch()
+    figures = _draw_figures(folder)
     findings = _judge(figures)
     found = report(findings, {f"{_REPORT}/{_name(n)}": figures[n] for n in NUMBERS})
     text = json.dumps(found, indent=1, ensure_ascii=False, allow_nan=False)
@@ -53,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         rows = [[verdict, str(count)] for verdict, count in verdict_counts(found).items()]
         print_table(f"{len(findings)} claims of the paper", ["verdict", "claims"], rows)
-        print(f"report:   {out / _REPORT}.md, {out / _REPORT}.json\npictures: {pictures}")
+        print(f"report:   {out / _REPORT}.md, {out / _REPORT}.json\nfigures:  {folder}")
     return 0
 
 

@@ -8,8 +8,6 @@ from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_json, print_table, progress_bar
 from stickslip_ros.versions import versions
 
-HELP = "write a sound bag from one that is cut off or damaged"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
@@ -17,8 +15,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "bag",
         metavar="BAG",
         type=Path,
-        help="bag directory, or one .mcap file, such as a killed recorder or a bad disk leaves; "
-        "it is only read",
+        help="bag directory, or one .mcap file, such as a killed recorder leaves; it is "
+        "not changed",
     )
     parser.add_argument(
         "out", metavar="OUT", type=Path, help="directory for the sound bag; must not exist"

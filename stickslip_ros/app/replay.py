@@ -11,11 +11,11 @@ from stickslip_ros.app.optional_dependencies import loading_ros
 from stickslip_ros.app.output import progress_bar
 from stickslip_ros.text import printable
 
-HELP = "publish the messages of a bag again, as they were spaced"
 DESCRIPTION = (
-    "Publish the messages of a bag again, unchanged, under their recorded names and as they were "
-    "spaced. It begins when one of the topics has a reader and, for half a second, no other reader "
-    "has come; it ends with the bag, or at Ctrl-C. The stamps in the messages stay as they are."
+    "Publish the messages of a bag again, unchanged, under their recorded names and with their "
+    "recorded spacing. The replay starts when one of the topics has a reader and no other reader "
+    "has appeared for half a second. It ends with the bag, or at Ctrl-C. The stamps in the "
+    "messages are not changed."
 )
 
 
@@ -24,33 +24,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = DESCRIPTION
     parser.usage = "%(prog)s BAG [OPTION ...]"  # argparse shows BAG last, where --topics takes it
     parser.add_argument(
-        "bag", metavar="BAG", type=Path, help="bag directory, or one .mcap file; stands first"
+        "bag", metavar="BAG", type=Path, help="bag directory, or one .mcap file; the first argument"
     )
     parser.add_argument(
         "--rate",
         type=float,
         default=1.0,
         metavar="R",
-        help="recorded time over wall time (default: 1)",
+        help="ratio of recorded time to wall time (default: 1)",
     )
     parser.add_argument(
         "--loop",
         action="store_true",
-        help="begin anew at the end, until Ctrl-C; readers see the stamps go back",
+        help="start again at the end, until Ctrl-C; readers see the stamps go back",
     )
     parser.add_argument(
         "--start",
         type=seconds,
         default=0.0,
         metavar="S",
-        help="begin at S s from the first message of the bag (default: 0)",
+        help="start at S s from the first message of the bag (default: 0)",
     )
     parser.add_argument(
         "--duration",
         type=seconds,
         default=float("inf"),
         metavar="S",
-        help="replay S s of recorded time (default: up to the end)",
+        help="replay S s of recorded time (default: until the end)",
     )
     parser.add_argument(
         "--topics",
@@ -67,9 +67,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="extend",
         default=[],
         metavar="NODE",
-        help="begin when these nodes read the topics (default: when somebody does)",
+        help="start when these nodes read the topics (default: when any node does)",
     )
-    add_network(parser, "let other machines see the topics (default: they are kept on this one)")
+    add_network(parser, "let other machines see the topics (default: loopback only)")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
     reach = keep_on_this_machine(arguments.network)
 
     def offering(topics: Sequence[str]) -> None:
-        wait = f"until {', '.join(arguments.wait_for) or 'somebody'} reads them"
+        wait = f"until {', '.join(arguments.wait_for) or 'a node'} reads them"
         offer = f"{arguments.bag}: {', '.join(topics)}, {reach}, waiting {wait}"
         print(printable(offer), file=sys.stderr)
 

@@ -1,20 +1,23 @@
 """`stickslip report`: the measures of recorded runs."""
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.arguments import add_json, add_plot, check_picture, seconds, write_picture
+from stickslip_ros.app.arguments import add_json, add_plot, check_figure, seconds, write_figure
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_figures, print_json
-from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.plots.run_history import RunHistory
-from stickslip_ros.plots.units import Units
 from stickslip_ros.plots.why_no_cycle import why_no_cycle
-from stickslip_ros.studies.recorded_drive import recorded_drive
 from stickslip_ros.text import printable
 from stickslip_ros.versions import versions
 
-HELP = "measure a recorded run, or set several side by side"
+if TYPE_CHECKING:
+    from stickslip_ros.plots.run_history import RunHistory
+
+_MOST_DRAWN = 6
+"""Bags that a figure can show, each in its own colour."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="BAG",
         nargs="+",
         type=Path,
-        help="bag directory, or one .mcap file; also one that is still recorded, cut off or "
-        "damaged: what is left of it is measured, and what is missing said",
+        help="bag directory, or one .mcap file; also one that is being recorded, cut off or "
+        "damaged: the readable part is measured, and a sentence names what is missing",
     )
     parser.add_argument(
         "--from",
@@ -33,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=0.0,
         metavar="S",
-        help="leave out what is before, s from the first sample of each bag (default: 0)",
+        help="start of the measured part, s from the first sample of each bag (default: 0)",
     )
     parser.add_argument(
         "--to",
@@ -41,39 +44,48 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=float("inf"),
         metavar="S",
-        help="leave out what is after, s from the first sample of each bag (default: the end)",
+        help="end of the measured part, s from the first sample of each bag (default: the end)",
     )
     parser.add_argument(
-        "--namespace", metavar="NS", help="ROS namespace of the drive, where a bag holds several"
+        "--namespace",
+        metavar="NS",
+        help="ROS namespace of the drive, if a bag holds several",
     )
-    add_plot(parser, "motion, force, cycles and friction law of the one bag")
+    add_plot(
+        parser,
+        "motion, force, cycles and friction law of a bag; of several bags motion and force side by "
+        "side, their cycles and phase portraits in the same panels",
+    )
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.bags.report import report_of_bag
+        from stickslip_ros.plots.run_history import RunHistory
+        from stickslip_ros.plots.units import Units
+        from stickslip_ros.studies.recorded_drive import recorded_drive
     plot: Path | None = arguments.plot
     bags: list[Path] = arguments.bags
-    check_picture(plot)
-    if plot is not None and len(bags) > 1:
-        raise InvalidInputError(f"--plot {plot}: draws one bag, and {len(bags)} were given")
-    history = None if plot is None else RunHistory()
+    check_figure(arguments)
+    if plot is not None and len({*bags}) > _MOST_DRAWN:
+        raise InvalidInputError(
+            f"--plot {plot}: draws at most {_MOST_DRAWN} bags, and {len({*bags})} were given"
+        )
+    histories = {} if plot is None else {str(bag): RunHistory() for bag in bags}
     reports = {
         str(bag): report_of_bag(
             bag,
             start=arguments.start,
             end=arguments.end,
             namespace=arguments.namespace,
-            observer=history,
+            observer=histories.get(str(bag)),
         )
-        for bag in bags
+        for bag in dict.fromkeys(bags)
     }
-    if plot is not None and history is not None:
-        # Half as long again to import as everything else.
-        from stickslip_ros.plots.recorded_run import recorded_run_figure
-
-        drive = recorded_drive(bags[0], arguments.namespace)
-        write_picture(plot, recorded_run_figure(bags[0], drive, history, reports[str(bags[0])]))
+    if plot is not None:
+        _draw(arguments, histories, reports)
     if arguments.json:
         results = [{**report, "bag": bag} for bag, report in reports.items()]
         result = results[0] if len(results) == 1 else {"reports": results}
@@ -94,3 +106,29 @@ def run(arguments: argparse.Namespace) -> int:
         for sentence in sentences:
             print(printable(f"{bag}: {sentence}") if several else sentence)
     return 0
+
+
+def _draw(
+    arguments: argparse.Namespace,
+    histories: Mapping[str, "RunHistory"],
+    reports: Mapping[str, Mapping[str, Any]],
+) -> None:
+    from stickslip_ros.physics.measures.cycle_measures import measures_of
+    from stickslip_ros.plots.recorded_run import recorded_run_figure
+    from stickslip_ros.plots.runs_figure import DrawnRun, runs_figure
+    from stickslip_ros.studies.recorded_drive import recorded_drive
+
+    runs: list[DrawnRun] = []
+    for bag, report in reports.items():
+        drive = recorded_drive(Path(bag), arguments.namespace)
+        runs.append(DrawnRun(bag, histories[bag], measures_of(report), drive))
+    if len(runs) > 1:
+        notes = [
+            f"{bag}: {sentence}"
+            for bag, report in reports.items()
+            for sentence in [*report["missing"], *report["notes"]]
+        ]
+        write_figure(arguments, runs_figure(runs, notes=notes))
+        return
+    (bag, history, _, drive), report = runs[0], reports[runs[0].name]
+    write_figure(arguments, recorded_run_figure(Path(bag), drive, history, report))

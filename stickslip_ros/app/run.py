@@ -8,8 +8,9 @@ from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from datetime import UTC, datetime
 from itertools import count
+from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.arguments import (
@@ -23,23 +24,18 @@ from stickslip_ros.app.arguments import (
     scenario_of,
     seconds,
 )
-from stickslip_ros.app.optional_dependencies import check_dashboard, loading_ros
+from stickslip_ros.app.optional_dependencies import check_dashboard, interrupts_kept, loading_ros
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
-from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.recorder import check_new_bag
-from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed_packages import find_executable
-from stickslip_ros.plots.units import Units
 from stickslip_ros.plots.why_no_cycle import why_no_cycle
 from stickslip_ros.running.namespace_lock import NamespaceInUseError
-from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, Scenario
-from stickslip_ros.scenarios.parameters import Pace, WashoutControllerParameters
+from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE
+from stickslip_ros.scenarios.pace import Pace
 from stickslip_ros.text import printable
 
-_LAW_OF_OURS = [f"washout_controller.{name}" for name in WashoutControllerParameters.law_names()]
-
-HELP = "run a scenario as ROS 2 nodes, record it and report"
+if TYPE_CHECKING:
+    from stickslip_ros.scenarios.files import Scenario
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,14 +44,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     control.add_argument(
         "--controller",
         metavar="CONTROLLER",
-        help="start this controller in place of the washout controller: a Python script, or "
-        "PACKAGE/EXECUTABLE as for `ros2 run`; "
-        "what follows -- are arguments for it, as in -- --ros-args -p gain:=3.0",
+        help="start this controller instead of the washout controller: a Python script, or "
+        "PACKAGE/EXECUTABLE as for `ros2 run`; arguments after -- are passed to it, as in "
+        "-- --ros-args -p gain:=3.0",
     )
     control.add_argument(
         "--external-controller",
         action="store_true",
-        help="start no controller, and wait for one that somebody else starts",
+        help="start no controller, and wait for one that you start yourself",
     )
     parser.add_argument(
         "--duration", type=seconds, metavar="S", help="simulated time, s (default: until Ctrl-C)"
@@ -63,7 +59,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--pace",
         choices=[str(pace) for pace in Pace],
-        help="keep to the clock, or go on as soon as the force has come (default: the scenario's)",
+        help="follow the clock, or continue as soon as each force has arrived (default: the "
+        "scenario's)",
     )
     parser.add_argument(
         "--composed",
@@ -74,20 +71,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--bag",
         type=Path,
         metavar="DIR",
-        help="directory to record to; must not exist (default: bags/<scenario>-<UTC time>)",
+        help="directory to record to; must not exist (default: a new one in bags/)",
     )
     add_namespace(parser)
     parser.add_argument(
         "--dashboard",
         action="store_true",
-        help="show the run on a web page, as `stickslip dashboard` does; the page ends with it",
+        help="show the run on a web page, as `stickslip dashboard` does, until the run ends",
     )
-    add_network(parser, "let other machines see the nodes (default: they are kept on this one)")
+    add_network(parser, "let other machines see the nodes (default: loopback only)")
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.bags.recorder import check_new_bag
+        from stickslip_ros.plots.units import Units
+        from stickslip_ros.scenarios.parameters import WashoutControllerParameters
     overrides: list[str] = []
     if arguments.pace is not None:
         overrides.append(f"plant.pace={arguments.pace}")
@@ -95,12 +96,13 @@ def run(arguments: argparse.Namespace) -> int:
         overrides.append(f"plant.duration={arguments.duration!r}")
     namespace = namespace_of(arguments.namespace)
     controller = _other_controller(arguments)
+    law_of_ours = [f"washout_controller.{name}" for name in WashoutControllerParameters.law_names()]
     scenario = scenario_of(
         arguments,
         *overrides,
         namespace=namespace,
         other_nodes=controller is not None,
-        unused=[] if controller is None else _LAW_OF_OURS,
+        unused=[] if controller is None else law_of_ours,
     )
     if controller is not None and not scenario.plant.expects_control:
         raise InvalidInputError(
@@ -110,24 +112,26 @@ def run(arguments: argparse.Namespace) -> int:
     check_new_bag(bag)
     if arguments.dashboard:
         check_dashboard()
+    # Before ROS is loaded, which takes a while.
+    _tell(_announcement(scenario, bag, composed=arguments.composed))
     with loading_ros():
         from stickslip_ros.nodes.base.network import keep_on_this_machine
     reach = keep_on_this_machine(arguments.network)
-    _tell(f"{scenario.name}: nodes in {namespace}, {reach}; recording to {bag}")
+    _tell(f"nodes in {namespace}, {reach}")
     with _dashboard(namespace) if arguments.dashboard else nullcontext():
-        figures, interrupted = record(
+        results, interrupted = record(
             scenario, bag, namespace=namespace, composed=arguments.composed, controller=controller
         )
     if arguments.json:
         command = shlex.join([arguments.controller, *arguments.further]) if controller else None
-        print_json({**figures, "controller_command": command, **made_of(scenario)})
+        print_json({**results, "controller_command": command, **made_of(scenario)})
     else:
-        report, drive = figures["report"], scenario.plant.as_drive()
-        print_figures(scenario.name, {"": {**report, **figures}}, {"": Units.for_drive(drive)})
+        report, drive = results["report"], scenario.plant.as_drive()
+        print_figures(scenario.name, {"": {**report, **results}}, {"": Units.for_drive(drive)})
         reason = why_no_cycle(report["regime"], report["duration"], drive)
         if reason is not None:
             print(reason)
-    if not figures["report"]["complete"]:
+    if not results["report"]["complete"]:
         raise RunError(f"the bag {bag} could not be written to its end")
     if interrupted:
         _tell(f"stickslip run: interrupted: the bag {bag} is closed; the nodes have ended")
@@ -135,17 +139,33 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _announcement(scenario: "Scenario", bag: Path, *, composed: bool) -> str:
+    """Return in one line what is started."""
+    from stickslip_ros.plots.units import Units
+
+    plant = scenario.plant
+    pace = "lockstep" if plant.pace is Pace.LOCKSTEP else "real time"
+    if plant.pace is Pace.REALTIME and plant.real_time_factor != 1.0:
+        pace += f" x {plant.real_time_factor:g}"
+    duration = "until Ctrl-C"
+    if isfinite(plant.duration):
+        unit = Units.for_drive(plant.as_drive()).of_unit("s")
+        duration = f"duration {plant.duration:g} {unit}".rstrip()
+    where = "in this process" if composed else "in processes of their own"
+    return f"{scenario.name}: {pace}, {duration}; starting the nodes {where}; recording to {bag}"
+
+
 def record(
-    scenario: Scenario,
+    scenario: "Scenario",
     bag: Path,
     *,
     namespace: str = DEFAULT_NAMESPACE,
     composed: bool,
     controller: Sequence[str] | None = None,
 ) -> tuple[dict[str, Any], bool]:
-    """Run the nodes into `bag`; return the figures of the run, and whether it was interrupted.
+    """Run the nodes into `bag`; return its results, and whether it was interrupted.
 
-    `controller` is the command of one in place of ours, empty for one that others start.
+    `controller` is the command of one in place of ours, empty for one that is started elsewhere.
     Raises KeyboardInterrupt where nothing was recorded before that, and RunError, with what is
     left, where the run failed.
     """
@@ -201,8 +221,8 @@ def default_bag(scenario: str) -> Path:
     return next(path for path in candidates if not path.exists())
 
 
-def _bag_of(scenario: Scenario) -> Path | None:
-    """Return where the scenario says to record to; a file, unlike -p, says it of this directory."""
+def _bag_of(scenario: "Scenario") -> Path | None:
+    """Return the bag that the scenario names; in a file it must be below this directory."""
     name = scenario.analyzer.bag
     if not name or any(given.startswith("analyzer.bag=") for given in scenario.overrides):
         return Path(name) if name else None
@@ -219,19 +239,21 @@ def _bag_of(scenario: Scenario) -> Path | None:
 
 
 def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
-    """Return the command of the controller in place of ours, empty if somebody else starts it."""
+    """Return the command of the controller in place of ours, empty if it is started elsewhere."""
     if arguments.controller is not None:
         with naming("--controller"):
             return [str(find_executable(arguments.controller)), *arguments.further]
     if arguments.further:
         raise InvalidInputError(
-            f"-- {shlex.join(arguments.further)}: what follows -- is for --controller, "
+            f"-- {shlex.join(arguments.further)}: arguments after -- are for --controller, "
             "which is not given"
         )
     return [] if arguments.external_controller else None
 
 
 def _figures(bag: Path, controller: str | None, plant: Mapping[str, str]) -> dict[str, Any]:
+    from stickslip_ros.bags.report import report_of_bag
+
     report = report_of_bag(bag)
     return {
         "bag": str(bag),
@@ -252,7 +274,9 @@ def _tell(sentence: str) -> None:
 
 
 def _state_of(bag: Path) -> str:
-    """Say what a run that failed has left."""
+    """Return what a failed run has left."""
+    from stickslip_ros.bags.reader import Recording
+
     try:
         with Recording(bag) as recording:
             if recording.complete:
@@ -261,5 +285,5 @@ def _state_of(bag: Path) -> str:
         return "nothing was recorded"
     return (
         f"the bag {bag} was not closed: `stickslip report` reads what it holds, "
-        "`stickslip repair` makes a sound one of it"
+        "`stickslip repair` writes a sound bag from it"
     )

@@ -7,21 +7,16 @@ from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
     add_scenario,
-    check_picture,
+    check_figure,
     made_of,
     naming,
     scenario_of,
     seconds,
-    write_picture,
+    write_figure,
 )
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
-from stickslip_ros.plots.run_history import RunHistory
-from stickslip_ros.plots.units import Units
 from stickslip_ros.plots.why_no_cycle import why_no_cycle
-from stickslip_ros.studies.settling import check_continuous
-from stickslip_ros.studies.simulate import default_duration, simulate
-
-HELP = "run a scenario without ROS and measure its motion"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--continuous-control",
         action="store_true",
-        help="let the controller act without sampling, as in the paper's eq. 19 "
+        help="let the controller act continuously, as in the paper's eq. 19 "
         "(default: the force is held from sample to sample, as between the nodes)",
     )
     add_plot(parser, "motion, force, cycles and friction law")
@@ -45,12 +40,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.plots.run_history import RunHistory
+        from stickslip_ros.plots.units import Units
+        from stickslip_ros.studies.settling import check_continuous
+        from stickslip_ros.studies.simulate import default_duration, simulate
     scenario = scenario_of(arguments)
     duration = arguments.duration
     if duration is None:
         duration = default_duration(scenario)
     plot: Path | None = arguments.plot
-    check_picture(plot)
+    check_figure(arguments)
     if arguments.continuous_control:
         with naming("--continuous-control:"):
             check_continuous(scenario)
@@ -66,10 +66,9 @@ def run(arguments: argparse.Namespace) -> int:
             observer=history,
         )
     if plot is not None and history is not None:
-        # Half as long again to import as everything else.
         from stickslip_ros.plots.simulated_run import simulated_run_figure
 
-        write_picture(plot, simulated_run_figure(scenario, history, measures))
+        write_figure(arguments, simulated_run_figure(scenario, history, measures))
     if arguments.json:
         print_json({**measures.as_dict(), "duration": duration, **made_of(scenario)})
     else:

@@ -1,4 +1,4 @@
-"""`stickslip stability`: what theory says of a scenario, without running it."""
+"""`stickslip stability`: the theory of a scenario, without a simulation."""
 
 import argparse
 
@@ -6,21 +6,14 @@ from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
     add_scenario,
-    check_picture,
+    check_figure,
     made_of,
     scenario_of,
-    write_picture,
+    write_figure,
 )
-from stickslip_ros.app.output import print_json, print_table, progress_bar
+from stickslip_ros.app.optional_dependencies import interrupts_kept
+from stickslip_ros.app.output import print_json, print_parts, progress_bar
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.plots.stability_table import stability_tables
-from stickslip_ros.studies.stability import (
-    stability,
-    stability_map,
-    why_no_stability_map,
-)
-
-HELP = "equilibrium, Hopf speeds, limit cycles and critical gains of a scenario, by theory"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_scenario(parser)
     add_plot(
         parser,
-        "where the sampled loop is stable and how fast it comes to rest, over corner frequency and "
+        "where the sampled loop is stable and how fast it settles, over cutoff frequency and "
         "linear gain, and the critical gain over the delay of the force",
     )
     add_json(parser)
@@ -36,9 +29,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.plots.stability_table import stability_tables
+        from stickslip_ros.studies.stability import stability, stability_map, why_no_stability_map
     scenario = scenario_of(arguments)
+    check_figure(arguments)
     if arguments.plot is not None:
-        check_picture(arguments.plot)
         reason = why_no_stability_map(scenario)
         if reason is not None:
             raise InvalidInputError(f"--plot {arguments.plot}: there is nothing to draw: {reason}")
@@ -46,16 +42,11 @@ def run(arguments: argparse.Namespace) -> int:
         found, notes = stability(scenario)
     if arguments.plot is not None:
         with progress_bar("drawing", None):
-            # Half as long again to import as everything else.
             from stickslip_ros.plots.stability_map import stability_figure
 
-            write_picture(arguments.plot, stability_figure(*stability_map(scenario)))
+            write_figure(arguments, stability_figure(*stability_map(scenario)))
     if arguments.json:
         print_json({**found, "notes": notes, **made_of(scenario)})
     else:
-        for part in stability_tables(scenario, found, notes):
-            if isinstance(part, str):
-                print(part)
-            else:
-                print_table(*part)
+        print_parts(stability_tables(scenario, found, notes))
     return 0

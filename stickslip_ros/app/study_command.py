@@ -24,26 +24,26 @@ _TABLES = (".csv", ".json")
 
 
 def add_running(parser: argparse.ArgumentParser, course: SettlingCourse) -> None:
-    """Add how each point is followed, by default as in `course`, where, and what is kept of it."""
+    """Add how each point is followed (default: `course`), where it is computed, and --out."""
     parser.add_argument(
         "--continuous-control",
         action="store_true",
-        help="let the controller act without sampling, as in the paper's eq. 19, which takes a "
-        "fraction of the time (default: the force is held from sample to sample)",
+        help="let the controller act continuously, as in the paper's eq. 19, which is several "
+        "times as fast (default: the force is held from sample to sample)",
     )
     parser.add_argument(
         "--transient",
         type=float,
         default=course.transient,
         metavar="PERIODS",
-        help="natural periods that are passed over at each point (default: %(default)g)",
+        help="natural periods that are skipped at each point (default: %(default)g)",
     )
     parser.add_argument(
         "--cycles",
         type=int,
         default=course.cycles,
         metavar="COUNT",
-        help="whole cycles that are measured then (default: %(default)d)",
+        help="whole cycles that are measured after them (default: %(default)d)",
     )
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
@@ -51,8 +51,8 @@ def add_running(parser: argparse.ArgumentParser, course: SettlingCourse) -> None
         type=_workers,
         default=1,
         metavar="COUNT",
-        help="processes of this machine that share the points (default: 1); what is found is the "
-        "same, to the last bit",
+        help="processes on this machine that share the points (default: 1); the results are the "
+        "same, bit for bit",
     )
     where.add_argument(
         "--dask",
@@ -64,19 +64,19 @@ def add_running(parser: argparse.ArgumentParser, course: SettlingCourse) -> None
         "--out",
         type=Path,
         metavar="FILE",
-        help=f"write a table of all points ({', '.join(_TABLES)}); an existing one is left alone. "
-        "Interrupted, what is done stays in FILE.part, and the same command goes on from there",
+        help=f"write a table of all points ({', '.join(_TABLES)}); an existing file is refused. "
+        "If interrupted, the finished points stay in FILE.part, and the same command continues",
     )
 
 
 def course_of(arguments: argparse.Namespace, default: SettlingCourse) -> SettlingCourse:
-    """Return how each point is to be followed, what cannot be asked for being as in `default`."""
+    """Return how each point is followed: as asked for, and otherwise as in `default`."""
     return replace(default, transient=arguments.transient, cycles=arguments.cycles)
 
 
 @contextmanager
 def computed(arguments: argparse.Namespace, study: "Study", label: str) -> "Generator[Journal]":
-    """Compute what is missing of the study, and provide its journal, complete."""
+    """Compute the missing points of the study, and provide its complete journal."""
     with interrupts_kept():
         from stickslip_ros.studies.dask_cluster import DaskError, dask_executor
         from stickslip_ros.studies.journal import Journal
@@ -88,9 +88,9 @@ def computed(arguments: argparse.Namespace, study: "Study", label: str) -> "Gene
         check_new("--out", out)
     part = None if out is None else out.with_name(f"{out.name}.part")
     with Journal(study, part) as journal:
-        kept = "; without --out nothing is kept"
+        kept = "; without --out no point is kept"
         if part is not None:
-            kept = f"; what is done stays in {part}, and the same command goes on from there"
+            kept = f"; they stay in {part}, and the same command continues from there"
         try:
             with progress_bar(label, study.plan.size) as progress:
                 if arguments.dask is None:
@@ -122,7 +122,7 @@ def write_results(
 ) -> None:
     """Write the table of a complete journal to where it was asked for, a file or as JSON.
 
-    As JSON it also holds what was `made` of all points together.
+    As JSON it also holds `made`, which belongs to all points together.
     """
     from stickslip_ros.studies.columns import write_json
 

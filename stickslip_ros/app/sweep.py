@@ -1,32 +1,30 @@
-"""`stickslip sweep`: what a scenario settles on over the values of one parameter or two."""
+"""`stickslip sweep`: the settled motion of a scenario over one parameter or two."""
 
 import argparse
+from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
     add_scenario,
-    check_picture,
+    check_figure,
     naming,
     scenario_of,
-    write_picture,
+    write_figure,
 )
+from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_table
 from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.plots.sweep_table import sweep_table, units_of
-from stickslip_ros.studies.columns import Columns, ExtraColumns
-from stickslip_ros.studies.journal import Journal
-from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settling import SettlingCourse
-from stickslip_ros.studies.sweep import sweep_study
-from stickslip_ros.studies.transitions import transitions
+from stickslip_ros.studies.options import Carry, SettlingCourse
 
-HELP = "measure what a scenario settles on, over the values of one parameter or two"
+if TYPE_CHECKING:
+    from stickslip_ros.studies.columns import ExtraColumns
+    from stickslip_ros.studies.journal import Journal
 
-_DESCRIPTION = f"""{HELP}: amplitude, regime, stick fraction and the turning points of the settled
-motion, for a bifurcation diagram (one parameter) or a map (two). A point that fails or runs away
-is a row of the table, with the reason."""
+_DESCRIPTION = """Measure the settled motion of a scenario over the values of one parameter or two:
+amplitude, regime, stick fraction and turning points, for a bifurcation diagram (one parameter) or a
+map (two). A point that fails or diverges is a row of the table, with the reason."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,14 +38,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NODE.PARAMETER=A:B:COUNT",
         help="COUNT values from A to B of a parameter of plant or washout_controller, SI units, as "
         "in --over plant.belt_speed=0.02:0.6:1000; A:B:COUNT:log for a geometric sequence. A "
-        "second --over makes it a map",
+        "second --over gives a map",
     )
     parser.add_argument(
         "--carry",
         choices=[str(carry) for carry in Carry],
-        help="begin each point where its neighbour ended, filter included, along the (last) "
-        "parameter up, down or both ways, which shows hysteresis (default: every point begins in "
-        "the scenario's initial state)",
+        help="start each point in the final state of its neighbour, filter included, with the "
+        "(last) parameter going up, down or both, which shows hysteresis (default: start every "
+        "point in the scenario's initial state)",
     )
     add_running(parser, SettlingCourse())
     add_plot(parser, "the bifurcation diagram, or the map")
@@ -55,13 +53,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--colour",
         choices=("regime", "amplitude", "stick_fraction"),
         default="regime",
-        help="what the map shows (default: %(default)s)",
+        help="quantity that the map shows (default: %(default)s)",
     )
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.plots.sweep_table import sweep_table, units_of
+        from stickslip_ros.studies.plan import Axis, Grid
+        from stickslip_ros.studies.sweep import sweep_study
+        from stickslip_ros.studies.transitions import transitions
     with naming("--over"):
         axes = [Axis.parse(text) for text in arguments.over]
     if len(axes) == 1 and arguments.colour != "regime":
@@ -73,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
         course=course_of(arguments, SettlingCourse()),
         continuous=arguments.continuous_control,
     )
-    check_picture(arguments.plot)
+    check_figure(arguments)
     plan = study.plan
     assert isinstance(plan, Grid)
     label = f"sweep of {study.scenario.name}, {plan.size} points"
@@ -88,14 +91,15 @@ def run(arguments: argparse.Namespace) -> int:
         write_results(arguments, journal, further, made)
         if not arguments.json:
             print_table(*sweep_table(study, journal.points))
+            units = units_of(study)
             for name, values in theory.items():
-                print(f"{name}: {', '.join(units_of(study).texts(values, plan.axes[0].unit))}")
+                print(f"{name}: {', '.join(units.texts(values, plan.axes[0].unit))}")
     return 0
 
 
-def _draw(arguments: argparse.Namespace, journal: Journal) -> None:
-    # Half as long again to import as everything else.
+def _draw(arguments: argparse.Namespace, journal: "Journal") -> None:
     from stickslip_ros.plots.sweep_picture import sweep_figure
+    from stickslip_ros.studies.columns import Columns
 
     columns = Columns.from_journal(journal)
-    write_picture(arguments.plot, sweep_figure(columns, journal.study, arguments.colour))
+    write_figure(arguments, sweep_figure(columns, journal.study, arguments.colour))

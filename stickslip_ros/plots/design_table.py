@@ -9,7 +9,7 @@ from stickslip_ros.studies.design import Design
 from stickslip_ros.tables import TextTable
 
 CONTROLLER = {
-    "corner_frequency": ("corner frequency", "rad/s"),
+    "corner_frequency": ("cutoff frequency", "rad/s"),
     "linear_gain": ("linear gain", "N s/m"),
     "cubic_gain": ("cubic gain", "N s^3/m^3"),
     "force_limit": ("force limit", "N"),
@@ -19,12 +19,12 @@ CONTROLLER = {
 MARGINS = {
     "gain_down": ("unstable below this share of the linear gain", ""),
     "gain_up": ("unstable above this multiple of it", ""),
-    "delay": ("unstable with this further delay", "s"),
+    "delay": ("delay margin", "s"),
 }
 WORST = {
-    "predicted_settling_time": ("settles in", "s"),
+    "predicted_settling_time": ("1 % settling time, predicted", "s"),
     "settling_time": ("simulated", "s"),
-    "predicted_peak_force": ("peak force", "N"),
+    "predicted_peak_force": ("peak force, predicted", "N"),
     "peak_force": ("simulated", "N"),
 }
 CHECKS = {"belt_speed": ("belt speed", "m/s"), "vibrates": ("vibrates", "")} | WORST
@@ -45,14 +45,14 @@ def design_tables(name: str, found: Design) -> Iterator[TextTable | str]:
         yield TextTable(task, ["proposal", ""], _rows(values, CONTROLLER, units))
         if found.margins is not None:
             margins = _rows(asdict(found.margins), MARGINS, units)
-            yield TextTable("to instability at any of these belt speeds", ["margins", ""], margins)
+            yield TextTable("margins at the worst of these belt speeds", ["margins", ""], margins)
         checks = [asdict(check) for check in found.checks]
         columns = [
             units.texts([check[key] for check in checks], unit) for key, (_, unit) in CHECKS.items()
         ]
         headings = [label for label, _ in CHECKS.values()]
         rows = list(zip(*columns, strict=True))
-        yield TextTable("while it catches the vibration", headings, rows)
+        yield TextTable("verification", headings, rows)
     if found.remark is not None:
         yield found.remark
 

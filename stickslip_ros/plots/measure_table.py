@@ -19,8 +19,8 @@ LABELS: dict[str, tuple[str, str]] = {
     "multipliers": ("Floquet multipliers", ""),
     "peak_force": ("peak control force", "N"),
     "peak_applied_force": ("peak control force acting", "N"),
-    "resting_force": ("control force at the end", "N"),
-    "resting_applied_force": ("control force acting at the end", "N"),
+    "resting_force": ("final control force", "N"),
+    "resting_applied_force": ("final control force acting", "N"),
     "samples": ("samples", ""),
     "lost_samples": ("lost samples", ""),
     "late_forces": ("late forces", ""),
@@ -35,9 +35,9 @@ LABELS: dict[str, tuple[str, str]] = {
 
 _SENT = {
     "peak_force": ("peak_applied_force", "peak control force sent"),
-    "resting_force": ("resting_applied_force", "control force sent at the end"),
+    "resting_force": ("resting_applied_force", "final control force sent"),
 }
-"""What of a force that was sent acted, and what it is called where that is not the same."""
+"""The measure of the force that acted, and the label of the sent force where the two differ."""
 
 _SAME_SCALE = {
     "amplitude": "midpoint",
@@ -45,7 +45,7 @@ _SAME_SCALE = {
     "resting_force": "peak_force",
     "resting_applied_force": "peak_applied_force",
 }
-"""Which other quantity tells how large one is that may be rounding."""
+"""The quantity with which a value is compared to see whether it is rounding error."""
 
 _ALL_SI: Mapping[str, Units] = {}
 
@@ -68,7 +68,7 @@ def measure_table(
 
 
 def _tell_apart(rows: dict[str, list[str]], columns: Mapping[str, Mapping[str, Any]]) -> None:
-    """Leave out what acted where it is not known or is what was sent, and drops without any."""
+    """Omit the force that acted if it is unknown or equals the sent one, and drops without any."""
     for sent, (applied, label) in _SENT.items():
         known = [figures.get(applied) is not None for figures in columns.values()]
         cells = zip(known, rows.get(sent, [])[1:], rows.get(applied, [])[1:], strict=False)
@@ -83,7 +83,7 @@ def _tell_apart(rows: dict[str, list[str]], columns: Mapping[str, Mapping[str, A
 def _row(
     name: str, unit: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, Units]
 ) -> list[str]:
-    """Return the cells of one figure; columns in the same units have the same prefix."""
+    """Return the cells of one row; columns in the same units have the same prefix."""
     cells: dict[str, str] = {}
     for shown_in in {units.get(column, SI) for column in columns}:
         own = [column for column in columns if units.get(column, SI) == shown_in]
@@ -95,7 +95,7 @@ def _row(
 
 
 def _shown(name: str, figures: Mapping[str, Any]) -> Any:
-    """Return what is shown of a figure: of a regime also whether it is steady."""
+    """Return the value to print; for a regime also whether it is steady."""
     value = figures.get(name)
     if name == "regime":
         return with_trend(Regime.label(value), figures.get("trend"))

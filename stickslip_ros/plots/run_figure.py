@@ -2,21 +2,31 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple, Self
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpecFromSubplotSpec
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.cycle_measures import Measures, with_trend
+from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.decimation import intervals, peaks
-from stickslip_ros.plots.regimes import REGIMES
+from stickslip_ros.plots.panes import (
+    LEAST_SPAN,
+    PIXELS,
+    Pane,
+    broken,
+    draw_line,
+    end_duration,
+    measures_text,
+    say,
+    shade,
+    widened,
+)
 from stickslip_ros.plots.run_history import DrawnMotion, RunHistory
 from stickslip_ros.plots.style import (
     BLUE,
@@ -31,15 +41,6 @@ from stickslip_ros.plots.style import (
 )
 from stickslip_ros.plots.units import Units
 
-LAST_CYCLES = 5
-"""Number of cycles that are enlarged, and in the phase portrait."""
-
-_PIXELS = 1000
-"""Intervals of time across a panel, of about one pixel each."""
-
-_LEAST_SPAN = 1e-6
-"""Smallest span of an axis, as a share of the largest value on it: less is rounding."""
-
 _MOTION: Any = {"color": BLUE, "lw": 1.0}
 _BELT: Any = {"color": "black", "lw": 1.0, "ls": "--", "zorder": 2.5}
 _REST: Any = {"color": GREEN, "lw": 1.2, "ls": ":", "zorder": 2.5}
@@ -50,25 +51,6 @@ _DROPPED: Any = {"color": ORANGE, "alpha": 0.5, "marker": ".", "ms": 2.0, "ls": 
 _FRICTION: Any = {"color": SKY_BLUE, "lw": 0.7}
 _EARLIER: Any = {"color": LIGHT_GREY, "lw": 0.7}
 _STICKS: Any = {"color": GREY, "lw": 5.0, "solid_capstyle": "butt", "zorder": 1.9}
-_SHADE = LinearSegmentedColormap.from_list("stick", [to_rgba(GREY, 0.0), to_rgba(GREY, 0.6)])
-
-
-class _Pane(NamedTuple):
-    """A section of the run over time."""
-
-    title: str
-    rows: DrawnMotion
-    start: float
-    end: float
-
-    @classmethod
-    def covering(cls, title: str, rows: DrawnMotion, *other: FloatArray) -> Self:
-        """Return a pane that covers the rows and the other times."""
-        times = [time for time in (rows.time, *other) if len(time)]
-        if not times:
-            return cls(title, rows, 0.0, 1.0)
-        start, end = min(float(t[0]) for t in times), max(float(t[-1]) for t in times)
-        return cls(title, rows, start, end if end > start else start + 1.0)
 
 
 @styled
@@ -93,12 +75,12 @@ def run_figure(
     motion = history.motion
     if drive is not None and len(motion.time):
         drive = replace(drive, belt_speed=float(motion.belt_velocity[-1]))
-    last = history.end(_shown(motion, measures, drive))
+    last = history.end(end_duration(motion, measures, drive))
     panels = _Panels(history, drive, last if len(last.time) > 1 else history.end(float("inf")))
     figure = Figure(figsize=(12.0, 10.0))
     if history.left_out:
         notes = [*notes, f"not drawn: {history.left_out} samples without an increasing time"]
-    set_title(figure, title, _found(measures, panels.units), *notes)
+    set_title(figure, title, measures_text(measures, panels.units), *notes)
     above, below = figure.add_gridspec(2, 1, height_ratios=(3.0, 1.9))
     panels.over_time(figure, above.subgridspec(3, 2, width_ratios=(2.0, 1.0)))
     left, middle, right = below.subgridspec(1, 3)
@@ -132,7 +114,7 @@ class _Panels:
         self.units = units = Units.for_drive(drive)
         self._history, self._drive, self._last = history, drive, last
         motion = history.motion
-        self._run = _Pane.covering("whole run", motion, *self._force_times)
+        self._run = Pane.covering("whole run", motion, *self._force_times)
         self._length = units.axis("displacement", "m", motion.position)
         self._speed = units.axis("velocity", "m/s", motion.velocity, motion.belt_velocity)
         self.holds = False
@@ -148,7 +130,7 @@ class _Panels:
         """Draw displacement, velocity and force: the whole run, and its end enlarged."""
         history = self._history
         others = [] if len(self._last.time) else self._force_times
-        end = _Pane.covering("end of the run, enlarged", self._last, *others)
+        end = Pane.covering("end of the run, enlarged", self._last, *others)
         traces = history.friction, history.control, history.dropped
         whole = [trace.columns() for trace in traces]
         ending = [trace.since(end.start) for trace in traces]
@@ -160,36 +142,36 @@ class _Panels:
             position, velocity, force = column
             position.set_title(pane.title)
             self._draw_motion(position, velocity, pane)
-            _draw_line(force, pane, friction, newton, history.gap, **_FRICTION)
+            draw_line(force, pane, friction, newton, history.gap, **_FRICTION)
             gap = history.control_gap
-            _draw_line(force, pane, control, newton, gap, **_CONTROL)
+            draw_line(force, pane, control, newton, gap, **_CONTROL)
             self.holds |= _draw_held(force, pane, control, newton, gap, dropped[0])
-            _draw_line(force, pane, dropped, newton, gap, **_DROPPED)
+            draw_line(force, pane, dropped, newton, gap, **_DROPPED)
             self._label_time(force, pane)
         labels = self._length[1], self._speed[1], label
         for row, of_row in zip(panels, labels, strict=True):
             row[0].set_ylabel(of_row)
-            row[0].set_ylim(_widened(*row[0].get_ylim()))
+            row[0].set_ylim(widened(*row[0].get_ylim()))
             for axes, pane in zip(row, (self._run, end), strict=True):
-                _shade(axes, pane)
+                shade(axes, pane)
 
-    def _label_time(self, axes: Axes, pane: _Pane) -> None:
+    def _label_time(self, axes: Axes, pane: Pane) -> None:
         scale, label = self.units.axis("time", "s", pane.start, pane.end)
         axes.set_xlabel(label)
         axes.xaxis.set_major_formatter(lambda value, _: f"{value / scale:.10g}")
         axes.set_xlim(pane.start, pane.end)
 
-    def _draw_motion(self, position: Axes, velocity: Axes, pane: _Pane) -> None:
+    def _draw_motion(self, position: Axes, velocity: Axes, pane: Pane) -> None:
         rows, gap = pane.rows, self._history.gap
         length, speed = self._length[0], self._speed[0]
         if self._drive is not None:
             # On a belt at rest any position within the static friction is an equilibrium.
             belt = np.where(rows.belt_velocity == 0.0, np.nan, rows.belt_velocity)
             rest = self._drive.friction.at_rest(belt) * self._drive.length_scale
-            _draw_line(position, pane, (rows.time, rest), length, gap, **_REST)
-        _draw_line(position, pane, (rows.time, rows.position), length, gap, **_MOTION)
-        _draw_line(velocity, pane, (rows.time, rows.belt_velocity), speed, gap, **_BELT)
-        _draw_line(velocity, pane, (rows.time, rows.velocity), speed, gap, **_MOTION)
+            draw_line(position, pane, (rows.time, rest), length, gap, **_REST)
+        draw_line(position, pane, (rows.time, rows.position), length, gap, **_MOTION)
+        draw_line(velocity, pane, (rows.time, rows.belt_velocity), speed, gap, **_BELT)
+        draw_line(velocity, pane, (rows.time, rows.velocity), speed, gap, **_MOTION)
 
     def portrait(self, axes: Axes) -> None:
         """Draw the phase portrait of the last cycles, above that of the start."""
@@ -198,10 +180,10 @@ class _Panels:
         axes.set_xlabel(label)
         axes.set_ylabel(speed_label)
         if not len(self._last.time):
-            _say(axes, "no motion recorded")
+            say(axes, "no motion recorded")
             return
         for rows, look in ((self._history.beginning, _EARLIER), (self._last, _MOTION)):
-            time, position, velocity, belt, stick_time = _broken(
+            time, position, velocity, belt, stick_time = broken(
                 self._history.gap, rows.time, *rows[1:]
             )
             many = len(time) > MANY
@@ -213,8 +195,8 @@ class _Panels:
         axes.axhline(belt_speed / speed, **_BELT)
         if self._drive is not None and belt_speed != 0.0:
             axes.plot(self._drive.equilibrium_position / length, 0.0, zorder=3.0, **_POINT)
-        axes.set_xlim(_widened(*axes.get_xlim()))
-        axes.set_ylim(_widened(*axes.get_ylim()))
+        axes.set_xlim(widened(*axes.get_xlim()))
+        axes.set_ylim(widened(*axes.get_ylim()))
 
     def cycles(self, amplitude: Axes, stick_fraction: Axes) -> None:
         """Draw amplitude and stick fraction of each cycle over time."""
@@ -223,15 +205,15 @@ class _Panels:
         amplitude.tick_params(labelbottom=False)
         scale, label = self.units.axis("amplitude", "m", columns[0])
         if not len(time):
-            _say(amplitude, "no cycle was completed")
+            say(amplitude, "no cycle was completed")
         span = float(time[-1] - time[0]) if len(time) else 0.0
-        rows = peaks(intervals(time, span / _PIXELS or 1.0), *columns)
+        rows = peaks(intervals(time, span / PIXELS or 1.0), *columns)
         farthest = float(np.abs(self._history.motion.position).max(initial=0.0)) / scale
         for axes, values, least in (
-            (amplitude, columns[0] / scale, _LEAST_SPAN * farthest),
+            (amplitude, columns[0] / scale, LEAST_SPAN * farthest),
             (stick_fraction, columns[1], 0.0),
         ):
-            marker = "." if len(time) < _PIXELS else ""
+            marker = "." if len(time) < PIXELS else ""
             axes.plot(time[rows], values[rows], marker=marker, ms=3.0, **_MOTION | {"lw": 0.5})
             axes.set_ylim(0.0, max(1.1 * float(values.max(initial=0.0)), least) or 1.0)
         amplitude.set_ylabel(label)
@@ -243,7 +225,7 @@ class _Panels:
         axes.set_title("friction law, with the range of this run")
         drive, reached = self._drive, self._history.relative_speeds
         if drive is None:
-            _say(axes, "the drive is not known")
+            say(axes, "the drive is not known")
             return
         at_rest = -drive.belt_speed
         least, largest = reached or (min(at_rest, 0.0), max(at_rest, 0.0))
@@ -291,43 +273,9 @@ class _Panels:
             axes.plot([0.0, 0.0], [-limit, limit], **look)
 
 
-def _found(measures: Measures, units: Units) -> str:
-    found = [with_trend(REGIMES[measures.regime].label, measures.trend)]
-    for name, value, unit in (
-        ("amplitude", measures.amplitude, "m"),
-        ("frequency", measures.frequency, "Hz"),
-        ("stick fraction", measures.stick_fraction, ""),
-    ):
-        if value is not None and measures.period is not None:
-            found.append(f"{name} {units.text(value, unit)}")
-    return ", ".join(found)
-
-
-def _shown(motion: DrawnMotion, measures: Measures, drive: Drive | None) -> float:
-    """Return the duration of the enlarged end, s; a fixed share of the run without a period."""
-    span = float(motion.time[-1] - motion.time[0]) if len(motion.time) else 0.0
-    period = measures.period or (drive.natural_period if drive is not None else 0.0)
-    return min(LAST_CYCLES * period, span) or 0.05 * span
-
-
-def _draw_line(
-    axes: Axes, pane: _Pane, trace: Sequence[FloatArray], scale: float, gap: float, **look: Any
-) -> None:
-    """Draw a trace of time and values across a pane and slightly beyond, with every peak."""
-    time, values = trace
-    first, end = np.searchsorted(time, (pane.start, pane.end), "right")
-    rows = slice(max(int(first) - 1, 0), int(end) + 1)
-    time, values = time[rows], values[rows]
-    length = (pane.end - pane.start) / _PIXELS
-    drawn = peaks(intervals(time, length), values)
-    # No rows are missing between neighbouring intervals.
-    time, values = _broken(max(gap, 2.0 * length), time[drawn], values[drawn])
-    axes.plot(time, values / scale, **look)
-
-
 def _draw_held(
     axes: Axes,
-    pane: _Pane,
+    pane: Pane,
     control: Sequence[FloatArray],
     scale: float,
     gap: float,
@@ -338,7 +286,7 @@ def _draw_held(
     If forces were `dropped` (times in s) in the gap, the acting force is unknown and not drawn.
     """
     time, force = control
-    behind = np.flatnonzero(np.diff(time) > max(gap, 2.0 * (pane.end - pane.start) / _PIXELS))
+    behind = np.flatnonzero(np.diff(time) > max(gap, 2.0 * (pane.end - pane.start) / PIXELS))
     came = np.diff(np.searchsorted(dropped, time)) > 0
     behind = behind[~came[behind]]
     behind = behind[(time[behind + 1] > pane.start) & (time[behind] < pane.end)]
@@ -349,35 +297,3 @@ def _draw_held(
     drawn[2::3] = np.nan
     axes.plot(time[rows], drawn, **_HELD)
     return True
-
-
-def _widened(low: float, high: float) -> tuple[float, float]:
-    """Return limits of an axis that span more than the rounding of its values."""
-    middle = (low + high) / 2.0
-    half = max(high - low, _LEAST_SPAN * max(abs(low), abs(high))) / 2.0
-    return (low, high) if half == (high - low) / 2.0 else (middle - half, middle + half)
-
-
-def _broken(gap: float, time: FloatArray, *columns: FloatArray) -> list[FloatArray]:
-    """Return the columns with a row of NaN between times further apart than `gap`."""
-    behind = np.flatnonzero(np.diff(time) > gap) + 1
-    return [np.insert(column, behind, np.nan) for column in (time, *columns)]
-
-
-def _shade(axes: Axes, pane: _Pane) -> None:
-    """Shade each pixel column of a pane by the share of time in which the slide sticks."""
-    bottom, top = axes.get_ylim()
-    if len(pane.rows.time):
-        edges = np.linspace(pane.start, pane.end, _PIXELS + 1)
-        stick_time = np.interp(edges, pane.rows.time, pane.rows.stick_time)
-        share = np.diff(stick_time) / np.diff(edges)
-        axes.imshow(
-            share[np.newaxis], cmap=_SHADE, vmin=0.0, vmax=1.0, aspect="auto", zorder=0.0,
-            extent=(pane.start, pane.end, bottom, top), interpolation="nearest",
-        )  # fmt: skip
-        axes.set_xlim(pane.start, pane.end)
-        axes.set_ylim(bottom, top)
-
-
-def _say(axes: Axes, why: str) -> None:
-    axes.text(0.5, 0.5, why, ha="center", va="center", transform=axes.transAxes)

@@ -38,7 +38,7 @@ _LABELS: dict[str, dict[str, tuple[str, str]]] = {
         "spectral_radius": ("spectral radius", ""),
         "stable": ("stable", ""),
         "decay_rate": ("decay rate", "1/s"),
-        "settling_time": ("settling time, to a hundredth", "s"),
+        "settling_time": ("1 % settling time", "s"),
         "critical_linear_gain": ("critical linear gain", "N s/m"),
         "stable_linear_gains": ("stable linear gains", "N s/m"),
     },

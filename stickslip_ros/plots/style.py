@@ -6,6 +6,7 @@ from io import BytesIO
 from pathlib import Path
 from textwrap import fill
 from typing import Any, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
 
 import matplotlib as mpl
 from matplotlib import rc_context
@@ -52,6 +53,12 @@ _LOOK: dict[str, Any] = {
 _REPRODUCIBLE = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 """Metadata to omit by file type, so that the same figure gives the same file."""
 
+DPI = 130.0
+"""Dots per inch of a PNG."""
+
+_titles: WeakKeyDictionary[Figure, tuple[str, ...]] = WeakKeyDictionary()
+"""The lines above each figure, before they are broken to its width."""
+
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
@@ -70,12 +77,26 @@ def styled(draw: Callable[_P, _R]) -> Callable[_P, _R]:
 
 def set_title(figure: Figure, *lines: str) -> None:
     """Set the title of a figure to `lines`; long lines are wrapped, and cut after three."""
+    _titles[figure] = lines
     letters = round(10.0 * float(figure.get_figwidth()))  # ten per inch, on average
     broken = (fill(printable(line), letters, max_lines=3, placeholder=" ...") for line in lines)
     figure.suptitle("\n".join(broken), parse_math=False)
 
 
-def save(figure: Figure, path: Path, *, colours: int | None = None) -> None:
+@styled
+def adapt(figure: Figure, *, size: tuple[float, float] | None = None, title: bool = True) -> None:
+    """Give a figure another size (width and height, inches), or remove the title above it."""
+    if size is not None:
+        figure.set_size_inches(*size)
+    if not title:
+        figure.suptitle("")
+    elif figure in _titles:
+        set_title(figure, *_titles[figure])
+
+
+def save(
+    figure: Figure, path: Path, *, colours: int | None = None, dots_per_inch: float = DPI
+) -> None:
     """Write a figure to `path`; the format follows the ending: .png, .svg or .pdf.
 
     Vector formats keep text as text. A limited number of `colours` makes a PNG, to be kept with the
@@ -92,7 +113,7 @@ def save(figure: Figure, path: Path, *, colours: int | None = None) -> None:
                 few = image.convert("RGB").quantize(colours, Image.Quantize.MAXCOVERAGE)
             few.save(path, optimize=True)
         else:
-            figure.savefig(path, dpi=130, metadata=_REPRODUCIBLE.get(ending))
+            figure.savefig(path, dpi=dots_per_inch, metadata=_REPRODUCIBLE.get(ending))
 
 
 def _use_style() -> None:

@@ -1,4 +1,4 @@
-"""Why there is nothing to measure in a motion."""
+"""Why a motion has no measures."""
 
 from typing import TYPE_CHECKING
 
@@ -6,7 +6,7 @@ if TYPE_CHECKING:
     from stickslip_ros.physics.model.drive import Drive
 
 _FAR = 10.0
-"""Ratio of belt speed and Hopf speed from which on another unit may have been meant."""
+"""Ratio of belt speed and Hopf speed beyond which the unit is probably wrong."""
 
 
 def why_no_cycle(regime: str | None, duration: float, drive: "Drive | None") -> str | None:
@@ -22,8 +22,8 @@ def why_no_cycle(regime: str | None, duration: float, drive: "Drive | None") -> 
         return said
     period = drive.natural_period
     if duration < 3.0 * period:
-        return f"{said}: the natural period is {units.text(period, 's')}, so it takes longer"
+        return f"{said}: the natural period is {units.text(period, 's')}, so run it for longer"
     ratio = hopf_ratio(drive)
     if ratio is not None and not 1.0 / _FAR < ratio < _FAR:
-        return f"{said}: the slide has not turned back, nor come to rest; {hopf_distance(drive)}"
-    return f"{said}: the slide has not turned back twice, nor come to rest; it may take longer"
+        return f"{said}: the slide has neither turned back nor settled; {hopf_distance(drive)}"
+    return f"{said}: the slide has neither turned back twice nor settled; run it for longer"

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -20,6 +20,9 @@ from stickslip_ros.scenarios.parameters import (
 from stickslip_ros.scenarios.sections import PARAMETERS_KEY, ScenarioFile, read_file
 from stickslip_ros.tables import TextTable
 from stickslip_ros.text import did_you_mean
+
+FILE, BASE, OVERRIDE, DEFAULT = "file", "base", "override", "default"
+"""Where the value of a parameter comes from."""
 
 _NAMED_BY_PATH = "a file is given by its path ending in .yaml"
 
@@ -54,8 +57,16 @@ class Scenario:
     """The scenario file."""
     other_sections: tuple[str, ...] = ()
     """Sections of the file that match none of these nodes, such as that of a user's own node."""
-    given: frozenset[str] = field(default=frozenset(), compare=False, repr=False)
-    """NODE.PARAMETER of each parameter that the file, its base or an override sets."""
+    sources: Mapping[str, str] = field(default_factory=dict[str, str], compare=False, repr=False)
+    """Source of each value, by NODE.PARAMETER: `FILE`, `BASE` or `OVERRIDE`; defaults are not
+    listed."""
+    bases: tuple[Path, ...] = field(default=(), compare=False, repr=False)
+    """The files that complete the scenario file, the nearest first."""
+
+    @property
+    def given(self) -> frozenset[str]:
+        """NODE.PARAMETER of each parameter that the file, its base or an override sets."""
+        return frozenset(self.sources)
 
     @property
     def left_to_defaults(self) -> list[str]:
@@ -63,7 +74,7 @@ class Scenario:
         names = [f"plant.{name}" for name in (*self.plant.drive_names(), "rate")]
         if self.plant.expects_control:
             names += [f"washout_controller.{name}" for name in self.washout_controller.law_names()]
-        return [name for name in names if name not in self.given]
+        return [name for name in names if name not in self.sources]
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
         """Return the parameters of every node.
@@ -124,7 +135,7 @@ class Scenario:
         by_node: dict[str, dict[str, Any]] = {}
         texts: dict[str, str] = {}
         for override in overrides:
-            node, parameter, value = _parse_override(override)
+            node, parameter, value = parse_override(override)
             by_node.setdefault(node, {})[parameter] = value
             texts[node] = f"{texts.get(node, '')} {override:.80}"
         changes: dict[str, Any] = {
@@ -137,7 +148,7 @@ class Scenario:
         return replace(
             self,
             overrides=(*self.overrides, *overrides),
-            given=self.given | given,
+            sources={**self.sources, **dict.fromkeys(given, OVERRIDE)},
             **changes,
         )
 
@@ -253,9 +264,16 @@ def load_scenario(
         files.append(read_file(below, namespace))
         below = _path_of_base(files[-1])
     values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
+    sources: dict[str, str] = {}
     other_sections: list[str] = []
+
+    def set_value(source: str, node: str, name: str, value: Any) -> None:
+        values[node][name] = value
+        sources[f"{node}.{name}"] = source
+
     for file in files[::-1]:
-        other_sections = file.apply(values, namespace, other_nodes=other_nodes)
+        source = FILE if file is files[0] else BASE
+        other_sections = file.apply(partial(set_value, source), namespace, other_nodes=other_nodes)
     models: dict[str, Any] = {
         node: NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
         for node, parameters in values.items()
@@ -265,7 +283,8 @@ def load_scenario(
         overrides=(),
         path=path,
         other_sections=tuple(other_sections),
-        given=frozenset(f"{node}.{name}" for node in values for name in values[node]),
+        sources=sources,
+        bases=tuple(file.path for file in files[1:]),
         **models,
     )
     return scenario.overridden(overrides) if overrides else scenario
@@ -278,6 +297,12 @@ def config_directories() -> list[Path]:
     return [directory for directory in [source_tree, *installed] if directory.is_dir()]
 
 
+def shipped_scenarios() -> dict[str, Path]:
+    """Return the files of the scenarios that are found by name, by that name."""
+    found = {path.stem: path for d in config_directories()[::-1] for path in d.glob("*.yaml")}
+    return dict(sorted(found.items()))
+
+
 def _find(name_or_path: str) -> Path:
     """Return the file of that path, or otherwise of that name, with or without .yaml."""
     path = Path(name_or_path)
@@ -287,7 +312,7 @@ def _find(name_or_path: str) -> Path:
         return path
     if "/" in name_or_path:
         raise InvalidInputError(f"no scenario file {name_or_path}")
-    shipped = {path.stem: path for d in config_directories()[::-1] for path in d.glob("*.yaml")}
+    shipped = shipped_scenarios()
     if name in shipped:
         return shipped[name]
     missing, otherwise = f"no scenario file {name_or_path}", _NAMED_BY_PATH
@@ -310,7 +335,11 @@ def _path_of_base(file: ScenarioFile) -> Path | None:
         raise InvalidInputError(f"{file.path}: base: {error}") from None
 
 
-def _parse_override(override: str) -> tuple[str, str, Any]:
+def parse_override(override: str) -> tuple[str, str, Any]:
+    """Return node, parameter and value of a text NODE.PARAMETER=VALUE.
+
+    The value is not checked. Raises InvalidInputError for an unknown node or parameter.
+    """
     target, equals, text = override.partition("=")
     node, _, parameter = target.partition(".")
     known = [

@@ -70,6 +70,10 @@ class Parameter:
     """Whether a number must be finite."""
     range: tuple[float, float] | None
     """Smallest and largest value, if the parameter has both and at least one is its own."""
+    least: float | None
+    """Smallest value of a number, if it has one."""
+    largest: float | None
+    """Largest value of a number, if it has one."""
 
 
 def parameters_of(model: type[BaseModel], prefix: str = "") -> Iterator[Parameter]:
@@ -112,6 +116,8 @@ def _parameter(name: str, info: FieldInfo) -> Parameter:
         limits=one_of or _in_words(limits),
         finite=not any(getattr(each, "allow_inf_nan", False) for each in info.metadata),
         range=(limits["ge"], limits["le"]) if told and len(limits) == 2 else None,
+        least=limits.get("ge"),
+        largest=limits.get("le"),
     )
 
 

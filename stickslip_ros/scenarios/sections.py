@@ -1,7 +1,7 @@
 """Reading a scenario file: sections of node name patterns, each with parameters."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -16,8 +16,11 @@ from stickslip_ros.text import did_you_mean, shown
 PARAMETERS_KEY = "ros__parameters"
 _LARGEST = 1_000_000
 """Largest number of characters in a scenario file."""
-_SCENARIO = "scenario"
+BASE_SECTION = "scenario"
 """Last part of the name of the section that names the base and belongs to no node."""
+
+SetValue = Callable[[str, str, Any], None]
+"""Takes node, flat name and value of a parameter."""
 
 
 class ScenarioFile(NamedTuple):
@@ -29,10 +32,8 @@ class ScenarioFile(NamedTuple):
     base: str | None
     """Name or path of the scenario that supplies the omitted parameters."""
 
-    def apply(
-        self, values: Mapping[str, dict[str, Any]], namespace: str, *, other_nodes: bool
-    ) -> list[str]:
-        """Write the parameters of the nodes in `namespace` to `values`, by node and flat name.
+    def apply(self, set_value: SetValue, namespace: str, *, other_nodes: bool) -> list[str]:
+        """Pass each parameter of the nodes in `namespace` to `set_value`.
 
         Return the sections of unknown nodes. Raises InvalidInputError for an unknown parameter
         and, unless `other_nodes` is set, for an unknown node.
@@ -40,17 +41,19 @@ class ScenarioFile(NamedTuple):
         other_sections: list[str] = []
         prefix = namespace.rstrip("/")
         for pattern, parameters in self.sections:
-            nodes = [node for node in values if section_matches(pattern, f"{prefix}/{node}")]
+            nodes = [
+                node for node in NODE_PARAMETERS if section_matches(pattern, f"{prefix}/{node}")
+            ]
             if nodes:
-                _apply(values, self.path, pattern, parameters, nodes)
+                _apply(set_value, self.path, pattern, parameters, nodes)
             elif other_nodes:
                 other_sections.append(pattern)
             else:
                 node = pattern.rpartition("/")[2]
-                every = f"the nodes in namespace {namespace} are {', '.join(values)}"
+                every = f"the nodes in namespace {namespace} are {', '.join(NODE_PARAMETERS)}"
                 raise InvalidInputError(
                     f"{self.path}: section {pattern} matches no node; "
-                    + did_you_mean(node, values.keys() - {node}, every)
+                    + did_you_mean(node, NODE_PARAMETERS.keys() - {node}, every)
                 )
         return other_sections
 
@@ -63,8 +66,8 @@ def read_file(path: Path, namespace: str) -> ScenarioFile:
     sections: list[tuple[str, Mapping[str, Any]]] = []
     base: str | None = None
     for pattern, parameters in _sections(path):
-        own = section_matches(pattern, f"{namespace.rstrip('/')}/{_SCENARIO}")
-        if own and pattern.endswith(f"/{_SCENARIO}"):
+        own = section_matches(pattern, f"{namespace.rstrip('/')}/{BASE_SECTION}")
+        if own and pattern.endswith(f"/{BASE_SECTION}"):
             base = _base_of(path, pattern, parameters)
         else:
             sections.append((pattern, parameters))
@@ -94,13 +97,13 @@ def _base_of(path: Path, pattern: str, parameters: Mapping[str, Any]) -> str:
 
 
 def _apply(
-    values: Mapping[str, dict[str, Any]],
+    set_value: SetValue,
     path: Path,
     pattern: str,
     parameters: Mapping[str, Any],
     nodes: Sequence[str],
 ) -> None:
-    """Write the parameters of a section to the values of the nodes that it matches."""
+    """Pass the parameters of a section to `set_value` for the nodes that it matches."""
     known = {node: known_parameters(NODE_PARAMETERS[node]) for node in nodes}
     for name, value in parameters.items():
         takers = [node for node in nodes if len(nodes) == 1 or name in known[node]]
@@ -110,7 +113,7 @@ def _apply(
                 + did_you_mean(name, {*chain(*known.values())}, "docs/parameters.md lists all")
             )
         for node in takers:
-            values[node][name] = value
+            set_value(node, name, value)
 
 
 def _sections(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -140,3 +143,18 @@ def _walk(tree: Any, name: str, path: Path) -> Iterator[tuple[str, Mapping[str, 
             yield name, dict(flattened(cast(dict[Any, Any], below)))
         else:
             raise InvalidInputError(f"{path}: {name}: {PARAMETERS_KEY} must be names and values")
+
+
+def leading_comment(path: Path) -> str:
+    """Return the first sentence of the comment at the top of a scenario file.
+
+    Empty for a file without one.
+    """
+    comment: list[str] = []
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for line in file:
+            if not line.startswith("#"):
+                break
+            comment.append(line.strip("# \n"))
+    sentence, _, _ = " ".join(comment).partition(". ")
+    return sentence.rstrip(".")

@@ -85,7 +85,6 @@ def test_one_line_and_status_2(
 @pytest.mark.parametrize(
     "arguments",
     [
-        (),
         ("nosuch",),
         ("simulate",),
         ("simulate", "paper", "--duration", "-1"),

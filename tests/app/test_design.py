@@ -43,7 +43,7 @@ def test_the_table_has_the_proposal_and_what_it_does(stickslip: Run) -> None:
     done = stickslip("design", "feed_drive", *LIMIT, "--belt-speed", "0.03:0.04")
     assert done.returncode == 0, done.stderr
     for text in (
-        "belt speed 30 mm/s to 40 mm/s", "linear gain", "further delay", "peak force",
+        "belt speed 30 mm/s to 40 mm/s", "linear gain", "delay margin", "peak force",
         "--out FILE",
     ):  # fmt: skip
         assert text in done.stdout
@@ -133,7 +133,7 @@ def test_without_vibration_nothing_is_simulated(stickslip: Run) -> None:
     done = stickslip("design", "feed_drive", "--belt-speed", "0.06", *jitter, "--json")
     found = json.loads(done.stdout)
     assert "nothing vibrates" in found["remark"]
-    assert "force_jitter is left out" in found["remark"]
+    assert "force_jitter is ignored" in found["remark"]
     assert found["settling_time"] is found["peak_force"] is found["margins"]["delay"] is None
     assert found["predicted_settling_time"] > 0.0
 

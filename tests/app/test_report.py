@@ -4,6 +4,7 @@ from xml.etree import ElementTree
 
 import pytest
 from geometry_msgs.msg import WrenchStamped
+from PIL import Image
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
@@ -137,7 +138,7 @@ def test_parameters_that_are_none_are_no_drive(command, tmp_path, parameters):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["report", "bag", "bag", "--plot", "out.png"], "draws one bag, and 2 were given"),
+        (["report", *"abcdefg", "--plot", "out.png"], "draws at most 6 bags, and 7 were given"),
         (["report", "bag", "--plot", "out.gif"], "must end in one of .png, .svg, .pdf"),
         (["report", "bag", "--plot", "none/out.png"], "there is no directory none"),
         (["report", "empty", "--plot", "out.png"], "holds no .mcap file"),
@@ -215,7 +216,7 @@ def test_of_forces_that_were_all_refused_none_acted(command, tmp_path, pace):
     figures = {row[0].strip(): row[-1].strip() for row in rows}
     assert figures["peak control force sent"] == "128.6 N"
     assert figures["peak control force acting"] == "0 N"
-    assert figures["control force acting at the end"] == "0 N"
+    assert figures["final control force acting"] == "0 N"
     assert figures["dropped forces"] == str(report["dropped_forces"])
 
 
@@ -234,7 +235,7 @@ def test_forces_that_all_acted_are_reported_once(command, tmp_path):
     rows = command("report", tmp_path / "bag")[1].splitlines()
     assert [row.split("  ")[0] for row in rows if "control force" in row] == [
         "peak control force",
-        "control force at the end",
+        "final control force",
     ]
 
 
@@ -246,5 +247,78 @@ def test_a_bag_that_does_not_tell_what_was_dropped_claims_nothing_of_what_acted(
     rows = command("report", REFERENCE)[1].splitlines()
     assert [row.split("  ")[0] for row in rows if "control force" in row] == [
         "peak control force",
-        "control force at the end",
+        "final control force",
     ]
+
+
+def test_several_bags_are_drawn_in_one_figure(command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    record(tmp_path / "first")
+    record(tmp_path / "second", states=STAMPS[:500])
+    plain = command("report", "first", "second", "--json")[1]
+    status, out, error = command("report", "first", "second", "--json", "--plot", "runs.svg")
+    assert (status, out, error) == (0, plain, "")
+    shown = texts(tmp_path / "runs.svg")
+    assert "first; second" in shown
+    assert shown.count("first") >= 2  # above its column, and in the legend
+
+
+@pytest.mark.parametrize(
+    ("options", "width", "height"),
+    [
+        ((), 1560, 1300),
+        (("--size", "10x8"), 1300, 1040),
+        (("--size", "10x8", "--dpi", "50"), 500, 400),
+    ],
+)
+def test_a_figure_has_the_size_that_is_asked_for(command, tmp_path, options, width, height):
+    picture = tmp_path / "run.png"
+    assert command("report", REFERENCE, "--plot", picture, *options)[0] == 0
+    with Image.open(picture) as image:
+        assert image.size == (width, height)
+
+
+def test_a_figure_has_no_title_if_none_is_wanted(command, tmp_path):
+    picture = tmp_path / "run.svg"
+    command("report", REFERENCE, "--plot", picture)
+    assert str(REFERENCE) in " ".join(texts(picture))
+    command("report", REFERENCE, "--plot", picture, "--no-title")
+    assert "stick-slip" not in " ".join(texts(picture))
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        (("--size", "6"), "'6' is not WIDTHxHEIGHT in inches, each from 2 to 50"),
+        (("--size", "0x4"), "'0x4' is not"),
+        (("--size", "nanx4"), "'nanx4' is not"),
+        (("--size", "6x4x2"), "'6x4x2' is not"),
+        (("--size", "2x2"), "--size 2x2: is too small for this figure"),
+        (("--dpi", "0"), "'0' is not a whole number of dots per inch from 20 to 600"),
+        (("--dpi", "1e3"), "'1e3' is not"),
+        (("--size", "50x50", "--dpi", "600"), "--size 50x50 --dpi 600: would be 9e+08 pixels"),
+    ],
+)
+def test_a_figure_that_is_nonsense_is_refused(command, tmp_path, options, complaint):
+    status, out, error = command("report", REFERENCE, "--plot", tmp_path / "run.png", *options)
+    assert (status, out) == (2, "")
+    assert complaint in error.splitlines()[-1]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("options", [("--size", "6x4"), ("--dpi", "100"), ("--no-title",)])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("simulate", "paper"),
+        ("report", REFERENCE),
+        ("stability", "paper"),
+        ("design", "paper"),
+        ("basin", "paper"),
+        ("sweep", "paper", "--over", "plant.mass=1:2:2"),
+    ],
+)
+def test_options_of_a_figure_need_a_figure(command, arguments, options):
+    status, out, error = command(*arguments, *options)
+    assert (status, out) == (2, "")
+    assert f"{' '.join(options)}: needs --plot FILE, which is not given" in error

@@ -156,7 +156,7 @@ def test_an_existing_table_is_left_alone(stickslip: Run, tmp_path: Path) -> None
     (tmp_path / "table.csv").write_text("mine")
     done = stickslip(*FREE, *SPEEDS, "--out", "table.csv")
     assert done.returncode == 2
-    assert "--out table.csv: exists already, and is left as it is" in done.stderr
+    assert "--out table.csv: exists already; it is not overwritten" in done.stderr
     assert (tmp_path / "table.csv").read_text() == "mine"
 
 
@@ -175,7 +175,7 @@ def test_interrupted_it_keeps_what_is_done_and_goes_on_from_there(
     process.send_signal(signal.SIGINT)
     _, messages = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
-    assert "of 1200 points are done; what is done stays in table.csv.part" in messages
+    assert "of 1200 points are done; they stay in table.csv.part" in messages
     assert "Traceback" not in messages
     assert not (tmp_path / "table.csv").exists()
     kept = part.read_bytes()

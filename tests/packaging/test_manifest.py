@@ -15,6 +15,7 @@ KEYS = {
     "heyoka": set(),
     "hypothesis": {"python3-hypothesis"},
     "ipykernel": set(),
+    "jsonschema": {"python3-jsonschema"},
     "lz4": set(),
     "markdown-it-py": set(),
     "matplotlib": {"python3-matplotlib"},

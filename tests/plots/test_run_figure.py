@@ -18,7 +18,8 @@ from stickslip_ros.physics.measures.observer import MeasuredMotion
 from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.plots.run_figure import LAST_CYCLES, run_figure
+from stickslip_ros.plots.panes import LAST_CYCLES
+from stickslip_ros.plots.run_figure import run_figure
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.style import save
 from stickslip_ros.samples import SampleColumns

@@ -1,0 +1,50 @@
+"""`stickslip new`: a complete scenario file to edit."""
+
+import argparse
+import shlex
+from pathlib import Path
+
+from stickslip_ros.app.arguments import check_new, writing
+from stickslip_ros.app.optional_dependencies import interrupts_kept
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.text import printable
+
+_ENDINGS = (".yaml", ".yml")
+_SOURCE = "feed_drive"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.description = (
+        "Write a scenario file with every parameter of every node. Comments give meaning, unit and "
+        "bounds of each. Edit the file, then give it to any command in place of a scenario's name. "
+        "It is a ROS parameter file: nodes read it by --params-file, too."
+    )
+    parser.add_argument(
+        "file", metavar="FILE", type=Path, help="file to write, .yaml; must not exist"
+    )
+    parser.add_argument(
+        "--from",
+        dest="source",
+        default=_SOURCE,
+        metavar="SCENARIO",
+        help="scenario whose values the file starts with, by name or path (default: %(default)s)",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.scenarios.files import load_scenario
+        from stickslip_ros.scenarios.template import commented_file
+    path: Path = arguments.file
+    if path.suffix not in _ENDINGS:
+        raise InvalidInputError(f"{path}: must end in {' or '.join(_ENDINGS)}")
+    check_new("FILE", path)
+    scenario = load_scenario(arguments.source)
+    command = shlex.join(["stickslip", "simulate", str(path)])
+    heading = f"{path.stem}: a drive with the values of {scenario.name}, to be edited.\n{command}"
+    with writing("FILE", path), path.open("x", encoding="utf-8") as file:
+        file.write(commented_file(scenario, printable(heading)))
+    print(f"{printable(str(path))} is written: `{printable(command)}` simulates it")
+    return 0

@@ -1,0 +1,90 @@
+"""`stickslip show`: every parameter of a scenario, and where its value comes from."""
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from stickslip_ros.app.arguments import add_json, add_scenario_file
+from stickslip_ros.app.optional_dependencies import interrupts_kept
+from stickslip_ros.app.output import print_json, print_table
+from stickslip_ros.text import printable
+from stickslip_ros.versions import versions
+
+if TYPE_CHECKING:
+    from stickslip_ros.scenarios.files import Scenario
+
+_OF_THE_LOOP = ("plant", "washout_controller")
+"""Nodes whose parameters have no unit where the drive is dimensionless."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.description = (
+        "Show every parameter of a scenario with its value and unit. The last column says where "
+        "the value comes from: the file, its base, an override (-p), or the default."
+    )
+    add_scenario_file(parser)
+    add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command; return the exit status."""
+    with interrupts_kept():
+        from stickslip_ros.plots.units import Units
+        from stickslip_ros.scenarios.files import load_scenario
+        from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+    scenario = load_scenario(
+        arguments.scenario, arguments.overrides, base=arguments.base, other_nodes=True
+    )
+    found = {node: _parameters(scenario, node) for node in NODE_PARAMETERS}
+    bases = [str(path) for path in scenario.bases]
+    if arguments.json:
+        print_json(
+            {
+                "name": scenario.name,
+                "path": str(scenario.path),
+                "bases": bases,
+                "overrides": list(scenario.overrides),
+                "parameters": found,
+                "other_sections": list(scenario.other_sections),
+                "versions": versions(),
+            }
+        )
+        return 0
+    print(printable(f"{scenario.name}: {', completed by '.join([str(scenario.path), *bases])}"))
+    units = Units.for_drive(scenario.plant.as_drive())
+    for node, parameters in found.items():
+        unit = units.of_unit if node in _OF_THE_LOOP else str
+        rows = [
+            [name, _text(row["value"]), unit(row["unit"] or ""), row["source"]]
+            for name, row in parameters.items()
+        ]
+        print()
+        print_table("", [node, "value", "unit", "from"], rows)
+    for section in scenario.other_sections:
+        print(printable(f"\nsection {section} is for another node"))
+    return 0
+
+
+def _parameters(scenario: "Scenario", node: str) -> dict[str, dict[str, Any]]:
+    from stickslip_ros.scenarios.files import DEFAULT
+    from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+    from stickslip_ros.scenarios.template import own_first
+
+    values = scenario.as_dict()[node]
+    return {
+        parameter.name: {
+            "value": values[parameter.name],
+            "unit": parameter.unit,
+            "source": scenario.sources.get(f"{node}.{parameter.name}", DEFAULT),
+            "default": parameter.default,
+            "allowed": parameter.bounds,
+            "meaning": parameter.meaning,
+        }
+        for parameter in own_first(NODE_PARAMETERS[node])
+    }
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value) if isinstance(value, float) else str(value)

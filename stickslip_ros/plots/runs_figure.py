@@ -1,0 +1,191 @@
+"""The figure of several runs: motion and force side by side, all cycles in one panel."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.measures.cycle_measures import Measures
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.plots.decimation import intervals, peaks
+from stickslip_ros.plots.panes import (
+    LEAST_SPAN,
+    PIXELS,
+    Pane,
+    broken,
+    draw_line,
+    end_duration,
+    measures_text,
+    say,
+    shade,
+    widened,
+)
+from stickslip_ros.plots.run_history import RunHistory
+from stickslip_ros.plots.style import (
+    AMBER,
+    BLUE,
+    GREEN,
+    MANY,
+    ORANGE,
+    PURPLE,
+    SKY_BLUE,
+    set_title,
+    styled,
+)
+from stickslip_ros.plots.units import SI, Units
+
+_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY_BLUE)
+_DASHES = ("-", "--", "-.", ":", (0, (6, 1)), (0, (3, 1, 1, 1)))
+_MARKERS = "os^Dv*"
+
+
+class DrawnRun(NamedTuple):
+    """A run that is drawn beside others."""
+
+    name: str
+    history: RunHistory
+    measures: Measures
+    drive: Drive | None
+
+
+@styled
+def runs_figure(runs: Sequence[DrawnRun], *, notes: Sequence[str] = ()) -> Figure:
+    """Return the figure of up to six runs, each in its own colour.
+
+    Above a column for each run: displacement and force over time, with the same axes. Below, all
+    runs together: the phase portrait of the last cycles, and amplitude and stick fraction of each
+    cycle. `notes` are printed below the title. The units are SI unless all drives are
+    dimensionless.
+    """
+    looks: list[dict[str, Any]] = [
+        {"color": colour, "ls": dashes} for colour, dashes in zip(_COLOURS, _DASHES, strict=True)
+    ][: len(runs)]
+    figure = Figure(figsize=(12.0, 9.0))
+    set_title(figure, "; ".join(run.name for run in runs), *notes)
+    picture = _Picture(runs, looks)
+    above, below = figure.add_gridspec(2, 1, height_ratios=(1.3, 1.0))
+    panels: Any = above.subgridspec(2, len(runs)).subplots(sharex=True, sharey="row")
+    picture.over_time(panels)
+    left, middle, right = below.subgridspec(1, 3)
+    picture.portrait(figure.add_subplot(left))
+    amplitude = figure.add_subplot(middle)
+    picture.cycles(amplitude, figure.add_subplot(right, sharex=amplitude))
+    handles = [
+        Line2D([], [], marker=marker, ms=4.0, label=run.name, **look)
+        for run, look, marker in zip(runs, looks, _MARKERS, strict=False)
+    ]
+    columns = max(1, min(len(handles), 120 // max(len(run.name) + 8 for run in runs)))
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+    return figure
+
+
+class _Picture:
+    """What the panels have in common, and each of them."""
+
+    def __init__(self, runs: Sequence[DrawnRun], looks: Sequence[dict[str, Any]]) -> None:
+        self._runs, self._looks = runs, looks
+        own = {Units.for_drive(run.drive) for run in runs}
+        self._units = own.pop() if len(own) == 1 else SI
+        motions = [run.history.motion for run in runs]
+        self._motions = motions
+        self._length = self._units.axis("displacement", "m", *(m.position for m in motions))
+        self._speed = self._units.axis("velocity", "m/s", *(m.velocity for m in motions))
+
+    def over_time(self, panels: Any) -> None:
+        """Draw displacement and force of each run in its own column."""
+        forces = [run.history.control.columns() for run in self._runs]
+        newton, force_label = self._units.axis("control force", "N", *(f[1] for f in forces))
+        panes = [
+            Pane.covering(run.name, motion, force[0])
+            for run, motion, force in zip(self._runs, self._motions, forces, strict=True)
+        ]
+        scale, time_label = self._units.axis("time", "s", *(pane.end for pane in panes))
+        for (position, force), run, look, pane, trace in zip(
+            panels.T, self._runs, self._looks, panes, forces, strict=True
+        ):
+            solid = look | {"ls": "-", "lw": 1.0}
+            rows, history = pane.rows, run.history
+            draw_line(
+                position, pane, (rows.time, rows.position), self._length[0], history.gap, **solid
+            )
+            draw_line(
+                force, pane, trace, newton, history.control_gap, drawstyle="steps-post", **solid
+            )
+            position.set_title(
+                f"{pane.title}\n{measures_text(run.measures, self._units)}", fontsize=8.0, wrap=True
+            )
+            _label_time(force, scale, time_label)
+            if not len(rows.time):
+                say(position, "no motion recorded")
+        for row, label in zip(panels, (self._length[1], force_label), strict=True):
+            row[0].set_ylabel(label)
+            row[0].set_ylim(widened(*row[0].get_ylim()))
+        start, end = min(pane.start for pane in panes), max(pane.end for pane in panes)
+        for axes, pane in zip(panels[0], panes, strict=True):
+            shade(axes, pane)
+            axes.set_xlim(start, end)
+
+    def portrait(self, axes: Axes) -> None:
+        """Draw the phase portraits of the last cycles."""
+        axes.set_title("phase portrait of the last cycles")
+        axes.set_xlabel(self._length[1])
+        axes.set_ylabel(self._speed[1])
+        for run, motion, look, marker in zip(
+            self._runs, self._motions, self._looks, _MARKERS, strict=False
+        ):
+            if not len(motion.time):
+                continue
+            rows = run.history.end(end_duration(motion, run.measures, run.drive))
+            time, position, velocity = broken(
+                run.history.gap, rows.time, rows.position, rows.velocity
+            )
+            axes.plot(
+                position / self._length[0],
+                velocity / self._speed[0],
+                rasterized=len(time) > MANY,
+                marker=marker,
+                ms=4.0,
+                markevery=[
+                    len(time) - 1
+                ],  # where it ends, which is all there is of a slide at rest
+                **look,
+            )
+        axes.set_xlim(widened(*axes.get_xlim()))
+        axes.set_ylim(widened(*axes.get_ylim()))
+
+    def cycles(self, amplitude: Axes, stick_fraction: Axes) -> None:
+        """Draw amplitude and stick fraction of each cycle over time."""
+        all_cycles = [run.history.cycles for run in self._runs]
+        scale, label = self._units.axis("amplitude", "m", *(c[1] for c in all_cycles))
+        amplitude.set_title("amplitude of each cycle")
+        amplitude.set_ylabel(label)
+        stick_fraction.set_title("stick fraction of each cycle")
+        stick_fraction.set_ylabel("stick fraction")
+        if not any(len(time) for time, *_ in all_cycles):
+            say(amplitude, "no cycle was completed")
+        largest = [0.0, 0.0]
+        for (time, *columns), look, marker in zip(all_cycles, self._looks, _MARKERS, strict=False):
+            span = float(time[-1] - time[0]) if len(time) else 0.0
+            rows = peaks(intervals(time, span / PIXELS or 1.0), *columns)
+            values: tuple[FloatArray, FloatArray] = (columns[0] / scale, columns[1])
+            for number, axes in enumerate((amplitude, stick_fraction)):
+                every = max(1, len(rows) // 12)
+                axes.plot(
+                    time[rows], values[number][rows], marker=marker, ms=4.0, markevery=every, **look
+                )
+                largest[number] = max(largest[number], float(values[number].max(initial=0.0)))
+        farthest = max(float(np.abs(m.position).max(initial=0.0)) for m in self._motions) / scale
+        amplitude.set_ylim(0.0, max(1.1 * largest[0], LEAST_SPAN * farthest) or 1.0)
+        stick_fraction.set_ylim(0.0, 1.1 * largest[1] or 1.0)
+        scale, label = self._units.axis("time", "s", *(motion.time for motion in self._motions))
+        for axes in (amplitude, stick_fraction):
+            _label_time(axes, scale, label)
+
+
+def _label_time(axes: Axes, scale: float, label: str) -> None:
+    axes.set_xlabel(label)
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value / scale:.10g}")

@@ -1,0 +1,59 @@
+"""A complete scenario file with comments, to be edited by a user."""
+
+from collections.abc import Iterator
+from textwrap import wrap
+
+from stickslip_ros.scenarios import ros_yaml
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters
+from stickslip_ros.scenarios.sections import PARAMETERS_KEY
+
+_WIDTH = 100
+
+
+def commented_file(scenario: Scenario, heading: str) -> str:
+    """Return the text of a scenario file with every parameter of every node of the scenario.
+
+    A comment above each parameter gives its meaning, its unit and what is allowed. `heading` is
+    the comment at the top, line by line.
+    """
+    lines = [part for line in heading.splitlines() for part in _comment(line, "")]
+    values = scenario.as_dict()
+    for node, model in NODE_PARAMETERS.items():
+        lines += ["", f"/**/{node}:", f"  {PARAMETERS_KEY}:"]
+        lines += _section(own_first(model), values[node])
+    return "\n".join(lines) + "\n"
+
+
+def own_first(model: type[NodeParameters]) -> list[Parameter]:
+    """Return the parameters of a node, those that every node has at the end."""
+    common = NodeParameters.model_fields
+    return sorted(parameters_of(model), key=lambda parameter: parameter.name in common)
+
+
+def _section(parameters: list[Parameter], values: dict[str, object]) -> Iterator[str]:
+    group = ""
+    for parameter in parameters:
+        own_group, _, name = parameter.name.rpartition(".")
+        if own_group != group and own_group:
+            yield f"    {own_group}:"
+        group = own_group
+        indent = "      " if group else "    "
+        yield from _comment(_explained(parameter), indent)
+        # ROS cannot read an empty list: it does not say of what type the items are.
+        lead = f"{indent}# " if values[parameter.name] == [] else indent
+        text = ros_yaml.dump({name: values[parameter.name]}).replace('"', "", 2)
+        yield from (lead + line for line in text.splitlines())
+
+
+def _explained(parameter: Parameter) -> str:
+    allowed = parameter.bounds
+    if not parameter.finite:
+        allowed = f"{allowed}, or .inf" if allowed else "or .inf"
+    notes = ", ".join(filter(None, [parameter.unit, allowed]))
+    return f"{parameter.meaning} [{notes}]" if notes else parameter.meaning
+
+
+def _comment(text: str, indent: str) -> list[str]:
+    return [f"{indent}# {line}" for line in wrap(text, _WIDTH - len(indent) - 2)]

@@ -1,0 +1,203 @@
+"""list, show, new and schema: what a user learns of scenarios, and the file to edit."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+import yaml
+
+from stickslip_ros.scenarios.files import load_scenario, shipped_scenarios
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from tests.app.conftest import Run
+from tests.scenarios.conftest import read_by_ros  # noqa: F401 - a fixture used here
+
+
+def test_list_names_what_can_be_given_by_name(stickslip: Run) -> None:
+    done = stickslip("list")
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    named = [line.split(maxsplit=1) for line in lines if re.match(r"  \w", line)]
+    shown = dict(named)
+    assert shown["feed_drive"].startswith("The slide of a machine tool: 100 kg, 16 Hz")
+    assert shown["stribeck"].startswith("Cubic Stribeck law")
+    assert "parameters: static, minimum, minimum_speed" in [line.strip() for line in lines]
+    assert "linear_gain" in lines[-1]
+    found = json.loads(stickslip("list", "--json").stdout)
+    assert [scenario["name"] for scenario in found["scenarios"]] == list(shipped_scenarios())
+    assert "plant.friction.slope" in found["friction_laws"][2]["parameters"]
+
+
+def parameters(done: Any) -> dict[str, dict[str, Any]]:
+    return json.loads(done.stdout)["parameters"]
+
+
+def test_show_tells_where_each_value_comes_from(stickslip: Run, tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text(
+        "/**/scenario: {ros__parameters: {base: feed_drive}}\n"
+        "/**/plant: {ros__parameters: {mass: 80.0}}\n"
+    )
+    arguments = ("show", "mine.yaml", "-p", "plant.belt_speed=0.02")
+    done = stickslip(*arguments, "--json")
+    found = parameters(done)
+    assert json.loads(done.stdout)["bases"][0].endswith("config/feed_drive.yaml")
+    assert {
+        name: (row["value"], row["source"]) for name, row in found["plant"].items()
+    }.items() >= {
+        "mass": (80.0, "file"),
+        "stiffness": (1e6, "base"),
+        "belt_speed": (0.02, "override"),
+        "friction.slope": (0.45, "default"),
+    }.items()
+    assert {node: set(rows) for node, rows in found.items()} == {
+        node: set(values) for node, values in load_scenario("paper").as_dict().items()
+    }
+    lines = [line.split() for line in stickslip(*arguments).stdout.splitlines()]
+    assert ["mass", "80.0", "kg", "file"] in lines
+    assert ["belt_speed", "0.02", "m/s", "override"] in lines
+
+
+def test_a_dimensionless_scenario_is_shown_without_units(stickslip: Run) -> None:
+    lines = [line.split() for line in stickslip("show", "paper").stdout.splitlines()]
+    assert ["mass", "1.0", "file"] in lines
+    assert ["max_bag_size", "0", "bytes", "default"] in lines
+
+
+def test_show_tells_of_sections_for_other_nodes(stickslip: Run, tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text("/**/damper: {ros__parameters: {gain: 3.0}}\n")
+    done = stickslip("show", "mine.yaml", "--base", "feed_drive")
+    assert "section /**/damper is for another node" in done.stdout
+
+
+@pytest.mark.parametrize("source", ["feed_drive", "paper"])
+def test_new_writes_a_file_that_is_the_scenario(
+    stickslip: Run, tmp_path: Path, source: str
+) -> None:
+    done = stickslip("new", "mine.yaml", "--from", source)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "`stickslip simulate mine.yaml`" in done.stdout
+    mine = load_scenario(str(tmp_path / "mine.yaml"))
+    assert mine.as_dict() == load_scenario(source).as_dict()
+    assert mine.left_to_defaults == []
+    text = (tmp_path / "mine.yaml").read_text()
+    assert max(map(len, text.splitlines())) <= 100
+    for node, model in NODE_PARAMETERS.items():
+        for parameter in load_scenario(source).as_dict()[node]:
+            assert f"{parameter.rpartition('.')[2]}:" in text, (model, parameter)
+    assert "    # Mass of the slide. [kg, above 0]\n    mass: " in text
+    assert stickslip("simulate", "mine.yaml", "--duration", "1", "--json").returncode == 0
+
+
+def test_ros_reads_a_new_file(
+    stickslip: Run,
+    tmp_path: Path,
+    read_by_ros: Any,  # noqa: F811
+) -> None:
+    stickslip("new", "mine.yaml", "--from", "paper")
+    values = load_scenario("paper").as_dict()["plant"]
+    given = {
+        name: value for name, value in values.items() if name not in ("wait_for", "use_sim_time")
+    }
+    assert read_by_ros(str(tmp_path / "mine.yaml")) == given
+
+
+def test_new_keeps_lists_and_texts(stickslip: Run, tmp_path: Path) -> None:
+    (tmp_path / "other.yaml").write_text(
+        '/**/plant: {ros__parameters: {wait_for: [analyzer, "b"]}}\n'
+        '/**/analyzer: {ros__parameters: {bag: "a: \\"b\\" #"}}\n'
+    )
+    stickslip("new", "mine.yml", "--from", "./other.yaml")
+    mine = load_scenario(str(tmp_path / "mine.yml"))
+    assert mine.plant.wait_for == ["analyzer", "b"]
+    assert mine.analyzer.bag == 'a: "b" #'
+
+
+@pytest.mark.parametrize(
+    ("arguments", "refusal"),
+    [
+        (("new", "kept.yaml"), "FILE kept.yaml: exists already; it is not overwritten"),
+        (("new", "mine.txt"), "mine.txt: must end in .yaml or .yml"),
+        (("new", "none/mine.yaml"), "there is no directory none"),
+        (("new", "mine.yaml", "--from", "papr"), "did you mean paper?"),
+        (("show", "papr"), "did you mean paper?"),
+        (("show", "paper", "-p", "plant.mas=1"), "did you mean plant.mass?"),
+        (("set", "plant.mas=1"), "did you mean plant.mass?"),
+        (("set", "plnt.mass=1"), "unknown node plnt; did you mean plant?"),
+        (("set", "plant.mass"), "must be NODE.PARAMETER=VALUE"),
+        (("set", "plant.mass=heavy"), "plant.mass = 'heavy' is refused: must be a finite number"),
+        (("set", "plant.mass=1", "--namespace", "a b"), "--namespace 'a b'"),
+    ],
+)
+def test_what_is_wrong_is_refused_in_a_line(
+    stickslip: Run, tmp_path: Path, arguments: tuple[str, ...], refusal: str
+) -> None:
+    (tmp_path / "kept.yaml").write_text("kept")
+    done = stickslip(*arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = done.stderr.splitlines()
+    assert refusal in line
+    assert [file.name for file in tmp_path.iterdir()] == ["kept.yaml"]
+    assert (tmp_path / "kept.yaml").read_text() == "kept"
+
+
+@pytest.fixture
+def schema(stickslip: Run) -> Any:
+    found = json.loads(stickslip("schema").stdout)
+    jsonschema.Draft7Validator.check_schema(found)
+    return jsonschema.Draft7Validator(found)
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_the_schema_accepts_what_ships_and_what_new_writes(
+    schema: Any, stickslip: Run, tmp_path: Path, name: str
+) -> None:
+    stickslip("new", "mine.yaml", "--from", name)
+    for path in (shipped_scenarios()[name], tmp_path / "mine.yaml"):
+        assert list(schema.iter_errors(yaml.safe_load(path.read_text()))) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "/**/plant: {ros__parameters: {friction.law: coulomb, friction: {static: 0.3}}}",
+        "/feed_drive/plant: {ros__parameters: {mass: 2}}",
+        "/**/scenario: {ros__parameters: {base: feed_drive}}",
+        "/**/damper: {ros__parameters: {gain: 3.0}}",
+        "/**/washout_controller: {ros__parameters: {force_limit: .inf}}",
+    ],
+)
+def test_the_schema_accepts_other_ways_to_write_it(schema: Any, text: str) -> None:
+    assert list(schema.iter_errors(yaml.safe_load(text))) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("/**/plant: {ros__parameters: {mas: 1.0}}", "mas"),
+        ("/**/plant: {ros__parameters: {mass: -1.0}}", "-1.0"),
+        ("/**/plant: {ros__parameters: {mass: heavy}}", "heavy"),
+        ("/**/plant: {ros__parameters: {friction: {law: sticky}}}", "sticky"),
+        ("/**/plant: {mass: 1.0}", "ros__parameters"),
+        ("/**/scenario: {ros__parameters: {bas: paper}}", "base"),
+        ("/**/analyzer: {ros__parameters: {window: 0}}", "0"),
+    ],
+)
+def test_the_schema_refuses_what_is_wrong(schema: Any, text: str, named: str) -> None:
+    errors = list(schema.iter_errors(yaml.safe_load(text)))
+    assert any(named in error.message for error in errors)
+
+
+def test_the_schema_tells_unit_meaning_default_and_choices(stickslip: Run) -> None:
+    sections = json.loads(stickslip("schema").stdout)["definitions"]
+    plant = sections["plant"]["properties"]["ros__parameters"]["properties"]
+    assert plant["mass"] == {
+        "description": "Mass of the slide. [kg]",
+        "type": "number",
+        "minimum": 1e-30,
+        "maximum": 1e30,
+        "default": 1.0,
+    }
+    assert "coulomb" in plant["friction"]["properties"]["law"]["enum"]
+    assert plant["wait_for"]["items"] == {"type": "string"}
