@@ -244,7 +244,7 @@ class LockstepPacer(Pacer):
 class RealtimePacer(Pacer):
     """Publishes each sample at its absolute deadline, by the monotonic clock, from its own thread.
 
-    After a stall the samples that are due follow at once; each one published after the deadline
+    After a stall the samples that are due follow immediately; each one published after the deadline
     of the next counts as a missed deadline.
     """
 

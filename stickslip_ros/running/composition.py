@@ -41,7 +41,7 @@ class Composition:
                 self.nodes[name] = node
                 self.spinner.add(node)
                 if node.trigger_configure() is not TransitionCallbackReturn.SUCCESS:
-                    raise RunError(f"{name} could not be configured; its log says why")
+                    raise RunError(f"{name} could not be configured; see its log")
         except BaseException:
             self.close()
             raise
@@ -52,7 +52,7 @@ class Composition:
         """Activate a node; wait up to `timeout` (s, wall time) for the nodes that it needs."""
         done = TransitionCallbackReturn.SUCCESS
         if not self.spinner.spin_until(lambda: node.trigger_activate() is done, timeout):
-            reason = node.missing_peers() or "its log says why"
+            reason = node.missing_peers() or "see its log"
             raise RunError(f"{node.get_name()} could not be activated: {reason}")
 
     def set_parameters(self, node: ManagedNode[Any], values: Mapping[str, Any]) -> None:

@@ -74,7 +74,7 @@ class LifecycleClient:
             check()
             if state in asked or state == "finalized":
                 done = _PARTICIPLE[asked[-1]] if asked else "brought up"
-                raise RunError(f"the controller {self.name} could not be {done}; its log says why")
+                raise RunError(f"the controller {self.name} could not be {done}; see its log")
             if monotonic() >= deadline:
                 raise RunError(f"the controller {self.name} was not active within {timeout:g} s")
             # It may proceed to its next state by itself.

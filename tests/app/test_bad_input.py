@@ -201,7 +201,7 @@ def test_a_clock_that_no_stamp_can_hold_is_refused(
     monkeypatch.setattr("time.time_ns", lambda: now)
     done = stickslip("run", "paper", "--duration", "1")
     assert done.returncode == 2
-    assert f"the clock of this machine says {year}: " in done.stderr.splitlines()[-1]
+    assert f"the clock of this machine shows the year {year}: " in done.stderr.splitlines()[-1]
 
 
 @pytest.mark.parametrize(

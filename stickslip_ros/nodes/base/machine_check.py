@@ -31,8 +31,8 @@ def check_machine(domain: int) -> None:
     if not 0 < now < END_OF_TIME:
         year = datetime.fromtimestamp(now / NANOSECONDS, UTC).year
         raise InvalidInputError(
-            f"the clock of this machine says {year}: the stamps of ROS messages range from 1970 "
-            "to January 2038"
+            f"the clock of this machine shows the year {year}: the stamps of ROS messages "
+            "range from 1970 to January 2038"
         )
     if is_kept_on_loopback() and not _reaches_itself():
         raise InvalidInputError(

@@ -22,17 +22,17 @@ def keep_on_this_machine(network: bool) -> str:
     """
     _translate_predecessor()
     names = [_DISCOVERY_RANGE, *(["ROS_DISCOVERY_SERVER", _PROFILES] if is_fast_dds() else [])]
-    said = [f"{name}={os.environ[name]}" for name in names if os.environ.get(name)]
+    given = [f"{name}={os.environ[name]}" for name in names if os.environ.get(name)]
     if network:
         os.environ[_DISCOVERY_RANGE] = "SUBNET"
-    elif not said:
+    elif not given:
         os.environ.update(this_machine_only())
     prefer_prompt_middleware()
     if network:
         return "open to the network"
     if this_machine_only().items() <= os.environ.items():
         return "loopback only"
-    return f"as the environment says: {' '.join(said)}"
+    return f"set by the environment: {' '.join(given)}"
 
 
 def this_machine_only() -> dict[str, str]:
