@@ -64,7 +64,7 @@ def test_without_a_proposal_it_says_why() -> None:
 
 def test_jitter_is_remarked_on() -> None:
     found = ss.design(ss.scenario("feed_drive", force_jitter=0.001), belt_speed=0.04)
-    assert "force_jitter is left out" in (found.remark or "")
+    assert "force_jitter is omitted" in (found.remark or "")
 
 
 @pytest.mark.parametrize("speed", ["fast", (0.01, 0.02, 0.03), (0.05, 0.01), -0.04, ("a", "b")])

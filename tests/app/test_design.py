@@ -133,7 +133,7 @@ def test_without_vibration_nothing_is_simulated(stickslip: Run) -> None:
     done = stickslip("design", "feed_drive", "--belt-speed", "0.06", *jitter, "--json")
     found = json.loads(done.stdout)
     assert "nothing vibrates" in found["remark"]
-    assert "force_jitter is ignored" in found["remark"]
+    assert "force_jitter is omitted" in found["remark"]
     assert found["settling_time"] is found["peak_force"] is found["margins"]["delay"] is None
     assert found["predicted_settling_time"] > 0.0
 
