@@ -33,6 +33,7 @@ from stickslip_ros.scenarios.files import Scenario, parameter_file
 from stickslip_ros.scenarios.sections import section_matches
 
 _READY_TIMEOUT = 30.0
+_ANSWER_TIMEOUT = 5.0
 _EXIT_TIMEOUT = 2.0 * GUARD_TIMEOUT + 2.0
 _DISCOVERY_TIME = 3.0
 """Time, s, after which a problem is reported: a shorter one may be due to discovery."""
@@ -196,17 +197,16 @@ class _Supervisor:
             self._take_through(node, Transition.TRANSITION_ACTIVATE)
 
     def _configure(self, nodes: Iterable[str]) -> None:
-        """Configure all nodes at the same time, and again those that were not ready for it."""
+        """Configure all nodes at the same time.
+
+        Then look again at those that were not ready for it, or whose answer was lost.
+        """
         clients = [self._client(node) for node in nodes]
         for client in clients:
             client.start_change(Transition.TRANSITION_CONFIGURE)
-
-        def unanswered() -> list[str]:
-            return [client.name for client in clients if not client.change_ended()]
-
-        if not self._spinner.spin_until(lambda: not unanswered(), _READY_TIMEOUT):
-            self._fail_unready(unanswered())
-            return
+        self._spinner.spin_until(
+            lambda: not [client for client in clients if not client.change_ended()], _ANSWER_TIMEOUT
+        )
         for client in clients:
             if not client.changed:
                 self._take_through(client.name, Transition.TRANSITION_CONFIGURE)
@@ -216,12 +216,8 @@ class _Supervisor:
         ready = self._spinner.spin_until(
             lambda: self._change_state(node, transition), _READY_TIMEOUT, period=0.02
         )
-        if not ready:
-            self._fail_unready([node])
-
-    def _fail_unready(self, nodes: Iterable[str]) -> None:
-        if not self._is_ended():
-            self._fail(f"{', '.join(nodes)} did not become ready within {_READY_TIMEOUT:g} s")
+        if not ready and not self._is_ended():
+            self._fail(f"{node} did not become ready within {_READY_TIMEOUT:g} s")
 
     def _connect_user_controller(self, command: Sequence[str]) -> None:
         """Wait for the user's controller; our nodes are activated once connected to it.

@@ -20,6 +20,12 @@ NEXT_TRANSITION = {
 }
 """The next transition from a state towards the active one."""
 
+_STATE_AFTER = {
+    Transition.TRANSITION_CONFIGURE: "inactive",
+    Transition.TRANSITION_ACTIVATE: ACTIVE,
+    Transition.TRANSITION_DEACTIVATE: "inactive",
+}
+
 _PARTICIPLE = {"unconfigured": "configured", "inactive": "activated"}
 
 
@@ -34,8 +40,8 @@ class LifecycleClient:
         self.name = name
         self._spinner = spinner
         self._timeout = answer_timeout
+        self._get_state = ServiceCall(node, GetState, f"{name}/get_state")
         # No second request: it would be invalid while the transition is in progress.
-        self._get_state = ServiceCall(node, GetState, f"{name}/get_state", answer_time=inf)
         self._change_state = ServiceCall(node, ChangeState, f"{name}/change_state", answer_time=inf)
 
     def state(self) -> str:
@@ -44,7 +50,15 @@ class LifecycleClient:
         return answer.current_state.label if answer is not None else ""
 
     def change_state(self, transition: int) -> bool:
-        """Request a transition; return whether the node has made it."""
+        """Request a transition; return whether the node has made it.
+
+        If the last request was not answered, it is repeated only in a state that shows that it had
+        no effect: the answer may be lost, or the transition still in progress.
+        """
+        if self._change_state.sent and self._change_state.answer is None:
+            state = self.state()
+            if state == _STATE_AFTER[transition] or state not in NEXT_TRANSITION:
+                return state == _STATE_AFTER[transition]
         self._spinner.ask(self._change_state, _request(transition), self._timeout)
         return self.changed
 

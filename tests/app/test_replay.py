@@ -26,7 +26,7 @@ def test_it_says_what_it_waits_for_plays_to_the_end_and_is_done(
     assert process.stderr is not None
     offered = process.stderr.readline()
     assert f"bag: {FORCES}, {STATES}, loopback only" in offered
-    assert "waiting until somebody reads them" in offered
+    assert "waiting until a node reads them" in offered
     assert "no node reads" in process.stderr.readline()
     forces, states = graph.listen(CONTROL_FORCE, raw=True), graph.listen(JOINT_STATES, raw=True)
     graph.wait_until(lambda: len(states) == len(forces) == 150, "all is heard")

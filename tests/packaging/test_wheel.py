@@ -70,7 +70,8 @@ def test_holds_what_ros_looks_for(content, stem, checkout, executables):
 
 
 def test_names_its_extras(header):
-    assert set(header.get_all("Provides-Extra")) == {"dashboard", "ros", "dask", "test", "dev"}
+    extras = {"analysis", "dashboard", "dask", "dev", "docs", "ros", "test"}
+    assert set(header.get_all("Provides-Extra")) == extras
     assert header["Requires-Python"] == ">=3.11"
 
 
