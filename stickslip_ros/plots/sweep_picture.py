@@ -313,6 +313,8 @@ def _scale(axis: Axis) -> dict[str, Any]:
 
 
 def _title(study: Study) -> str:
-    scenario = study.scenario
-    changed = f", {' '.join(scenario.overrides)}" if scenario.overrides else ""
+    """Return the title: the scenario with its overrides, but for parameters that vary."""
+    scenario, varied = study.scenario, study.plan.parameters
+    fixed = [text for text in scenario.overrides if text.partition("=")[0] not in varied]
+    changed = f", {' '.join(fixed)}" if fixed else ""
     return f"Settled motions of {scenario.name}{changed}"

@@ -224,3 +224,11 @@ def test_beside_a_colour_bar_what_runs_away_is_grey(tmp_path: Path) -> None:
 def test_under_sampled_control_there_is_a_limit_of_stability(tmp_path: Path) -> None:
     found = swept("washout_controller.linear_gain=-1.5:0.5:3", overrides=("plant.rate=20",))
     assert "limit of stability -0.8" in diagram(tmp_path / "diagram.svg", found)
+
+
+def test_the_title_omits_overrides_of_the_parameter_that_varies() -> None:
+    columns, study = swept(
+        "plant.belt_speed=0.5:0.6:2", overrides=(FREE, "plant.belt_speed=0.3", "plant.damping=0.03")
+    )
+    title = diagram_figure(columns, study).get_suptitle()
+    assert title == f"Settled motions of paper, {FREE} plant.damping=0.03"
