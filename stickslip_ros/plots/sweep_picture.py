@@ -314,7 +314,8 @@ def _scale(axis: Axis) -> dict[str, Any]:
 
 def _title(study: Study) -> str:
     """Return the title: the scenario with its overrides, but for parameters that vary."""
-    scenario, varied = study.scenario, study.plan.parameters
-    fixed = [text for text in scenario.overrides if text.partition("=")[0] not in varied]
-    changed = f", {' '.join(fixed)}" if fixed else ""
-    return f"Settled motions of {scenario.name}{changed}"
+    scenario = study.scenario
+    untold = (*study.plan.parameters, "plant.expects_control")
+    fixed = [text for text in scenario.overrides if text.partition("=")[0] not in untold]
+    control = "with control" if scenario.plant.expects_control else "no control"
+    return f"Settled motions of {' '.join([scenario.name, *fixed])}, {control}"

@@ -89,7 +89,7 @@ def test_a_diagram_names_axes_regimes_and_transitions(tmp_path: Path, over_speed
     picture = diagram(tmp_path / "diagram.svg", over_speed)
     for name in ("plant.belt_speed", "turning points of x", "amplitude"):
         assert f"{name} (dimensionless)" in picture
-    for text in ("stick-slip", "equilibrium", "stick fraction", FREE):
+    for text in ("stick-slip", "equilibrium", "stick fraction", "no control"):
         assert text in picture
     for text in ("Hopf point 0.48876", "limit of sticking 0.43947"):
         assert text in picture
@@ -231,4 +231,4 @@ def test_the_title_omits_overrides_of_the_parameter_that_varies() -> None:
         "plant.belt_speed=0.5:0.6:2", overrides=(FREE, "plant.belt_speed=0.3", "plant.damping=0.03")
     )
     title = diagram_figure(columns, study).get_suptitle()
-    assert title == f"Settled motions of paper, {FREE} plant.damping=0.03"
+    assert title == "Settled motions of paper plant.damping=0.03, no control"
