@@ -125,8 +125,8 @@ class _CallableScenario(ModuleType):
     """
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
-        function = import_module("stickslip_ros.api.scenarios").scenario
-        return function(*arguments, **options)
+        package = sys.modules[self.__name__.rpartition(".")[0]]
+        return package.__getattr__("scenario")(*arguments, **options)
 
 
 def find_moved_modules() -> None:

@@ -1,9 +1,12 @@
 """`stickslip completion`: the completion script of a shell."""
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from stickslip_ros.app.commands import COMMANDS
+
+ParserOf = Callable[[str], argparse.ArgumentParser]
+"""Returns the parser of a command by its name."""
 
 _FILES = ("BAG", "CONTROLLER", "DIR", "FILE", "OUT")
 """Metavars of files and directories."""
@@ -87,11 +90,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     if arguments.shell == "zsh":
         print("autoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit")
-    print(_script(arguments.shell), end="")
+    print(_script(arguments.shell, arguments.parser_of), end="")
     return 0
 
 
-def _script(shell: str) -> str:
+def _script(shell: str, parser_of: ParserOf) -> str:
     from stickslip_ros.scenarios.files import shipped_scenarios
     from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
     from stickslip_ros.scenarios.template import own_first
@@ -105,7 +108,7 @@ def _script(shell: str) -> str:
         name: ("true", "false") if parameter.kind is bool else parameter.choices
         for name, parameter in parameters.items()
     }
-    of_commands, of_options = _cases()
+    of_commands, of_options = _cases(parser_of)
     parts = {
         "@SHELL@": shell,
         "@SPACE@": _SPACE_OF_ZSH if shell == "zsh" else "",
@@ -127,16 +130,14 @@ def _script(shell: str) -> str:
     return script
 
 
-def _cases() -> tuple[list[str], list[str]]:
+def _cases(parser_of: ParserOf) -> tuple[list[str], list[str]]:
     """Return the branches of the script for the commands, and for their options with a value."""
-    from stickslip_ros.app.main import command_parser
-
     of_commands: list[str] = []
     of_options: list[str] = []
     for name in COMMANDS:
         options: list[str] = []
         positional = ""
-        for action in command_parser(name)._actions:  # pyright: ignore[reportPrivateUsage]
+        for action in parser_of(name)._actions:  # pyright: ignore[reportPrivateUsage]
             completed = _completed(action)
             options += action.option_strings
             if action.option_strings and action.nargs != 0:

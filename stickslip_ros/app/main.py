@@ -84,7 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         parser = _parser(given)
         if command and not command.startswith("-") and command not in COMMANDS:
             parser.error(f"unknown command {command!r:.80}; {did_you_mean(command, COMMANDS)}")
-        chosen, unknown = parser.parse_known_args(given, argparse.Namespace(further=further))
+        known = argparse.Namespace(further=further, parser_of=command_parser)
+        chosen, unknown = parser.parse_known_args(given, known)
         if unknown:
             chosen.parser.error(_unrecognized(unknown, chosen.parser.format_usage()))
         status: int = chosen.run(chosen)
