@@ -1,5 +1,6 @@
 """How results print: as tables in a terminal and in a notebook, with figures beside them."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from functools import partial
 from html import escape
@@ -16,12 +17,12 @@ Parts = Iterable[TextTable | str]
 """Tables and sentences that a result prints as."""
 
 
-class Shown:
+class Shown(ABC):
     """A result that prints as tables: plain text in a terminal, HTML in a notebook."""
 
+    @abstractmethod
     def _parts(self) -> Parts:
         """Return the tables and sentences."""
-        raise NotImplementedError
 
     def __repr__(self) -> str:
         return "\n".join(

@@ -42,9 +42,9 @@ def run(arguments: argparse.Namespace) -> int:
         raise InvalidInputError(f"{path}: must end in {' or '.join(_ENDINGS)}")
     check_new("FILE", path)
     scenario = load_scenario(arguments.source)
-    command = shlex.join(["stickslip", "simulate", str(path)])
-    heading = f"{path.stem}: a drive with the values of {scenario.name}, to be edited.\n{command}"
+    command = printable(shlex.join(["stickslip", "simulate", str(path)]))
+    title = f"{path.stem}: a drive with the values of {scenario.name}, to be edited."
     with writing("FILE", path), path.open("x", encoding="utf-8") as file:
-        file.write(commented_file(scenario, printable(heading)))
-    print(f"{printable(str(path))} is written: `{printable(command)}` simulates it")
+        file.write(commented_file(scenario, f"{printable(title)}\n{command}"))
+    print(f"{printable(str(path))} is written: `{command}` simulates it")
     return 0

@@ -17,6 +17,7 @@ from stickslip_ros.app.arguments import (
 from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
 from stickslip_ros.plots.why_no_cycle import why_no_cycle
+from stickslip_ros.studies.options import DEFAULT_PERIODS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration",
         type=seconds,
         metavar="S",
-        help="simulated time, s (default: the scenario's, else 200 periods)",
+        help=f"simulated time, s (default: the scenario's, else {DEFAULT_PERIODS:g} periods)",
     )
     parser.add_argument(
         "--continuous-control",

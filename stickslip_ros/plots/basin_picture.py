@@ -22,7 +22,7 @@ from stickslip_ros.studies.study import Study
 
 
 def study_figure(columns: Columns, basins: Basins, study: Study) -> Figure:
-    """Return the picture of which attractor each start of a study leads to."""
+    """Return the figure of which attractor each start of a study leads to."""
     plan, scenario = study.plan, study.scenario
     drive = scenario.plant.as_drive()
     units = Units.for_drive(drive)

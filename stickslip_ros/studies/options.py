@@ -46,6 +46,9 @@ class SettlingCourse:
                 raise InvalidInputError(f"{shown}: must be from {least} to {LONGEST:g}")
 
 
+DEFAULT_PERIODS = 200.0
+"""Default duration of a simulation, in natural periods."""
+
 BASIN_COURSE = SettlingCourse(transient=50.0, patience=80)
 """Default settling of a basin study: short at first, since most motions are steady soon."""
 

@@ -12,17 +12,15 @@ from stickslip_ros.physics.measures.observer import RunObserver
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.studies.options import DEFAULT_PERIODS
 from stickslip_ros.studies.settling import check_continuous
-
-_DEFAULT_PERIODS = 200.0
-"""Natural periods of a run that has no duration."""
 
 
 def default_duration(scenario: Scenario) -> float:
-    """Return the scenario's own duration, s, or without one 200 natural periods."""
+    """Return the scenario's own duration, s, or without one `DEFAULT_PERIODS`."""
     if isfinite(scenario.plant.duration):
         return scenario.plant.duration
-    return _DEFAULT_PERIODS * scenario.plant.as_drive().natural_period
+    return DEFAULT_PERIODS * scenario.plant.as_drive().natural_period
 
 
 def simulate(

@@ -103,6 +103,14 @@ def test_ros_reads_a_new_file(
     assert read_by_ros(str(tmp_path / "mine.yaml")) == given
 
 
+def test_new_begins_with_its_title_and_a_command(stickslip: Run, tmp_path: Path) -> None:
+    assert stickslip("new", "mine.yaml", "--from", "paper").returncode == 0
+    title, command, empty, *_ = (tmp_path / "mine.yaml").read_text().splitlines()
+    assert title == "# mine: a drive with the values of paper, to be edited."
+    assert command == "# stickslip simulate mine.yaml"
+    assert empty == ""
+
+
 def test_new_keeps_lists_and_texts(stickslip: Run, tmp_path: Path) -> None:
     (tmp_path / "other.yaml").write_text(
         '/**/plant: {ros__parameters: {wait_for: [analyzer, "b"]}}\n'
