@@ -1,6 +1,7 @@
 """The base class of the friction laws."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import inf
 from typing import Any, ClassVar, Self
@@ -8,46 +9,56 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from stickslip_ros.deprecated_names import Renamed
+from stickslip_ros.physics.model.constants import Scales, constant, scaled
 
 
 @dataclass(frozen=True)
 class FrictionLaw(ABC):
-    """Static friction law: the friction coefficient as a function of the relative speed.
+    """Friction law: the friction coefficient as a function of the relative speed.
 
-    A law is a frozen dataclass of its constants. `coefficient` is written once; it accepts floats,
-    numpy arrays and heyoka expressions, and so do the constants.
+    A law is a frozen dataclass of its constants, each described by `constant`. Its equations are
+    written once; they accept floats, numpy arrays and heyoka expressions, and so do the constants.
+
+    A static law defines `coefficient`. A law with a memory also has `states` with their rates, and
+    no stick: the slide always slips, however slowly. A law in pieces, or whose elements stick and
+    slip, has `switches`: values that are constant in each of its modes. A mode ends where one of
+    `margins` falls to zero; `switches_after` then gives the next one.
 
     Examples
     --------
-    A law of your own, with one more constant (add it to `LAWS` to use it in scenarios):
+    A law of your own:
 
     >>> from dataclasses import dataclass
+    >>> from typing import Any
+    >>> from stickslip_ros.physics.model.constants import constant
     >>> from stickslip_ros.physics.model.friction import FrictionLaw
     >>> @dataclass(frozen=True)
     ... class Viscous(FrictionLaw):
     ...     name = "viscous"
-    ...     inverse_speed_power = {"viscous": 1}
-    ...     viscous: float
+    ...     rise: Any = constant(0.1, "Increase of the coefficient with speed.", "s/m")
     ...
     ...     def coefficient(self, relative_speed, sign):
-    ...         return -self.static * sign - self.viscous * relative_speed
+    ...         return -self.static * sign - self.rise * relative_speed
     >>> Viscous.constants()
-    ('static', 'viscous')
-    >>> float(Viscous(static=0.3, viscous=0.5).at_rest(0.1))
+    ('static', 'rise')
+    >>> float(Viscous(static=0.3, rise=0.5).at_rest(0.1))
     0.35
     """
 
     name: ClassVar[str]
     """Name of the law in the parameters."""
+    states: ClassVar[Mapping[str, str | None]] = {}
+    """Unit of each state of the memory by name; empty for a static law."""
+    switches: ClassVar[Sequence[str]] = ()
+    """Names of the values that are constant in each mode of the law."""
     inverse_speed_power: ClassVar[dict[str, int]] = {}
-    """For each constant that has a dimension, the power n of its unit (s/m)^n."""
+    """Power n of the unit (s/m)^n of constants without description: laws of version 0.1."""
 
-    static: Any
-    """Static (break-away) coefficient mu_s: the largest |F|/N during stick."""
+    static: Any = constant(0.4, "Static (break-away) coefficient mu_s.", at_least=0.0)
 
     @abstractmethod
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        """Return the friction coefficient during slip, mu(v_r) = F/N.
+        """Return the friction coefficient during steady slip, mu(v_r) = F/N.
 
         `sign` is a separate argument so that the branch is smooth up to and beyond v_r = 0, as the
         integrator needs.
@@ -64,6 +75,169 @@ class FrictionLaw(ABC):
         float, array or expression
             Coefficient with the sign of the force on the slide, dimensionless.
         """
+
+    @property
+    def limits(self) -> tuple[Any, Any]:
+        """Largest |F|/N during stick before the slide slips forward (v_r > 0), and backward."""
+        return self.static, self.static
+
+    def friction(
+        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
+    ) -> Any:
+        """Return the friction coefficient during slip, steady or not.
+
+        Parameters
+        ----------
+        relative_speed : float, array or expression
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float, array or expression
+            sgn(v_r), -1 or 1.
+        memory : sequence of float or expression
+            Values of `states`.
+        switches : sequence of float or expression
+            Values of `switches`.
+
+        Returns
+        -------
+        float, array or expression
+            Coefficient with the sign of the force on the slide; by default `coefficient`.
+        """
+        return self.coefficient(relative_speed, sign)
+
+    def memory_rates(
+        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
+    ) -> Sequence[Any]:
+        """Return the derivatives of the memory by time; arguments as in `friction`.
+
+        Parameters
+        ----------
+        relative_speed : float or expression
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float or expression
+            sgn(v_r), -1 or 1.
+        memory : sequence of float or expression
+            Values of `states`.
+        switches : sequence of float or expression
+            Values of `switches`.
+
+        Returns
+        -------
+        sequence of float or expression
+            Rate of each of `states`.
+        """
+        return ()
+
+    def margins(
+        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
+    ) -> Sequence[Any]:
+        """Return what is above zero in a mode; where one falls to zero the mode ends.
+
+        The sign of v_r need not be among them: the drive follows it.
+
+        Parameters
+        ----------
+        relative_speed : float or expression
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float or expression
+            sgn(v_r), -1 or 1.
+        memory : sequence of float or expression
+            Values of `states`.
+        switches : sequence of float or expression
+            Values of `switches`.
+
+        Returns
+        -------
+        sequence of float or expression
+            Margins; as many in every mode, and a constant above zero where there is none.
+        """
+        return ()
+
+    def switches_at(
+        self, relative_speed: float, sign: float, memory: Sequence[float]
+    ) -> Sequence[float]:
+        """Return the switches of the mode that starts in a state.
+
+        It is called at the start of a motion, and when the relative speed changes its sign.
+
+        Parameters
+        ----------
+        relative_speed : float
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float
+            sgn(v_r) from now on, -1 or 1.
+        memory : sequence of float
+            Values of `states`.
+
+        Returns
+        -------
+        sequence of float
+            Values of `switches`.
+        """
+        return ()
+
+    def switches_after(
+        self, margin: int, sign: float, switches: Sequence[float]
+    ) -> Sequence[float]:
+        """Return the switches of the mode that follows where a margin has fallen to zero.
+
+        Parameters
+        ----------
+        margin : int
+            Index of the margin.
+        sign : float
+            sgn(v_r), -1 or 1.
+        switches : sequence of float
+            Values of `switches` so far.
+
+        Returns
+        -------
+        sequence of float
+            Values of `switches` from then on.
+        """
+        return switches
+
+    def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
+        """Return the memory in steady slip: the start of the search for an equilibrium.
+
+        Parameters
+        ----------
+        relative_speed : float
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float
+            sgn(v_r), -1 or 1.
+
+        Returns
+        -------
+        sequence of float
+            Values of `states`; by default 0.
+        """
+        return (0.0,) * len(self.states)
+
+    def initial_memory(self, relative_speed: float) -> Sequence[float]:
+        """Return the memory at the start of a motion.
+
+        Parameters
+        ----------
+        relative_speed : float
+            Speed v_r of the slide relative to the belt, m/s.
+
+        Returns
+        -------
+        sequence of float
+            Values of `states`; by default 0.
+        """
+        return (0.0,) * len(self.states)
+
+    def refusal(self) -> str | None:
+        """Return a sentence that says which constants do not fit together, or None.
+
+        Returns
+        -------
+        str or None
+            Sentence with names, values and what is allowed; bounds of one constant are not its
+            subject.
+        """
+        return None
 
     def at_rest(self, belt_speed: Any) -> Any:
         """Return mu(-v_belt), eq. 6: the coefficient for a slide at rest on a moving belt.
@@ -91,24 +265,31 @@ class FrictionLaw(ABC):
         """Speed that may change the coefficient by a factor, m/s; infinite for polynomials."""
         return inf
 
-    def scaled(self, speed: float) -> Self:
-        """Return the same law with speeds in units of `speed`.
+    @property
+    def sticks(self) -> bool:
+        """Whether the slide can stick to the belt: only without a memory."""
+        return not self.states
+
+    def scaled(self, speed: float, length: float = 1.0) -> Self:
+        """Return the same law in other units of speed and length.
 
         Parameters
         ----------
         speed : float
             New unit of speed, m/s.
+        length : float, optional
+            New unit of length, m; a static law does not depend on it.
 
         Returns
         -------
         FrictionLaw
             Law of the same class.
         """
-        changes = {
+        undescribed = {
             name: getattr(self, name) * speed**power
             for name, power in self.inverse_speed_power.items()
         }
-        return replace(self, **changes)
+        return replace(scaled(self, Scales(length, speed)), **undescribed)
 
     @classmethod
     def constants(cls) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
 
 
@@ -24,14 +25,12 @@ class Exponential(FrictionLaw):
     """
 
     name: ClassVar[str] = "exponential"
-    inverse_speed_power: ClassVar[dict[str, int]] = {"decay_speed": -1, "viscous": 1}
 
-    kinetic: Any
-    """Coulomb coefficient mu_k, the limit at high speed without viscous friction."""
-    decay_speed: Any
-    """Speed v_s over which the coefficient decays from mu_s to mu_k, m/s."""
-    viscous: Any
-    """Viscous coefficient mu_v, the increase with speed, s/m."""
+    kinetic: Any = constant(0.25, "Kinetic coefficient mu_k.", at_least=0.0)
+    decay_speed: Any = constant(
+        0.5, "Speed v_s of the decay from mu_s to mu_k.", "m/s", positive=True
+    )
+    viscous: Any = constant(0.0, "Increase of the coefficient with speed.", "s/m")
 
     @property
     def characteristic_speed(self) -> float:
@@ -61,3 +60,15 @@ class Exponential(FrictionLaw):
         decay = heyoka.exp(exponent) if symbolic else np.exp(exponent)
         drop = self.static - self.kinetic
         return -sign * (self.kinetic + drop * decay + self.viscous * speed)
+
+    def refusal(self) -> str | None:
+        """Refuse a kinetic coefficient above the static one; see `FrictionLaw.refusal`.
+
+        Returns
+        -------
+        str or None
+            Sentence with both values.
+        """
+        if self.kinetic <= self.static:
+            return None
+        return f"kinetic = {self.kinetic} must not exceed static = {self.static}"

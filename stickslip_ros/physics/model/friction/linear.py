@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
 
 
@@ -18,10 +19,8 @@ class Linear(FrictionLaw):
     """
 
     name: ClassVar[str] = "linear"
-    inverse_speed_power: ClassVar[dict[str, int]] = {"slope": 1}
 
-    slope: Any
-    """Decrease of the coefficient with the relative speed, s/m."""
+    slope: Any = constant(0.45, "Decrease of the coefficient with relative speed.", "s/m")
 
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
         """Return mu(v_r); see `FrictionLaw.coefficient`.

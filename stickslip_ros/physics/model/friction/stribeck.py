@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
 
 
@@ -21,12 +22,11 @@ class Stribeck(FrictionLaw):
     """
 
     name: ClassVar[str] = "stribeck"
-    inverse_speed_power: ClassVar[dict[str, int]] = {"minimum_speed": -1}
 
-    minimum: Any
-    """Smallest kinetic coefficient mu_m."""
-    minimum_speed: Any
-    """Relative speed v_m at which the coefficient is smallest, m/s."""
+    minimum: Any = constant(0.25, "Smallest kinetic coefficient mu_m.", at_least=0.0)
+    minimum_speed: Any = constant(
+        0.5, "Relative speed v_m at which the coefficient is smallest.", "m/s", positive=True
+    )
 
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
         """Return mu(v_r), eq. 3; see `FrictionLaw.coefficient`.
@@ -46,3 +46,15 @@ class Stribeck(FrictionLaw):
         drop = self.static - self.minimum
         ratio = relative_speed / self.minimum_speed
         return -self.static * sign + drop / 2.0 * (3.0 * ratio - ratio * ratio * ratio)
+
+    def refusal(self) -> str | None:
+        """Refuse a smallest coefficient above the static one; see `FrictionLaw.refusal`.
+
+        Returns
+        -------
+        str or None
+            Sentence with both values.
+        """
+        if self.minimum <= self.static:
+            return None
+        return f"minimum = {self.minimum} must not exceed static = {self.static}"

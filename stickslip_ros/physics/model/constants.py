@@ -1,0 +1,167 @@
+"""The constants of a part of a drive: unit, bounds, default and meaning, in its dataclass."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from functools import cache
+from math import inf
+from typing import Any, TypeVar
+
+_Part = TypeVar("_Part")
+
+_KEY = "constant"
+
+_BASE_UNITS: Mapping[str, tuple[int, int, int, int]] = {
+    "m": (1, 0, 0, 0),
+    "s": (0, 1, 0, 0),
+    "N": (0, 0, 1, 0),
+    "kg": (-1, 2, 1, 0),
+    "Hz": (0, -1, 0, 0),
+    "rad": (0, 0, 0, 0),
+    "1": (0, 0, 0, 0),
+    "value": (0, 0, 0, 1),
+}
+"""Powers of length, time, force and, for a course, of what it gives in each unit."""
+
+
+@dataclass(frozen=True)
+class Constant:
+    """Description of one constant."""
+
+    name: str
+    default: float
+    meaning: str
+    """Meaning, as a sentence."""
+    unit: str | None
+    """Unit, such as "N s/m"; None for a pure number."""
+    at_least: float
+    """Smallest allowed value."""
+    positive: bool
+    """Whether the value must be above zero."""
+
+
+def constant(
+    default: float,
+    meaning: str,
+    unit: str | None = None,
+    *,
+    at_least: float = -inf,
+    positive: bool = False,
+) -> Any:
+    """Describe a constant, as the default of a dataclass field.
+
+    Parameters
+    ----------
+    default : float
+        Default value.
+    meaning : str
+        Meaning, as a sentence; shown in help texts and in the documentation.
+    unit : str, optional
+        Unit of m, s, N, kg, Hz and rad, such as "N s/m"; the scaling derives from it. In a course
+        `value` is the unit of what the course gives. By default the constant is a pure number.
+    at_least : float, optional
+        Smallest allowed value.
+    positive : bool, optional
+        Whether the value must be above zero.
+
+    Returns
+    -------
+    dataclasses.Field
+        Field with this description.
+
+    Raises
+    ------
+    ValueError
+        If the unit is unknown.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> from stickslip_ros.physics.model.constants import constant, constants_of
+    >>> @dataclass(frozen=True)
+    ... class Spring:
+    ...     stiffness: float = constant(1.0, "Stiffness of the spring.", "N/m", positive=True)
+    >>> constants_of(Spring)["stiffness"].unit
+    'N/m'
+    """
+    unit_powers(unit)
+    described = Constant("", default, meaning, unit, at_least, positive)
+    return field(default=default, metadata={_KEY: described})
+
+
+@cache
+def constants_of(part: type) -> Mapping[str, Constant]:
+    """Return the constants of a part's class by name, in the order of their definition.
+
+    Parameters
+    ----------
+    part : type
+        Dataclass.
+
+    Returns
+    -------
+    mapping of str to Constant
+        Description of each field made with `constant`.
+    """
+    return {
+        each.name: replace(each.metadata[_KEY], name=each.name)
+        for each in fields(part)
+        if _KEY in each.metadata
+    }
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Units in which a drive is dimensionless."""
+
+    length: float
+    """Unit of length, m."""
+    speed: float
+    """Unit of speed, m/s."""
+    force: float = 1.0
+    """Unit of force, N."""
+
+    def factor(self, unit: str | None, value: str | None = None) -> float:
+        """Return the factor from SI units to dimensionless values; `value` as in `unit_powers`."""
+        length, time, force, values = unit_powers(unit)
+        more = unit_powers(value)
+        length, time, force = (
+            power + values * further
+            for power, further in zip((length, time, force), more[:3], strict=True)
+        )
+        if length == -time:  # a power of a speed
+            return self.speed**-length * self.force**-force
+        return self.length ** (-length - time) * self.speed**time * self.force**-force
+
+
+def scaled(part: _Part, scales: Scales, value: str | None = None) -> _Part:
+    """Return a part with its constants in units of `scales`; `value` is the unit of a course."""
+    changes = {
+        name: getattr(part, name) * scales.factor(described.unit, value)
+        for name, described in constants_of(type(part)).items()
+        if described.unit is not None
+    }
+    return replace(part, **changes) if changes else part  # type: ignore[type-var]
+
+
+@cache
+def unit_powers(unit: str | None) -> tuple[int, int, int, int]:
+    """Return the powers of length, time, force and of what a course gives, in a unit."""
+    total = [0, 0, 0, 0]
+    for sign, name, power in _factors(unit or "1"):
+        if name not in _BASE_UNITS:
+            raise ValueError(f"unit {unit!r}: {name!r} is none of {', '.join(_BASE_UNITS)}")
+        for axis, base in enumerate(_BASE_UNITS[name]):
+            total[axis] += sign * power * base
+    return total[0], total[1], total[2], total[3]
+
+
+def _factors(unit: str) -> Iterator[tuple[int, str, int]]:
+    """Yield sign, name and power of each factor; everything after a slash is divided by."""
+    numerator, *denominators = unit.split("/")
+    for sign, part in ((1, numerator), *((-1, each) for each in denominators)):
+        for factor in part.split():
+            name, _, power = factor.partition("^")
+            if not re.fullmatch(r"\d*", power):
+                raise ValueError(f"unit {unit!r}: the power of {name} must be a whole number")
+            yield sign, name, int(power or 1)
