@@ -3,7 +3,10 @@
 from dataclasses import dataclass
 from functools import cached_property
 from math import pi, sqrt
+from typing import Self
 
+from stickslip_ros.physics.model.constants import Scales, scaled
+from stickslip_ros.physics.model.course import Course, NoCourse
 from stickslip_ros.physics.model.friction import FrictionLaw
 
 
@@ -40,6 +43,10 @@ class Drive:
     """Belt (feed) speed v_belt, m/s; positive, negative or zero."""
     friction: FrictionLaw
     """Friction law; its speeds are in m/s."""
+    belt: Course = NoCourse()
+    """Course added to the belt speed, m/s."""
+    load: Course = NoCourse()
+    """Course added to the normal force, N."""
 
     @cached_property
     def angular_frequency(self) -> float:
@@ -65,6 +72,26 @@ class Drive:
     def speed_scale(self) -> float:
         """Scale of speed V = w0 L, m/s."""
         return self.angular_frequency * self.length_scale
+
+    @cached_property
+    def scales(self) -> Scales:
+        """Units in which the drive is dimensionless."""
+        return Scales(self.length_scale, self.speed_scale, self.normal_force)
+
+    @cached_property
+    def dimensionless(self) -> Self:
+        """The same drive in these units, eq. 2: m = k = N = 1."""
+        scales = self.scales
+        return type(self)(
+            mass=1.0,
+            damping=self.damping_coefficient,
+            stiffness=1.0,
+            normal_force=1.0,
+            belt_speed=self.belt_speed / self.speed_scale,
+            friction=self.friction.scaled(self.speed_scale, self.length_scale),
+            belt=scaled(self.belt, scales, "m/s"),
+            load=scaled(self.load, scales, "N"),
+        )
 
     @property
     def equilibrium_position(self) -> float:

@@ -1,22 +1,34 @@
-"""The equations of motion, eq. 5 and 19 of the paper, as symbolic expressions.
+"""The equations of motion, eq. 5, and of the washout controller, eq. 17 and 18.
 
-Everything is dimensionless (see `Drive`). The integrator of the motion is compiled from these
-expressions. The derivatives of the right-hand side are derived from them, too.
+They are written once, for floats, arrays and heyoka expressions: a drive may have expressions for
+its constants. The integrator of the motion and all derivatives are compiled from them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
-
-import heyoka as hy
+from typing import Any, ClassVar
 
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import FrictionLaw
 
-X, Y, W = hy.make_vars("x", "y", "w")
-"""Displacement X, speed Y = X' and, with continuous control, the state W of the washout filter."""
 
-SPEED = 1
-"""Index of Y in a state."""
+def reaction(drive: Drive, position: Any, velocity: Any, force: Any) -> Any:
+    """Return h = k x + c x' - u: the friction force that keeps the slide from accelerating."""
+    return drive.stiffness * position + drive.damping * velocity - force
+
+
+def acceleration(drive: Drive, friction_force: Any, reaction: Any) -> Any:
+    """Return x'' = (F - h)/m, eq. 5, with the friction force F = N mu(x' - v_belt)."""
+    return (friction_force - reaction) / drive.mass
+
+
+def normal_force(drive: Drive, time: Any, switches: Sequence[Any] = ()) -> Any:
+    """Return the normal force N(t), with the load."""
+    return drive.normal_force + drive.load.value(time, switches)
+
+
+def belt_speed(drive: Drive, time: Any, switches: Sequence[Any] = ()) -> Any:
+    """Return the speed of the belt v_belt(t)."""
+    return drive.belt_speed + drive.belt.value(time, switches)
 
 
 @dataclass(frozen=True)
@@ -33,6 +45,9 @@ class WashoutGains:
     >>> gains.force(0.01)
     -30.0
     """
+
+    states: ClassVar[tuple[str, ...]] = ("w",)
+    """Names of the states: W of the filter, m."""
 
     corner_frequency: Any
     """Cutoff frequency d of the filter, rad/s."""
@@ -92,51 +107,36 @@ class WashoutGains:
         """
         return self.linear * filtered + self.cubic * filtered * filtered * filtered
 
+    def state_rates(self, speed: Any, states: Sequence[Any]) -> tuple[Any, ...]:
+        """Return the rates of the states, w' = v, eq. 17.
 
-class Equations:
-    """Right-hand sides for slip and for stick, for one friction law.
+        Parameters
+        ----------
+        speed : float, array or expression
+            Speed y of the slide.
+        states : sequence of float, array or expression
+            State w of the filter.
 
-    The constants are runtime parameters (`heyoka.par`) of the compiled expressions; `parameters`
-    returns their values for a drive.
+        Returns
+        -------
+        tuple of float, array or expression
+            Rate of w, in the unit of `speed`.
+        """
+        return (self.filtered(speed, states[0]),)
 
-    With `continuous_control` the force is that of the washout controller, eq. 19, and the filter
-    state W is a third variable. Otherwise the force is a parameter, which the integration holds
-    constant.
-    """
+    def control_force(self, speed: Any, states: Sequence[Any]) -> Any:
+        """Return the force without sampling, eq. 17 and 18.
 
-    def __init__(self, law: type[FrictionLaw], continuous_control: bool) -> None:
-        self.continuous_control = continuous_control
-        names = ["damping", "belt_speed", "force", "sign", "corner_frequency", "linear", "cubic"]
-        names += law.constants()
-        self.index = {name: number for number, name in enumerate(names)}
-        """Index of each parameter in the integrator's array of parameters."""
-        par = {name: hy.par[number] for name, number in self.index.items()}
+        Parameters
+        ----------
+        speed : float, array or expression
+            Speed y of the slide.
+        states : sequence of float, array or expression
+            State w of the filter.
 
-        gains = WashoutGains(par["corner_frequency"], par["linear"], par["cubic"])
-        filtered = gains.filtered(Y, W)
-        force = gains.force(filtered) if continuous_control else par["force"]
-        friction = law(*[par[name] for name in law.constants()])
-
-        self.relative_speed = Y - par["belt_speed"]
-        """v_r = X' - v0."""
-        self.reaction = X + par["damping"] * Y - force
-        """h = X + 2 beta X' - U: the friction needed to keep the slide from accelerating."""
-        self.acceleration = friction.coefficient(self.relative_speed, par["sign"]) - self.reaction
-        """X'' during slip, eq. 5: mu(X' - v0) - 2 beta X' - X + U."""
-        self.sign = par["sign"]
-        self.static = par["static"]
-
-        filter_equation = [(W, filtered)] if continuous_control else []
-        self.slip = [(X, Y), (Y, self.acceleration), *filter_equation]
-        """Slip with sgn(v_r) = sign."""
-        self.stick = [(X, Y), (Y, 0.0 * Y), *filter_equation]
-        """Stick: the slide moves with the belt, so its speed is constant."""
-
-    def parameters(self, drive: Drive) -> dict[str, float]:
-        """Return the parameter values of a drive: damping, belt speed and the law's constants."""
-        law = drive.friction.scaled(drive.speed_scale)
-        return {
-            "damping": drive.damping_coefficient,
-            "belt_speed": drive.belt_speed / drive.speed_scale,
-            **{name: float(getattr(law, name)) for name in law.constants()},
-        }
+        Returns
+        -------
+        float, array or expression
+            Control force u, in the unit of the gains.
+        """
+        return self.force(self.filtered(speed, states[0]))

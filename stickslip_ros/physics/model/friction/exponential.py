@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
+from stickslip_ros.physics.model.functions import exp
 
 
 @dataclass(frozen=True)
@@ -52,13 +51,9 @@ class Exponential(FrictionLaw):
         float, array or expression
             Coefficient, dimensionless.
         """
-        import heyoka  # what computes with no expressions does not load it
-
         speed = relative_speed * sign
-        exponent = -speed / self.decay_speed
-        symbolic = isinstance(exponent, heyoka.expression)
-        decay = heyoka.exp(exponent) if symbolic else np.exp(exponent)
         drop = self.static - self.kinetic
+        decay = exp(-speed / self.decay_speed)
         return -sign * (self.kinetic + drop * decay + self.viscous * speed)
 
     def refusal(self) -> str | None:

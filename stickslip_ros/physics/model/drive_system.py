@@ -1,0 +1,460 @@
+"""A drive as a hybrid system: slip and stick of the slide, and the modes of its law and courses."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cached_property, partial
+from itertools import accumulate
+from math import copysign, inf, ulp
+from typing import Any, NamedTuple
+
+import heyoka as hy
+
+from stickslip_ros.physics.model import equations
+from stickslip_ros.physics.model.course import NoCourse
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.hybrid import (
+    Flow,
+    Guard,
+    HybridSystem,
+    Instant,
+    Mode,
+    structure_number,
+    with_switches,
+)
+
+POSITION, SPEED, MEMORY = 0, 1, 2
+"""Indices of X and Y in a state, and of the first state of the law's memory."""
+
+UNBOUNDED_SPEED = 1e3
+"""Dimensionless speed of the slide above which the motion counts as unbounded."""
+
+SLIP, STICK = "slip", "stick"
+"""The flows of a drive. In slip the first switch is sgn(v_r), in stick it is 0."""
+
+BELT_REACHED = 0
+"""Index of the guard of slip at which the slide reaches the speed of the belt."""
+
+_HYSTERESIS = 2.0**-45
+"""Distance behind a guard of a part at which the mode ends.
+
+The mode that follows then starts before its own guards: heyoka misses an event in a step that
+starts on one. It also keeps rounding from leading back.
+"""
+
+
+class _Parts(NamedTuple):
+    """Switches, one group for each part."""
+
+    law: Sequence[Any]
+    belt: Sequence[Any]
+    load: Sequence[Any]
+
+
+@dataclass(frozen=True)
+class _SymbolicDrive:
+    """The drive and its control with expressions for their constants."""
+
+    drive: Drive
+    control: WashoutGains | None
+
+
+class DriveSystem(HybridSystem):
+    """Drive, dimensionless (see `Drive`), with a held force or with continuous control.
+
+    The states are X, Y = X', the memory of the friction law and the states of the controller. In
+    slip the slide follows eq. 5; where it reaches the speed of the belt it sticks if its law can
+    hold it, -mu_forward N <= h <= mu_backward N with the reaction h. Otherwise it passes that speed
+    or slips the other way. In stick it moves with the belt until the reaction leaves these limits.
+
+    Parameters
+    ----------
+    drive : Drive
+        Drive in SI units.
+    control : WashoutGains, optional
+        Continuous controller in SI units, eq. 19. By default the force is the input `force`.
+    """
+
+    def __init__(self, drive: Drive, control: WashoutGains | None = None) -> None:
+        self.drive = drive.dimensionless
+        self.control = None if control is None else control.scaled(drive)
+        law = self.drive.friction
+        control_states = () if self.control is None else self.control.states
+        self.states = ("x", "y", *(f"friction.{name}" for name in law.states), *control_states)
+        self.inputs = ("force",)
+        parts = (law.switches, self.drive.belt.switches, self.drive.load.switches)
+        self.switches = (
+            "sign",
+            *(
+                f"{part}.{name}"
+                for part, names in zip(_Parts._fields, parts, strict=True)
+                for name in names
+            ),
+        )
+        # Where the switches of law, belt and load start, after the sign.
+        self._ends = list(accumulate(map(len, parts[:2]), initial=1))
+        self._control_states = slice(MEMORY + len(law.states), None)
+        self.structure = structure_number((_structure(self.drive), _structure(self.control)))
+        self._steady = isinstance(self.drive.belt, NoCourse)
+        self._belt_speed, self._normal_force = self.drive.belt_speed, self.drive.normal_force
+        self._plain = self._steady and isinstance(self.drive.load, NoCourse)
+        self._sticks = law.sticks
+        self._forward_limit, self._backward_limit = map(float, law.limits)
+        self._characteristic_speed = law.characteristic_speed
+        self.limits_steps = law.characteristic_speed != inf
+        self._static_law = None if law.states or law.switches else law.coefficient
+
+    @cached_property
+    def constants(self) -> dict[str, float]:
+        """Damping, belt speed and the constants of law, courses and controller."""
+        values: dict[str, float] = {
+            "damping": self.drive.damping,
+            "belt_speed": self.drive.belt_speed,
+        }
+        for prefix in ("friction", "belt", "load"):
+            values |= _numbers(getattr(self.drive, prefix), prefix)
+        return values | (_numbers(self.control, "control") if self.control is not None else {})
+
+    @cached_property
+    def autonomous(self) -> bool:
+        """Whether belt speed and load are constant."""
+        return self._plain
+
+    def flow(self, name: str) -> Flow:
+        """Return the flow `SLIP` or `STICK`.
+
+        In slip the guards are: the slide reaches the belt speed; the motion is unbounded. In stick:
+        the reaction exceeds the limit against backward, and against forward slip. Then come those
+        of law, belt and load.
+        """
+        state, _, (force,), all_switches, time = self.symbols
+        symbolic = self._symbolic
+        drive, law = symbolic.drive, symbolic.drive.friction
+        switches, sign = self._by_part(all_switches), all_switches[0]
+        y, memory = state[SPEED], state[MEMORY : self._control_states.start]
+        own = state[self._control_states]
+        if symbolic.control is not None:
+            force = symbolic.control.control_force(y, own)
+        control_rates = () if symbolic.control is None else symbolic.control.state_rates(y, own)
+        belt_speed = equations.belt_speed(drive, time, switches.belt)
+        normal = equations.normal_force(drive, time, switches.load)
+        reaction = equations.reaction(drive, state[POSITION], y, force)
+        courses = [
+            *_guards(drive.belt.margins(time, switches.belt), DriveSystem.turn_belt),
+            *_guards(drive.load.margins(time, switches.load), DriveSystem.turn_load),
+        ]
+        if name == STICK:
+            forward, backward = law.limits
+            belt_acceleration = _by_time(drive, time, switches.belt, 0.0 * y)
+            held = reaction if self._steady else reaction + drive.mass * belt_acceleration
+            return Flow(
+                rates=(y, belt_acceleration, *control_rates),
+                guards=(
+                    Guard(normal * backward - held, DriveSystem.release_backward),
+                    Guard(normal * forward + held, DriveSystem.release_forward),
+                    *courses,
+                ),
+                marks=() if self._steady else (y, belt_acceleration),
+            )
+        relative_speed = y - belt_speed
+        friction = normal * law.friction(relative_speed, sign, memory, switches.law)
+        acceleration = equations.acceleration(drive, friction, reaction)
+        return Flow(
+            rates=(
+                y,
+                acceleration,
+                *law.memory_rates(relative_speed, sign, memory, switches.law),
+                *control_rates,
+            ),
+            guards=(
+                Guard(sign * relative_speed, DriveSystem.reach_belt),
+                # The slide diverges in the direction of the slip. The margin is of the order of
+                # one, since heyoka's error is relative to the largest of states and events.
+                Guard(1.0 - sign * y / UNBOUNDED_SPEED, DriveSystem.diverge),
+                *_guards(
+                    law.margins(relative_speed, sign, memory, switches.law), DriveSystem.switch_friction
+                ),
+                *courses,
+            ),
+            marks=(y, acceleration),
+        )
+
+    def reach_belt(self, mode: Mode, instant: Instant) -> Mode:
+        """Stick, or slip on in either direction, where the slide reaches the belt speed."""
+        instant.state[SPEED] = self.belt_speed(mode, instant.time)
+        if self._sticks:
+            return self._resting(mode, instant)
+        return self._slip(mode, -mode.switches[0], instant)
+
+    def release_backward(self, mode: Mode, instant: Instant) -> Mode:
+        """Slip backward where the reaction exceeds its limit."""
+        return self._slip(mode, -1.0, instant)
+
+    def release_forward(self, mode: Mode, instant: Instant) -> Mode:
+        """Slip forward where the reaction falls below its limit."""
+        return self._slip(mode, 1.0, instant)
+
+    def diverge(self, mode: Mode, instant: Instant) -> None:
+        """End an unbounded motion."""
+
+    def switch_friction(self, mode: Mode, instant: Instant, *, margin: int) -> Mode:
+        """Enter the mode of the law that follows at one of its margins."""
+        own = self._by_part(mode.switches).law
+        return with_switches(
+            mode, 1, self.drive.friction.switches_after(margin, mode.switches[0], own)
+        )
+
+    def turn_belt(self, mode: Mode, instant: Instant, *, margin: int) -> Mode:
+        """Enter the mode that follows at a corner of the belt's course."""
+        own = self._by_part(mode.switches).belt
+        return with_switches(mode, self._ends[1], self.drive.belt.switches_after(margin, own))
+
+    def turn_load(self, mode: Mode, instant: Instant, *, margin: int) -> Mode:
+        """Enter the mode that follows at a corner of the load's course."""
+        own = self._by_part(mode.switches).load
+        return with_switches(mode, self._ends[2], self.drive.load.switches_after(margin, own))
+
+    def settled(self, mode: Mode | None, instant: Instant) -> Mode:
+        """Return stick, or slip in the direction of the relative speed; see the class."""
+        if mode is not None and self._steady:
+            sign = mode.switches[0]
+            if sign != 0.0:
+                if (instant.state[SPEED] - self._belt_speed) * sign > 0.0:
+                    return mode
+            elif self.has_closed_form(mode):
+                held = self.reaction(instant)
+                if -self._forward_limit <= held <= self._backward_limit:
+                    return mode
+        if mode is None:
+            mode = self._starting(instant)
+        elif mode.flow == STICK and not self._steady:  # without the rounding of the integration
+            instant.state[SPEED] = self.belt_speed(mode, instant.time)
+        belt_speed = self.belt_speed(mode, instant.time)
+        relative_speed = instant.state[SPEED] - belt_speed
+        if relative_speed == 0.0:
+            settled = self._resting(mode, instant)
+            if settled is mode:
+                self.separate(mode, instant)
+            return settled
+        sign = 1.0 if relative_speed > 0.0 else -1.0
+        return mode if mode.switches[0] == sign else self._slip(mode, sign, instant)
+
+    def is_unbounded(self, instant: Instant) -> bool:
+        """Return whether the slide is faster than `UNBOUNDED_SPEED`."""
+        return abs(instant.state[SPEED]) > UNBOUNDED_SPEED
+
+    def separate(self, mode: Mode, instant: Instant) -> None:
+        """Move a slide that starts to slip, or sticks near its limit, by rounding errors."""
+        state, sign = instant.state, mode.switches[0]
+        if sign == 0.0:
+            held = self.held_force(mode, instant)
+            margin = self._rounding(held, instant)
+            limit = self._backward_limit if held > 0.0 else self._forward_limit
+            if abs(held) > self.normal_force(mode, instant.time) * limit - margin:
+                state[POSITION] -= copysign(margin, held)
+            return
+        belt_speed = self.belt_speed(mode, instant.time)
+        if state[SPEED] == belt_speed:
+            if self._sticks:
+                held = self.held_force(mode, instant)
+                margin = self._rounding(held, instant)
+                limit = self._backward_limit if sign < 0.0 else self._forward_limit
+                if abs(held) < self.normal_force(mode, instant.time) * limit + margin:
+                    state[POSITION] -= copysign(margin, sign)
+            state[SPEED] += copysign(max(ulp(belt_speed), ulp(1.0)), sign)
+
+    def has_closed_form(self, mode: Mode) -> bool:
+        """Return whether the slide moves in a straight line: it sticks, and all is constant."""
+        return mode.flow == STICK and self._plain and self.control is None
+
+    def closed_form(self, mode: Mode, instant: Instant, duration: float) -> tuple[int | None, float]:
+        """Move with the belt for `duration`, or until the reaction reaches its limit."""
+        state, speed = instant.state, self.drive.belt_speed
+        if speed != 0.0:
+            limit = self._backward_limit if speed > 0.0 else -self._forward_limit
+            limit = limit - self.drive.damping * speed + instant.inputs[0]
+            time = max((limit - state[POSITION]) / speed, 0.0)
+            if time < duration:
+                state[POSITION] = limit
+                return (0 if speed > 0.0 else 1), time
+        state[POSITION] += speed * duration
+        return None, duration
+
+    def longest_step(self, instant: Instant) -> float:
+        """Return a time in which the speed changes by the law's characteristic speed at most.
+
+        heyoka chooses a step from the series at its start. It would miss an exponential that is
+        negligible there and rises before the step ends.
+        """
+        state = instant.state
+        acceleration = (
+            abs(self.reaction(instant)) + abs(state[POSITION]) + abs(state[SPEED])
+            + self._forward_limit
+        )  # fmt: skip
+        return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
+
+    def overflow(self, instant: Instant) -> None:
+        """Set the speed at which a motion counts as unbounded: what overflows exceeds any speed."""
+        instant.state[SPEED] = copysign(UNBOUNDED_SPEED, -self.reaction(instant))
+
+    def initial_state(self, position: float, velocity: float) -> list[float]:
+        """Return the state at the start: the memory is that of the law, the controller at rest."""
+        law, control = self.drive.friction, self.control
+        memory = law.initial_memory(velocity - self.drive.belt_speed)
+        own = [velocity / control.corner_frequency] if control is not None else []
+        return [position, velocity, *map(float, memory), *own]
+
+    def belt_speed(self, mode: Mode, time: float) -> float:
+        """Return the speed of the belt."""
+        if self._steady:
+            return self._belt_speed
+        return float(equations.belt_speed(self.drive, time, self._by_part(mode.switches).belt))
+
+    def normal_force(self, mode: Mode, time: float) -> float:
+        """Return the normal force."""
+        if self._plain:
+            return self._normal_force
+        return float(equations.normal_force(self.drive, time, self._by_part(mode.switches).load))
+
+    def control_force(self, instant: Instant) -> float:
+        """Return the force on the slide: the input, or that of the continuous controller."""
+        if self.control is None:
+            return instant.inputs[0]
+        state = instant.state
+        return self.control.control_force(state[SPEED], state[self._control_states])
+
+    def reaction(self, instant: Instant) -> float:
+        """Return h = X + 2 beta X' - U."""
+        state = instant.state
+        force = instant.inputs[0] if self.control is None else self.control_force(instant)
+        return equations.reaction(self.drive, state[POSITION], state[SPEED], force)
+
+    def held_force(self, mode: Mode, instant: Instant) -> float:
+        """Return the friction force that a slide needs to move with the belt."""
+        if self._steady:
+            return self.reaction(instant)
+        tiny = 1e-30j  # imaginary, so that nothing cancels
+        switches = self._by_part(mode.switches).belt
+        speed: Any = equations.belt_speed(self.drive, instant.time + tiny, switches)
+        return self.reaction(instant) + self.drive.mass * (speed.imag / tiny.imag)
+
+    def friction_force(self, mode: Mode, instant: Instant) -> float:
+        """Return the friction force on the slide."""
+        sign = mode.switches[0]
+        if sign == 0.0:
+            return self.held_force(mode, instant)
+        state = instant.state
+        if self._static_law is not None and self._plain:
+            coefficient = self._static_law(state[SPEED] - self._belt_speed, sign)
+            return self._normal_force * float(coefficient)
+        belt_speed = self.belt_speed(mode, instant.time)
+        coefficient = self.drive.friction.friction(
+            state[SPEED] - belt_speed, sign, self._memory(instant), self._law_switches(mode)
+        )
+        return self.normal_force(mode, instant.time) * float(coefficient)
+
+    @cached_property
+    def _symbolic(self) -> _SymbolicDrive:
+        constants = self.symbols.constants
+
+        def symbols(prefix: str, part: Any) -> Any:
+            return replace(part, **{
+                name: constants[f"{prefix}.{name}"] for name in _numbers(part)
+            })  # fmt: skip
+
+        drive = replace(
+            self.drive,
+            damping=constants["damping"],
+            belt_speed=constants["belt_speed"],
+            friction=symbols("friction", self.drive.friction),
+            belt=symbols("belt", self.drive.belt),
+            load=symbols("load", self.drive.load),
+        )
+        control = None if self.control is None else symbols("control", self.control)
+        return _SymbolicDrive(drive, control)
+
+    def _memory(self, instant: Instant) -> Sequence[float]:
+        return () if self._sticks else instant.state[MEMORY : self._control_states.start].tolist()
+
+    def _law_switches(self, mode: Mode) -> Sequence[float]:
+        return mode.switches[1 : self._ends[1]]
+
+    def _by_part(self, switches: Sequence[Any]) -> _Parts:
+        first, belt, load = self._ends
+        return _Parts(switches[first:belt], switches[belt:load], switches[load:])
+
+    def _starting(self, instant: Instant) -> Mode:
+        """Return stick, with the switches that the courses have at an instant."""
+        belt = self.drive.belt.switches_at(instant.time)
+        load = self.drive.load.switches_at(instant.time)
+        law = (0.0,) * len(self.drive.friction.switches)
+        return Mode(STICK, (0.0, *law, *belt, *load))
+
+    def _slip(self, mode: Mode, sign: float, instant: Instant) -> Mode:
+        """Return slip in a direction; the courses stay in their modes."""
+        law, state = self.drive.friction, instant.state
+        switches: Sequence[float] = ()
+        if law.switches:
+            relative_speed = state[SPEED] - self.belt_speed(mode, instant.time)
+            switches = law.switches_at(relative_speed, sign, self._memory(instant))
+        _, *courses = self._by_part(mode.switches)
+        return Mode(SLIP, (sign, *switches, *courses[0], *courses[1]))
+
+    def _resting(self, mode: Mode, instant: Instant) -> Mode:
+        """Return the mode of a slide that has the speed of the belt."""
+        if self._sticks:
+            held, normal = self.held_force(mode, instant), self.normal_force(mode, instant.time)
+            if held > normal * self._backward_limit:
+                return self._slip(mode, -1.0, instant)
+            if held < -normal * self._forward_limit:
+                return self._slip(mode, 1.0, instant)
+            if mode.flow == STICK:
+                return mode
+            law = (0.0,) * len(self.drive.friction.switches)
+            return Mode(STICK, with_switches(mode, 0, (0.0, *law)).switches)
+        forward = self._slip(mode, 1.0, instant)
+        accelerates = self.friction_force(forward, instant) >= self.held_force(mode, instant)
+        return forward if accelerates else self._slip(mode, -1.0, instant)
+
+    def _rounding(self, held: float, instant: Instant) -> float:
+        force, position = self.control_force(instant), instant.state[POSITION]
+        return 8.0 * ulp(abs(position) + abs(held) + abs(force) + self._backward_limit)
+
+
+def _guards(margins: Sequence[Any], leads: Callable[..., Mode]) -> list[Guard]:
+    return [
+        Guard(margin + _HYSTERESIS, partial(leads, margin=number))
+        for number, margin in enumerate(margins)
+    ]
+
+
+def _by_time(drive: Drive, time: Any, switches: Sequence[Any], zero: Any) -> Any:
+    """Return the acceleration of the belt as an expression; `zero` if its speed is constant."""
+    instant = hy.expression("time_of_course")
+    speed = drive.belt.value(instant, switches)
+    if not isinstance(speed, hy.expression):
+        return zero
+    return zero + hy.subs(hy.diff(speed, instant), {instant: time})
+
+
+def _numbers(part: Any, prefix: str = "") -> dict[str, float]:
+    """Return the fields of a part that are numbers, by name."""
+    dot = f"{prefix}." if prefix else ""
+    values = {each.name: getattr(part, each.name) for each in fields(part)}
+    return {
+        f"{dot}{name}": float(value)
+        for name, value in values.items()
+        if isinstance(value, int | float)
+    }
+
+
+def _structure(part: Any) -> Any:
+    """Return what of a part, apart from the numbers in it, makes its equations; hashable."""
+    if not is_dataclass(part):
+        return part
+    others = {each.name: getattr(part, each.name) for each in fields(part)}
+    return type(part), tuple(
+        (name, _structure(value))
+        for name, value in others.items()
+        if not isinstance(value, int | float)
+    )

@@ -1,0 +1,33 @@
+"""Elementary functions of floats, complex numbers, arrays and heyoka expressions alike."""
+
+from typing import Any
+
+import numpy as np
+
+
+def _function(name: str, x: Any) -> Any:
+    if isinstance(x, int | float | complex | np.ndarray | np.generic):
+        return getattr(np, name)(x)
+    import heyoka  # what computes with no expressions does not load it
+
+    return getattr(heyoka, name)(x)
+
+
+def exp(x: Any) -> Any:
+    """Return the exponential of a float, an array or an expression."""
+    return _function("exp", x)
+
+
+def log(x: Any) -> Any:
+    """Return the natural logarithm of a float, an array or an expression."""
+    return _function("log", x)
+
+
+def sin(x: Any) -> Any:
+    """Return the sine of a float, an array or an expression."""
+    return _function("sin", x)
+
+
+def tanh(x: Any) -> Any:
+    """Return the hyperbolic tangent of a float, an array or an expression."""
+    return _function("tanh", x)

@@ -1,0 +1,191 @@
+"""Hybrid systems: states that follow the rates of a mode, and guards that lead to another mode.
+
+One description serves the integrator, the equilibrium, the derivatives of any order, the
+variational equations and the jumps of the derivatives at a guard.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from math import inf
+from typing import Any, NamedTuple
+
+import heyoka as hy
+
+
+class Mode(NamedTuple):
+    """Mode of a hybrid system: a flow, and values that are constant in the mode.
+
+    A system of several parts has a mode of each part in `switches`, one after another: the modes of
+    the system are products of the modes of its parts, and those of one flow are compiled once.
+    """
+
+    flow: str
+    """Name of the flow."""
+    switches: tuple[float, ...]
+    """Values of the system's switches."""
+
+
+@dataclass(slots=True)
+class Instant:
+    """Instant of a motion, dimensionless."""
+
+    state: "memoryview[float]"
+    """Values of the states."""
+    inputs: list[float]
+    """Values of the inputs."""
+    time: float = 0.0
+    """Time from the start of the motion."""
+
+
+Leads = Callable[[Any, Mode, Instant], Mode | None]
+"""Method of a system: the mode that follows, or None at the end of the motion; it may set the state.
+
+The compiled flow is shared by the systems of one structure, so that it is not bound to one.
+"""
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Ends a mode where its margin falls to zero, and leads to the mode that follows."""
+
+    margin: Any
+    """Expression that is above zero in the mode."""
+    leads: Leads
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Right-hand side of the modes of one kind, as expressions."""
+
+    rates: tuple[Any, ...]
+    """Derivative of each state by time."""
+    guards: tuple[Guard, ...]
+    marks: tuple[Any, ...] = ()
+    """Expressions at whose zeros a recorded motion has breakpoints."""
+
+
+class Symbols(NamedTuple):
+    """The variables of a system, as expressions."""
+
+    state: tuple[Any, ...]
+    constants: Mapping[str, Any]
+    inputs: tuple[Any, ...]
+    switches: tuple[Any, ...]
+    time: Any
+    """Time from the start of the motion."""
+
+
+class HybridSystem(ABC):
+    """Hybrid system with the values of its constants; all values are dimensionless.
+
+    Systems of equal `structure` have the same flows, as expressions, and differ in the values of
+    their constants.
+    """
+
+    structure: int
+    """Number of the structure; see `structure_number`."""
+    states: tuple[str, ...]
+    """Names of the states."""
+    constants: Mapping[str, float]
+    """Values of the constants by name."""
+    inputs: tuple[str, ...]
+    """Names of values that are set from outside and held."""
+    switches: tuple[str, ...]
+    """Names of values that are constant in each mode."""
+
+    @abstractmethod
+    def flow(self, name: str) -> Flow:
+        """Return a flow by its name, in `symbols`."""
+
+    def shared_flow(self, name: str) -> Flow:
+        """Return a flow by its name; systems of one structure share it."""
+        key = (self.structure, name)
+        if key not in _flows:
+            _flows[key] = self.flow(name)
+        return _flows[key]
+
+    def leads(self, guard: int, mode: Mode, instant: Instant) -> Mode | None:
+        """Return the mode to which a guard of the present mode leads; None at the end."""
+        return self._guards(mode.flow)[guard].leads(self, mode, instant)
+
+    @abstractmethod
+    def settled(self, mode: Mode | None, instant: Instant) -> Mode:
+        """Return the mode that continues, or starts, at an instant.
+
+        It is asked at the start of each integration, since inputs may have changed. Without `mode`
+        the motion starts. In a mode that continues the state must be off its guards.
+        """
+
+    def is_unbounded(self, instant: Instant) -> bool:
+        """Return whether a motion that starts here counts as unbounded."""
+        return False
+
+    def separate(self, mode: Mode, instant: Instant) -> None:
+        """Move the state, by rounding errors, off a guard of a mode that starts on it."""
+
+    def has_closed_form(self, mode: Mode) -> bool:
+        """Return whether `closed_form` solves the mode."""
+        return False
+
+    def closed_form(self, mode: Mode, instant: Instant, duration: float) -> tuple[int | None, float]:
+        """Advance the state for `duration` or up to a guard; return the guard, and the time taken."""
+        raise NotImplementedError
+
+    limits_steps = False
+    """Whether `longest_step` limits the steps of the integration."""
+
+    def longest_step(self, instant: Instant) -> float:
+        """Return the longest step that misses no feature of the rates."""
+        return inf
+
+    def overflow(self, instant: Instant) -> None:
+        """Set the state of a motion whose rates are no longer finite."""
+
+    @cached_property
+    def _guards(self) -> Callable[[str], tuple[Guard, ...]]:
+        return cache(lambda name: self.shared_flow(name).guards)
+
+    @cached_property
+    def autonomous(self) -> bool:
+        """Whether no flow depends on the time."""
+        return True
+
+    @cached_property
+    def variables(self) -> tuple[Any, ...]:
+        """The states as variables of expressions."""
+        return tuple(hy.expression(name) for name in self.states)
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Index of constants, inputs, switches and of the time at the start, by name."""
+        names = (*self.constants, *self.inputs, *self.switches, "epoch")
+        return {name: number for number, name in enumerate(names)}
+
+    @cached_property
+    def symbols(self) -> Symbols:
+        """The variables of the expressions of `flow`."""
+        par = {name: hy.par[number] for name, number in self.index.items()}
+        return Symbols(
+            self.variables,
+            {name: par[name] for name in self.constants},
+            tuple(par[name] for name in self.inputs),
+            tuple(par[name] for name in self.switches),
+            par["epoch"] + hy.time,
+        )
+
+
+_flows: dict[tuple[int, str], Flow] = {}
+_structures: dict[Hashable, int] = {}
+
+
+def structure_number(structure: Hashable) -> int:
+    """Return the number of a structure, the same for equal ones: it is quicker to look up."""
+    return _structures.setdefault(structure, len(_structures))
+
+
+def with_switches(mode: Mode, first: int, values: Sequence[float]) -> Mode:
+    """Return a mode with other switches from the index `first` on."""
+    switches = mode.switches
+    return Mode(mode.flow, (*switches[:first], *values, *switches[first + len(values) :]))

@@ -1,0 +1,133 @@
+"""Compiled flows: heyoka integrators for one flow of a hybrid system, lent to one motion at a time.
+
+What is compiled depends on the structure of a system only. A motion borrows an integrator for each
+flow that it enters and gives it back when it ends, so that the next motion of this structure needs
+no compilation. An integrator is never shared by two motions.
+"""
+
+from collections import defaultdict
+from copy import copy
+from enum import Enum
+from typing import Any
+
+import heyoka as hy
+
+from stickslip_ros.physics.model.hybrid import HybridSystem
+
+# heyoka warns on standard output, which is for results, where a marker's polynomial is only
+# rounding, as in equilibrium.
+hy.set_logger_level_error()
+
+Marks = list[tuple[float, float, float]]
+"""Time, and the first two states, at the zeros of a flow's marks."""
+
+
+class Detail(Enum):
+    """What is integrated and found along with the states."""
+
+    STATES = "states"
+    """Nothing."""
+    MARKS = "marks"
+    """Zeros of the flow's marks."""
+    DERIVATIVES = "derivatives"
+    """The marks, and the derivatives of the states by those at the start."""
+
+
+class CompiledFlow:
+    """Compiled integrator with views of its arrays, which cost as much to create as a short step.
+
+    Reading or writing an element of a memoryview takes half the time of an array's.
+    """
+
+    __slots__ = ("marks", "parameters", "state", "taylor", "variables")
+
+    def __init__(self, taylor: Any, states: int) -> None:
+        """Wrap a heyoka integrator whose variables begin with this number of states."""
+        self.taylor = taylor
+        self.state = taylor.state
+        """States and derivatives."""
+        self.variables: memoryview[float] = self.state[:states].data
+        self.parameters: memoryview[float] = taylor.pars.data
+        # heyoka copies its callbacks with the integrator.
+        self.marks = [event.callback.found for event in taylor.nt_events]
+
+    def another(self) -> "CompiledFlow":
+        """Return an independent integrator of the same flow; it needs no compilation."""
+        return CompiledFlow(copy(self.taylor), len(self.variables))
+
+    def take_marks(self) -> Marks:
+        """Return the marks since the last call, in order of time."""
+        found: Marks = sorted(mark for marks in self.marks for mark in marks)
+        for marks in self.marks:
+            marks.clear()
+        return found
+
+
+_Key = tuple[int, str, Detail]
+
+_originals: dict[_Key, CompiledFlow] = {}
+_shelves: dict[_Key, list[CompiledFlow]] = defaultdict(list)
+
+
+class FlowLoans:
+    """The integrators that one motion has borrowed; they are given back when it ends."""
+
+    def __init__(self) -> None:
+        self._borrowed: dict[_Key, tuple[CompiledFlow, list[CompiledFlow]]] = {}
+
+    def flow(self, system: HybridSystem, name: str, detail: Detail) -> CompiledFlow:
+        """Return the integrator of a flow, compiled if there is none of this structure yet."""
+        key = (system.structure, name, detail)
+        if key not in self._borrowed:
+            if detail is Detail.MARKS and not system.shared_flow(name).marks:
+                return self.flow(system, name, Detail.STATES)
+            shelf = _shelves[key]
+            try:
+                flow = shelf.pop()
+            except IndexError:
+                flow = _original(system, name, detail).another()
+            self._borrowed[key] = flow, shelf
+        return self._borrowed[key][0]
+
+    def __del__(self) -> None:
+        for flow, shelf in self._borrowed.values():
+            shelf.append(flow)
+
+
+def _original(system: HybridSystem, name: str, detail: Detail) -> CompiledFlow:
+    key = (system.structure, name, detail)
+    if key not in _originals:
+        _originals[key] = _compile(system, name, detail)
+    return _originals[key]
+
+
+def _compile(system: HybridSystem, name: str, detail: Detail) -> CompiledFlow:
+    flow = system.shared_flow(name)
+    equations = list(zip(system.variables, flow.rates, strict=True))
+    if detail is Detail.DERIVATIVES:
+        equations = hy.var_ode_sys(equations, hy.var_args.vars, order=1)
+    downward = hy.event_direction.negative
+    taylor = hy.taylor_adaptive(
+        equations,
+        [0.0] * len(system.states),
+        t_events=[hy.t_event(guard.margin, direction=downward) for guard in flow.guards],
+        nt_events=[
+            hy.nt_event(mark, callback=_Finder(zero_speed=number == 0))
+            for number, mark in enumerate(flow.marks if detail is not Detail.STATES else ())
+        ],
+        fast_math=True,  # a quarter faster; the error stays below 2e-12 over 190 periods
+    )
+    return CompiledFlow(taylor, len(system.states))
+
+
+class _Finder:
+    """Callback of a mark, with what it has found."""
+
+    def __init__(self, *, zero_speed: bool) -> None:
+        """The first mark is the speed: there it is exactly zero."""
+        self.found: Marks = []
+        self._zero_speed = zero_speed
+
+    def __call__(self, integrator: Any, now: float, _: int) -> None:
+        x, y = integrator.update_d_output(now)[:2].tolist()
+        self.found.append((now, x, 0.0 if self._zero_speed else y))
