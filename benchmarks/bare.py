@@ -6,7 +6,7 @@ from typing import Any
 import heyoka as hy
 
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion.integrator import UNBOUNDED_SPEED
+from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
 
 
 class BareMotion:

@@ -23,8 +23,8 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.slices import Row, by_turns, compare_times, show
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
 from stickslip_ros.physics.model.friction import Stribeck
-from stickslip_ros.physics.motion.integrator import UNBOUNDED_SPEED
 from stickslip_ros.physics.motion.motion import Motion
 
 DAMPING, STATIC, MINIMUM, MINIMUM_SPEED = 0.02, 0.4, 0.25, 0.5

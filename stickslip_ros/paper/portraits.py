@@ -10,7 +10,7 @@ from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import RecordedMotion
 
 PERIODS = 300.0
 """Default duration of a trajectory, in natural periods."""
@@ -86,27 +86,13 @@ class Portrait:
 
 
 def portraits(cases: Iterable[PortraitCase]) -> Iterator[Portrait]:
-    """Yield the portraits of the cases in order.
-
-    Integrators are compiled again only if the friction law changes.
-    """
-    motions: dict[bool, Motion] = {}
-    for case in cases:
-        controlled = case.gains is not None
-        if controlled not in motions:
-            motions[controlled] = Motion(
-                case.drive, 0.0, 0.0, continuous_control=controlled, record=True
-            )
-        yield _portrait(case, motions[controlled])
+    """Yield the portraits of the cases in order."""
+    return map(_portrait, cases)
 
 
-def _portrait(case: PortraitCase, motion: Motion) -> Portrait:
-    drive, gains = case.drive, case.gains
-    motion.drive = drive
-    if gains is not None:
-        motion.set_gains(gains.corner_frequency, gains.linear, gains.cubic)
-    motion.take_breakpoints()
-    motion.restart(0.0, 0.0)
+def _portrait(case: PortraitCase) -> Portrait:
+    drive = case.drive
+    motion = RecordedMotion(drive, 0.0, 0.0, case.gains)
     duration = PERIODS * drive.natural_period if case.duration is None else case.duration
     samples = round(duration / drive.natural_period * SAMPLES_PER_PERIOD)
     for _ in range(samples):

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 from stickslip_ros.paper.figures import BifurcationFigure, bifurcation_drive
-from stickslip_ros.physics.theory.sticking import Release
 from stickslip_ros.studies.settling import ControlledDrive
 from stickslip_ros.studies.transitions import (
     HOPF_POINT,
@@ -16,14 +15,13 @@ from stickslip_ros.studies.transitions import (
 
 def transition_marks(figure: BifurcationFigure) -> dict[str, float]:
     """Return the values of the parameter at the transitions that the diagram shows, by name."""
-    release = Release()
 
     def case(value: float) -> ControlledDrive:
         return ControlledDrive(bifurcation_drive(figure.number, value))
 
     margins: dict[str, Callable[[float], float]] = {
         HOPF_POINT: lambda value: hopf_margin(case(value)),
-        STICKING_LIMIT: lambda value: stick_margin(case(value), release),
+        STICKING_LIMIT: lambda value: stick_margin(case(value)),
     }
     found: dict[str, float] = {}
     for name, margin in margins.items():

@@ -14,8 +14,8 @@ from stickslip_ros.studies.settling import (
     ControlledDrive,
     MotionState,
     Settled,
-    Settler,
     SettlingCourse,
+    settle,
 )
 
 COURSE = SettlingCourse(transient=300.0, cycles=6)
@@ -40,10 +40,9 @@ def bifurcation_diagram(
     drives: Sequence[Drive], progress: Progress = lambda _: None, course: SettlingCourse = COURSE
 ) -> BifurcationDiagram:
     """Return the motion that each drive settles on from rest at X = 0."""
-    settler = Settler()
     settled: list[Settled] = []
     for drive in drives:
-        settled.append(settler.settle(ControlledDrive(drive), MotionState(0.0, 0.0), course))
+        settled.append(settle(ControlledDrive(drive), MotionState(0.0, 0.0), course))
         progress(len(settled) / len(drives))
     counts = [len(motion.turning_points) for motion in settled]
     return BifurcationDiagram(

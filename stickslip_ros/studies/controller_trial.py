@@ -15,7 +15,7 @@ from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
 from stickslip_ros.physics.theory.linear_sampled_loop import SETTLED
 from stickslip_ros.stamps import NANOSECONDS
@@ -90,14 +90,12 @@ class Outcome:
 
 
 class Bench:
-    """One compiled motion on which trials of one friction law are run."""
+    """Trials at one sampling rate with one delay of the force."""
 
-    def __init__(self, drive: Drive, rate: float, force_delay: float) -> None:
+    def __init__(self, rate: float, force_delay: float) -> None:
         """Prepare trials at `rate` (Hz) with `force_delay` (s)."""
         self._rate = rate
         self._force_delay = force_delay
-        self._motion = Motion(drive, 0.0, 0.0)
-        self._recording = Motion(drive, 0.0, 0.0, record=True)
 
     def vibration(self, drive: Drive) -> Vibration:
         """Return the vibration of `drive`, the largest if there are several.
@@ -105,19 +103,16 @@ class Bench:
         The motion starts at the point of release, where the slip phase of a stick-slip cycle
         starts too.
         """
-        motion = self._recording
-        motion.drive = drive
-        speed = drive.belt_speed
-        motion.restart(release_position(drive), speed)
+        motion = RecordedMotion(drive, release_position(drive), drive.belt_speed)
         # On a slow belt a cycle is mostly the time in which the belt loads the spring.
         loading = loading_time(drive)
-        found, before = self._measured(loading), inf
+        found, before = _measured(motion, loading), inf
         for _ in range(6):
             amplitude = found.velocity_amplitude
             if found.period is None or amplitude is None or abs(amplitude / before - 1.0) < 1e-4:
                 break
             motion.advance(300 * drive.natural_period)
-            found, before = self._measured(loading), amplitude
+            found, before = _measured(motion, loading), amplitude
         if found.period is None:
             return Vibration(drive, self._rate, found.regime, None, np.empty(0), np.empty(0))
         # The fewest cycles that last nearly a whole number of samples, or else the nearest of all.
@@ -132,17 +127,6 @@ class Bench:
         motion.take_breakpoints()
         position, velocity = np.array(states).T
         return Vibration(drive, self._rate, found.regime, found.period, position, velocity)
-
-    def _measured(self, loading: float) -> Measures:
-        """Measure the next ten cycles, each of a natural period and `loading` (s)."""
-        motion = self._recording
-        motion.take_breakpoints()
-        motion.advance((10 + 2) * (motion.drive.natural_period + loading))
-        meter = CycleMeter(10)
-        meter.feed(motion.take_breakpoints(), motion.drive.belt_speed)
-        if motion.unbounded:
-            meter.report_run_away()
-        return meter.measures()
 
     def catch(
         self, vibration: Vibration, washout: WashoutParameters, phases: int, patience: float
@@ -198,10 +182,7 @@ class Bench:
         size: float,
     ) -> Outcome:
         """Run the loop until the distance has stayed small for a natural period, or `patience`."""
-        motion = self._motion
-        motion.force = 0.0
-        motion.drive = drive
-        motion.restart(*start)
+        motion = Motion(drive, *start)
         loop = SampledLoop(motion, self._rate, stamp, force_delay=self._force_delay)
         omega, equilibrium = drive.angular_frequency, drive.equilibrium_position
         calm = ceil((drive.natural_period + self._force_delay) * self._rate)
@@ -227,3 +208,14 @@ class Bench:
             last / self._rate if settled else None,
             loop.unbounded or (not settled and recent >= size),
         )
+
+
+def _measured(motion: RecordedMotion, loading: float) -> Measures:
+    """Measure the next ten cycles of a motion, each of a natural period and `loading` (s)."""
+    motion.take_breakpoints()
+    motion.advance((10 + 2) * (motion.drive.natural_period + loading))
+    meter = CycleMeter(10)
+    meter.feed(motion.take_breakpoints(), motion.drive.belt_speed)
+    if motion.unbounded:
+        meter.report_run_away()
+    return meter.measures()

@@ -10,7 +10,8 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import SPEED, WashoutGains
+from stickslip_ros.physics.model.drive_system import SPEED
+from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.studies.controller_trial import Vibration
 from stickslip_ros.studies.design_task import Task
@@ -172,7 +173,7 @@ class Candidates:
 
 def _cubic_coefficient(drive: Drive) -> float:
     """Return the coefficient of the falling cubic friction at high speed, N s^3/m^3, or zero."""
-    law, high = drive.friction.scaled(drive.speed_scale), 1e6
+    law, high = drive.dimensionless.friction, 1e6
     coefficient = -float(law.coefficient(high, 1.0)) / high**3
     return coefficient * drive.normal_force / drive.speed_scale**3 if coefficient > 1e-6 else 0.0
 

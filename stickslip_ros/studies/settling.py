@@ -12,7 +12,8 @@ from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, CycleMeter, Measures, Regime
 from stickslip_ros.physics.measures.observer import MeasuredMotion
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
@@ -99,98 +100,82 @@ class Settled(NamedTuple):
         return _is_settled(self.measures)
 
 
-class Settler:
-    """Simulates motions in sequence; each one is independent of those before.
+def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) -> Settled:
+    """Simulate the motion from `start` and measure it after the transient.
 
-    Compiling an integrator costs more than most motions, so it is compiled once for each friction
-    law.
+    Raises RunError if the motion is too stiff to integrate.
     """
+    drive, washout = case.drive, case.washout
+    control = washout.gains if washout is not None and case.sampled is None else None
+    motion = RecordedMotion(drive, start.position, start.velocity, control)
+    motion.recording = False
+    loading = 0.0 if drive.belt_speed == 0.0 else loading_time(drive)
+    transient = course.transient * drive.natural_period
+    controlled = washout is not None or case.sampled is not None
+    if controlled:  # otherwise one step covers the stick phase on a slow belt
+        loading = min(loading, 50.0 * drive.natural_period)
+        transient += loading
+    # The first and the last cycle are incomplete.
+    cycles = max(course.cycles, LEAST_CYCLES) + 2
+    block = cycles * drive.natural_period
+    law = loop = None
+    if case.sampled is not None:
+        loop = case.sampled.as_loop(motion)
+        block = max(block, loop.period)
+        if washout is not None:
+            law = Washout(washout, start.low_passed)
+            simulate_sampled(loop, motion, law, washout.start_after, CycleMeter(1))
 
-    def __init__(self) -> None:
-        self._motions: dict[bool, Motion] = {}
+        def advance(duration: float, section: _Section) -> None:
+            simulate_sampled(loop, motion, law, duration, section.meter, observer=section)
+    else:
+        if washout is not None:
+            _begin_control(motion, washout, start)
 
-    def settle(self, case: ControlledDrive, start: MotionState, course: SettlingCourse) -> Settled:
-        """Simulate the motion from `start` and measure it after the transient.
+        def advance(duration: float, section: _Section) -> None:
+            motion.advance(duration)
+            measure_block(motion, section.meter, section)
 
-        Raises RunError if the motion is too stiff to integrate.
-        """
-        drive, washout = case.drive, case.washout
-        continuous = washout is not None and case.sampled is None
-        motion = self._motions.get(continuous)
-        if motion is None:
-            motion = Motion(drive, 0.0, 0.0, continuous_control=continuous, record=True)
-            self._motions[continuous] = motion
+    def observe() -> _Section:
         motion.recording = False
-        motion.begin(drive, start.position, start.velocity)
-        loading = 0.0 if drive.belt_speed == 0.0 else loading_time(drive)
-        transient = course.transient * drive.natural_period
-        controlled = washout is not None or case.sampled is not None
-        if controlled:  # otherwise one step covers the stick phase on a slow belt
-            loading = min(loading, 50.0 * drive.natural_period)
-            transient += loading
-        # The first and the last cycle are incomplete.
-        cycles = max(course.cycles, LEAST_CYCLES) + 2
-        block = cycles * drive.natural_period
-        law = loop = None
-        if case.sampled is not None:
-            loop = case.sampled.as_loop(motion)
-            block = max(block, loop.period)
-            if washout is not None:
-                law = Washout(washout, start.low_passed)
-                simulate_sampled(loop, motion, law, washout.start_after, CycleMeter(1))
+        section = _Section(course.cycles)
+        advance(transient, section)
+        if motion.sticking and not controlled and drive.belt_speed != 0.0:
+            left = (release_position(drive) - motion.position) / drive.belt_speed
+            if left > drive.natural_period:  # the transient has only started
+                motion.advance(left)
+                motion.advance(transient)
+        motion.recording = True
+        longest = cycles * (drive.natural_period + loading)
+        done, step = 0.0, block
+        while not motion.unbounded and done < longest and not (done and section.done):
+            advance(step, section)
+            done, step = done + step, done + step  # cycles on a slow belt are that long
+        if motion.unbounded:
+            section.meter.report_run_away()
+        return section
 
-            def advance(duration: float, section: _Section) -> None:
-                simulate_sampled(loop, motion, law, duration, section.meter, observer=section)
-        else:
-            if washout is not None:
-                _begin_control(motion, washout, start)
-
-            def advance(duration: float, section: _Section) -> None:
-                motion.advance(duration)
-                measure_block(motion, section.meter, section)
-
-        def observe() -> _Section:
-            motion.recording = False
-            section = _Section(course.cycles)
-            advance(transient, section)
-            if motion.sticking and not controlled and drive.belt_speed != 0.0:
-                left = (release_position(drive) - motion.position) / drive.belt_speed
-                if left > drive.natural_period:  # the transient has only started
-                    motion.advance(left)
-                    motion.advance(transient)
-            motion.recording = True
-            longest = cycles * (drive.natural_period + loading)
-            done, step = 0.0, block
-            while not motion.unbounded and done < longest and not (done and section.done):
-                advance(step, section)
-                done, step = done + step, done + step  # cycles on a slow belt are that long
-            if motion.unbounded:
-                section.meter.report_run_away()
-            return section
-
-        section = observe()
-        for _ in range(course.patience - 1):
-            before, section = section.meter.measures(), observe()
-            measures = section.meter.measures()
-            if _is_settled(measures) and _alike(before, measures):
-                break
-        low_passed = motion.low_passed if continuous else None
-        if law is not None and loop is not None:
-            law.answer(loop.sample.stamp, loop.sample.velocity)
-            low_passed = law.low_passed
-        return section.settled(MotionState(motion.position, motion.velocity, low_passed))
+    section = observe()
+    for _ in range(course.patience - 1):
+        before, section = section.meter.measures(), observe()
+        measures = section.meter.measures()
+        if _is_settled(measures) and _alike(before, measures):
+            break
+    low_passed = motion.low_passed if control is not None else None
+    if law is not None and loop is not None:
+        law.answer(loop.sample.stamp, loop.sample.velocity)
+        low_passed = law.low_passed
+    return section.settled(MotionState(motion.position, motion.velocity, low_passed))
 
 
-def _begin_control(motion: Motion, washout: WashoutParameters, start: MotionState) -> None:
+def _begin_control(motion: RecordedMotion, washout: WashoutParameters, start: MotionState) -> None:
     """Run the filter alone for `start_after`, then activate the controller."""
-    gains = (washout.linear_gain, washout.cubic_gain)
-    motion.set_gains(
-        washout.corner_frequency, *(gains if washout.start_after == 0.0 else (0.0, 0.0))
-    )
+    none = WashoutGains(washout.corner_frequency, 0.0, 0.0)
+    motion.control = washout.gains if washout.start_after == 0.0 else none
     motion.low_passed = start.velocity if start.low_passed is None else start.low_passed
     if washout.start_after > 0.0:
         motion.advance(washout.start_after)
-        motion.set_gains(washout.corner_frequency, *gains)
+        motion.control = washout.gains
 
 
 def _is_settled(measures: Measures) -> bool:

@@ -9,7 +9,7 @@ from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
 from stickslip_ros.physics.loop.washout import Washout
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import RunObserver
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.options import DEFAULT_PERIODS
@@ -43,12 +43,9 @@ def simulate(
         check_continuous(scenario)
     plant = scenario.plant
     washout = scenario.washout_controller.as_washout() if plant.expects_control else None
-    motion = Motion(
-        plant.as_drive(),
-        plant.initial.position,
-        plant.initial.velocity,
-        continuous_control=continuous,
-        record=True,
+    control = washout.gains if continuous and washout is not None else None
+    motion = RecordedMotion(
+        plant.as_drive(), plant.initial.position, plant.initial.velocity, control
     )
     meter = CycleMeter(scenario.analyzer.window)
     if continuous:

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, replace
-from threading import local
 from typing import Any, NamedTuple, Self
 
 from stickslip_ros.errors import StickslipError
@@ -13,8 +12,8 @@ from stickslip_ros.studies.plan import Plan
 from stickslip_ros.studies.settling import (
     ControlledDrive,
     MotionState,
-    Settler,
     SettlingCourse,
+    settle,
 )
 
 MEASURES = tuple(
@@ -127,16 +126,6 @@ class Study:
         }
 
 
-class _Settlers(local):
-    """One settler for each thread, since one thread at a time may use an integrator."""
-
-    def __init__(self) -> None:
-        self.settler = Settler()
-
-
-_SETTLERS = _Settlers()
-
-
 def compute(study: Study, points: Sequence[int], start: MotionState | None) -> Piece:
     """Compute some points in their order; a pure function, for any process.
 
@@ -159,9 +148,8 @@ def _compute_point(
         case, initial = study.case(index)
         if start is not None and case.washout is not None:
             case = replace(case, washout=replace(case.washout, start_after=0.0))
-        settled = _SETTLERS.settler.settle(case, start or initial, study.course)
+        settled = settle(case, start or initial, study.course)
     except (StickslipError, ArithmeticError) as error:
-        _SETTLERS.settler = Settler()
         nothing = Measures(None, None, None, None, None, None, 0, None)
         return Point(index, nothing, False, (), " ".join(str(error).split())), None
     measures, end, reason = replace(settled.measures, steady=None, trend=None), settled.end, None

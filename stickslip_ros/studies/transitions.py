@@ -13,7 +13,7 @@ from stickslip_ros.errors import StickslipError
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.physics.theory.roots import zero_between
-from stickslip_ros.physics.theory.sticking import Release
+from stickslip_ros.physics.theory.sticking import release_margin
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.settling import ControlledDrive
 from stickslip_ros.studies.study import Study
@@ -62,7 +62,7 @@ def hopf_margin(case: ControlledDrive, *, coarse: bool = False) -> float:
     return 1.0 - (loop.coarsened() if coarse else loop).spectral_radius(washout.gains)
 
 
-def stick_margin(case: ControlledDrive, release: Release) -> float:
+def stick_margin(case: ControlledDrive) -> float:
     """Return a margin above zero if the slide sticks again after release, and zero at the limit.
 
     NaN on a belt at rest, and under control or a disturbance, for which there is no theory.
@@ -70,7 +70,7 @@ def stick_margin(case: ControlledDrive, release: Release) -> float:
     drive = case.drive
     if case.washout is not None or case.sampled is not None or drive.belt_speed == 0.0:
         return nan
-    return tanh(release.stick_margin(replace(drive, belt_speed=abs(drive.belt_speed))))
+    return tanh(release_margin(replace(drive, belt_speed=abs(drive.belt_speed))))
 
 
 def sign_changes(margin: Callable[[float], float], values: Sequence[float]) -> Iterator[float]:
@@ -109,11 +109,10 @@ def transition_map(study: Study, axes: tuple[Axis, Axis]) -> TransitionMap:
 
 
 def _margins(study: Study, *, coarse: bool = False) -> dict[str, _Margin]:
-    release = Release()
     sampled = study.scenario.plant.expects_control and not study.continuous
     return {
         STABILITY_LIMIT if sampled else HOPF_POINT: lambda case: hopf_margin(case, coarse=coarse),
-        STICKING_LIMIT: lambda case: stick_margin(case, release),
+        STICKING_LIMIT: stick_margin,
     }
 
 

@@ -50,7 +50,7 @@ def test_the_bag_of_a_killed_analyzer_is_reported_and_can_be_repaired(
 def test_a_plant_that_gives_up_is_reported_and_its_bag_is_closed(
     stickslip: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip_ros.physics.motion.motion._SPARE_STEPS", 10_000)
+    monkeypatch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 10_000)
     stiff = ("--composed", "--bag", "bag", "-p", "plant.damping=1e12")
     done = stickslip("run", "paper", *stiff)
     assert done.returncode == 1

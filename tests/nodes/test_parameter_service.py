@@ -281,7 +281,7 @@ def test_what_is_set_while_inactive_acts_when_it_is_activated(graph: Graph) -> N
 def test_a_motion_that_has_become_too_stiff_pauses_the_plant(
     graph: Graph, pace: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("stickslip_ros.physics.motion.motion._SPARE_STEPS", 1000)
+    monkeypatch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 1000)
     heard = graph.listen(JOINT_STATES, raw=True)
     plant = graph.add(PlantNode, pace=pace, expects_control=False, wait_for=["observer"])
     graph.wait_until(lambda: plant.active and heard, "samples come")

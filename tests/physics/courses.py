@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import Motion, RecordedMotion
 
 # Rounding grows without bound where a motion just misses sticking, or just does not. Examples
 # closer to that are left out: by a thousandth in relative speed (of V) and in reaction (of N).
@@ -30,7 +30,7 @@ class Course:
     durations: tuple[float, ...]
 
     def motion(self) -> Motion:
-        return Motion(self.drive, self.position, self.velocity, record=True)
+        return RecordedMotion(self.drive, self.position, self.velocity)
 
     def run(self) -> tuple[Motion, list[Breakpoints]] | None:
         """Return the motion at the end and the breakpoints of each force; None if left out."""

@@ -6,7 +6,7 @@ import pytest
 
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import RecordedMotion
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, LimitCycle
 
 # In natural periods. The slowest transient, at belt speed 0.46, dies out e-fold in four.
@@ -15,7 +15,7 @@ TRANSIENT, MEASURED = 400, 40
 
 def settled(drive: Drive) -> Measures:
     """The measures of what the drive does from rest, after the transient."""
-    motion = Motion(drive, 0.0, 0.0, record=True)
+    motion = RecordedMotion(drive, 0.0, 0.0)
     motion.advance(TRANSIENT * drive.natural_period)
     motion.take_breakpoints()
     motion.advance(MEASURED * drive.natural_period)

@@ -17,7 +17,7 @@ from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Mea
 from stickslip_ros.physics.measures.observer import MeasuredMotion
 from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.plots.panes import LAST_CYCLES
 from stickslip_ros.plots.run_figure import run_figure
 from stickslip_ros.plots.run_history import RunHistory
@@ -76,7 +76,7 @@ def all_acted(force: FloatArray) -> npt.NDArray[np.bool_]:
 def moving(drive: Drive, duration: float) -> Drawn:
     """Draw a motion from rest, sampled at 64 points in a natural period."""
     history, meter, cycles = RunHistory(), CycleMeter(20), list[Cycle]()
-    motion = Motion(drive, 0.0, 0.0, record=True)
+    motion = RecordedMotion(drive, 0.0, 0.0)
     step = drive.natural_period / 64.0
     for _ in range(round(duration / step)):
         motion.advance(step)

@@ -17,7 +17,7 @@ from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, 
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.design import Design, Task, design, margins
@@ -46,7 +46,7 @@ def controlled(
     drive: Drive, task: Task, controller: WashoutParameters, duration: float
 ) -> tuple[Measures, float]:
     """Run the drive from rest, the controller coming on as it says; return measures and peak."""
-    motion = Motion(drive, 0.0, 0.0, record=True)
+    motion = RecordedMotion(drive, 0.0, 0.0)
     loop = SampledLoop(motion, task.rate, LOCKSTEP_START, force_delay=task.force_delay)
     washout = RecordingWashout(controller)
     measures = simulate_sampled(loop, motion, washout, duration, CycleMeter(5))
@@ -177,7 +177,7 @@ def test_the_cubic_gain_is_within_what_the_friction_law_bears() -> None:
     assert 0.0 <= controller.cubic_gain <= 3e5
     # From any speed it comes back, even with a force that is not limited.
     for speed in (0.3, -3.0, 30.0):
-        motion = Motion(FEED_DRIVE, 0.0, speed, record=True)
+        motion = RecordedMotion(FEED_DRIVE, 0.0, speed)
         loop = SampledLoop(motion, 1000.0, LOCKSTEP_START)
         free = replace(controller, force_limit=inf, start_after=0.0)
         measures = simulate_sampled(loop, motion, Washout(free), 8.0, CycleMeter(5))

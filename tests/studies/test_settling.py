@@ -13,12 +13,12 @@ from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.studies import settling
 from stickslip_ros.studies.settling import (
     LONGEST,
     ControlledDrive,
     MotionState,
     Settled,
-    Settler,
     SettlingCourse,
     check_continuous,
 )
@@ -27,7 +27,6 @@ from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER, LimitCycle
 from tests.studies.studies import EXPONENTIAL, paper
 
 REST = MotionState(0.0, 0.0)
-SETTLER = Settler()
 
 WEAK = ("washout_controller.linear_gain=-0.05", "washout_controller.cubic_gain=0.0")
 """A controller under which the paper's drive still vibrates."""
@@ -36,7 +35,7 @@ WEAK = ("washout_controller.linear_gain=-0.05", "washout_controller.cubic_gain=0
 def settle(
     case: ControlledDrive, start: MotionState = REST, course: SettlingCourse | None = None
 ) -> Settled:
-    return SETTLER.settle(case, start, course or SettlingCourse(cycles=6))
+    return settling.settle(case, start, course or SettlingCourse(cycles=6))
 
 
 def in_units(mass: float, length: float, time: float) -> Drive:
@@ -139,9 +138,9 @@ MIXED: list[tuple[ControlledDrive, MotionState]] = [
 """Laws, units, control and ends of every kind."""
 
 
-def _found(settler: Settler, case: ControlledDrive, start: MotionState) -> object:
+def _found(case: ControlledDrive, start: MotionState) -> object:
     try:
-        settled = settler.settle(case, start, SettlingCourse(5.0, 2, 2))
+        settled = settling.settle(case, start, SettlingCourse(5.0, 2, 2))
     except RunError as error:
         return str(error)
     return settled._replace(turning_points=settled.turning_points.tolist())  # pyright: ignore
@@ -149,21 +148,20 @@ def _found(settler: Settler, case: ControlledDrive, start: MotionState) -> objec
 
 @pytest.fixture(scope="module")
 def alone() -> list[object]:
-    """What each of the mixed cases comes to when its settler has done nothing before."""
+    """What each of the mixed cases comes to when its integrator is new."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("stickslip_ros.physics.motion.motion._SPARE_STEPS", 1000)
-        return [_found(Settler(), *mixed) for mixed in MIXED]
+        patch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 1000)
+        return [_found(*mixed) for mixed in MIXED]
 
 
 @pytest.mark.long
 @given(order=st.permutations(range(len(MIXED))))
 @settings(max_examples=4)
 def test_what_was_followed_before_changes_no_bit(alone: list[object], order: list[int]) -> None:
-    settler = Settler()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("stickslip_ros.physics.motion.motion._SPARE_STEPS", 1000)
+        patch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 1000)
         for number in order:
-            assert _found(settler, *MIXED[number]) == alone[number]
+            assert _found(*MIXED[number]) == alone[number]
 
 
 def test_the_mixed_cases_are_of_every_kind(alone: list[object]) -> None:

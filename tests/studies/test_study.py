@@ -39,8 +39,8 @@ MIXED = [
 
 @pytest.fixture(autouse=True)
 def _little_patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stickslip_ros.physics.motion.motion._SPARE_STEPS", 1000)
-    monkeypatch.setattr("stickslip_ros.physics.motion.motion._STEPS_PER_RADIAN", 100)
+    monkeypatch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 1000)
+    monkeypatch.setattr("stickslip_ros.physics.motion.hybrid_motion.STEPS_PER_UNIT", 100)
 
 
 def points(study: Study) -> list[Point]:

@@ -9,7 +9,7 @@ import pytest
 from stickslip_ros.physics.model.friction import Exponential
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
-from stickslip_ros.physics.theory.sticking import Release, sticking_onset
+from stickslip_ros.physics.theory.sticking import sticking_onset
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.plan import Axis, Grid
 from stickslip_ros.studies.settling import ControlledDrive
@@ -149,14 +149,6 @@ def test_a_sign_change_at_a_value_itself_is_found_once() -> None:
         pytest.approx(0.4),
     ]
     assert list(sign_changes(lambda x: x * x, [-1.0, 0.0, 1.0])) == []
-
-
-def test_what_a_release_does_was_not_changed_by_the_drives_before() -> None:
-    drives = [replace(PAPER, belt_speed=0.2, stiffness=stiffness) for stiffness in (0.3, 3.0)]
-    together = Release()
-    assert [together.stick_margin(drive) for drive in drives] == [
-        Release().stick_margin(drive) for drive in drives
-    ]
 
 
 @pytest.mark.usefixtures("coarse_maps")

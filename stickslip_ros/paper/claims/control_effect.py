@@ -1,7 +1,6 @@
 """Section 4: the effect of the control, Fig. 12 and 13."""
 
 from dataclasses import replace
-from functools import cache
 from math import log
 
 from stickslip_ros.paper.claims.claim import Computations, Evidence, Number, Observation
@@ -27,7 +26,8 @@ from stickslip_ros.paper.claims.paper_values import (
 from stickslip_ros.paper.claims.summaries import VIBRATING, amplitude, border, falling, listed
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.theory.hopf import hopf_points
 
 computes = Computations()
@@ -174,22 +174,15 @@ def _(_: Evidence) -> Number:
 
 def _largest_cubic_gain(belt_speed: float, corner_frequency: float, speed: float) -> float:
     """Return the cubic gain above which the motion with that initial speed diverges."""
-    motion = _controlled_motion()
 
     def stays(cubic: float) -> bool:
-        motion.begin(unit_drive(belt_speed), 0.0, 0.0)
-        motion.set_gains(corner_frequency, 0.0, cubic)
-        motion.restart(0.0, speed)
+        gains = WashoutGains(corner_frequency, 0.0, cubic)
+        motion = Motion(unit_drive(belt_speed), 0.0, speed, gains)
         motion.low_passed = 0.0
         motion.advance(100.0)
         return not motion.unbounded
 
     return border(stays, 0.0, 2.0)
-
-
-@cache
-def _controlled_motion() -> Motion:
-    return Motion(unit_drive(0.4), 0.0, 0.0, continuous_control=True)
 
 
 @computes("eq-30-hopf")
@@ -293,10 +286,8 @@ def _(evidence: Evidence) -> Observation:
 
 
 def _comes_to_rest(linear: float, position: float, speed: float) -> bool:
-    motion, drive = _controlled_motion(), unit_drive(0.4)
-    motion.begin(drive, 0.0, 0.0)
-    motion.set_gains(FILTER.corner_frequency, linear, 0.0)
-    motion.restart(position, speed)
+    drive = unit_drive(0.4)
+    motion = Motion(drive, position, speed, replace(FILTER, linear=linear, cubic=0.0))
     motion.advance(3000.0)
     off = abs(motion.position - drive.equilibrium_position) + abs(motion.velocity)
     return off < 1e-3 * drive.belt_speed

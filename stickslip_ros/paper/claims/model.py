@@ -22,7 +22,6 @@ from stickslip_ros.paper.claims.summaries import listed
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import Equations
 from stickslip_ros.physics.model.friction import Stribeck
 from stickslip_ros.physics.theory.roots import zero_between
 
@@ -77,7 +76,7 @@ def _(_: Evidence) -> Formula:
 
 @computes("eq-2")
 def _(_: Evidence) -> Formula:
-    law = _SLIDE.friction.scaled(_SLIDE.speed_scale)
+    law = _SLIDE.dimensionless.friction
     coefficient = slip_friction(law, STATES[1] - _SLIDE.belt_speed / _SLIDE.speed_scale)
     return Formula(
         coefficient - _SLIDE.damping_coefficient * STATES[1] - STATES[0],
@@ -115,7 +114,7 @@ def _(_: Evidence) -> Formula:
     read = _SLIDE.belt_speed / (sqrt(_SLIDE.stiffness / _SLIDE.mass) * length)
     return Formula(
         None,
-        Equations(Stribeck, continuous_control=False).parameters(_SLIDE)["belt_speed"],
+        _SLIDE.dimensionless.belt_speed,
         {"With L, which is not defined, read as N/k": read},
         "One symbol is used for the speed in m/s and for the dimensionless one.",
     )

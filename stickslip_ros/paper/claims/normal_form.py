@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.equations import SPEED
+from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.linear import Expansion
 

@@ -6,9 +6,8 @@ Everything is dimensionless, for the unit drive of `figures`.
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Any, TypeVar
+from typing import TypeVar
 
-import heyoka as hy
 import numpy as np
 import numpy.typing as npt
 
@@ -16,9 +15,12 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.claims.claim import Formula, Number
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import Equations, W, WashoutGains, X, Y
+from stickslip_ros.physics.model.drive_system import SLIP, DriveSystem
+from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import FrictionLaw
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.model.hybrid import Mode
+from stickslip_ros.physics.motion import Motion, RecordedMotion
+from stickslip_ros.physics.motion.derivatives import flow_rates, parameter_values
 from stickslip_ros.physics.theory.critical_gains import CriticalGains, critical_gains
 from stickslip_ros.physics.theory.cycle_bounds import follow, release_position
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
@@ -180,8 +182,7 @@ def arrivals(drive: Drive) -> list[float]:
 
     They start after the release and end with the first one that friction can hold.
     """
-    motion = _motion()
-    motion.begin(drive, release_position(drive), drive.belt_speed)
+    motion = RecordedMotion(drive, release_position(drive), drive.belt_speed)
     motion.take_breakpoints()
     *_, breakpoints = follow(motion)
     arrived = np.abs(breakpoints.velocity - drive.belt_speed) <= _ROUNDING * drive.belt_speed
@@ -193,8 +194,7 @@ def arrivals(drive: Drive) -> list[float]:
 
 def stays(drive: Drive) -> bool:
     """Return whether the motion from rest at X = 0 does not diverge."""
-    motion = _motion()
-    motion.begin(drive, 0.0, 0.0)
+    motion = Motion(drive, 0.0, 0.0)
     motion.advance(600.0)  # a diverging motion has diverged by then
     return not motion.unbounded
 
@@ -215,30 +215,12 @@ def rates(drive: Drive, states: FloatArray, gains: WashoutGains | None = None) -
 
     n is 2, or 3 with `gains` (SI), for eq. 5 and eq. 19.
     """
-    equations, compiled = _compiled(type(drive.friction), gains is not None)
-    values: dict[str, Any] = equations.parameters(drive)
-    if gains is not None:
-        values |= vars(gains.scaled(drive))
-    values["sign"] = np.sign(states[1] - values["belt_speed"])
-    parameters = np.zeros((len(equations.index), states.shape[1]))
-    for name, value in values.items():
-        parameters[equations.index[name]] = value
-    return compiled(states, pars=parameters[: compiled.nparams])
+    system = DriveSystem(drive, gains)
+    signs = np.sign(states[1] - system.constants["belt_speed"])
+    modes = [parameter_values(system, Mode(SLIP, (sign,)), (0.0,)) for sign in signs.tolist()]
+    return flow_rates(system, SLIP).at(states, np.array(modes).T)[0]
 
 
 def time_dependent() -> bool:
     """Return whether the equations depend on time explicitly."""
-    _, compiled = _compiled(type(unit_drive(1.0).friction), False)
-    return bool(compiled.is_time_dependent)
-
-
-@cache
-def _motion() -> Motion:
-    return Motion(unit_drive(1.0), 0.0, 0.0, record=True)
-
-
-@cache
-def _compiled(law: type[FrictionLaw], continuous_control: bool) -> tuple[Equations, Any]:
-    equations = Equations(law, continuous_control)
-    state = [X, Y, W] if continuous_control else [X, Y]
-    return equations, hy.cfunc([rate for _, rate in equations.slip], state)
+    return not DriveSystem(unit_drive(1.0)).autonomous

@@ -28,7 +28,7 @@ from stickslip_ros.paper.claims.paper_values import (
 )
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import RecordedMotion
 
 computes = Computations()
 
@@ -101,7 +101,7 @@ computes["eq-6-first"] = lambda _: Formula(
 @computes("first-approximation")
 def _(_: Evidence) -> Observation:
     drive = unit_drive(0.45)
-    motion = Motion(drive, expansion(0.45).equilibrium[0] - 1e-6, 0.0, record=True)
+    motion = RecordedMotion(drive, expansion(0.45).equilibrium[0] - 1e-6, 0.0)
     motion.advance(20.0 * drive.natural_period)
     breakpoints = motion.take_breakpoints()
     turns = np.flatnonzero((breakpoints.velocity[:-1] == 0.0) & (breakpoints.velocity[1:] > 0.0))

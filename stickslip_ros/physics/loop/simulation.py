@@ -8,11 +8,14 @@ from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver, RunObserver
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.progress import Progress
 
 
-def measure_block(motion: Motion, meter: CycleMeter, observer: MotionObserver | None) -> None:
+def measure_block(
+    motion: RecordedMotion, meter: CycleMeter, observer: MotionObserver | None
+) -> None:
     """Feed a meter, and an observer, with what `motion` has recorded since the last call."""
     breakpoints, belt_speed = motion.take_breakpoints(), motion.drive.belt_speed
     cycles = meter.feed(breakpoints, belt_speed)
@@ -23,7 +26,7 @@ def measure_block(motion: Motion, meter: CycleMeter, observer: MotionObserver | 
 
 def simulate_sampled(
     loop: SampledLoop,
-    motion: Motion,
+    motion: RecordedMotion,
     washout: Washout | None,
     duration: float,
     meter: CycleMeter,
@@ -37,8 +40,8 @@ def simulate_sampled(
     ----------
     loop : SampledLoop
         Loop to advance.
-    motion : Motion
-        Motion of `loop`; it must record its breakpoints.
+    motion : RecordedMotion
+        Motion of `loop`.
     washout : Washout or None
         Controller that answers the samples; None for no control.
     duration : float
@@ -73,10 +76,10 @@ def simulate_sampled(
     >>> from stickslip_ros.physics.measures import CycleMeter
     >>> from stickslip_ros.physics.model.drive import Drive
     >>> from stickslip_ros.physics.model.friction import Stribeck
-    >>> from stickslip_ros.physics.motion import Motion
+    >>> from stickslip_ros.physics.motion import RecordedMotion
     >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
     ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
-    >>> motion = Motion(drive, position=0.0, velocity=0.0, record=True)
+    >>> motion = RecordedMotion(drive, position=0.0, velocity=0.0)
     >>> loop = SampledLoop(motion, rate=1000.0, start=0)
     >>> washout = Washout(WashoutParameters(20.0, linear_gain=-3000.0, cubic_gain=0.0))
     >>> simulate_sampled(loop, motion, washout, 5.0, CycleMeter(20)).regime.value
@@ -103,7 +106,7 @@ def simulate_sampled(
 
 
 def simulate_continuous(
-    motion: Motion,
+    motion: RecordedMotion,
     washout: WashoutParameters | None,
     duration: float,
     meter: CycleMeter,
@@ -117,8 +120,8 @@ def simulate_continuous(
 
     Parameters
     ----------
-    motion : Motion
-        Motion with continuous control that records its breakpoints.
+    motion : RecordedMotion
+        Motion, with continuous control unless `washout` is None.
     washout : WashoutParameters or None
         Constants of the controller; None for no control. `force_limit` is not used.
     duration : float
@@ -151,11 +154,11 @@ def simulate_continuous(
     >>> from stickslip_ros.physics.measures import CycleMeter
     >>> from stickslip_ros.physics.model.drive import Drive
     >>> from stickslip_ros.physics.model.friction import Stribeck
-    >>> from stickslip_ros.physics.motion import Motion
+    >>> from stickslip_ros.physics.motion import RecordedMotion
     >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
     ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
-    >>> motion = Motion(drive, 0.0, 0.0, continuous_control=True, record=True)
     >>> washout = WashoutParameters(20.0, linear_gain=-3000.0, cubic_gain=0.0)
+    >>> motion = RecordedMotion(drive, 0.0, 0.0, control=washout.gains)
     >>> simulate_continuous(motion, washout, 5.0, CycleMeter(20)).regime.value
     'equilibrium'
     """
@@ -168,7 +171,7 @@ def simulate_continuous(
     done = 0.0
     for length, share in ((free, 0.0), (duration - free, 1.0)):
         if washout is not None:
-            motion.set_gains(
+            motion.control = WashoutGains(
                 washout.corner_frequency, share * washout.linear_gain, share * washout.cubic_gain
             )
         end = done + length

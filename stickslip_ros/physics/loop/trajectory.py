@@ -83,7 +83,7 @@ class TrajectoryRecorder:
         number = self._number
         if number - self._now * self._rate > _ROUNDING:
             return
-        speed = motion.drive.belt_speed
+        speed = motion.belt_speed
         sample = Sample(
             0,
             motion.position,

@@ -125,3 +125,7 @@ class NoCourse(Course):
             0.
         """
         return 0.0
+
+
+NO_COURSE = NoCourse()
+"""The course of what is constant."""

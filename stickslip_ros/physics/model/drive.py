@@ -6,7 +6,7 @@ from math import pi, sqrt
 from typing import Self
 
 from stickslip_ros.physics.model.constants import Scales, scaled
-from stickslip_ros.physics.model.course import Course, NoCourse
+from stickslip_ros.physics.model.course import NO_COURSE, Course
 from stickslip_ros.physics.model.friction import FrictionLaw
 
 
@@ -43,9 +43,9 @@ class Drive:
     """Belt (feed) speed v_belt, m/s; positive, negative or zero."""
     friction: FrictionLaw
     """Friction law; its speeds are in m/s."""
-    belt: Course = NoCourse()
+    belt: Course = NO_COURSE
     """Course added to the belt speed, m/s."""
-    load: Course = NoCourse()
+    load: Course = NO_COURSE
     """Course added to the normal force, N."""
 
     @cached_property

@@ -96,6 +96,14 @@ class DriveSystem(HybridSystem):
         self._control_states = slice(MEMORY + len(law.states), None)
         self.structure = structure_number((_structure(self.drive), _structure(self.control)))
         self._steady = isinstance(self.drive.belt, NoCourse)
+        self.constants = {
+            "damping": self.drive.damping,
+            "belt_speed": self.drive.belt_speed,
+            **_numbers(law, "friction"),
+            **_numbers(self.drive.belt, "belt"),
+            **_numbers(self.drive.load, "load"),
+            **(_numbers(self.control, "control") if self.control is not None else {}),
+        }
         self._belt_speed, self._normal_force = self.drive.belt_speed, self.drive.normal_force
         self._plain = self._steady and isinstance(self.drive.load, NoCourse)
         self._sticks = law.sticks
@@ -103,17 +111,6 @@ class DriveSystem(HybridSystem):
         self._characteristic_speed = law.characteristic_speed
         self.limits_steps = law.characteristic_speed != inf
         self._static_law = None if law.states or law.switches else law.coefficient
-
-    @cached_property
-    def constants(self) -> dict[str, float]:
-        """Damping, belt speed and the constants of law, courses and controller."""
-        values: dict[str, float] = {
-            "damping": self.drive.damping,
-            "belt_speed": self.drive.belt_speed,
-        }
-        for prefix in ("friction", "belt", "load"):
-            values |= _numbers(getattr(self.drive, prefix), prefix)
-        return values | (_numbers(self.control, "control") if self.control is not None else {})
 
     @cached_property
     def autonomous(self) -> bool:
@@ -159,6 +156,7 @@ class DriveSystem(HybridSystem):
         relative_speed = y - belt_speed
         friction = normal * law.friction(relative_speed, sign, memory, switches.law)
         acceleration = equations.acceleration(drive, friction, reaction)
+        margins = law.margins(relative_speed, sign, memory, switches.law)
         return Flow(
             rates=(
                 y,
@@ -171,9 +169,7 @@ class DriveSystem(HybridSystem):
                 # The slide diverges in the direction of the slip. The margin is of the order of
                 # one, since heyoka's error is relative to the largest of states and events.
                 Guard(1.0 - sign * y / UNBOUNDED_SPEED, DriveSystem.diverge),
-                *_guards(
-                    law.margins(relative_speed, sign, memory, switches.law), DriveSystem.switch_friction
-                ),
+                *_guards(margins, DriveSystem.switch_friction),
                 *courses,
             ),
             marks=(y, acceleration),
@@ -267,7 +263,9 @@ class DriveSystem(HybridSystem):
         """Return whether the slide moves in a straight line: it sticks, and all is constant."""
         return mode.flow == STICK and self._plain and self.control is None
 
-    def closed_form(self, mode: Mode, instant: Instant, duration: float) -> tuple[int | None, float]:
+    def closed_form(
+        self, mode: Mode, instant: Instant, duration: float
+    ) -> tuple[int | None, float]:
         """Move with the belt for `duration`, or until the reaction reaches its limit."""
         state, speed = instant.state, self.drive.belt_speed
         if speed != 0.0:
@@ -293,9 +291,11 @@ class DriveSystem(HybridSystem):
         )  # fmt: skip
         return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
 
-    def overflow(self, instant: Instant) -> None:
+    def overflow(self, mode: Mode, instant: Instant) -> Mode:
         """Set the speed at which a motion counts as unbounded: what overflows exceeds any speed."""
-        instant.state[SPEED] = copysign(UNBOUNDED_SPEED, -self.reaction(instant))
+        sign = copysign(1.0, -self.reaction(instant))
+        instant.state[SPEED] = sign * UNBOUNDED_SPEED
+        return self._slip(mode, sign, instant)
 
     def initial_state(self, position: float, velocity: float) -> list[float]:
         """Return the state at the start: the memory is that of the law, the controller at rest."""

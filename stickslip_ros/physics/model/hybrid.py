@@ -7,7 +7,7 @@ variational equations and the jumps of the derivatives at a guard.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from math import inf
 from typing import Any, NamedTuple
 
@@ -40,9 +40,9 @@ class Instant:
 
 
 Leads = Callable[[Any, Mode, Instant], Mode | None]
-"""Method of a system: the mode that follows, or None at the end of the motion; it may set the state.
+"""Method of a system: the mode that follows, or None at the end of the motion.
 
-The compiled flow is shared by the systems of one structure, so that it is not bound to one.
+It may set the state. It is not bound to a system, since those of one structure share their flows.
 """
 
 
@@ -108,7 +108,7 @@ class HybridSystem(ABC):
 
     def leads(self, guard: int, mode: Mode, instant: Instant) -> Mode | None:
         """Return the mode to which a guard of the present mode leads; None at the end."""
-        return self._guards(mode.flow)[guard].leads(self, mode, instant)
+        return self.shared_flow(mode.flow).guards[guard].leads(self, mode, instant)
 
     @abstractmethod
     def settled(self, mode: Mode | None, instant: Instant) -> Mode:
@@ -122,15 +122,17 @@ class HybridSystem(ABC):
         """Return whether a motion that starts here counts as unbounded."""
         return False
 
-    def separate(self, mode: Mode, instant: Instant) -> None:
+    def separate(self, mode: Mode, instant: Instant) -> None:  # noqa: B027 - none by default
         """Move the state, by rounding errors, off a guard of a mode that starts on it."""
 
     def has_closed_form(self, mode: Mode) -> bool:
         """Return whether `closed_form` solves the mode."""
         return False
 
-    def closed_form(self, mode: Mode, instant: Instant, duration: float) -> tuple[int | None, float]:
-        """Advance the state for `duration` or up to a guard; return the guard, and the time taken."""
+    def closed_form(
+        self, mode: Mode, instant: Instant, duration: float
+    ) -> tuple[int | None, float]:
+        """Advance the state for `duration` or up to a guard; return the guard and the time."""
         raise NotImplementedError
 
     limits_steps = False
@@ -140,12 +142,9 @@ class HybridSystem(ABC):
         """Return the longest step that misses no feature of the rates."""
         return inf
 
-    def overflow(self, instant: Instant) -> None:
-        """Set the state of a motion whose rates are no longer finite."""
-
-    @cached_property
-    def _guards(self) -> Callable[[str], tuple[Guard, ...]]:
-        return cache(lambda name: self.shared_flow(name).guards)
+    def overflow(self, mode: Mode, instant: Instant) -> Mode:
+        """Set the state of a motion whose rates are no longer finite; return its last mode."""
+        return mode
 
     @cached_property
     def autonomous(self) -> bool:

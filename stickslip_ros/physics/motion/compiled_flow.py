@@ -124,7 +124,7 @@ class _Finder:
     """Callback of a mark, with what it has found."""
 
     def __init__(self, *, zero_speed: bool) -> None:
-        """The first mark is the speed: there it is exactly zero."""
+        """Record zeros of a mark; at one of the speed (`zero_speed`) it is exactly zero."""
         self.found: Marks = []
         self._zero_speed = zero_speed
 

@@ -24,9 +24,13 @@ class FlowRates:
         self._compiled = hy.cfunc([*flow.rates, *gradients], list(variables))
 
     def at(self, state: FloatArray, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the rates, shape (n,), and the gradients of rates and margins, shape (m, n)."""
-        found: FloatArray = self._compiled(state, pars=parameters[: self._compiled.nparams])
-        return found[: self._order], found[self._order :].reshape(-1, self._order)
+        """Return the rates, as the state (n, ...), and their gradients and those of the margins.
+
+        The gradients have the shape (rates and margins, n, ...).
+        """
+        found = _evaluated(self._compiled, state, parameters)
+        order = self._order
+        return found[:order], found[order:].reshape(-1, order, *state.shape[1:])
 
 
 _rates: dict[tuple[int, str], FlowRates] = {}
@@ -68,7 +72,7 @@ class FlowTensors:
         of a result is the component, and the last one has length m. The axes between are the states
         and then the constant.
         """
-        found = self._compiled(states, pars=parameters[: self._compiled.nparams])
+        found = _evaluated(self._compiled, states, parameters)
         points = states.shape[1]
         tensors = [
             np.zeros((self.order, *[self.order + 1] * order, points))
@@ -94,3 +98,8 @@ def flow_tensors(system: HybridSystem, name: str, constant: str) -> FlowTensors:
 def parameter_values(system: HybridSystem, mode: Mode, inputs: Sequence[float]) -> FloatArray:
     """Return the values of a system's parameters in a mode, in the order of its expressions."""
     return np.array([*system.constants.values(), *inputs, *mode.switches, 0.0])
+
+
+def _evaluated(compiled: Any, state: FloatArray, parameters: FloatArray) -> FloatArray:
+    used = parameters[: compiled.nparams]
+    return compiled(np.ascontiguousarray(state), pars=np.ascontiguousarray(used))

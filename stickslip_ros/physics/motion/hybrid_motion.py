@@ -166,6 +166,7 @@ class HybridMotion:
         if self._timed:
             flow.parameters[self._epoch] = epoch
         taylor.time = now
+        before = flow.variables.tolist()
         if self._system.limits_steps:
             longest = self._system.longest_step(instant)
             reached = taylor.propagate_until(end, self._steps_left, longest)
@@ -177,7 +178,8 @@ class HybridMotion:
             return None, end
         taylor.reset_cooldowns()  # the next integration is another phase
         if outcome == _NOT_FINITE:  # what causes this exceeds any bound immediately
-            self._system.overflow(instant)
+            flow.variables[:] = array("d", before)
+            self._mode = self._system.overflow(self._mode, instant)
             return _DIVERGED, now
         if self._steps_left <= 0:
             flow.take_marks()  # of a phase that is not reported

@@ -22,7 +22,7 @@ def averaged_growth(drive: Drive, belt_speed: Any, amplitude: Any) -> FloatArray
     overtake the belt, if the law's characteristic speed is not much below v0 / 10,000. A result
     that cannot be distinguished from rounding is zero.
     """
-    law = drive.friction.scaled(drive.speed_scale)
+    law = drive.dimensionless.friction
     belt_speed, amplitude = np.asarray(belt_speed, float), np.asarray(amplitude, float)
     relative_speed = np.multiply.outer(amplitude, np.cos(_PHASES)) - belt_speed[..., np.newaxis]
     friction = law.coefficient(relative_speed, np.where(relative_speed > 0.0, 1.0, -1.0))

@@ -61,7 +61,7 @@ class CubicLoop:
         CubicLoop or None
             Dimensionless coefficients; None if the drive has another law or its belt is at rest.
         """
-        law = drive.friction.scaled(drive.speed_scale)
+        law = drive.dimensionless.friction
         if not isinstance(law, Stribeck) or drive.belt_speed == 0.0:
             return None
         drop = law.static - law.minimum

@@ -14,9 +14,9 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
 from stickslip_ros.physics.model.equations import WashoutGains
-from stickslip_ros.physics.motion.integrator import UNBOUNDED_SPEED
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion.recorded_motion import RecordedMotion
 
 _ROUNDING = 16.0 * float(np.finfo(float).eps)
 """Share of its terms below which g is rounding."""
@@ -44,7 +44,7 @@ def loading_time(drive: Drive) -> float:
     return 2.0 * drive.friction.static * drive.length_scale / abs(drive.belt_speed)
 
 
-def follow(motion: Motion) -> Iterator[Breakpoints]:
+def follow(motion: RecordedMotion) -> Iterator[Breakpoints]:
     """Yield all breakpoints of a recording `motion` so far, repeatedly, up to `longest_return`."""
     drive = motion.drive
     breakpoints, now = Breakpoints.empty(), 0.0
@@ -104,7 +104,7 @@ def largest_cycle(drive: Drive) -> float | None:
 
 def _net_force(drive: Drive) -> tuple[FloatArray, FloatArray]:
     """Return speeds y on both sides of rest and of the belt speed, and g there."""
-    law = drive.friction.scaled(drive.speed_scale)
+    law = drive.dimensionless.friction
     belt_speed = abs(drive.belt_speed) / drive.speed_scale
     least = 1e-6 * min(belt_speed, drive.friction.characteristic_speed / drive.speed_scale)
     distances = np.geomspace(least, UNBOUNDED_SPEED, 2048)

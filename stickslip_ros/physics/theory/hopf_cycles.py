@@ -7,7 +7,8 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import SPEED, WashoutGains
+from stickslip_ros.physics.model.drive_system import SPEED
+from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.physics.theory.hopf import ComplexPair
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, shoot

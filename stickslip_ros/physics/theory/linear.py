@@ -1,27 +1,23 @@
 """Expansion of the slip equations at the equilibrium: the derivatives of the right-hand side.
 
-heyoka differentiates the symbolic equations, for any friction law. Everything is dimensionless
-(see `Drive`); n is 2 for the open loop, with the state (X, Y), and 3 with continuous control,
-with the filter state W, too.
+heyoka differentiates the equations of the `DriveSystem`, for any smooth friction law. Everything is
+dimensionless (see `Drive`). The n states are X, Y, the memory of the law and, with continuous
+control, the filter state W.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from itertools import permutations
+from functools import cached_property
 from math import copysign
-from typing import Any
 
-import heyoka as hy
 import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import Equations, W, WashoutGains, X, Y
-from stickslip_ros.physics.model.friction import FrictionLaw
-
-_HIGHEST_ORDER = 3
+from stickslip_ros.physics.model.drive_system import SLIP, DriveSystem
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.motion.derivatives import flow_tensors
+from stickslip_ros.physics.theory.equilibrium import equilibria
 
 
 @dataclass(frozen=True)
@@ -32,7 +28,7 @@ class Expansion:
     """
 
     equilibrium: FloatArray
-    """State in equilibrium: X = mu(-v0), eq. 6, Y = 0, W = 0; shape (n,)."""
+    """State in equilibrium: X = mu(-v0), eq. 6, and Y = 0; shape (n,)."""
     jacobian: FloatArray
     """A, eq. 7 and 20; shape (n, n)."""
     quadratic: FloatArray
@@ -87,14 +83,14 @@ def expand(drive: Drive, gains: WashoutGains | None = None) -> Expansion | None:
     """
     if drive.belt_speed == 0.0:
         return None
-    position, (first, second, third) = _at_equilibrium(
+    states, (first, second, third) = _at_equilibrium(
         drive, gains, np.array([drive.belt_speed / drive.speed_scale])
     )
     n = len(first)
     first, second, third = first[..., 0], second[..., 0], third[..., 0]
     moves = -np.linalg.solve(first[:, :n], first[:, n])
     return Expansion(
-        equilibrium=np.concatenate([position, np.zeros(n - 1)]),
+        equilibrium=states[:, 0],
         jacobian=first[:, :n],
         quadratic=second[:, :n, :n],
         cubic=third[:, :n, :n, :n],
@@ -112,12 +108,16 @@ def hurwitz_determinants(jacobian: FloatArray) -> FloatArray:
     """Return the Routh-Hurwitz determinants of Jacobians (..., n, n): shape (..., n).
 
     With the characteristic polynomial l^n + c1 l^(n-1) + ... + cn they are c2, c1, or for order 3
-    c3, c1, c1 c2 - c3. All are above zero if the equilibrium is stable. At a Hopf point the last
-    one is zero, and the others are above zero.
+    c3, c1, c1 c2 - c3, and in general cn and the leading principal minors of Hurwitz's matrix of
+    orders 1 to n-1. All are above zero if the equilibrium is stable. At a Hopf point the last one
+    is zero, and the others are above zero.
     """
+    order = jacobian.shape[-1]
+    if order > 3:
+        return _hurwitz_minors(jacobian)
     trace = np.trace(jacobian, axis1=-2, axis2=-1)
     determinant = np.linalg.det(jacobian)
-    if jacobian.shape[-1] == 2:
+    if order == 2:
         return np.stack([determinant, -trace], axis=-1)
     minors = sum(
         jacobian[..., i, i] * jacobian[..., j, j] - jacobian[..., i, j] * jacobian[..., j, i]
@@ -126,65 +126,33 @@ def hurwitz_determinants(jacobian: FloatArray) -> FloatArray:
     return np.stack([-determinant, -trace, determinant - trace * minors], axis=-1)
 
 
-class _SmoothField:
-    """Compiled derivatives of the slip equations of one law, by the state and the belt speed."""
-
-    def __init__(self, law: type[FrictionLaw], continuous_control: bool) -> None:
-        self.equations = Equations(law, continuous_control)
-        state = [X, Y, W] if continuous_control else [X, Y]
-        self.order = len(state)
-        by = [*state, hy.par[self.equations.index["belt_speed"]]]
-        right_hand_side = [rate for _, rate in self.equations.slip]
-        tensors = hy.diff_tensors(right_hand_side, diff_args=by, diff_order=_HIGHEST_ORDER)
-        self._places: list[tuple[int, ...]] = []
-        expressions: list[Any] = []
-        for order in range(1, _HIGHEST_ORDER + 1):
-            for (component, *powers), expression in tensors.get_derivatives(order):
-                axes = [axis for axis, power in enumerate(powers) for _ in range(power)]
-                self._places.append((component, *axes))
-                expressions.append(expression)
-        self._compiled = hy.cfunc(expressions, state)
-
-    def derivatives(
-        self, states: FloatArray, values: Mapping[str, float | FloatArray]
-    ) -> list[FloatArray]:
-        """Return the derivatives of orders 1 to 3 at states of shape (n, m).
-
-        `values` are the parameter values of the equations, by name. The first axis of a result is
-        the component, and the last one has length m. The axes between are the state and then the
-        belt speed.
-        """
-        points = states.shape[1]
-        parameters = np.zeros((len(self.equations.index), points))
-        for name, value in values.items():
-            parameters[self.equations.index[name]] = value
-        found = self._compiled(states, pars=parameters[: self._compiled.nparams])
-        tensors = [
-            np.zeros((self.order, *[self.order + 1] * order, points))
-            for order in range(1, _HIGHEST_ORDER + 1)
-        ]
-        for (component, *axes), value in zip(self._places, found, strict=True):
-            for order in set(permutations(axes)):
-                tensors[len(axes) - 1][component, *order] = value
-        return tensors
-
-
-_smooth_field = lru_cache(maxsize=None)(_SmoothField)
+def _hurwitz_minors(jacobian: FloatArray) -> FloatArray:
+    """Return cn and the minors of orders 1 to n-1, by the Faddeev-LeVerrier algorithm."""
+    order = jacobian.shape[-1]
+    identity = np.eye(order)
+    power, coefficients = np.broadcast_to(identity, jacobian.shape), [np.ones(jacobian.shape[:-2])]
+    for number in range(1, order + 1):
+        product = jacobian @ power
+        coefficients.append(-np.trace(product, axis1=-2, axis2=-1) / number)
+        power = product + coefficients[-1][..., np.newaxis, np.newaxis] * identity
+    hurwitz = np.zeros(jacobian.shape)
+    for row in range(order):
+        for column in range(order):
+            if 0 <= 2 * column - row + 1 <= order:
+                hurwitz[..., row, column] = coefficients[2 * column - row + 1]
+    minors = [np.linalg.det(hurwitz[..., :size, :size]) for size in range(1, order)]
+    return np.stack([coefficients[order], *minors], axis=-1)
 
 
 def _at_equilibrium(
     drive: Drive, gains: WashoutGains | None, belt_speeds: FloatArray
 ) -> tuple[FloatArray, list[FloatArray]]:
-    """Return X in equilibrium at belt speeds of one sign, shape (m,), and the derivatives there."""
-    field = _smooth_field(type(drive.friction), gains is not None)
-    sign = -copysign(1.0, belt_speeds[0])
-    law = drive.friction.scaled(drive.speed_scale)
-    positions = law.at_rest(belt_speeds)
-    states = np.zeros((field.order, len(belt_speeds)))
-    states[0] = positions
-    values: dict[str, float | FloatArray] = {
-        **field.equations.parameters(drive), "belt_speed": belt_speeds, "sign": sign, "force": 0.0
-    }  # fmt: skip
-    if gains is not None:
-        values |= vars(gains.scaled(drive))
-    return positions, field.derivatives(states, values)
+    """Return the equilibria at m belt speeds of one sign, (n, m), and the derivatives there."""
+    system = DriveSystem(drive, gains)
+    values = np.zeros((len(system.index), len(belt_speeds)))
+    for name, value in system.constants.items():
+        values[system.index[name]] = value
+    values[system.index["belt_speed"]] = belt_speeds
+    values[system.index["sign"]] = -copysign(1.0, belt_speeds[0])
+    states = equilibria(system, values)
+    return states, flow_tensors(system, SLIP, "belt_speed").at(states, values)

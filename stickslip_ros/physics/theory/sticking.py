@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.cycle_bounds import follow, least_cycle, release_position
 from stickslip_ros.physics.theory.roots import zero_between
@@ -88,16 +88,15 @@ def sticking_onset(drive: Drive) -> StickingOnset:
     """
     averaged = _averaged(drive)
     reference = averaged if isinstance(averaged, float) else abs(drive.belt_speed)
-    release = Release()
     speeds = ((reference or drive.speed_scale) * _FOLLOWED).tolist()
-    followed = _followed(drive, release, speeds)
+    followed = _followed(drive, speeds)
     onset = followed if isinstance(followed, float) else None
     return StickingOnset(
         approximate=averaged if isinstance(averaged, float) else None,
         exact=onset,
         no_approximate=averaged if isinstance(averaged, str) else None,
         no_exact=followed if isinstance(followed, str) else None,
-        ranges=tuple(_ranges(drive, release, speeds, onset)),
+        ranges=tuple(_ranges(drive, speeds, onset)),
         followed=(speeds[-1], speeds[0]),
     )
 
@@ -129,12 +128,12 @@ def _averaged(drive: Drive) -> float | str:
     return onset * drive.speed_scale
 
 
-def _followed(drive: Drive, release: "Release", speeds: Sequence[float]) -> float | str:
+def _followed(drive: Drive, speeds: Sequence[float]) -> float | str:
     """Return the exact onset (m/s), or the reason why there is none; the speeds to try descend."""
 
     def excess(speed: float) -> float:
         at_speed = replace(drive, belt_speed=speed)
-        return -1.0 if least_cycle(at_speed) is None else release.excess(at_speed)
+        return -1.0 if least_cycle(at_speed) is None else release_excess(at_speed)
 
     above = None
     for speed in speeds:
@@ -146,7 +145,7 @@ def _followed(drive: Drive, release: "Release", speeds: Sequence[float]) -> floa
     if above is not None:
         return zero_between(lambda speed: np.tanh(excess(speed)), speed, above)
     sticking = next(
-        (speed for speed in speeds if release.stick_margin(replace(drive, belt_speed=speed)) > 0.0),
+        (speed for speed in speeds if release_margin(replace(drive, belt_speed=speed)) > 0.0),
         0.0,
     )
     if sticking == speed:
@@ -158,13 +157,13 @@ def _followed(drive: Drive, release: "Release", speeds: Sequence[float]) -> floa
 
 
 def _ranges(
-    drive: Drive, release: "Release", speeds: Sequence[float], onset: float | None
+    drive: Drive, speeds: Sequence[float], onset: float | None
 ) -> Iterator[tuple[float, float]]:
     """Yield the ranges of belt speeds, ascending, at which a slide that stuck sticks again."""
 
     def margin(speed: float) -> float:
         at_speed = replace(drive, belt_speed=speed)
-        return -1.0 if least_cycle(at_speed) is None else tanh(release.stick_margin(at_speed))
+        return -1.0 if least_cycle(at_speed) is None else tanh(release_margin(at_speed))
 
     tried = [(speed, margin(speed)) for speed in speeds if onset is None or speed < onset]
     if onset is not None:  # below it there is a range, however narrow
@@ -184,59 +183,51 @@ def _ranges(
         yield low, tried[-1][0] if onset is None else onset
 
 
-class Release:
-    """Motion of a slide after the belt releases it, which always happens in the same state.
+def release_excess(drive: Drive) -> float:
+    """Return the share of the belt speed by which the slide's next upward speed exceeds it.
 
-    The belt moves, at a speed above zero. Use one object for many drives: compiling the integrator
-    costs more than most motions.
+    The belt moves, at a speed above zero, and has released the slide.
+
+    -1 if the slide does not move upward again. Above the belt speed friction reverses: there
+    the peak is that of the parabola which starts with the slide's acceleration and loses v0 of
+    it per unit of time, as an orbit does that touches. Raises RunError for a motion too stiff
+    to follow.
     """
+    peaks = (_highest(breakpoints, drive.belt_speed) for breakpoints in _follow_release(drive))
+    peak = next((peak for peak in peaks if peak is not None), None)
+    if peak is None:
+        return -1.0
+    position, velocity = peak
+    excess = velocity / drive.belt_speed - 1.0
+    if abs(excess) > _ROUNDING:
+        return excess
+    acceleration = (release_position(drive) - position) / drive.length_scale
+    excess = (acceleration / (drive.belt_speed / drive.speed_scale)) ** 2 / 2.0
+    return excess if excess > _ROUNDING else 0.0
 
-    def __init__(self) -> None:
-        self._motion: Motion | None = None
 
-    def excess(self, drive: Drive) -> float:
-        """Return the share of the belt speed by which the slide's next upward speed exceeds it.
+def release_margin(drive: Drive) -> float:
+    """Return a value above zero if the slide sticks again, and below zero if it does not.
 
-        -1 if the slide does not move upward again. Above the belt speed friction reverses: there
-        the peak is that of the parabola which starts with the slide's acceleration and loses v0 of
-        it per unit of time, as an orbit does that touches. Raises RunError for a motion too stiff
-        to follow.
-        """
-        peaks = (_highest(breakpoints, drive.belt_speed) for breakpoints in self._follow(drive))
-        peak = next((peak for peak in peaks if peak is not None), None)
-        if peak is None:
-            return -1.0
-        position, velocity = peak
-        excess = velocity / drive.belt_speed - 1.0
-        if abs(excess) > _ROUNDING:
-            return excess
-        acceleration = (release_position(drive) - position) / drive.length_scale
-        excess = (acceleration / (drive.belt_speed / drive.speed_scale)) ** 2 / 2.0
-        return excess if excess > _ROUNDING else 0.0
+    It is zero where the slide only just sticks: because it only just reaches the belt speed, or
+    because its force is the largest that friction can hold. A slide that overtakes the belt
+    sticks when it falls back to the belt speed, or never: in the plane of position and speed
+    its orbit then encloses all previous ones. Raises RunError like `release_excess`.
+    """
+    excess = release_excess(drive)
+    if excess <= 0.0:
+        return excess
+    entries = (_entry(breakpoints, drive.belt_speed) for breakpoints in _follow_release(drive))
+    position = next((entry for entry in entries if entry is not None), None)
+    if position is None:
+        return -1.0
+    return min(excess, (release_position(drive) - position) / drive.length_scale)
 
-    def stick_margin(self, drive: Drive) -> float:
-        """Return a value above zero if the slide sticks again, and below zero if it does not.
 
-        It is zero where the slide only just sticks: because it only just reaches the belt speed, or
-        because its force is the largest that friction can hold. A slide that overtakes the belt
-        sticks when it falls back to the belt speed, or never: in the plane of position and speed
-        its orbit then encloses all previous ones. Raises RunError like `excess`.
-        """
-        excess = self.excess(drive)
-        if excess <= 0.0:
-            return excess
-        entries = (_entry(breakpoints, drive.belt_speed) for breakpoints in self._follow(drive))
-        position = next((entry for entry in entries if entry is not None), None)
-        if position is None:
-            return -1.0
-        return min(excess, (release_position(drive) - position) / drive.length_scale)
-
-    def _follow(self, drive: Drive) -> Iterator[Breakpoints]:
-        if self._motion is None:
-            self._motion = Motion(drive, 0.0, 0.0, record=True)
-        self._motion.begin(drive, release_position(drive), drive.belt_speed)
-        self._motion.take_breakpoints()
-        return follow(self._motion)
+def _follow_release(drive: Drive) -> Iterator[Breakpoints]:
+    motion = RecordedMotion(drive, release_position(drive), drive.belt_speed)
+    motion.take_breakpoints()
+    return follow(motion)
 
 
 def _highest(breakpoints: Breakpoints, belt_speed: float) -> tuple[float, float] | None:

@@ -11,7 +11,7 @@ from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.loop.simulation import simulate_sampled
 from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.physics.drives import FEED_DRIVE, PAPER
 
 SAMPLES = 30
@@ -191,7 +191,7 @@ def test_the_same_seed_gives_the_same_motion_and_another_one_another() -> None:
 
 def controlled(delay: float, jitter: float, seed: int = 0) -> Measures:
     """The feed drive with its washout, from half a second on; 1 ms from sample to sample."""
-    motion = Motion(FEED_DRIVE, 0.0, 0.0, record=True)
+    motion = RecordedMotion(FEED_DRIVE, 0.0, 0.0)
     loop = SampledLoop(
         motion,
         1000.0,

@@ -12,7 +12,7 @@ from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Linear
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
 
 SECOND = 10**9
@@ -27,7 +27,7 @@ def sampled(
     drive: Drive = PAPER,
     position: float = 0.0,
 ) -> tuple[Measures, Motion]:
-    motion = Motion(drive, position, 0.0, record=True)
+    motion = RecordedMotion(drive, position, 0.0)
     loop = SampledLoop(motion, rate, SECOND)
     controller = Washout(washout) if washout is not None else None
     return simulate_sampled(loop, motion, controller, duration, CycleMeter(20)), motion
@@ -39,7 +39,8 @@ def continuous(
     drive: Drive = PAPER,
     position: float = 0.0,
 ) -> tuple[Measures, Motion]:
-    motion = Motion(drive, position, 0.0, continuous_control=True, record=True)
+    control = None if washout is None else washout.gains
+    motion = RecordedMotion(drive, position, 0.0, control)
     return simulate_continuous(motion, washout, duration, CycleMeter(20)), motion
 
 
@@ -162,7 +163,8 @@ def test_a_positive_cubic_gain_escapes_from_large_speeds() -> None:
 @pytest.mark.parametrize("simulate", [sampled, continuous])
 def test_progress_rises_to_one(simulate: Simulate) -> None:
     shares: list[float] = []
-    motion = Motion(PAPER, 0.0, 0.0, continuous_control=simulate is continuous, record=True)
+    control = PAPER_GAINS.gains if simulate is continuous else None
+    motion = RecordedMotion(PAPER, 0.0, 0.0, control)
     if simulate is sampled:
         loop = SampledLoop(motion, 100.0, SECOND)
         simulate_sampled(loop, motion, Washout(PAPER_GAINS), 300.0, CycleMeter(20), shares.append)

@@ -7,7 +7,7 @@ import pytest
 from stickslip_ros.physics.measures.breakpoints import Breakpoints, breakpoints_from_samples
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import RecordedMotion
 from tests.physics.drives import LIMIT_CYCLES, PAPER
 
 CYCLES = 15
@@ -15,7 +15,7 @@ CYCLES = 15
 
 def breakpoints_both_ways(drive: Drive, per_cycle: int) -> tuple[Breakpoints, Breakpoints]:
     """The breakpoints of some natural periods: the motion's own, and those from its samples."""
-    motion = Motion(drive, 0.0, 0.0, record=True)
+    motion = RecordedMotion(drive, 0.0, 0.0)
     motion.advance(200.0 * drive.natural_period)
     motion.take_breakpoints()
     step = drive.natural_period / per_cycle

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures, Regime, Trend
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import RecordedMotion
 from tests.examples import examples
 from tests.physics.drives import PAPER
 
@@ -32,7 +32,7 @@ def vibration(cycles: float, speed: float = 1.0, centre: float = 0.0) -> Breakpo
 @cache
 def recorded(drive: Drive, position: float, velocity: float, duration: float) -> Breakpoints:
     """Breakpoints at every 0.1 s as well, as a loop that is sampled has them."""
-    motion = Motion(drive, position, velocity, record=True)
+    motion = RecordedMotion(drive, position, velocity)
     for _ in range(round(duration / 0.1)):
         motion.advance(0.1)
     return motion.take_breakpoints()
@@ -122,7 +122,7 @@ def test_a_motion_that_never_turns_ends_in_equilibrium() -> None:
 
 def test_cycles_of_long_ago_do_not_count() -> None:
     """Ten periods ago it cycled; since then, strongly damped, it never turned."""
-    motion = Motion(PAPER, 0.0, 0.0, record=True)
+    motion = RecordedMotion(PAPER, 0.0, 0.0)
     meter = CycleMeter(window=20)
     motion.advance(60.0)
     meter.feed(motion.take_breakpoints(), 0.4)
@@ -149,7 +149,7 @@ def test_riding_a_belt_at_rest_is_stuck() -> None:
 
 def test_sticking_now_and_then_on_a_belt_at_rest_is_not_stuck() -> None:
     """A force that alternates between 1 and -1 moves the slide at each turn, then it sticks."""
-    motion = Motion(AT_REST, 0.0, 0.0, record=True)
+    motion = RecordedMotion(AT_REST, 0.0, 0.0)
     meter = CycleMeter(window=3)
     for number in range(20):
         motion.force = (-1.0) ** number

@@ -6,7 +6,7 @@ from math import cos, sin
 import pytest
 
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import RecordedMotion
 from tests.physics.drives import PAPER
 
 FRICTIONLESS = [
@@ -21,7 +21,7 @@ laws = pytest.mark.parametrize("law", FRICTIONLESS, ids=lambda law: law.name)
 @laws
 @pytest.mark.parametrize("belt_speed", [0.2, 0.0])
 def test_at_rest_it_stays_at_rest(law: FrictionLaw, belt_speed: float) -> None:
-    motion = Motion(replace(PAPER, belt_speed=belt_speed, friction=law), 0.0, 0.0, record=True)
+    motion = RecordedMotion(replace(PAPER, belt_speed=belt_speed, friction=law), 0.0, 0.0)
     motion.advance(100.0)
     assert motion.position == pytest.approx(0.0, abs=1e-12)
     assert motion.velocity == pytest.approx(0.0, abs=1e-12)
@@ -32,7 +32,7 @@ def test_at_rest_it_stays_at_rest(law: FrictionLaw, belt_speed: float) -> None:
 @pytest.mark.parametrize("belt_speed", [0.2, 0.0, -0.5])
 def test_it_passes_the_speed_of_the_belt_unmoved(law: FrictionLaw, belt_speed: float) -> None:
     drive = replace(PAPER, damping=0.0, belt_speed=belt_speed, friction=law)
-    motion = Motion(drive, 1.0, 0.0, record=True)
+    motion = RecordedMotion(drive, 1.0, 0.0)
     motion.advance(20.0)
     assert motion.position == pytest.approx(cos(20.0), rel=1e-12)
     assert motion.velocity == pytest.approx(-sin(20.0), rel=1e-12)

@@ -8,7 +8,7 @@ import pytest
 
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.friction import Coulomb
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.physics.drives import FEED_DRIVE, PAPER
 
 # On a fast belt Coulomb friction is constant: a free vibration about mu_s with amplitude 0.3.
@@ -16,7 +16,7 @@ FREE = replace(PAPER, damping=0.0, belt_speed=1.0, friction=Coulomb(0.4))
 
 
 def test_turning_points_have_a_velocity_of_exactly_zero() -> None:
-    motion = Motion(FREE, 0.7, 0.0, record=True)
+    motion = RecordedMotion(FREE, 0.7, 0.0)
     motion.advance(10.0)
     breakpoints = motion.take_breakpoints()
     turning = breakpoints[breakpoints.velocity == 0.0]
@@ -26,7 +26,7 @@ def test_turning_points_have_a_velocity_of_exactly_zero() -> None:
 
 
 def test_velocity_extremes_are_breakpoints() -> None:
-    motion = Motion(FREE, 0.7, 0.0, record=True)
+    motion = RecordedMotion(FREE, 0.7, 0.0)
     motion.advance(10.0)
     breakpoints = motion.take_breakpoints()
     fastest = breakpoints[np.abs(np.abs(breakpoints.velocity) - 0.3) < 1e-13]
@@ -38,7 +38,7 @@ def test_velocity_extremes_are_breakpoints() -> None:
 def test_no_sampled_state_is_beyond_the_breakpoints(step: float) -> None:
     """Between neighbouring breakpoints displacement and speed have no extremes."""
     drive = replace(FEED_DRIVE, belt_speed=0.02)
-    coarse = Motion(drive, 0.0, 0.0, record=True)
+    coarse = RecordedMotion(drive, 0.0, 0.0)
     coarse.advance(0.3)
     breakpoints = coarse.take_breakpoints()
     sampled = Motion(drive, 0.0, 0.0)
@@ -55,7 +55,7 @@ def test_no_sampled_state_is_beyond_the_breakpoints(step: float) -> None:
 
 
 def test_breakpoints_are_in_si_units_and_end_where_the_motion_is() -> None:
-    motion = Motion(FEED_DRIVE, 0.0, 0.0, record=True)
+    motion = RecordedMotion(FEED_DRIVE, 0.0, 0.0)
     motion.advance(0.05)
     motion.advance(0.02)
     breakpoints = motion.take_breakpoints()
@@ -66,20 +66,22 @@ def test_breakpoints_are_in_si_units_and_end_where_the_motion_is() -> None:
 
 
 def test_breakpoints_are_taken_once() -> None:
-    motion = Motion(PAPER, 0.0, 0.0, record=True)
+    motion = RecordedMotion(PAPER, 0.0, 0.0)
     motion.advance(1.0)
     assert len(motion.take_breakpoints()) > 1
     assert len(motion.take_breakpoints()) == 0
 
 
 def test_a_motion_that_does_not_record_has_none() -> None:
-    motion = Motion(PAPER, 0.0, 0.0)
+    motion = RecordedMotion(PAPER, 0.0, 0.0)
+    motion.recording = False
+    motion.take_breakpoints()
     motion.advance(10.0)
     assert len(motion.take_breakpoints()) == len(Breakpoints.empty())
 
 
 def test_a_stick_begins_at_the_landing() -> None:
-    motion = Motion(PAPER, 0.0, 0.0, record=True)
+    motion = RecordedMotion(PAPER, 0.0, 0.0)
     for _ in range(1000):
         motion.advance(0.1)
     breakpoints = motion.take_breakpoints()

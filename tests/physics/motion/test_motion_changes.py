@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Exponential
 from stickslip_ros.physics.motion.motion import Motion
 from tests.physics.drives import FEED_DRIVE, PAPER
@@ -84,8 +85,7 @@ def test_restart_puts_the_slide_somewhere_else_and_keeps_the_force() -> None:
 
 
 def test_restart_puts_the_filter_of_the_continuous_controller_to_rest() -> None:
-    motion = Motion(FEED_DRIVE, 0.0, 0.0, continuous_control=True)
-    motion.set_gains(20.0, -3000.0, 0.0)
+    motion = Motion(FEED_DRIVE, 0.0, 0.0, WashoutGains(20.0, -3000.0, 0.0))
     motion.advance(0.3)
     assert abs(control_force(motion)) > 1.0
     motion.restart(1e-4, -0.08)
@@ -109,11 +109,9 @@ def test_friction_while_slipping_is_that_of_the_law() -> None:
 
 @changes
 def test_a_new_drive_takes_over_the_gains_of_the_continuous_controller(changed: Drive) -> None:
-    motion = Motion(FEED_DRIVE, 0.0, 0.0, continuous_control=True)
-    motion.set_gains(20.0, -3000.0, -1e4)
+    motion = Motion(FEED_DRIVE, 0.0, 0.0, WashoutGains(20.0, -3000.0, -1e4))
     motion.drive = changed
-    fresh = Motion(changed, 0.0, 0.0, continuous_control=True)
-    fresh.set_gains(20.0, -3000.0, -1e4)
+    fresh = Motion(changed, 0.0, 0.0, WashoutGains(20.0, -3000.0, -1e4))
     motion.advance(0.1)
     fresh.advance(0.1)
     assert motion.position == pytest.approx(fresh.position, rel=1e-9)
@@ -122,8 +120,7 @@ def test_a_new_drive_takes_over_the_gains_of_the_continuous_controller(changed: 
 
 @changes
 def test_a_new_drive_takes_over_the_filter_of_the_continuous_controller(changed: Drive) -> None:
-    motion = Motion(FEED_DRIVE, 3e-4, -0.05, continuous_control=True)
-    motion.set_gains(20.0, -3000.0, -1e4)
+    motion = Motion(FEED_DRIVE, 3e-4, -0.05, WashoutGains(20.0, -3000.0, -1e4))
     motion.advance(0.01)
     before = control_force(motion)
     motion.drive = changed
@@ -132,11 +129,10 @@ def test_a_new_drive_takes_over_the_filter_of_the_continuous_controller(changed:
 
 
 def test_the_filter_goes_on_without_a_jump_when_its_corner_frequency_changes() -> None:
-    motion = Motion(FEED_DRIVE, 3e-4, -0.05, continuous_control=True)
-    motion.set_gains(20.0, -3000.0, -1e4)
+    motion = Motion(FEED_DRIVE, 3e-4, -0.05, WashoutGains(20.0, -3000.0, -1e4))
     motion.advance(0.01)
     before = control_force(motion)
-    motion.set_gains(50.0, -3000.0, -1e4)
+    motion.control = WashoutGains(50.0, -3000.0, -1e4)
     assert abs(before) > 10.0
     assert control_force(motion) == pytest.approx(before, rel=1e-3)
 

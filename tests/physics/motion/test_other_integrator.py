@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.physics.drives import PAPER
 
 Coefficient = Callable[[float, float], float]
@@ -82,7 +82,7 @@ class Solver:
 @pytest.mark.parametrize(("law", "coefficient"), LAWS, ids=lambda part: getattr(part, "name", ""))
 @pytest.mark.parametrize("belt", [0.3, -0.3])
 def test_same_motion(law: FrictionLaw, coefficient: Coefficient, belt: float) -> None:
-    motion = Motion(replace(PAPER, belt_speed=belt, friction=law), 0.1, 0.9, record=True)
+    motion = RecordedMotion(replace(PAPER, belt_speed=belt, friction=law), 0.1, 0.9)
     solver = Solver(coefficient, belt, 0.1, 0.9)
     for force, duration in [(0.0, 9.0), (0.5, 4.0), (-0.7, 5.0), (0.1, 7.0)]:
         motion.force = force

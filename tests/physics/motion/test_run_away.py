@@ -7,7 +7,7 @@ import pytest
 
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Regime
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.physics.drives import PAPER
 
 LAWS = [
@@ -39,7 +39,7 @@ def test_it_is_found_to_run_away_at_a_thousand_times_the_speed_scale(unit: float
         belt_speed=0.2 * unit,
         friction=Linear(static=0.4, slope=0.9 / unit),
     )
-    motion = Motion(drive, 0.0, 0.0, record=True)
+    motion = RecordedMotion(drive, 0.0, 0.0)
     motion.advance(60.0)
     assert motion.unbounded
     assert abs(motion.velocity) == pytest.approx(1e3 * unit, rel=1e-9)

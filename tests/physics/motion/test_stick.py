@@ -12,7 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.model.friction import Coulomb
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.physics.drives import FEED_DRIVE, PAPER
 
 BELT = 0.2
@@ -33,7 +33,7 @@ def test_the_slide_rides_the_belt_exactly() -> None:
 @directions
 def test_it_breaks_away_where_friction_can_no_longer_hold_it(direction: float) -> None:
     drive = replace(PAPER, belt_speed=direction * BELT)
-    motion = Motion(drive, 0.0, direction * BELT, record=True)
+    motion = RecordedMotion(drive, 0.0, direction * BELT)
     limit = 0.4 - 0.02 * BELT
     motion.advance(limit / BELT - 1e-9)
     assert motion.sticking
@@ -76,7 +76,7 @@ def test_rounding_at_the_limit_does_not_hold_the_slide_for_ever(
 
 @directions
 def test_it_lands_and_sticks(direction: float) -> None:
-    motion = Motion(replace(PAPER, belt_speed=direction * BELT), 0.0, 0.0, record=True)
+    motion = RecordedMotion(replace(PAPER, belt_speed=direction * BELT), 0.0, 0.0)
     motion.advance(2.0)
     assert motion.sticking
     assert motion.velocity == direction * BELT
@@ -90,7 +90,7 @@ def test_it_lands_and_sticks(direction: float) -> None:
 def test_it_passes_the_speed_of_a_belt_that_cannot_hold_it(direction: float) -> None:
     """Arriving at belt speed with h = 2 > 0.4, friction changes sign and it slows down further."""
     drive = replace(PAPER, belt_speed=direction * BELT)
-    motion = Motion(drive, direction * 2.0, direction * 0.3, record=True)
+    motion = RecordedMotion(drive, direction * 2.0, direction * 0.3)
     before = motion.friction_force
     motion.advance(0.1)
     assert not motion.sticking
@@ -102,7 +102,7 @@ def test_it_passes_the_speed_of_a_belt_that_cannot_hold_it(direction: float) -> 
 
 @directions
 def test_a_jump_of_the_force_breaks_the_stick_at_once(direction: float) -> None:
-    motion = Motion(SLOW, 0.0, BELT, record=True)
+    motion = RecordedMotion(SLOW, 0.0, BELT)
     motion.advance(1.0)
     assert motion.sticking
     motion.take_breakpoints()
@@ -132,7 +132,7 @@ def test_a_short_hop_off_the_belt_ends_where_it_lands() -> None:
     t = 2 atan(0.05).
     """
     drive = replace(PAPER, damping=0.0, belt_speed=1.0, friction=Coulomb(0.25))
-    motion = Motion(drive, 0.7, 1.0, record=True)
+    motion = RecordedMotion(drive, 0.7, 1.0)
     motion.force = 1.0
     motion.advance(0.2)
     hop = 2.0 * 0.04995839572194276  # atan(0.05)

@@ -6,7 +6,7 @@ import pytest
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model.friction import Coulomb
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.physics.motion.variational import SensitiveMotion, TooStiffError
 from tests.physics.drives import PAPER
 
@@ -15,7 +15,7 @@ STIFF = replace(PAPER, damping=1e9)
 
 @pytest.fixture(autouse=True)
 def _little_patience(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stickslip_ros.physics.motion.motion._SPARE_STEPS", 1000)
+    monkeypatch.setattr("stickslip_ros.physics.motion.hybrid_motion._SPARE_STEPS", 1000)
 
 
 def test_it_is_refused() -> None:
@@ -79,16 +79,16 @@ def test_a_law_that_was_used_before_is_as_it_was() -> None:
 def test_after_a_restart_nothing_of_a_refused_motion_is_recorded(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    motion = Motion(PAPER, 0.0, 0.0, record=True)
-    motion.begin(replace(PAPER, belt_speed=1.0), 0.1, 0.0)
-    for budget, steps in (("_SPARE_STEPS", 0), ("_STEPS_PER_RADIAN", 0.01)):
-        monkeypatch.setattr(f"stickslip_ros.physics.motion.motion.{budget}", steps)
-    monkeypatch.setattr("stickslip_ros.physics.motion.motion._STEPS_PER_ADVANCE", 10)
+    motion = RecordedMotion(replace(PAPER, belt_speed=1.0), 0.1, 0.0)
+    for budget, steps in (("STEPS_PER_UNIT", 0.01), ("_STEPS_PER_ADVANCE", 10)):
+        monkeypatch.setattr(f"stickslip_ros.physics.motion.hybrid_motion.{budget}", steps)
+    motion._steps_left = 0
     with pytest.raises(RunError):
         motion.advance(100.0)
     monkeypatch.undo()
-    fresh = Motion(PAPER, 0.0, 0.0, record=True)
-    motion.begin(PAPER, 0.0, 0.0)
+    fresh = RecordedMotion(PAPER, 0.0, 0.0)
+    motion.take_breakpoints()
+    motion = RecordedMotion(PAPER, 0.0, 0.0)  # it borrows what the refused motion has given back
     for one in (motion, fresh):
         one.advance(5.0)
     assert motion.take_breakpoints().time.tolist() == fresh.take_breakpoints().time.tolist()

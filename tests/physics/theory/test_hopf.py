@@ -12,7 +12,7 @@ from stickslip_ros.physics.measures.cycle_measures import CycleMeter
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear, Stribeck
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.physics.theory.hopf import hopf_points
@@ -108,12 +108,10 @@ def test_real_eigenvalues_of_opposite_sign_are_no_hopf_point() -> None:
 
 
 def speed_amplitude(drive: Drive, gains: WashoutGains | None, periods: int) -> float:
-    motion = Motion(drive, 0.0, 0.0, continuous_control=gains is not None, record=True)
+    motion = RecordedMotion(drive, 0.0, 0.0, control=gains)
     expansion = expand(drive)
     assert expansion is not None
     motion.restart(expansion.equilibrium[0] * drive.length_scale, 0.03 * drive.speed_scale)
-    if gains is not None:
-        motion.set_gains(gains.corner_frequency, gains.linear, gains.cubic)
     for _ in range(periods // 100):
         motion.take_breakpoints()
         motion.advance(100 * drive.natural_period)

@@ -15,7 +15,7 @@ from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.physics.motion.variational import SensitiveMotion
 from stickslip_ros.physics.theory.cycle_bounds import largest_cycle, least_cycle
 from stickslip_ros.physics.theory.limit_cycles import (
@@ -44,7 +44,7 @@ def returns(drive: Drive, cycle: LimitCycle, offset: float = 0.0) -> float:
 
 
 def ends_in(drive: Drive, position: float, periods: int = 150) -> Regime | None:
-    motion = Motion(drive, position, 0.0, record=True)
+    motion = RecordedMotion(drive, position, 0.0)
     motion.advance(periods * drive.natural_period)
     motion.take_breakpoints()
     motion.advance(3.0 * drive.natural_period)
@@ -228,7 +228,7 @@ def test_the_cycle_under_washout_control_is_what_a_long_run_leaves() -> None:
     cycle = limit_cycle_of_run(PAPER, 0.0, gains=GAINS)
     assert cycle is not None
     assert cycle.stable
-    motion = Motion(PAPER, 0.0, 0.0, continuous_control=True, record=True)
+    motion = RecordedMotion(PAPER, 0.0, 0.0, control=GAINS)
     run = simulate_continuous(motion, WashoutParameters(2.0, -0.5, 0.0), 1200.0, CycleMeter(10))
     assert cycle.period == pytest.approx(run.period, rel=1e-10)
     assert cycle.measures.amplitude == pytest.approx(run.amplitude, rel=1e-10)
@@ -238,8 +238,7 @@ def test_the_cycle_under_washout_control_is_what_a_long_run_leaves() -> None:
 def test_the_run_approaches_the_cycle_as_its_leading_multiplier_says() -> None:
     cycle = limit_cycle_of_run(PAPER, 0.0, gains=GAINS)
     assert cycle is not None
-    motion = Motion(PAPER, 0.0, 0.0, continuous_control=True, record=True)
-    motion.set_gains(GAINS.corner_frequency, GAINS.linear, GAINS.cubic)
+    motion = RecordedMotion(PAPER, 0.0, 0.0, control=GAINS)
     motion.advance(40.0 * cycle.period)
     breakpoints = motion.take_breakpoints()
     turns = (
@@ -350,7 +349,7 @@ def test_cycles_keep_within_the_bounds_that_energy_sets(drive: Drive) -> None:
         assert least <= drive.equilibrium_position - cycle.position <= largest
     # From beyond, the slide turns nearer, the belt being overtaken or not.
     for distance in (1.01 * largest, 2.0 * largest, 10.0 * largest):
-        motion = Motion(drive, drive.equilibrium_position - distance, 0.0, record=True)
+        motion = RecordedMotion(drive, drive.equilibrium_position - distance, 0.0)
         motion.advance(0.25 * drive.natural_period)
         motion.take_breakpoints()
         motion.advance(2.0 * drive.natural_period)

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
-from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.limit_cycles import limit_cycles
 from stickslip_ros.physics.theory.sticking import sticking_onset
@@ -29,7 +29,7 @@ def hopf_speed(damping: float, static: float, minimum: float, minimum_speed: flo
 
 def sticks(drive: Drive) -> bool:
     """Whether the plain motion, left alone from rest on the belt, still sticks at the end."""
-    motion = Motion(drive, 0.0, drive.belt_speed, record=True)
+    motion = RecordedMotion(drive, 0.0, drive.belt_speed)
     motion.advance(150.0 * drive.natural_period)
     motion.take_breakpoints()
     motion.advance(3.0 * drive.natural_period)
@@ -79,7 +79,7 @@ def test_at_the_exact_onset_the_cycle_touches_the_speed_of_the_belt() -> None:
     assert onset is not None
     drive = replace(PAPER, belt_speed=onset * (1.0 + 1e-10))
     (cycle,) = limit_cycles(drive)
-    motion = Motion(drive, cycle.position, 0.0, record=True)
+    motion = RecordedMotion(drive, cycle.position, 0.0)
     motion.advance(cycle.period)
     breakpoints = motion.take_breakpoints()
     assert not breakpoints.sticking.any()
