@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 _SHORTEST = 1e-3
 """Shortest time-out or period of a node, s."""
-_OF_DRIVE = [each.name for each in fields(Drive) if each.name != "friction"]
+_OF_DRIVE = [each.name for each in fields(Drive) if each.type is float]
 """Parameters of the plant that the drive takes unchanged."""
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
