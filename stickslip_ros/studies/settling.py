@@ -109,6 +109,7 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) ->
     control = washout.gains if washout is not None and case.sampled is None else None
     motion = RecordedMotion(drive, start.position, start.velocity, control)
     motion.recording = False
+    motion.take_breakpoints()  # the start is not part of what is measured
     loading = 0.0 if drive.belt_speed == 0.0 else loading_time(drive)
     transient = course.transient * drive.natural_period
     controlled = washout is not None or case.sampled is not None

@@ -267,10 +267,10 @@ class DriveSystem(HybridSystem):
         self, mode: Mode, instant: Instant, duration: float
     ) -> tuple[int | None, float]:
         """Move with the belt for `duration`, or until the reaction reaches its limit."""
-        state, speed = instant.state, self.drive.belt_speed
+        state, speed = instant.state, self._belt_speed
         if speed != 0.0:
             limit = self._backward_limit if speed > 0.0 else -self._forward_limit
-            limit = limit - self.drive.damping * speed + instant.inputs[0]
+            limit -= equations.reaction(self.drive, 0.0, speed, instant.inputs[0])
             time = max((limit - state[POSITION]) / speed, 0.0)
             if time < duration:
                 state[POSITION] = limit

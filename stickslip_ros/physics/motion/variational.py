@@ -60,6 +60,14 @@ class SensitiveMotion(RecordedMotion):
         """Derivative of the state by dimensionless time."""
         return self._rates(self._mode)[0]
 
+    def state_at(self, position: float, filter_state: float) -> FloatArray:
+        """Return the state at rest at a position (m), with the filter state W (m) under control."""
+        scale = self._drive.length_scale
+        state = self._system.initial_state(position / scale, 0.0)
+        if self._control is not None:
+            state[-1] = filter_state / scale
+        return np.array(state)
+
     def start(self, state: FloatArray) -> None:
         """Start again at `state`, at time zero and without breakpoints."""
         self._recorded.clear()

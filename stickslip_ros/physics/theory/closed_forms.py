@@ -12,6 +12,7 @@ from typing import Self
 from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Stribeck
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, require
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,13 @@ class CubicLoop:
         -------
         CubicLoop or None
             Dimensionless coefficients; None if the drive has another law or its belt is at rest.
+
+        Raises
+        ------
+        InvalidInputError
+            If belt or load follow a course.
         """
+        require("the closed form", drive, AUTONOMOUS)
         law = drive.dimensionless.friction
         if not isinstance(law, Stribeck) or drive.belt_speed == 0.0:
             return None

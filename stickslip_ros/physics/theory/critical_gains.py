@@ -6,6 +6,7 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, STATIC, require
 
 _ROUNDING = 1e-9
 """Relative change of a determinant with the gain below which it is treated as zero."""
@@ -39,6 +40,11 @@ def critical_gains(drive: Drive, gains: WashoutGains) -> CriticalGains | None:
         Critical gains in SI units; None if the belt is at rest, or if no linear gain stabilises the
         equilibrium.
 
+    Raises
+    ------
+    InvalidInputError
+        If the friction law has a memory, or belt or load follow a course.
+
     Examples
     --------
     The system of the paper:
@@ -53,6 +59,7 @@ def critical_gains(drive: Drive, gains: WashoutGains) -> CriticalGains | None:
     >>> round(critical.linear, 6), round(critical.cubic, 4)
     (-0.935296, 31.468)
     """
+    require("the critical gain", drive, AUTONOMOUS, STATIC)
     linear = _critical_linear_gain(drive, gains)
     if linear is None:
         return None

@@ -6,7 +6,7 @@ g(y) = mu(y - v0) - mu(-v0) - 2 beta y, and the energy (x^2 + x'^2) / 2 changes 
 """
 
 from collections.abc import Iterator
-from math import copysign, sqrt
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,14 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
-from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.equations import WashoutGains, acceleration, reaction
 from stickslip_ros.physics.motion.recorded_motion import RecordedMotion
+from stickslip_ros.physics.theory.requirements import (
+    AUTONOMOUS,
+    STATIC,
+    SYMMETRIC,
+    require,
+)
 
 _ROUNDING = 16.0 * float(np.finfo(float).eps)
 """Share of its terms below which g is rounding."""
@@ -27,8 +33,9 @@ def release_position(drive: Drive) -> float:
 
     There friction is at its limit and the slide is not yet accelerated: k x + c v_belt = N mu_s.
     """
-    limit = copysign(drive.normal_force * drive.friction.static, drive.belt_speed)
-    return (limit - drive.damping * drive.belt_speed) / drive.stiffness
+    forward, backward = drive.friction.limits
+    limit = drive.normal_force * (backward if drive.belt_speed >= 0.0 else -forward)
+    return (limit - reaction(drive, 0.0, drive.belt_speed, 0.0)) / drive.stiffness
 
 
 def longest_return(drive: Drive) -> float:
@@ -41,7 +48,8 @@ def longest_return(drive: Drive) -> float:
 
 def loading_time(drive: Drive) -> float:
     """Return the time (s) in which the belt bends the spring from one limit to the other."""
-    return 2.0 * drive.friction.static * drive.length_scale / abs(drive.belt_speed)
+    forward, backward = drive.friction.limits
+    return (forward + backward) * drive.length_scale / abs(drive.belt_speed)
 
 
 def follow(motion: RecordedMotion) -> Iterator[Breakpoints]:
@@ -61,8 +69,10 @@ def least_cycle(drive: Drive, gains: WashoutGains | None = None) -> float | None
 
     It is the speed in the open loop, where every cycle turns at least as far from the equilibrium,
     or with `gains` (SI) of eq. 19. None if there is no such speed: on a cycle the gain balances the
-    loss, so that there is no cycle up to `UNBOUNDED_SPEED`, unless energy is conserved.
+    loss, so that there is no cycle up to `UNBOUNDED_SPEED`, unless energy is conserved. Raises
+    InvalidInputError for a drive that it does not cover, see `requirements`.
     """
+    require("the energy of a cycle", drive, AUTONOMOUS, STATIC, SYMMETRIC)
     speed, force = _net_force(drive)
     if gains is not None:
         force += _control_bound(gains.scaled(drive), speed)
@@ -91,6 +101,7 @@ def largest_cycle(drive: Drive) -> float | None:
     where D = d - 2 n - max(l, p) is at least sqrt(2) v0. The energy then changes by less than
     2 (p + n) v0^2 / D - 2 (u - n) (D - v0^2 / D). None if there is no such u.
     """
+    require("the energy of a cycle", drive, AUTONOMOUS, STATIC, SYMMETRIC)
     speed, force = _net_force(drive)
     belt_speed = abs(drive.belt_speed) / drive.speed_scale
     above, below = force[speed > belt_speed], force[speed <= 0.0]
@@ -114,7 +125,8 @@ def _net_force(drive: Drive) -> tuple[FloatArray, FloatArray]:
     )  # fmt: skip
     speed = relative_speed + belt_speed
     friction: Any = law.coefficient(relative_speed, np.sign(relative_speed))
-    at_rest, damping = float(law.at_rest(belt_speed)), drive.damping_coefficient * speed
-    force = friction - at_rest - damping
-    terms = np.abs(friction) + abs(at_rest) + np.abs(damping)
+    at_rest = float(law.at_rest(belt_speed))
+    held = reaction(drive.dimensionless, at_rest, speed, 0.0)
+    force = acceleration(drive.dimensionless, friction, held)
+    terms = np.abs(friction) + abs(at_rest) + np.abs(held - at_rest)
     return speed, np.where(np.abs(force) < _ROUNDING * terms, 0.0, force)

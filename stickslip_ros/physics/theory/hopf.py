@@ -11,6 +11,7 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.linear import Expansion, expand, hurwitz_determinants, jacobians
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, require
 from stickslip_ros.physics.theory.roots import zero_between
 
 _BELT_SPEEDS = np.geomspace(1e-6, 1e3, 4001)
@@ -38,7 +39,7 @@ class HopfPoint:
 
 @dataclass(frozen=True)
 class ComplexPair:
-    """The complex pair of eigenvalues; among two or three eigenvalues there is one at most."""
+    """The complex pair of eigenvalues that decays slowest, or grows fastest."""
 
     growth: float
     """Real part."""
@@ -54,7 +55,7 @@ class ComplexPair:
         """Return the pair of the Jacobian; None if its eigenvalues are real."""
         decomposed: Any = np.linalg.eig(expansion.jacobian)
         values, right = decomposed
-        upper = int(np.argmax(values.imag))
+        upper = int(np.argmax(np.where(values.imag > 0.0, values.real, -np.inf)))
         if values[upper].imag <= 0.0:
             return None
         left = np.linalg.inv(right)[upper].conj()
@@ -65,8 +66,8 @@ class ComplexPair:
 def hopf_points(drive: Drive, gains: WashoutGains | None = None) -> list[HopfPoint]:
     """Return the Hopf points over the belt speed.
 
-    The search covers belt speeds from 1e-6 to 1e3 N/sqrt(k m). It may miss two points closer than
-    half a percent.
+    It covers every friction law, at constant belt speed and normal force. The search covers belt
+    speeds from 1e-6 to 1e3 N/sqrt(k m). It may miss two points closer than half a percent.
 
     Parameters
     ----------
@@ -79,6 +80,11 @@ def hopf_points(drive: Drive, gains: WashoutGains | None = None) -> list[HopfPoi
     -------
     list of HopfPoint
         Points in SI units, in order of the belt speed.
+
+    Raises
+    ------
+    InvalidInputError
+        If belt or load follow a course.
 
     Examples
     --------
@@ -93,6 +99,7 @@ def hopf_points(drive: Drive, gains: WashoutGains | None = None) -> list[HopfPoi
     >>> round(point.belt_speed, 6), point.supercritical
     (0.488763, True)
     """
+    require("the search for Hopf points", drive, AUTONOMOUS)
     margins = _hopf_margins(drive, gains, _BELT_SPEEDS)
     before = np.flatnonzero(np.sign(margins[:-1]) * np.sign(margins[1:]) < 0.0)
     points: list[HopfPoint] = []

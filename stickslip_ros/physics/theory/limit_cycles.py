@@ -28,6 +28,12 @@ from stickslip_ros.physics.theory.cycle_bounds import (
     longest_return,
     release_position,
 )
+from stickslip_ros.physics.theory.requirements import (
+    AUTONOMOUS,
+    STATIC,
+    SYMMETRIC,
+    require,
+)
 from stickslip_ros.physics.theory.roots import zero_between
 
 _ROUNDING = 1e-13
@@ -95,6 +101,11 @@ def shoot(
     LimitCycle or None
         Limit cycle; None if the iteration does not converge to one, or if the belt is at rest.
 
+    Raises
+    ------
+    InvalidInputError
+        If belt or load follow a course.
+
     Examples
     --------
     The system of the paper:
@@ -107,10 +118,11 @@ def shoot(
     >>> round(shoot(drive, position=-0.1, period=6.4).period, 6)
     6.392424
     """
+    require("shooting", drive, AUTONOMOUS)
     if drive.belt_speed == 0.0:
         return None
     motion = SensitiveMotion(drive, gains)
-    state = np.array([position, 0.0, filter_state])[: motion.order] / drive.length_scale
+    state = motion.state_at(position, filter_state)
     try:
         return _solve(motion, state, period)
     except TooStiffError:
@@ -148,7 +160,14 @@ def limit_cycle_of_run(
     LimitCycle or None
         Limit cycle; None if the motion settles or is unbounded, if the iteration does not converge,
         if the motion is too stiff to follow, or if the belt is at rest.
+
+    Raises
+    ------
+    InvalidInputError
+        If the friction law has a memory or differs between the directions, or belt or load follow a
+        course.
     """
+    require("the limit cycle of a run", drive, AUTONOMOUS, STATIC, SYMMETRIC)
     if drive.belt_speed == 0.0 or least_cycle(drive, gains) is None:
         return None
     motion = SensitiveMotion(drive, gains)
@@ -178,6 +197,12 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
         Cycles, the smallest first. The list is empty if the belt is at rest, if no energy is
         gained, or if the motion is too stiff to follow.
 
+    Raises
+    ------
+    InvalidInputError
+        If the friction law has a memory or differs between the directions, or belt or load follow a
+        course.
+
     Examples
     --------
     The system of the paper:
@@ -191,6 +216,7 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
     >>> round(cycle.measures.amplitude, 6), cycle.stable
     (0.434086, True)
     """
+    require("the search for limit cycles", drive, AUTONOMOUS, STATIC, SYMMETRIC)
     if drive.belt_speed == 0.0 or least_cycle(drive) is None:
         return []
     returns = _ReturnMap(drive)
@@ -467,7 +493,7 @@ def _cycle(motion: SensitiveMotion, shot: _Shot) -> LimitCycle | None:
         return None
     return LimitCycle(
         position=float(start[0]) * drive.length_scale,
-        filter_state=float(start[2]) * drive.length_scale if motion.order > 2 else None,
+        filter_state=None if motion.control is None else float(start[-1]) * drive.length_scale,
         period=period,
         multipliers=shot.multipliers(),
         measures=replace(measures, steady=True, trend=None),

@@ -18,6 +18,7 @@ from stickslip_ros.physics.model.drive_system import SLIP, DriveSystem
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.motion.derivatives import flow_tensors
 from stickslip_ros.physics.theory.equilibrium import equilibria
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, require
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,8 @@ class Expansion:
 def expand(drive: Drive, gains: WashoutGains | None = None) -> Expansion | None:
     """Return the expansion of the equations of motion at the equilibrium.
 
+    It covers every friction law, static or with a memory, at constant belt speed and normal force.
+
     Parameters
     ----------
     drive : Drive
@@ -65,6 +68,13 @@ def expand(drive: Drive, gains: WashoutGains | None = None) -> Expansion | None:
     Expansion or None
         Dimensionless expansion. None if the belt is at rest: friction then holds the slide anywhere
         within its limit, and the motion around is not smooth.
+
+    Raises
+    ------
+    InvalidInputError
+        If belt or load follow a course.
+    RunError
+        If the equilibrium of a law with a memory is not found.
 
     Examples
     --------
@@ -81,6 +91,7 @@ def expand(drive: Drive, gains: WashoutGains | None = None) -> Expansion | None:
     >>> round(float(expansion.eigenvalues[0].real), 6)
     0.071
     """
+    require("the expansion at the equilibrium", drive, AUTONOMOUS)
     if drive.belt_speed == 0.0:
         return None
     states, (first, second, third) = _at_equilibrium(
@@ -153,6 +164,12 @@ def _at_equilibrium(
     for name, value in system.constants.items():
         values[system.index[name]] = value
     values[system.index["belt_speed"]] = belt_speeds
-    values[system.index["sign"]] = -copysign(1.0, belt_speeds[0])
+    sign = -copysign(1.0, belt_speeds[0])
+    values[system.index["sign"]] = sign
+    law = system.drive.friction
+    for column, speed in enumerate(belt_speeds.tolist() if law.switches else ()):
+        switches = law.switches_at(-speed, sign, law.memory_at(-speed, sign))
+        for name, value in zip(law.switches, switches, strict=True):
+            values[system.index[f"law.{name}"], column] = value
     states = equilibria(system, values)
     return states, flow_tensors(system, SLIP, "belt_speed").at(states, values)

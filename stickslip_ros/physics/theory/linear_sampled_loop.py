@@ -19,6 +19,7 @@ from stickslip_ros.physics.loop.sampled_loop import whole_and_rest
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.linear import expand
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, STATIC, require
 
 LONGEST_DELAY = 300
 """Largest delay, in whole periods, for which the matrix is built; its order grows with it."""
@@ -112,7 +113,13 @@ class LinearSampledLoop:
         -------
         LinearSampledLoop or None
             Loop; None if the belt is at rest, or if the delay is longer than 300 periods.
+
+        Raises
+        ------
+        InvalidInputError
+            If the friction law has a memory, or belt or load follow a course.
         """
+        require("the theory of the sampled loop", drive, AUTONOMOUS, STATIC)
         expansion = expand(drive)
         if expansion is None or why_no_linear_loop(drive, rate, force_delay):
             return None

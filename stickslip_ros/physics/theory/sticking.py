@@ -12,6 +12,12 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.cycle_bounds import follow, least_cycle, release_position
+from stickslip_ros.physics.theory.requirements import (
+    AUTONOMOUS,
+    STATIC,
+    SYMMETRIC,
+    require,
+)
 from stickslip_ros.physics.theory.roots import zero_between
 
 _AVERAGED = np.geomspace(1e-4, 1e4, 200)
@@ -70,6 +76,9 @@ def sticking_onset(drive: Drive) -> StickingOnset:
 
     Raises
     ------
+    InvalidInputError
+        If the friction law has a memory or differs between the directions, or belt or load follow a
+        course.
     RunError
         If the motion is too stiff to follow.
 
@@ -86,6 +95,7 @@ def sticking_onset(drive: Drive) -> StickingOnset:
     >>> round(onset.approximate, 6), round(onset.exact, 6)
     (0.437163, 0.439472)
     """
+    require("the onset of sticking", drive, AUTONOMOUS, STATIC, SYMMETRIC)
     averaged = _averaged(drive)
     reference = averaged if isinstance(averaged, float) else abs(drive.belt_speed)
     speeds = ((reference or drive.speed_scale) * _FOLLOWED).tolist()

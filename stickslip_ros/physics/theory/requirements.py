@@ -1,0 +1,83 @@
+"""What a function of the theory needs of a drive; it refuses every other drive by name."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.course import NO_COURSE
+from stickslip_ros.physics.model.drive import Drive
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """Property of a drive that some of the theory needs."""
+
+    need: str
+    """What is needed, for a sentence."""
+    lack: Callable[[Drive], str | None]
+    """Returns what a drive has instead, for a sentence; None if it has the property."""
+
+
+def require(function: str, drive: Drive, *requirements: Requirement) -> None:
+    """Refuse a drive that a function of the theory does not cover.
+
+    Parameters
+    ----------
+    function : str
+        Name of what is computed, for the message.
+    drive : Drive
+        Drive to check.
+    *requirements : Requirement
+        Properties that the drive must have.
+
+    Raises
+    ------
+    InvalidInputError
+        If it lacks one of them; the sentence names function and drive.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.friction import Coulomb
+    >>> from stickslip_ros.physics.theory.requirements import AUTONOMOUS, STATIC, require
+    >>> drive = Drive(1.0, 0.02, 1.0, 1.0, 0.4, Coulomb(0.4))
+    >>> require("limit cycles", drive, AUTONOMOUS, STATIC)
+    """
+    for requirement in requirements:
+        lack = requirement.lack(drive)
+        if lack is not None:
+            raise InvalidInputError(f"{function} needs {requirement.need}: {lack}")
+
+
+def _courses(drive: Drive) -> str | None:
+    moving = [name for name in ("belt", "load") if getattr(drive, name) != NO_COURSE]
+    return f"the {' and the '.join(moving)} of the drive follow a course" if moving else None
+
+
+def _memory(drive: Drive) -> str | None:
+    law = drive.friction
+    states = ", ".join(law.states)
+    return f"the friction law {law.name} has a memory ({states})" if states else None
+
+
+def _asymmetry(drive: Drive) -> str | None:
+    law = drive.friction
+    forward, backward = law.limits
+    speeds = np.geomspace(1e-3, 1e3, 13) * drive.speed_scale
+    ahead = law.coefficient(speeds, np.ones(speeds.shape))
+    back = law.coefficient(-speeds, -np.ones(speeds.shape))
+    if forward == backward and np.array_equal(ahead, -back):
+        return None
+    return f"the friction law {law.name} differs between forward and backward slip"
+
+
+AUTONOMOUS = Requirement("a constant belt speed and a constant normal force", _courses)
+"""Belt speed and load are constant."""
+
+STATIC = Requirement("a friction law without memory", _memory)
+"""Friction depends on the relative speed only: without control the motion is planar."""
+
+SYMMETRIC = Requirement("friction that is the same in both directions", _asymmetry)
+"""The coefficient is an odd function of the relative speed."""
