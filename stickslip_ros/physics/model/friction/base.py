@@ -239,6 +239,24 @@ class FrictionLaw(ABC):
         """
         return None
 
+    def above_static(self, name: str) -> str | None:
+        """Return the refusal of a constant above the static coefficient, or None.
+
+        Parameters
+        ----------
+        name : str
+            Name of the constant.
+
+        Returns
+        -------
+        str or None
+            Sentence with both values, as `refusal` returns it.
+        """
+        value = getattr(self, name)
+        if value <= self.static:
+            return None
+        return f"{name} = {value} must not exceed static = {self.static}"
+
     def at_rest(self, belt_speed: Any) -> Any:
         """Return mu(-v_belt), eq. 6: the coefficient for a slide at rest on a moving belt.
 
