@@ -24,11 +24,14 @@ _RESERVED = {"law", "as_law", *dir(ParameterGroup)}
 
 def add_laws_of_other_packages() -> None:
     """Add the laws of other packages to `LAWS`, or the reason against one to `REFUSED_LAWS`."""
-    for package in distributions():
-        text = package.read_text("entry_points.txt")
-        if text and ENTRY_POINTS in text:  # parsing them all takes longer
-            for entry in package.entry_points.select(group=ENTRY_POINTS):
-                _add(entry, package)
+    found = [
+        (entry, package)
+        for package in distributions()
+        if ENTRY_POINTS in (package.read_text("entry_points.txt") or "")  # parsing takes longer
+        for entry in package.entry_points.select(group=ENTRY_POINTS)
+    ]
+    for entry, package in sorted(found, key=lambda each: (each[0].name, each[0].value)):
+        _add(entry, package)
 
 
 def _add(entry: EntryPoint, package: Distribution) -> None:
