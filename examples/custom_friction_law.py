@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from matplotlib.figure import Figure
 
+from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.limit_cycles import limit_cycles
@@ -24,9 +25,8 @@ class Rational(FrictionLaw):
     """-s [mu_k + (mu_s - mu_k) / (1 + delta |v_r|)] (Popp and Stelter, 1990)."""
 
     name: ClassVar[str] = "rational"
-    inverse_speed_power: ClassVar[dict[str, int]] = {"fading": 1}
-    kinetic: Any
-    fading: Any  # s/m
+    kinetic: Any = constant(0.25, "Kinetic coefficient mu_k.", at_least=0.0)
+    fading: Any = constant(4.0, "How fast the coefficient falls with speed.", "s/m", positive=True)
 
     @property
     def characteristic_speed(self) -> float:
@@ -43,7 +43,7 @@ folder = Path(sys.argv[1] if len(sys.argv) > 1 else "build")
 folder.mkdir(parents=True, exist_ok=True)
 
 paper = load_scenario("paper").plant.as_drive()
-laws = {"Stribeck": paper.friction, "rational": Rational(static=0.4, kinetic=0.25, fading=4.0)}
+laws = {"Stribeck": paper.friction, "rational": Rational(static=0.4)}
 figure = Figure(figsize=(8.0, 3.6), layout="constrained")
 curve, cycles = figure.subplots(1, 2)
 for name, law in laws.items():

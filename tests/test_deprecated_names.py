@@ -1,7 +1,9 @@
 """Names that a program for version 0.1 imports: all of its docs/reference.md."""
 
 import warnings
+from dataclasses import dataclass
 from importlib import import_module
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -111,3 +113,19 @@ def test_a_law_with_the_old_name_still_works() -> None:
 
     law: FrictionLaw = OldLaw(0.4, -1.0)
     assert law.characteristic_speed == 0.5
+
+
+def test_a_law_without_defaults_still_works() -> None:
+    @dataclass(frozen=True)
+    class OldLaw(FrictionLaw):
+        name: ClassVar[str] = "old"
+        inverse_speed_power: ClassVar[dict[str, int]] = {"rise": 1}
+        rise: Any
+
+        def coefficient(self, relative_speed: Any, sign: Any) -> Any:
+            return -self.static * sign - self.rise * relative_speed
+
+    assert OldLaw.constants() == ("static", "rise")
+    assert OldLaw(0.3, 0.5).scaled(4.0) == OldLaw(static=0.3, rise=2.0)
+    with pytest.raises(TypeError, match="missing constant 'rise', which has no default"):
+        OldLaw(0.3)

@@ -30,7 +30,10 @@ def run(arguments: argparse.Namespace) -> int:
     with interrupts_kept():
         from stickslip_ros.physics.model.friction import LAWS
         from stickslip_ros.scenarios.files import shipped_scenarios
+        from stickslip_ros.scenarios.friction_laws import REFUSED_LAWS
         from stickslip_ros.scenarios.parameters import WashoutControllerParameters
+    for name, reason in REFUSED_LAWS.items():
+        print(printable(f"friction law {name} is refused: {reason}"), file=sys.stderr)
     scenarios = [_scenario(name, path) for name, path in shipped_scenarios().items()]
     friction_laws: list[dict[str, Any]] = [
         {

@@ -7,19 +7,21 @@ models. The nested field `friction.static` is the ROS parameter of that name.
 import re
 from collections.abc import Callable
 from dataclasses import fields
-from math import isinf, pi, sqrt
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from math import inf, isinf, pi, sqrt
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, model_validator
+from pydantic import AfterValidator, create_model, model_validator
 
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.loop.washout import WashoutParameters
+from stickslip_ros.physics.model.constants import Constant, constants_of
 from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
+from stickslip_ros.scenarios.friction_laws import REFUSED_LAWS, add_laws_of_other_packages
 from stickslip_ros.scenarios.pace import Pace
 from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field
-from stickslip_ros.scenarios.validation import ParameterGroup
+from stickslip_ros.scenarios.validation import ParameterGroup, refused
 from stickslip_ros.text import shown
 
 if TYPE_CHECKING:
@@ -34,47 +36,59 @@ _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
 
 
 def _known_law(name: str) -> str:
-    if name not in LAWS:
-        raise ValueError(f"no law {name}")
-    return name
+    if name in LAWS:
+        return name
+    if name in REFUSED_LAWS:
+        raise refused(REFUSED_LAWS[name])
+    raise ValueError(f"no law {name}")
 
 
-class Friction(ParameterGroup):
-    """Friction law and its coefficients; each law uses those of its formula."""
+def _constants_of_laws() -> dict[str, Any]:
+    """Return a field for each constant of the laws, by name."""
+    laws: dict[str, list[str]] = {}
+    constants: dict[str, Constant] = {}
+    for law in LAWS.values():
+        for name, constant in constants_of(law).items():
+            constants.setdefault(name, constant)
+            laws.setdefault(name, []).append(law.name)
+    return {name: (float, _field_of(constants[name], laws[name])) for name in constants}
 
+
+def _field_of(constant: Constant, laws: list[str]) -> Any:
+    meaning = constant.meaning
+    if len(laws) < len(LAWS):
+        meaning = f"{meaning.removesuffix('.')} ({', '.join(laws)})."
+    least = max(constant.at_least, SMALLEST if constant.positive else -inf)
+    bounds: dict[str, Any] = {} if least == -inf else {"ge": least}
+    return field(float(constant.default), meaning, constant.unit, **bounds)
+
+
+add_laws_of_other_packages()
+
+
+class _ChosenLaw(ParameterGroup):
     law: Annotated[str, AfterValidator(_known_law)] = field(
         "stribeck", "Friction law.", choices=LAWS
     )
-    static: float = field(0.4, "Static (break-away) coefficient mu_s.", ge=0.0)
-    minimum: float = field(0.25, "Smallest kinetic coefficient mu_m (stribeck).", ge=0.0)
-    minimum_speed: float = field(
-        0.5,
-        "Relative speed v_m at which the coefficient is smallest (stribeck).",
-        "m/s",
-        ge=SMALLEST,
-    )
-    slope: float = field(0.45, "Decrease of the coefficient with relative speed (linear).", "s/m")
-    kinetic: float = field(0.25, "Kinetic coefficient mu_k (exponential).", ge=0.0)
-    decay_speed: float = field(
-        0.5, "Speed v_s of the decay from mu_s to mu_k (exponential).", "m/s", ge=SMALLEST
-    )
-    viscous: float = field(0.0, "Increase of the coefficient with speed (exponential).", "s/m")
 
     @model_validator(mode="after")
-    def _static_is_largest(self) -> Self:
-        """Refuse a kinetic coefficient above the static one, if the law uses it."""
-        for lower in ("minimum", "kinetic"):
-            if lower in LAWS[self.law].constants() and getattr(self, lower) > self.static:
-                raise ValueError(
-                    f"friction.{lower} = {getattr(self, lower)} must not exceed "
-                    f"friction.static = {self.static}"
-                )
+    def _constants_fit_together(self) -> Self:
+        """Refuse constants that the law refuses, under their names as parameters."""
+        law = self.as_law()
+        refusal = law.refusal()
+        if refusal is not None:
+            names = "|".join(law.constants())
+            raise ValueError(re.sub(rf"\b({names}) = ", r"friction.\1 = ", refusal))
         return self
 
     def as_law(self) -> FrictionLaw:
         """Return the friction law in SI units."""
         law = LAWS[self.law]
-        return law(*[getattr(self, name) for name in law.constants()])
+        return law(**{name: getattr(self, name) for name in law.constants()})
+
+
+class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_laws())):
+    """Friction law and its coefficients; each law uses those of its formula."""
 
 
 class Initial(ParameterGroup):

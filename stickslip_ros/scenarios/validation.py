@@ -6,6 +6,7 @@ from math import inf
 from typing import Any, Self, cast
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import PydanticCustomError
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.parameter_field import LARGEST, SMALLEST, known_parameters
@@ -18,6 +19,14 @@ _KIND_NAMES = {
     str: "a string",
     list: "a list of strings",
 }
+
+
+_REFUSED = "refused"
+
+
+def refused(reason: str) -> PydanticCustomError:
+    """Return the error for a value that is refused for a reason other than its bounds."""
+    return PydanticCustomError(_REFUSED, "{reason}", {"reason": reason})
 
 
 class ParameterGroup(BaseModel):
@@ -72,6 +81,9 @@ def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str
         name = ".".join(place)
         if name not in known:
             complaints.append(detail["msg"].removeprefix("Value error, "))
+            continue
+        if detail["type"] == _REFUSED:
+            complaints.append(f"{name} = {shown(detail['input'])} is refused: {detail['msg']}")
             continue
         parameter = known[name]
         allowed = _KIND_NAMES[parameter.kind]

@@ -14,6 +14,8 @@ from typing import Any
 
 import pytest
 
+from stickslip_ros.physics.model.constants import constants_of
+
 CHECKOUT = Path(__file__).parents[2]
 
 ROOMS = ("stickslip_ros",)
@@ -100,8 +102,8 @@ def section(found: Any) -> list[str]:
 
 
 def attributes_of(found: type) -> list[str]:
-    """The fields of a class and its bases that a docstring follows."""
-    documented: list[str] = []
+    """The fields of a class and its bases that a docstring follows, or that have a meaning."""
+    documented = [*constants_of(found)] if is_dataclass(found) else []
     for each in reversed(found.__mro__):
         if not is_of_package(each):
             continue

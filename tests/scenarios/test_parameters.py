@@ -124,6 +124,32 @@ def test_every_friction_law_can_be_chosen_and_made() -> None:
         assert type(plant.as_drive().friction) is law
 
 
+# Name, default, bounds and meaning that people rely on.
+FRICTION = [
+    ("static", 0.4, "at least 0", "Static (break-away) coefficient mu_s."),
+    ("minimum", 0.25, "at least 0", "Smallest kinetic coefficient mu_m (stribeck)."),
+    (
+        "minimum_speed",
+        0.5,
+        "above 0",
+        "Relative speed v_m at which the coefficient is smallest (stribeck).",
+    ),
+    ("slope", 0.45, "", "Decrease of the coefficient with relative speed (linear)."),
+    ("kinetic", 0.25, "at least 0", "Kinetic coefficient mu_k (exponential)."),
+    ("decay_speed", 0.5, "above 0", "Speed v_s of the decay from mu_s to mu_k (exponential)."),
+    ("viscous", 0.0, "", "Increase of the coefficient with speed (exponential)."),
+]
+
+
+def test_the_constants_of_the_laws_are_parameters() -> None:
+    found = [each for each in known("plant").values() if each.name.startswith("friction.")]
+    assert [
+        (each.name.removeprefix("friction."), each.default, each.bounds, each.meaning)
+        for each in found[1:]
+    ] == FRICTION
+    assert {each.kind for each in found[1:]} == {float}
+
+
 def test_a_law_gets_the_constants_of_its_formula() -> None:
     values = {"static": 0.5, "kinetic": 0.3, "decay_speed": 0.07, "viscous": 0.02}
     flat = {f"friction.{name}": value for name, value in values.items()}

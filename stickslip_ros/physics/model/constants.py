@@ -29,7 +29,9 @@ class Constant:
     """Description of one constant."""
 
     name: str
+    """Name of the field."""
     default: float
+    """Default value."""
     meaning: str
     """Meaning, as a sentence."""
     unit: str | None

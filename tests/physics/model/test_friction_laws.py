@@ -1,5 +1,10 @@
-from dataclasses import astuple
-from math import exp
+"""The friction laws: properties of every law in `LAWS`, and values of those known here."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from functools import cache
+from math import exp, inf
+from typing import Any
 
 import heyoka
 import numpy as np
@@ -7,6 +12,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from stickslip_ros.physics.model.constants import Constant, constants_of
 from stickslip_ros.physics.model.friction import (
     LAWS,
     Coulomb,
@@ -20,11 +26,36 @@ STRIBECK = Stribeck(static=0.4, minimum=0.25, minimum_speed=0.5)
 COULOMB = Coulomb(static=0.4)
 LINEAR = Linear(static=0.4, slope=0.9)
 EXPONENTIAL = Exponential(static=0.4, kinetic=0.25, decay_speed=0.5, viscous=0.1)
-EVERY_LAW = [STRIBECK, COULOMB, LINEAR, EXPONENTIAL]
+
+LARGEST = 10.0
+"""Magnitude of random constants, in SI units."""
 
 speeds = st.floats(-5.0, 5.0)
 signs = st.sampled_from([-1.0, 1.0])
-laws = st.sampled_from(EVERY_LAW)
+every_law = pytest.mark.parametrize("kind", LAWS.values(), ids=LAWS)
+
+
+def values(constant: Constant) -> st.SearchStrategy[float]:
+    """Values within the bounds of a constant."""
+    least = max(constant.at_least, 0.05 if constant.positive else -LARGEST)
+    return st.just(constant.default) | st.floats(least, max(least, 0.0) + LARGEST)
+
+
+@st.composite
+def laws(draw: st.DrawFn, kind: type[FrictionLaw]) -> FrictionLaw:
+    """Laws with constants that fit together, the defaults among them."""
+    described = constants_of(kind).items()
+    law = kind(**{name: draw(values(constant)) for name, constant in described})
+    assume(law.refusal() is None)
+    return law
+
+
+@cache
+def compiled(kind: type[FrictionLaw]) -> Any:
+    """The coefficient as a function of speed, sign and constants, compiled from its symbols."""
+    speed, sign, *constants = heyoka.make_vars("speed", "sign", *kind.constants())
+    law = kind(**dict(zip(kind.constants(), constants, strict=True)))
+    return heyoka.cfunc([law.coefficient(speed, sign)], [speed, sign, *constants])
 
 
 # The cubic has a = 3 (0.4 - 0.25) / (2 0.5) = 0.45 and b = (0.4 - 0.25) / (2 0.5^3) = 0.6.
@@ -48,49 +79,144 @@ def test_coefficient(law: FrictionLaw, relative_speed: float, expected: float) -
     assert law.coefficient(relative_speed, sign) == pytest.approx(expected, rel=1e-14)
 
 
-@pytest.mark.parametrize("law", EVERY_LAW)
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_friction_starts_at_the_static_coefficient(law: FrictionLaw, sign: float) -> None:
-    assert law.coefficient(0.0, sign) == pytest.approx(-0.4 * sign, rel=1e-15)
-
-
-@given(laws, speeds, signs)
-def test_friction_is_odd(law: FrictionLaw, speed: float, sign: float) -> None:
-    assert law.coefficient(-speed, -sign) == -law.coefficient(speed, sign)
-
-
 @given(st.floats(0.0, 2.0))
 def test_stribeck_friction_is_smallest_at_the_minimum_speed(speed: float) -> None:
     assume(abs(speed - 0.5) > 1e-6)
     assert STRIBECK.coefficient(-speed, -1.0) > STRIBECK.coefficient(-0.5, -1.0)
 
 
-@given(laws, speeds, signs, st.floats(1e-3, 1e3))
-def test_scaled_law_gives_the_same_coefficient(
-    law: FrictionLaw, speed: float, sign: float, unit: float
+@every_law
+def test_a_law_is_found_by_its_name_and_made_from_its_constants(kind: type[FrictionLaw]) -> None:
+    law = kind()
+    assert LAWS[law.name](**asdict(law)) == law
+    assert law.constants()[0] == "static"
+
+
+@every_law
+def test_every_constant_is_described(kind: type[FrictionLaw]) -> None:
+    described = constants_of(kind)
+    assert tuple(described) == kind.constants()
+    for constant in described.values():
+        assert constant.meaning.endswith(".")
+        assert constant.at_least <= constant.default < inf
+        assert constant.default > 0.0 or not constant.positive
+
+
+@every_law
+def test_the_defaults_fit_together(kind: type[FrictionLaw]) -> None:
+    assert kind().refusal() is None
+
+
+@every_law
+@given(data=st.data())
+def test_a_refusal_names_constants_with_their_values(
+    kind: type[FrictionLaw], data: st.DataObject
 ) -> None:
-    assert law.scaled(unit).coefficient(speed / unit, sign) == pytest.approx(
+    described = constants_of(kind).items()
+    law = kind(**{name: data.draw(values(constant)) for name, constant in described})
+    refusal = law.refusal()
+    if refusal is not None:
+        assert any(f"{name} = {getattr(law, name)}" in refusal for name in law.constants())
+
+
+@pytest.mark.parametrize(
+    ("law", "refusal"),
+    [
+        (Stribeck(static=0.4, minimum=0.5), "minimum = 0.5 must not exceed static = 0.4"),
+        (Exponential(static=0.1, kinetic=0.25), "kinetic = 0.25 must not exceed static = 0.1"),
+        (Exponential(static=0.25, kinetic=0.25), None),
+        (Coulomb(static=0.0), None),
+    ],
+)
+def test_the_static_coefficient_is_the_largest(law: FrictionLaw, refusal: str | None) -> None:
+    assert law.refusal() == refusal
+
+
+@every_law
+@given(data=st.data())
+def test_friction_starts_at_the_limit_of_its_direction(
+    kind: type[FrictionLaw], data: st.DataObject
+) -> None:
+    law = data.draw(laws(kind))
+    forward, backward = law.limits
+    assert min(forward, backward) >= 0.0
+    if law.sticks:
+        assert law.coefficient(0.0, 1.0) == pytest.approx(-forward, rel=1e-14, abs=1e-14)
+        assert law.coefficient(0.0, -1.0) == pytest.approx(backward, rel=1e-14, abs=1e-14)
+
+
+@every_law
+@given(st.data(), speeds, signs)
+def test_friction_with_equal_limits_is_odd(
+    kind: type[FrictionLaw], data: st.DataObject, speed: float, sign: float
+) -> None:
+    law = data.draw(laws(kind))
+    forward, backward = law.limits
+    assume(forward == backward)
+    assert law.coefficient(-speed, -sign) == -law.coefficient(speed, sign)
+
+
+@every_law
+@given(st.data(), speeds, signs, st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
+def test_scaled_law_gives_the_same_coefficient(
+    kind: type[FrictionLaw],
+    data: st.DataObject,
+    speed: float,
+    sign: float,
+    unit: float,
+    length: float,
+) -> None:
+    law = data.draw(laws(kind))
+    assert law.scaled(unit, length).coefficient(speed / unit, sign) == pytest.approx(
         law.coefficient(speed, sign), rel=1e-12, abs=1e-12
     )
 
 
-@pytest.mark.parametrize("law", EVERY_LAW)
-def test_arrays_and_symbols_give_what_numbers_give(law: FrictionLaw) -> None:
+@every_law
+@given(data=st.data())
+def test_the_characteristic_speed_is_a_speed(kind: type[FrictionLaw], data: st.DataObject) -> None:
+    law = data.draw(laws(kind))
+    assert law.characteristic_speed > 0.0
+    assert law.scaled(4.0).characteristic_speed == pytest.approx(law.characteristic_speed / 4.0)
+
+
+@every_law
+@given(data=st.data())
+def test_arrays_and_symbols_give_what_numbers_give(
+    kind: type[FrictionLaw], data: st.DataObject
+) -> None:
+    law = data.draw(laws(kind))
     relative_speeds = np.array([-1.5, -0.3, -0.0, 0.0, 0.2, 2.5])
     directions = np.array([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
     one_by_one = [
         float(law.coefficient(float(speed), float(sign)))
         for speed, sign in zip(relative_speeds, directions, strict=True)
     ]
-    speed, sign = heyoka.make_vars("speed", "sign")
-    compiled = heyoka.cfunc([law.coefficient(speed, sign)], [speed, sign])
-    np.testing.assert_allclose(law.coefficient(relative_speeds, directions), one_by_one, rtol=1e-14)
-    np.testing.assert_allclose(
-        compiled(np.array([relative_speeds, directions]))[0], one_by_one, rtol=1e-14
-    )
+    constants = [np.full(len(directions), value) for value in asdict(law).values()]
+    of_symbols = compiled(kind)(np.array([relative_speeds, directions, *constants]))[0]
+    close = {"rtol": 1e-14, "atol": 1e-14 * largest_term(law)}
+    np.testing.assert_allclose(law.coefficient(relative_speeds, directions), one_by_one, **close)
+    np.testing.assert_allclose(of_symbols, one_by_one, **close)
 
 
-@pytest.mark.parametrize("law", EVERY_LAW)
-def test_a_law_is_found_by_its_name_and_made_from_its_constants(law: FrictionLaw) -> None:
-    assert LAWS[law.name](*astuple(law)) == law
-    assert law.constants()[0] == "static"
+def largest_term(law: FrictionLaw) -> float:
+    """Size of what may cancel in a coefficient at speeds below 5 m/s."""
+    of_speeds = law.coefficient(np.array([-5.0, -1.0, 1.0, 5.0]), np.array([-1.0, -1.0, 1.0, 1.0]))
+    return max(1.0, *np.abs(of_speeds).tolist(), *map(abs, asdict(law).values()))
+
+
+@every_law
+@given(st.data(), speeds, signs)
+def test_memory_and_switches_have_the_length_that_their_names_give(
+    kind: type[FrictionLaw], data: st.DataObject, speed: float, sign: float
+) -> None:
+    law = data.draw(laws(kind))
+    memory = law.initial_memory(speed)
+    switches = law.switches_at(speed, sign, memory)
+    for given_memory in (memory, law.memory_at(speed, sign)):
+        assert len(given_memory) == len(law.states)
+    assert len(switches) == len(law.switches)
+    assert len(law.memory_rates(speed, sign, memory, switches)) == len(law.states)
+    margins: Sequence[Any] = law.margins(speed, sign, memory, switches)
+    for index in range(len(margins)):
+        assert len(law.switches_after(index, sign, switches)) == len(law.switches)

@@ -9,6 +9,9 @@ from stickslip_ros.physics.model.friction.stribeck import Stribeck
 LAWS: dict[str, type[FrictionLaw]] = {
     law.name: law for law in (Stribeck, Coulomb, Linear, Exponential)
 }
-"""Every friction law by the name it has in parameters."""
+"""Every friction law by the name it has in parameters.
+
+`stickslip_ros.scenarios.parameters` adds those of other packages, found by their entry points.
+"""
 
 __all__ = ["LAWS", "Coulomb", "Exponential", "FrictionLaw", "Linear", "Stribeck"]

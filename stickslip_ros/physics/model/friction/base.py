@@ -2,7 +2,8 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from math import inf
 from typing import Any, ClassVar, Self
 
@@ -239,6 +240,24 @@ class FrictionLaw(ABC):
         """
         return None
 
+    def above_static(self, name: str) -> str | None:
+        """Return the refusal of a constant above the static coefficient, or None.
+
+        Parameters
+        ----------
+        name : str
+            Name of the constant.
+
+        Returns
+        -------
+        str or None
+            Sentence with both values, as `refusal` returns it.
+        """
+        value = getattr(self, name)
+        if value <= self.static:
+            return None
+        return f"{name} = {value} must not exceed static = {self.static}"
+
     def at_rest(self, belt_speed: Any) -> Any:
         """Return mu(-v_belt), eq. 6: the coefficient for a slide at rest on a moving belt.
 
@@ -256,9 +275,12 @@ class FrictionLaw(ABC):
 
     sudden_speed = Renamed("characteristic_speed")
 
-    def __init_subclass__(cls) -> None:
-        if "sudden_speed" in vars(cls):  # a law written for version 0.1
+    def __init_subclass__(cls) -> None:  # for laws written for version 0.1
+        if "sudden_speed" in vars(cls):
             type.__setattr__(cls, "characteristic_speed", vars(cls)["sudden_speed"])
+        for name, kind in vars(cls).get("__annotations__", {}).items():
+            if name not in vars(cls) and "ClassVar" not in str(kind):
+                type.__setattr__(cls, name, field(default_factory=partial(_no_default, name)))
 
     @property
     def characteristic_speed(self) -> float:
@@ -300,4 +322,8 @@ class FrictionLaw(ABC):
         tuple of str
             Names in the order of the dataclass fields.
         """
-        return tuple(field.name for field in fields(cls))
+        return tuple(each.name for each in fields(cls))
+
+
+def _no_default(name: str) -> Any:
+    raise TypeError(f"missing constant {name!r}, which has no default")

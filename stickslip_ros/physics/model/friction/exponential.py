@@ -64,6 +64,4 @@ class Exponential(FrictionLaw):
         str or None
             Sentence with both values.
         """
-        if self.kinetic <= self.static:
-            return None
-        return f"kinetic = {self.kinetic} must not exceed static = {self.static}"
+        return self.above_static("kinetic")

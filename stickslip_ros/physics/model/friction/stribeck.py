@@ -55,6 +55,4 @@ class Stribeck(FrictionLaw):
         str or None
             Sentence with both values.
         """
-        if self.minimum <= self.static:
-            return None
-        return f"minimum = {self.minimum} must not exceed static = {self.static}"
+        return self.above_static("minimum")
