@@ -10,7 +10,7 @@ import pytest
 
 from stickslip_ros.deprecated_names import MOVED
 from stickslip_ros.physics.model.friction import Exponential, FrictionLaw, Linear
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.samples import SampleColumns
@@ -87,7 +87,7 @@ def test_what_was_not_public_is_no_attribute(module: str) -> None:
         (Attractor, "of", "from_point"),
         (Basins, "of", "from_points"),
         (Columns, "of", "from_journal"),
-        (Motion, "take_knots", "take_breakpoints"),
+        (RecordedMotion, "take_knots", "take_breakpoints"),
     ],
 )
 def test_members_have_their_old_names_too(owner: type, old: str, new: str) -> None:

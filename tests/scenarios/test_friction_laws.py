@@ -181,7 +181,7 @@ def test_a_law_that_does_not_fit_is_refused(
         ("falling", "absent:Falling", "cannot be imported: ModuleNotFoundError: No module named"),
         ("falling", "foreign:FALLING", "cannot be imported: AttributeError"),
         ("falling", "foreign", "is no class derived from FrictionLaw"),
-        ("falling", "for eign:", "cannot be imported: AttributeError"),
+        ("falling", "for eign:", "cannot be imported: "),
     ],
 )
 def test_an_entry_point_that_does_not_fit_is_refused(

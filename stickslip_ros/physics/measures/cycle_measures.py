@@ -232,10 +232,10 @@ class CycleMeter:
     >>> from stickslip_ros.physics.measures import CycleMeter
     >>> from stickslip_ros.physics.model.drive import Drive
     >>> from stickslip_ros.physics.model.friction import Stribeck
-    >>> from stickslip_ros.physics.motion import Motion
+    >>> from stickslip_ros.physics.motion import RecordedMotion
     >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
     ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
-    >>> motion = Motion(drive, position=0.0, velocity=0.0, record=True)
+    >>> motion = RecordedMotion(drive, position=0.0, velocity=0.0)
     >>> motion.advance(5.0)
     >>> meter = CycleMeter(window=20)
     >>> cycles = meter.feed(motion.take_breakpoints(), drive.belt_speed)
