@@ -35,6 +35,9 @@ SLIP, STICK = "slip", "stick"
 BELT_REACHED = 0
 """Index of the guard of slip at which the slide reaches the speed of the belt."""
 
+_STUCK, _FORWARD, _BACKWARD = Mode(STICK, (0.0,)), Mode(SLIP, (1.0,)), Mode(SLIP, (-1.0,))
+"""The modes of a drive whose law and courses have none."""
+
 _HYSTERESIS = 2.0**-45
 """Distance behind a guard of a part at which the mode ends.
 
@@ -91,6 +94,8 @@ class DriveSystem(HybridSystem):
                 for name in names
             ),
         )
+        self._reaction = partial(equations.reaction, self.drive)
+        self._one_switch = len(self.switches) == 1
         # Where the switches of law, belt and load start, after the sign.
         self._ends = list(accumulate(map(len, parts[:2]), initial=1))
         self._control_states = slice(MEMORY + len(law.states), None)
@@ -105,6 +110,8 @@ class DriveSystem(HybridSystem):
             **(_numbers(self.control, "control") if self.control is not None else {}),
         }
         self._belt_speed, self._normal_force = self.drive.belt_speed, self.drive.normal_force
+        # The speed relative to the belt with which a slide starts to slip.
+        self._least_speed = max(ulp(self._belt_speed), ulp(1.0))
         self._plain = self._steady and isinstance(self.drive.load, NoCourse)
         self._sticks = law.sticks
         self._forward_limit, self._backward_limit = map(float, law.limits)
@@ -177,7 +184,8 @@ class DriveSystem(HybridSystem):
 
     def reach_belt(self, mode: Mode, instant: Instant) -> Mode:
         """Stick, or slip on in either direction, where the slide reaches the belt speed."""
-        instant.state[SPEED] = self.belt_speed(mode, instant.time)
+        speed = self._belt_speed if self._steady else self.belt_speed(mode, instant.time)
+        instant.state[SPEED] = speed
         if self._sticks:
             return self._resting(mode, instant)
         return self._slip(mode, -mode.switches[0], instant)
@@ -242,22 +250,25 @@ class DriveSystem(HybridSystem):
     def separate(self, mode: Mode, instant: Instant) -> None:
         """Move a slide that starts to slip, or sticks near its limit, by rounding errors."""
         state, sign = instant.state, mode.switches[0]
-        if sign == 0.0:
-            held = self.held_force(mode, instant)
-            margin = self._rounding(held, instant)
-            limit = self._backward_limit if held > 0.0 else self._forward_limit
-            if abs(held) > self.normal_force(mode, instant.time) * limit - margin:
-                state[POSITION] -= copysign(margin, held)
+        x, y = state[POSITION], state[SPEED]
+        belt_speed = self._belt_speed if self._steady else self.belt_speed(mode, instant.time)
+        if sign != 0.0 and y != belt_speed:
             return
-        belt_speed = self.belt_speed(mode, instant.time)
-        if state[SPEED] == belt_speed:
-            if self._sticks:
-                held = self.held_force(mode, instant)
-                margin = self._rounding(held, instant)
-                limit = self._backward_limit if sign < 0.0 else self._forward_limit
-                if abs(held) < self.normal_force(mode, instant.time) * limit + margin:
-                    state[POSITION] -= copysign(margin, sign)
-            state[SPEED] += copysign(max(ulp(belt_speed), ulp(1.0)), sign)
+        if self._sticks:
+            force = instant.inputs[0] if self.control is None else self.control_force(instant)
+            held = self._reaction(x, y, force) if self._steady else self.held_force(mode, instant)
+            normal = self._normal_force if self._plain else self.normal_force(mode, instant.time)
+            backward = sign < 0.0 or (sign == 0.0 and held > 0.0)
+            limit = normal * (self._backward_limit if backward else self._forward_limit)
+            margin = 8.0 * ulp(abs(x) + abs(held) + abs(force) + limit)
+            if sign == 0.0:
+                if abs(held) > limit - margin:
+                    state[POSITION] = x - copysign(margin, held)
+                return
+            if abs(held) < limit + margin:
+                state[POSITION] = x - sign * margin
+        least = self._least_speed if self._steady else max(ulp(belt_speed), ulp(1.0))
+        state[SPEED] = y + sign * least
 
     def has_closed_form(self, mode: Mode) -> bool:
         """Return whether the slide moves in a straight line: it sticks, and all is constant."""
@@ -270,8 +281,10 @@ class DriveSystem(HybridSystem):
         state, speed = instant.state, self._belt_speed
         if speed != 0.0:
             limit = self._backward_limit if speed > 0.0 else -self._forward_limit
-            limit -= equations.reaction(self.drive, 0.0, speed, instant.inputs[0])
-            time = max((limit - state[POSITION]) / speed, 0.0)
+            limit -= self._reaction(0.0, speed, instant.inputs[0])
+            time = (limit - state[POSITION]) / speed
+            if time < 0.0:  # by rounding
+                time = 0.0
             if time < duration:
                 state[POSITION] = limit
                 return (0 if speed > 0.0 else 1), time
@@ -327,12 +340,14 @@ class DriveSystem(HybridSystem):
         """Return h = X + 2 beta X' - U."""
         state = instant.state
         force = instant.inputs[0] if self.control is None else self.control_force(instant)
-        return equations.reaction(self.drive, state[POSITION], state[SPEED], force)
+        return self._reaction(state[POSITION], state[SPEED], force)
 
     def held_force(self, mode: Mode, instant: Instant) -> float:
         """Return the friction force that a slide needs to move with the belt."""
         if self._steady:
-            return self.reaction(instant)
+            state = instant.state
+            force = instant.inputs[0] if self.control is None else self.control_force(instant)
+            return self._reaction(state[POSITION], state[SPEED], force)
         tiny = 1e-30j  # imaginary, so that nothing cancels
         switches = self._by_part(mode.switches).belt
         speed: Any = equations.belt_speed(self.drive, instant.time + tiny, switches)
@@ -392,6 +407,8 @@ class DriveSystem(HybridSystem):
 
     def _slip(self, mode: Mode, sign: float, instant: Instant) -> Mode:
         """Return slip in a direction; the courses stay in their modes."""
+        if self._one_switch:
+            return _FORWARD if sign > 0.0 else _BACKWARD
         law, state = self.drive.friction, instant.state
         switches: Sequence[float] = ()
         if law.switches:
@@ -403,11 +420,19 @@ class DriveSystem(HybridSystem):
     def _resting(self, mode: Mode, instant: Instant) -> Mode:
         """Return the mode of a slide that has the speed of the belt."""
         if self._sticks:
-            held, normal = self.held_force(mode, instant), self.normal_force(mode, instant.time)
+            if self._plain:
+                normal, state = self._normal_force, instant.state
+                force = instant.inputs[0] if self.control is None else self.control_force(instant)
+                held = self._reaction(state[POSITION], state[SPEED], force)
+            else:
+                normal = self.normal_force(mode, instant.time)
+                held = self.held_force(mode, instant)
             if held > normal * self._backward_limit:
                 return self._slip(mode, -1.0, instant)
             if held < -normal * self._forward_limit:
                 return self._slip(mode, 1.0, instant)
+            if self._one_switch:
+                return _STUCK
             if mode.flow == STICK:
                 return mode
             law = (0.0,) * len(self.drive.friction.switches)
@@ -415,10 +440,6 @@ class DriveSystem(HybridSystem):
         forward = self._slip(mode, 1.0, instant)
         accelerates = self.friction_force(forward, instant) >= self.held_force(mode, instant)
         return forward if accelerates else self._slip(mode, -1.0, instant)
-
-    def _rounding(self, held: float, instant: Instant) -> float:
-        force, position = self.control_force(instant), instant.state[POSITION]
-        return 8.0 * ulp(abs(position) + abs(held) + abs(force) + self._backward_limit)
 
 
 def _guards(margins: Sequence[Any], leads: Callable[..., Mode]) -> list[Guard]:

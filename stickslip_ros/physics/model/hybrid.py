@@ -106,10 +106,6 @@ class HybridSystem(ABC):
             _flows[key] = self.flow(name)
         return _flows[key]
 
-    def leads(self, guard: int, mode: Mode, instant: Instant) -> Mode | None:
-        """Return the mode to which a guard of the present mode leads; None at the end."""
-        return self.shared_flow(mode.flow).guards[guard].leads(self, mode, instant)
-
     @abstractmethod
     def settled(self, mode: Mode | None, instant: Instant) -> Mode:
         """Return the mode that continues, or starts, at an instant.
@@ -126,7 +122,7 @@ class HybridSystem(ABC):
         """Move the state, by rounding errors, off a guard of a mode that starts on it."""
 
     def has_closed_form(self, mode: Mode) -> bool:
-        """Return whether `closed_form` solves the mode."""
+        """Return whether `closed_form` solves the modes of this one's flow."""
         return False
 
     def closed_form(

@@ -4,7 +4,7 @@ from array import array
 
 import heyoka as hy
 
-from stickslip_ros.physics.model.hybrid import HybridSystem, Instant, Mode
+from stickslip_ros.physics.model.hybrid import HybridSystem, Instant, Leads, Mode
 from stickslip_ros.physics.motion.compiled_flow import CompiledFlow, Detail, FlowLoans
 
 STEPS_PER_UNIT = 10_000
@@ -25,12 +25,37 @@ _NO_EVENT = hy.taylor_outcome.time_limit.value
 _NOT_FINITE = hy.taylor_outcome.err_nf_state.value
 
 
-_LoadedFlow = tuple[CompiledFlow, range, range, bool]
-"""Integrator, indices of the inputs and switches that it uses, and whether it uses the time."""
-
-
 class TooManyStepsError(Exception):
     """Raised when a motion is too stiff to be followed."""
+
+
+class _PreparedFlow:
+    """Flow of a system that a motion may enter: integrator with its constants, and guards."""
+
+    __slots__ = ("epoch", "flow", "inputs", "leads", "mode", "switches")
+
+    def __init__(
+        self, system: HybridSystem, flow: CompiledFlow | None, leads: tuple[Leads, ...]
+    ) -> None:
+        self.flow = flow
+        """Integrator; None if the flow has a closed form."""
+        self.leads = leads
+        """Where each guard leads."""
+        self.mode: Mode | None = None
+        """Mode whose switches the integrator has."""
+        # heyoka keeps the parameters up to the last one that an equation uses.
+        used = 0 if flow is None else len(flow.parameters)
+        index = system.index
+        self.inputs, self.switches = (
+            [(number, index[name]) for number, name in enumerate(names) if index[name] < used]
+            for names in (system.inputs, system.switches)
+        )
+        """Number, and index in the integrator's parameters, of inputs and switches."""
+        self.epoch = index["epoch"] if index["epoch"] < used else None
+        """Index of the time at the start of the integration."""
+        if flow is not None:
+            constants = array("d", list(system.constants.values())[:used])
+            flow.parameters[: len(constants)] = memoryview(constants)
 
 
 class HybridMotion:
@@ -56,20 +81,15 @@ class HybridMotion:
         self._set_state(state)
 
     def _use(self, system: HybridSystem) -> None:
-        """Continue with a system that has the same states; the mode must be settled anew."""
+        """Continue with a system that has the same states; its mode is found by `_set_state`."""
         self._system = system
-        constants = system.constants.values()
-        self._first_input = len(constants)
-        self._first_switch = self._first_input + len(system.inputs)
-        self._epoch = self._first_switch + len(system.switches)
-        others = [0.0] * (self._epoch + 1 - len(constants))
-        self._parameters = memoryview(array("d", (*constants, *others)))
-        self._loaded: dict[str, _LoadedFlow] = {}
+        self._clocked, self._limits_steps = not system.autonomous, system.limits_steps
+        self._prepared: dict[str, _PreparedFlow] = {}
 
     def _set_detail(self, detail: Detail) -> None:
         """Continue with another detail."""
         self._detail, self._watched = detail, detail is not Detail.STATES
-        self._loaded.clear()
+        self._prepared.clear()
         self._enter(self._mode)
 
     def _set_state(self, state: list[float]) -> None:
@@ -81,74 +101,101 @@ class HybridMotion:
     def _enter(self, mode: Mode) -> None:
         """Continue in a mode."""
         self._mode = mode
-        system, instant = self._system, self._instant
-        if self._detail is not Detail.DERIVATIVES and system.has_closed_form(mode):
-            self._flow = None
+        try:
+            prepared = self._prepared[mode.flow]
+        except KeyError:
+            prepared = self._prepare(mode)
+        self._entered, self._flow = prepared, prepared.flow
+        if self._flow is None:
             return
-        system.separate(mode, instant)
-        loaded = self._loaded.get(mode.flow)
-        if loaded is None:
-            loaded = self._load(mode.flow)
-        self._flow, self._inputs, self._switches, self._timed = loaded
-        parameters, switches, first = self._flow.parameters, mode.switches, self._first_switch
-        for number in self._switches:
-            parameters[number] = switches[number - first]
+        instant, parameters = self._instant, self._flow.parameters
+        self._system.separate(mode, instant)
+        for number, index in prepared.inputs:
+            parameters[index] = instant.inputs[number]
+        if mode is not prepared.mode:
+            prepared.mode = mode
+            for number, index in prepared.switches:
+                parameters[index] = mode.switches[number]
         variables = self._flow.variables
-        variables[:] = instant.state
-        instant.state = variables
+        if instant.state is not variables:
+            variables[:] = instant.state
+            instant.state = variables
 
-    def _load(self, name: str) -> _LoadedFlow:
-        """Load the constants into the integrator of a flow."""
-        flow = self._loans.flow(self._system, name, self._detail)
-        # heyoka keeps the parameters up to the last one that an equation uses.
-        count = len(flow.parameters)
-        flow.parameters[:] = self._parameters[:count]
-        loaded = (
-            flow,
-            range(self._first_input, min(self._first_switch, count)),
-            range(self._first_switch, min(self._epoch, count)),
-            count > self._epoch,
-        )
-        self._loaded[name] = loaded
-        return loaded
+    def _prepare(self, mode: Mode) -> "_PreparedFlow":
+        """Load the constants into the integrator of a mode's flow, unless it has a closed form."""
+        name, system, flow = mode.flow, self._system, None
+        if self._detail is Detail.DERIVATIVES or not system.has_closed_form(mode):
+            flow = self._loans.flow(system, name, self._detail)
+        leads = tuple(guard.leads for guard in system.shared_flow(name).guards)
+        prepared = self._prepared[name] = _PreparedFlow(system, flow, leads)
+        return prepared
+
+    def _set_input(self, number: int, value: float) -> None:
+        """Hold an input at a value from now on."""
+        self._instant.inputs[number] = value
+        if self._flow is not None:
+            for used, index in self._entered.inputs:
+                if used == number:
+                    self._flow.parameters[index] = value
 
     def _advance(self, duration: float) -> None:
         """Integrate over a duration; stop early if the motion becomes unbounded."""
-        # Without `min`: two calls cost a twentieth of a step of the sampled loop.
+        system, instant, watched = self._system, self._instant, self._watched
+        # Without `min` and further calls: each costs a twentieth of a step of the sampled loop.
         if self._steps_left > _SPARE_STEPS:
             self._steps_left = _SPARE_STEPS
         steps = STEPS_PER_UNIT * duration
         self._steps_left += _STEPS_PER_ADVANCE + int(steps if steps < _MOST_STEPS else _MOST_STEPS)
-        instant = self._instant
-        mode = self._system.settled(self._mode, instant)
+        mode = system.settled(self._mode, instant)
         if mode is not self._mode:
             self._enter(mode)
         epoch, now = instant.time, 0.0
         while now < duration and not self.unbounded:
-            now = self._phase(epoch, now, duration)
-        instant.time = epoch + duration
+            end = self._begin(now, duration) if watched else duration
+            flow, guard = self._flow, None
+            if flow is None:
+                guard, elapsed = system.closed_form(mode, instant, end - now)
+                now = end if guard is None else now + elapsed
+            else:
+                taylor = flow.taylor
+                taylor.time = now
+                if self._clocked and self._entered.epoch is not None:
+                    flow.parameters[self._entered.epoch] = epoch
+                if self._limits_steps:
+                    longest = system.longest_step(instant)
+                    reached = taylor.propagate_until(end, self._steps_left, longest)
+                else:
+                    reached = taylor.propagate_until(end, self._steps_left)
+                outcome = reached[0].value
+                self._steps_left -= reached[3] + _STEPS_OF_A_PHASE
+                if outcome == _NO_EVENT:
+                    now = end
+                else:
+                    taylor.reset_cooldowns()  # the next integration is another phase
+                    if outcome == _NOT_FINITE:
+                        guard = self._overflow(flow)
+                    elif self._steps_left <= 0:
+                        flow.take_marks()  # of a phase that is not reported
+                        raise TooManyStepsError
+                    else:
+                        guard, now = -outcome - 1, taylor.time
+            if self._clocked:
+                instant.time = epoch + now
+            following: Mode | None = mode
+            if guard is not None:
+                leads = self._entered.leads[guard] if guard != _DIVERGED else _to_the_end
+                following = leads(system, mode, instant)
+            if watched:
+                self._pass(mode, guard, following, now)
+            if following is None:
+                self.unbounded = True
+            elif guard is not None:
+                mode = following
+                self._enter(mode)
 
-    def _phase(self, epoch: float, now: float, end: float) -> float:
-        """Move in the present mode up to a guard, or to `end`; return the time."""
-        system, instant, mode, flow = self._system, self._instant, self._mode, self._flow
-        if flow is None:
-            guard, elapsed = system.closed_form(mode, instant, end - now)
-            now = end if guard is None else now + elapsed
-        else:
-            guard, now = self._propagate(flow, epoch, now, end)
-        instant.time = epoch + now
-        if guard is None:
-            if self._watched:
-                self._pass(mode, None, mode, now)
-            return now
-        following = None if guard == _DIVERGED else system.leads(guard, mode, instant)
-        if self._watched:
-            self._pass(mode, guard, following, now)
-        if following is None:
-            self.unbounded = True
-        else:
-            self._enter(following)
-        return now
+    def _begin(self, now: float, end: float) -> float:
+        """Take note of the start of a phase; return its latest end. Not called without detail."""
+        return end
 
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
         """Take note of the end of a phase in `mode`, at a guard or not.
@@ -156,32 +203,15 @@ class HybridMotion:
         `now` is the time since the last advance. It is not called without any detail.
         """
 
-    def _propagate(
-        self, flow: CompiledFlow, epoch: float, now: float, end: float
-    ) -> tuple[int | None, float]:
-        """Integrate the flow from `now` to `end`; return the guard that ended it, and the time."""
-        taylor, instant = flow.taylor, self._instant
-        for number in self._inputs:
-            flow.parameters[number] = instant.inputs[number - self._first_input]
-        if self._timed:
-            flow.parameters[self._epoch] = epoch
-        taylor.time = now
-        before = flow.variables.tolist()
-        if self._system.limits_steps:
-            longest = self._system.longest_step(instant)
-            reached = taylor.propagate_until(end, self._steps_left, longest)
-        else:
-            reached = taylor.propagate_until(end, self._steps_left)
-        outcome = reached[0].value
-        self._steps_left -= reached[3] + _STEPS_OF_A_PHASE
-        if outcome == _NO_EVENT:
-            return None, end
-        taylor.reset_cooldowns()  # the next integration is another phase
-        if outcome == _NOT_FINITE:  # what causes this exceeds any bound immediately
-            flow.variables[:] = array("d", before)
-            self._mode = self._system.overflow(self._mode, instant)
-            return _DIVERGED, now
-        if self._steps_left <= 0:
-            flow.take_marks()  # of a phase that is not reported
-            raise TooManyStepsError
-        return -outcome - 1, float(taylor.time)
+    def _overflow(self, flow: CompiledFlow) -> int:
+        """End a motion whose rates are no longer finite: its cause exceeds any bound immediately.
+
+        The series of the last step still has the state at its start.
+        """
+        flow.variables[:] = array("d", flow.taylor.tc[: len(flow.variables), 0])
+        self._mode = self._system.overflow(self._mode, self._instant)
+        return _DIVERGED
+
+
+def _to_the_end(system: HybridSystem, mode: Mode, instant: Instant) -> None:
+    """Lead to the end of the motion, as a guard does."""

@@ -120,7 +120,7 @@ class Motion(HybridMotion):
         scaled = force / self._drive.normal_force
         if not -_LARGEST_FORCE <= scaled <= _LARGEST_FORCE:
             scaled = max(-_LARGEST_FORCE, min(_LARGEST_FORCE, scaled))
-        self._instant.inputs[0] = scaled
+        self._set_input(0, scaled)
 
     @property
     def applied_force(self) -> float:

@@ -8,7 +8,7 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SLIP, SPEED
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.hybrid import Mode
-from stickslip_ros.physics.motion.compiled_flow import CompiledFlow, Detail
+from stickslip_ros.physics.motion.compiled_flow import Detail
 from stickslip_ros.physics.motion.derivatives import flow_rates, parameter_values
 from stickslip_ros.physics.motion.recorded_motion import RecordedMotion
 
@@ -41,7 +41,7 @@ class SensitiveMotion(RecordedMotion):
         """Derivatives of the state (rows) by the state at the start (columns)."""
         self.landed = False
         """Whether the slide has stuck since the start."""
-        self._effort = 0.0
+        self._effort = self._begun = 0.0
         super().__init__(drive, 0.0, 0.0, gains)
         self.start(np.zeros(self.order))
 
@@ -84,36 +84,32 @@ class SensitiveMotion(RecordedMotion):
         except RunError:
             raise TooStiffError from None
 
-    def _phase(self, epoch: float, now: float, end: float) -> float:
-        if self._mode.flow != SLIP:
-            return super()._phase(epoch, now, end)
-        start, mode = now, self._mode
-        now = super()._phase(epoch, now, min(end, now + _LONGEST_SLIP))
-        stiffness = abs(float(self._rates(mode)[1][SPEED, SPEED]))
-        self._effort += (now - start) * (1.0 + stiffness)
-        if self._effort > _GREATEST_EFFORT:
-            raise TooStiffError
-        return now
-
-    def _propagate(
-        self, flow: CompiledFlow, epoch: float, now: float, end: float
-    ) -> tuple[int | None, float]:
+    def _begin(self, now: float, end: float) -> float:
         # Start from the identity: heyoka's error is relative to the largest of the variables.
-        derivatives = flow.state[self.order :].reshape(self.order, self.order)
-        derivatives[:] = np.eye(self.order)
-        found = super()._propagate(flow, epoch, now, end)
-        self.transition = derivatives @ self.transition
-        return found
+        self._derivatives[:] = np.eye(self.order)
+        self._begun = now
+        return min(end, now + _LONGEST_SLIP) if self._mode.flow == SLIP else end
 
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
         super()._pass(mode, guard, following, now)
+        self.transition = self._derivatives @ self.transition
+        before, gradients = self._rates(mode)
+        if mode.flow == SLIP:
+            self._effort += (now - self._begun) * (1.0 + abs(float(gradients[SPEED, SPEED])))
+            if self._effort > _GREATEST_EFFORT:
+                raise TooStiffError
         if guard is None or following is None:
             return
-        before, gradients = self._rates(mode)
         normal = gradients[self.order + guard]
         jump = self._rates(following)[0] - before
         self.transition += np.outer(jump / (normal @ before), normal @ self.transition)
         self.landed |= following.flow != SLIP
+
+    @property
+    def _derivatives(self) -> FloatArray:
+        """Derivatives of the state by that at the start of the phase, in the integrator."""
+        assert self._flow is not None
+        return self._flow.state[self.order :].reshape(self.order, self.order)
 
     def _rates(self, mode: Mode) -> tuple[FloatArray, FloatArray]:
         """Return the rates at the present state in a mode, and the gradients; see `FlowRates`."""
