@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 from functools import cached_property
 from math import expm1
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.equations import WashoutGains
 
 
 @dataclass(frozen=True)
@@ -25,10 +23,8 @@ class WashoutParameters:
     """Time from the first measurement during which the force is zero, s."""
 
     @cached_property
-    def gains(self) -> "WashoutGains":
+    def gains(self) -> WashoutGains:
         """Cutoff frequency and gains."""
-        from stickslip_ros.physics.model.equations import WashoutGains  # loads heyoka
-
         return WashoutGains(self.corner_frequency, self.linear_gain, self.cubic_gain)
 
 
