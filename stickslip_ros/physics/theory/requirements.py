@@ -52,8 +52,8 @@ def require(function: str, drive: Drive, *requirements: Requirement) -> None:
 
 
 def _courses(drive: Drive) -> str | None:
-    moving = [name for name in ("belt", "load") if getattr(drive, name) != NO_COURSE]
-    return f"the {' and the '.join(moving)} of the drive follow a course" if moving else None
+    moving = [f"its {name}" for name in ("belt", "load") if getattr(drive, name) != NO_COURSE]
+    return f"the drive has a course of {' and '.join(moving)}" if moving else None
 
 
 def _memory(drive: Drive) -> str | None:

@@ -1,0 +1,142 @@
+"""What the theory covers, and the sentence with which it refuses other drives."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.constants import constant
+from stickslip_ros.physics.model.course import Course
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw
+from stickslip_ros.physics.model.functions import sin
+from stickslip_ros.physics.theory.averaging import averaged_growth
+from stickslip_ros.physics.theory.closed_forms import CubicLoop
+from stickslip_ros.physics.theory.critical_gains import critical_gains
+from stickslip_ros.physics.theory.cycle_bounds import largest_cycle, least_cycle
+from stickslip_ros.physics.theory.hopf import hopf_points
+from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
+from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles, shoot
+from stickslip_ros.physics.theory.linear import expand
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.physics.theory.sticking import sticking_onset
+from tests.physics.drives import PAPER
+
+GAINS = WashoutGains(2.0, -1.0, -1.0)
+
+
+@dataclass(frozen=True)
+class Remembering(FrictionLaw):
+    """Dahl's law with a falling curve would be LuGre's; here the memory alone matters."""
+
+    name = "remembering"
+    states = {"deflection": "m"}  # noqa: RUF012
+    stiffness: Any = constant(5.0, "Stiffness of the bristles.", "1/m", positive=True)
+
+    def coefficient(self, relative_speed: Any, sign: Any) -> Any:
+        return -self.static * sign + 0.0 * relative_speed
+
+    def friction(
+        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
+    ) -> Any:
+        return -self.stiffness * memory[0]
+
+    def memory_rates(
+        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
+    ) -> Sequence[Any]:
+        yielding = self.stiffness * sign * memory[0] / self.static
+        return (relative_speed * (1.0 - yielding),)
+
+    def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
+        return (sign * self.static / self.stiffness,)
+
+
+@dataclass(frozen=True)
+class OneWay(Coulomb):
+    """Coulomb friction that holds better against forward slip."""
+
+    name = "one_way"
+
+    @property
+    def limits(self) -> tuple[Any, Any]:
+        return 1.5 * self.static, self.static
+
+
+@dataclass(frozen=True)
+class Swing(Course):
+    amplitude: float = constant(0.05, "Amplitude.", "value")
+
+    def value(self, time: Any, switches: Sequence[Any]) -> Any:
+        return self.amplitude * sin(time)
+
+
+REMEMBERS = replace(PAPER, friction=Remembering())
+ONE_WAY = replace(PAPER, friction=OneWay())
+LOADED = replace(PAPER, load=Swing())
+CARRIED = replace(PAPER, belt=Swing(), load=Swing())
+
+SENTENCES = {
+    "memory": (REMEMBERS, "the friction law remembering has a memory (deflection)"),
+    "one way": (ONE_WAY, "the friction law one_way differs between forward and backward slip"),
+    "load": (LOADED, "the drive has a course of its load"),
+    "belt and load": (CARRIED, "the drive has a course of its belt and its load"),
+}
+
+Theory = Callable[[Drive], object]
+
+SMOOTH: list[tuple[str, Theory]] = [
+    ("the expansion at the equilibrium", expand),
+    ("the search for Hopf points", hopf_points),
+    ("shooting", lambda drive: shoot(drive, -0.1, 6.4)),
+]
+WITHOUT_MEMORY: list[tuple[str, Theory]] = [
+    ("the critical gain", lambda drive: critical_gains(drive, GAINS)),
+    ("the critical gain", lambda drive: limit_cycle_from_hopf(drive, GAINS)),
+    ("the theory of the sampled loop", lambda drive: LinearSampledLoop.from_drive(drive, 100.0)),
+]
+SYMMETRIC: list[tuple[str, Theory]] = [
+    ("averaging", lambda drive: averaged_growth(drive, 0.4, 0.1)),
+    ("the energy of a cycle", least_cycle),
+    ("the energy of a cycle", largest_cycle),
+    ("the limit cycle of a run", lambda drive: limit_cycle_of_run(drive, 0.0)),
+    ("the search for limit cycles", limit_cycles),
+    ("the onset of sticking", sticking_onset),
+]
+REFUSED = [
+    *((*each, lack) for each in SMOOTH for lack in ("load", "belt and load")),
+    *((*each, lack) for each in WITHOUT_MEMORY for lack in ("memory", "load")),
+    *((*each, lack) for each in SYMMETRIC for lack in ("memory", "one way", "load")),
+    ("the closed form", CubicLoop.from_drive, "load"),
+]
+
+
+@pytest.mark.parametrize(("name", "theory", "lack"), REFUSED)
+def test_a_drive_that_is_not_covered_is_refused_by_name(
+    name: str, theory: Theory, lack: str
+) -> None:
+    drive, sentence = SENTENCES[lack]
+    with pytest.raises(InvalidInputError) as refused:
+        theory(drive)
+    assert str(refused.value).startswith(f"{name} needs ")
+    assert str(refused.value).endswith(sentence)
+
+
+@pytest.mark.parametrize("gains", [None, GAINS])
+def test_the_equilibrium_of_a_law_with_a_memory(gains: WashoutGains | None) -> None:
+    expansion = expand(REMEMBERS, gains)
+    assert expansion is not None
+    # Friction is that of steady slip, and the bristles are bent accordingly.
+    assert expansion.equilibrium[:3] == pytest.approx([0.4, 0.0, -0.4 / 5.0], rel=1e-14)
+    assert expansion.stable  # Dahl's friction does not fall with speed
+    assert len(expansion.eigenvalues) == (3 if gains is None else 4)
+    assert np.all(expansion.eigenvalues.real < 0.0)
+
+
+@pytest.mark.parametrize("theory", [expand, hopf_points, lambda drive: shoot(drive, -0.1, 6.4)])
+def test_what_covers_every_law_takes_them_all(theory: Theory) -> None:
+    for drive in (PAPER, REMEMBERS, ONE_WAY):
+        theory(drive)
