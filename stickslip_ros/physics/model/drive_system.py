@@ -45,6 +45,9 @@ The mode that follows then starts before its own guards: heyoka misses an event 
 starts on one. It also keeps rounding from leading back.
 """
 
+_SMALLEST_STEP = 2.0**-35
+"""Change of the belt speed at a corner below which it is rounding, and not a step."""
+
 
 class _Parts(NamedTuple):
     """Switches, one group for each part."""
@@ -209,14 +212,25 @@ class DriveSystem(HybridSystem):
         )
 
     def turn_belt(self, mode: Mode, instant: Instant, *, margin: int) -> Mode:
-        """Enter the mode that follows at a corner of the belt's course."""
+        """Enter the mode that follows at a corner, or a step, of the belt's course."""
+        before = self.belt_speed(mode, instant.time)
         own = self._by_part(mode.switches).belt
-        return with_switches(mode, self._ends[1], self.drive.belt.switches_after(margin, own))
+        mode = with_switches(mode, self._ends[1], self.drive.belt.switches_after(margin, own))
+        belt_speed = self.belt_speed(mode, instant.time)
+        if mode.flow == STICK and abs(belt_speed - before) <= _SMALLEST_STEP:
+            instant.state[SPEED] = belt_speed
+            return self._resting(mode, instant)  # the acceleration of the belt jumps
+        relative_speed = instant.state[SPEED] - belt_speed
+        if relative_speed == 0.0:
+            return self._resting(mode, instant)
+        sign = copysign(1.0, relative_speed)
+        return mode if mode.switches[0] == sign else self._slip(mode, sign, instant)
 
     def turn_load(self, mode: Mode, instant: Instant, *, margin: int) -> Mode:
-        """Enter the mode that follows at a corner of the load's course."""
+        """Enter the mode that follows at a corner, or a step, of the load's course."""
         own = self._by_part(mode.switches).load
-        return with_switches(mode, self._ends[2], self.drive.load.switches_after(margin, own))
+        mode = with_switches(mode, self._ends[2], self.drive.load.switches_after(margin, own))
+        return self._resting(mode, instant) if mode.flow == STICK else mode
 
     def settled(self, mode: Mode | None, instant: Instant) -> Mode:
         """Return stick, or slip in the direction of the relative speed; see the class."""
