@@ -217,14 +217,15 @@ class DriveSystem(HybridSystem):
         own = self._by_part(mode.switches).belt
         mode = with_switches(mode, self._ends[1], self.drive.belt.switches_after(margin, own))
         belt_speed = self.belt_speed(mode, instant.time)
-        if mode.flow == STICK and abs(belt_speed - before) <= _SMALLEST_STEP:
+        if abs(belt_speed - before) <= _SMALLEST_STEP:
+            if mode.flow != STICK:
+                return mode
             instant.state[SPEED] = belt_speed
             return self._resting(mode, instant)  # the acceleration of the belt jumps
         relative_speed = instant.state[SPEED] - belt_speed
         if relative_speed == 0.0:
             return self._resting(mode, instant)
-        sign = copysign(1.0, relative_speed)
-        return mode if mode.switches[0] == sign else self._slip(mode, sign, instant)
+        return self._slip(mode, copysign(1.0, relative_speed), instant)
 
     def turn_load(self, mode: Mode, instant: Instant, *, margin: int) -> Mode:
         """Enter the mode that follows at a corner, or a step, of the load's course."""
