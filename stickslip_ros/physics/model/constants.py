@@ -30,7 +30,7 @@ class Constant:
 
     name: str
     """Name of the field."""
-    default: float
+    default: float | tuple[float, ...]
     """Default value."""
     meaning: str
     """Meaning, as a sentence."""
@@ -40,22 +40,25 @@ class Constant:
     """Smallest allowed value."""
     positive: bool
     """Whether the value must be above zero."""
+    whole: bool
+    """Whether it is a whole number that makes the equations, such as a number of elements."""
 
 
 def constant(
-    default: float,
+    default: float | tuple[float, ...],
     meaning: str,
     unit: str | None = None,
     *,
     at_least: float = -inf,
     positive: bool = False,
+    whole: bool = False,
 ) -> Any:
     """Describe a constant, as the default of a dataclass field.
 
     Parameters
     ----------
-    default : float
-        Default value.
+    default : float or tuple of float
+        Default value; a tuple for a table.
     meaning : str
         Meaning, as a sentence; shown in help texts and in the documentation.
     unit : str, optional
@@ -65,6 +68,9 @@ def constant(
         Smallest allowed value.
     positive : bool, optional
         Whether the value must be above zero.
+    whole : bool, optional
+        Whether it is a whole number that makes the equations, such as a number of elements. It
+        stays a number in the symbolic equations.
 
     Returns
     -------
@@ -87,7 +93,7 @@ def constant(
     'N/m'
     """
     unit_powers(unit)
-    described = Constant("", default, meaning, unit, at_least, positive)
+    described = Constant("", default, meaning, unit, at_least, positive, whole)
     return field(default=default, metadata={_KEY: described})
 
 
@@ -139,11 +145,15 @@ class Scales:
 def scaled(part: _Part, scales: Scales, value: str | None = None) -> _Part:
     """Return a part with its constants in units of `scales`; `value` is the unit of a course."""
     changes = {
-        name: getattr(part, name) * scales.factor(described.unit, value)
+        name: _times(getattr(part, name), scales.factor(described.unit, value))
         for name, described in constants_of(type(part)).items()
         if described.unit is not None
     }
     return replace(part, **changes) if changes else part  # type: ignore[type-var]
+
+
+def _times(value: Any, factor: float) -> Any:
+    return tuple(each * factor for each in value) if isinstance(value, tuple) else value * factor
 
 
 @cache

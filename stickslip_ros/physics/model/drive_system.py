@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import heyoka as hy
 
 from stickslip_ros.physics.model import equations
+from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.course import NoCourse
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
@@ -388,8 +389,11 @@ class DriveSystem(HybridSystem):
         constants = self.symbols.constants
 
         def symbols(prefix: str, part: Any) -> Any:
+            names = {name: f"{prefix}.{name}" for name in _values(part)}
             return replace(part, **{
-                name: constants[f"{prefix}.{name}"] for name in _numbers(part)
+                name: tuple(constants[each] for each in _items(dotted, value))
+                if isinstance(value, tuple) else constants[dotted]
+                for (name, dotted), value in zip(names.items(), _values(part).values(), strict=True)
             })  # fmt: skip
 
         drive = replace(
@@ -473,14 +477,34 @@ def _by_time(drive: Drive, time: Any, switches: Sequence[Any], zero: Any) -> Any
     return zero + hy.subs(hy.diff(speed, instant), {instant: time})
 
 
-def _numbers(part: Any, prefix: str = "") -> dict[str, float]:
-    """Return the fields of a part that are numbers, by name."""
-    dot = f"{prefix}." if prefix else ""
+def _values(part: Any) -> dict[str, Any]:
+    """Return the fields of a part that are numbers, or tuples of them, by name.
+
+    Whole numbers, such as the number of elements, are no constants of the equations.
+    """
+    whole = {name for name, each in constants_of(type(part)).items() if each.whole}
     values = {each.name: getattr(part, each.name) for each in fields(part)}
     return {
-        f"{dot}{name}": float(value)
+        name: value
         for name, value in values.items()
-        if isinstance(value, int | float)
+        if name not in whole and isinstance(value, int | float | tuple)
+    }
+
+
+def _items(name: str, value: Any) -> dict[str, float]:
+    """Return a number, or the items of a tuple, by name."""
+    if not isinstance(value, tuple):
+        return {name: float(value)}
+    items: tuple[float, ...] = value
+    return {f"{name}[{number}]": float(each) for number, each in enumerate(items)}
+
+
+def _numbers(part: Any, prefix: str) -> dict[str, float]:
+    """Return the constants of a part by name."""
+    return {
+        name: number
+        for field, value in _values(part).items()
+        for name, number in _items(f"{prefix}.{field}", value).items()
     }
 
 
@@ -488,9 +512,11 @@ def _structure(part: Any) -> Any:
     """Return what of a part, apart from the numbers in it, makes its equations; hashable."""
     if not is_dataclass(part):
         return part
-    others = {each.name: getattr(part, each.name) for each in fields(part)}
-    return type(part), tuple(
-        (name, _structure(value))
-        for name, value in others.items()
-        if not isinstance(value, int | float)
-    )
+    values = _values(part)
+    lengths = {name: len(value) for name, value in values.items() if isinstance(value, tuple)}
+    others = {
+        each.name: _structure(getattr(part, each.name))
+        for each in fields(part)
+        if each.name not in values
+    }
+    return type(part), *lengths.items(), *others.items()

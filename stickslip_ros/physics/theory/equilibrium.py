@@ -47,7 +47,10 @@ def equilibria(system: DriveSystem, parameters: FloatArray) -> FloatArray:
     for _ in range(_ITERATIONS):
         rate, gradients = rates.at(states, parameters)
         jacobians = np.moveaxis(gradients[:order], -1, 0)
-        step = np.linalg.solve(jacobians, -rate.T[..., np.newaxis])[..., 0].T
+        try:
+            step = np.linalg.solve(jacobians, -rate.T[..., np.newaxis])[..., 0].T
+        except np.linalg.LinAlgError:
+            break
         states += step
         if np.all(np.abs(step) <= _CLOSE * np.maximum(1.0, np.abs(states).max(axis=0))):
             return states
