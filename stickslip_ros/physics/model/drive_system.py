@@ -162,7 +162,7 @@ class DriveSystem(HybridSystem):
                     Guard(normal * forward + held, DriveSystem.release_forward),
                     *courses,
                 ),
-                marks=() if self._steady else (y, belt_acceleration),
+                marks=self._marks_of_stick(y, belt_acceleration),
             )
         relative_speed = y - belt_speed
         friction = normal * law.friction(relative_speed, sign, memory, switches.law)
@@ -185,6 +185,13 @@ class DriveSystem(HybridSystem):
             ),
             marks=(y, acceleration),
         )
+
+    def _marks_of_stick(self, speed: Any, acceleration: Any) -> tuple[Any, ...]:
+        if self._steady:
+            return ()
+        epoch = hy.par[self.index["epoch"]]  # added to the time everywhere
+        varies = hy.diff(acceleration, epoch) != hy.expression(0.0)
+        return (speed, acceleration) if varies else (speed,)
 
     def reach_belt(self, mode: Mode, instant: Instant) -> Mode:
         """Stick, or slip on in either direction, where the slide reaches the belt speed."""

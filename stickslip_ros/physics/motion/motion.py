@@ -221,5 +221,6 @@ class Motion(HybridMotion):
         if system.control is not None:
             state[_W] = (y - filtered / drive.speed_scale) / system.control.corner_frequency
         self._use(system)
+        self._instant.time = self._time * drive.angular_frequency
         self.force = force
         self._set_state(state)
