@@ -88,6 +88,8 @@ def _check_constant(constant: Constant) -> None:
     name, default = constant.name, constant.default
     if name in _RESERVED or name.startswith("_") or not name.isascii():
         raise InvalidInputError(f"has a constant {name}: the name cannot be that of a parameter")
+    if isinstance(default, tuple):
+        return
     least = max(constant.at_least, SMALLEST if constant.positive else -LARGEST)
     if not isinstance(cast(Any, default), int | float) or not least <= default <= LARGEST:
         raise InvalidInputError(
@@ -115,7 +117,7 @@ def _one_for_all(constant: Constant) -> Mapping[str, str]:
     return {
         "unit": constant.unit or "none",
         "bounds": " and ".join(bounds) or "none",
-        "default": repr(float(constant.default)),
+        "default": repr(constant.default if constant.whole else float(cast(Any, constant.default))),
     }
 
 

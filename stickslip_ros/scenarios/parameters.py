@@ -7,7 +7,7 @@ models. The nested field `friction.static` is the ROS parameter of that name.
 import re
 from collections.abc import Callable
 from dataclasses import fields
-from math import inf, isinf, pi, sqrt
+from math import ceil, inf, isinf, pi, sqrt
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, create_model, model_validator
@@ -44,14 +44,19 @@ def _known_law(name: str) -> str:
 
 
 def _constants_of_laws() -> dict[str, Any]:
-    """Return a field for each constant of the laws, by name."""
+    """Return a field for each constant of the laws that is one number, by name."""
     laws: dict[str, list[str]] = {}
     constants: dict[str, Constant] = {}
     for law in LAWS.values():
         for name, constant in constants_of(law).items():
+            if isinstance(constant.default, tuple):
+                continue
             constants.setdefault(name, constant)
             laws.setdefault(name, []).append(law.name)
-    return {name: (float, _field_of(constants[name], laws[name])) for name in constants}
+    return {
+        name: (int if constant.whole else float, _field_of(constant, laws[name]))
+        for name, constant in constants.items()
+    }
 
 
 def _field_of(constant: Constant, laws: list[str]) -> Any:
@@ -60,7 +65,12 @@ def _field_of(constant: Constant, laws: list[str]) -> Any:
         meaning = f"{meaning.removesuffix('.')} ({', '.join(laws)})."
     least = max(constant.at_least, SMALLEST if constant.positive else -inf)
     bounds: dict[str, Any] = {} if least == -inf else {"ge": least}
-    return field(float(constant.default), meaning, constant.unit, **bounds)
+    default: Any = constant.default
+    if constant.whole:
+        bounds = {bound: ceil(value) for bound, value in bounds.items()}
+    return field(
+        int(default) if constant.whole else float(default), meaning, constant.unit, **bounds
+    )
 
 
 add_laws_of_other_packages()
@@ -84,7 +94,8 @@ class _ChosenLaw(ParameterGroup):
     def as_law(self) -> FrictionLaw:
         """Return the friction law in SI units."""
         law = LAWS[self.law]
-        return law(**{name: getattr(self, name) for name in law.constants()})
+        known = type(self).model_fields
+        return law(**{name: getattr(self, name) for name in law.constants() if name in known})
 
 
 class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_laws())):

@@ -20,10 +20,12 @@ class FrictionLaw(ABC):
     A law is a frozen dataclass of its constants, each described by `constant`. Its equations are
     written once; they accept floats, numpy arrays and heyoka expressions, and so do the constants.
 
-    A static law defines `coefficient`. A law with a memory also has `states` with their rates, and
-    no stick: the slide always slips, however slowly. A law in pieces, or whose elements stick and
-    slip, has `switches`: values that are constant in each of its modes. A mode ends where one of
-    `margins` falls to zero; `switches_after` then gives the next one.
+    Coefficients have the sign of the force on the slide: below zero while v_r > 0. A static law
+    defines `coefficient`. A law with a memory also has `states` with their rates, and no stick: the
+    slide always slips, however slowly. A law in pieces, or whose elements stick and slip, has
+    `switches`: values that are constant in each of its modes, such as the polynomial coefficients
+    of a piece. All modes then share one compiled flow. A mode ends where one of `margins` falls to
+    zero; `switches_after` then gives the next one.
 
     Examples
     --------
@@ -79,7 +81,11 @@ class FrictionLaw(ABC):
 
     @property
     def limits(self) -> tuple[Any, Any]:
-        """Largest |F|/N during stick before the slide slips forward (v_r > 0), and backward."""
+        """Largest |F|/N during stick before the slide slips forward (v_r > 0), and backward.
+
+        By default both are `static`. Friction is continuous where slip starts if they are
+        -coefficient(0, 1) and coefficient(0, -1).
+        """
         return self.static, self.static
 
     def friction(
@@ -149,7 +155,8 @@ class FrictionLaw(ABC):
         Returns
         -------
         sequence of float or expression
-            Margins; as many in every mode, and a constant above zero where there is none.
+            Margins of the order of one; as many in every mode. Where a mode lacks one it must be a
+            constant above zero, made from the switches, for example slips + (1 - slips) * margin.
         """
         return ()
 
@@ -199,6 +206,9 @@ class FrictionLaw(ABC):
 
     def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
         """Return the memory in steady slip: the start of the search for an equilibrium.
+
+        A law whose elements stick and slip must define it, so that `switches_at` gives the mode of
+        steady slip there.
 
         Parameters
         ----------
