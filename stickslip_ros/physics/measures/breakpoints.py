@@ -48,30 +48,44 @@ class Breakpoints(Table):
         return cls(none, none, none, np.empty(0, dtype=bool))
 
 
+def sticks(velocity: FloatArray, belt_velocity: FloatArray, stick_speed: float = 0.0) -> BoolArray:
+    """Return which samples stick: those with a relative speed of at most `stick_speed` (m/s).
+
+    With 0 a sample sticks only at exactly the velocity of the belt.
+    """
+    return np.abs(velocity - belt_velocity) <= stick_speed
+
+
 def breakpoints_from_samples(
     time: FloatArray,
     position: FloatArray,
     velocity: FloatArray,
     belt_velocity: FloatArray,
     *,
+    stick_speed: float = 0.0,
     exact_times: bool = True,
 ) -> Breakpoints:
     """Return the samples of a motion with interpolated stick edges, turning points and peaks.
 
-    A sample sticks when its velocity is that of the belt. Between two samples the displacement is
-    interpolated by the cubic that has both positions and both velocities. The arrays have equal
-    length n and SI units; the result has the n samples and the inserted points. Without
-    `exact_times` no peaks are inserted: they follow from distance over time and could be far too
-    high.
+    A sample sticks when its relative speed is at most `stick_speed` (m/s). Between two samples the
+    displacement is interpolated by the cubic that has both positions and both velocities. The
+    arrays have equal length n and SI units; the result has the n samples and the inserted points.
+    Without `exact_times` no peaks are inserted: they follow from distance over time and could be
+    far too high.
     """
-    stuck = velocity == belt_velocity
+    stuck = sticks(velocity, belt_velocity, stick_speed)
     breakpoints = Breakpoints(
         time, position, velocity, np.concatenate([[False], stuck[1:] & stuck[:-1]])
     )
-    breakpoints = _with_stick_edges(breakpoints, stuck, belt_velocity)
-    breakpoints = _with_interior_points(breakpoints, _Cubics.turning_points, velocity=0.0)
+    breakpoints = _with_stick_edges(breakpoints, stuck, belt_velocity, stick_speed)
+    # A slide that moves exactly with the belt turns with it; one that is only near the belt's
+    # velocity may turn while it sticks.
+    sticking = breakpoints.sticking
+    straight = sticking if stick_speed == 0.0 else np.zeros_like(sticking)
+    breakpoints = _with_interior_points(breakpoints, _Cubics.turning_points, straight, velocity=0.0)
     if exact_times:
-        breakpoints = _with_interior_points(breakpoints, _Cubics.velocity_peaks)
+        sticking = breakpoints.sticking
+        breakpoints = _with_interior_points(breakpoints, _Cubics.velocity_peaks, sticking)
     return breakpoints
 
 
@@ -81,38 +95,49 @@ def _insert(breakpoints: Breakpoints, at: npt.NDArray[np.intp], new: Breakpoints
 
 
 def _with_stick_edges(
-    breakpoints: Breakpoints, stuck: BoolArray, belt_velocity: FloatArray
+    breakpoints: Breakpoints, stuck: BoolArray, belt_velocity: FloatArray, stick_speed: float
 ) -> Breakpoints:
-    """Insert the instant at which the slide lands on the belt or leaves it.
+    """Insert the instant at which the slide starts or stops to stick.
 
-    The slide slips for a part s of the interval, next to its slipping end, where the relative
-    speed is r; for the other part it moves with the belt. The displacement relative to the belt is
-    then r s / 2 on landing (the relative speed falls linearly) and r s / 3 on leaving (the spring
-    has just reached the limit, so the relative speed starts quadratically).
+    For a part s of the interval, next to its slipping end, the velocity differs from that of the
+    sticking end; for the other part it equals it. The difference is r at the slipping end and has
+    the power p of the time from where it starts: p = 1 on landing (it falls linearly) and p = 2 on
+    leaving (the spring has just reached the limit). The displacement relative to a slide with the
+    velocity of the sticking end is then r s / (p + 1). Where s would be longer than the interval,
+    it is the interval, and p follows from this displacement. The edge is where the relative speed
+    is `stick_speed`: with 0 at the end of s, otherwise within s.
     """
     edges = np.flatnonzero(stuck[1:] != stuck[:-1])
     if len(edges) == 0:
         return breakpoints
     landing = stuck[edges + 1]
-    belt = np.where(landing, belt_velocity[edges + 1], belt_velocity[edges])
+    at_stick, at_slip = np.where(landing, edges + 1, edges), np.where(landing, edges, edges + 1)
+    riding, slipping = breakpoints.velocity[at_stick], breakpoints.velocity[at_slip]
+    stick_excess, slip_excess = riding - belt_velocity[at_stick], slipping - belt_velocity[at_slip]
     step = breakpoints.time[edges + 1] - breakpoints.time[edges]
-    relative_displacement = (
-        breakpoints.position[edges + 1] - breakpoints.position[edges] - belt * step
-    )
-    slipping_speed = (
-        np.where(landing, breakpoints.velocity[edges], breakpoints.velocity[edges + 1]) - belt
-    )
-    order = np.where(landing, 2.0, 3.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slip_time = np.nan_to_num(order * relative_displacement / slipping_speed, nan=0.0)
-    slip_time = np.clip(slip_time, 0.0, step)
-    stick_time = step - slip_time
-    instant = np.where(landing, slip_time, stick_time)
+    displacement = breakpoints.position[edges + 1] - breakpoints.position[edges] - riding * step
+    difference = slipping - riding
+    power = np.where(landing, 1.0, 2.0)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        slip_time = np.nan_to_num((power + 1.0) * displacement / difference, nan=0.0)
+        whole = slip_time > step
+        slip_time = np.clip(slip_time, 0.0, step)
+        power = np.where(whole, np.maximum(difference * step / displacement - 1.0, 0.0), power)
+        # The part of the difference within which the slide already, or still, sticks.
+        limit = np.copysign(stick_speed, slip_excess)
+        part = (limit - stick_excess) / (slip_excess - stick_excess)
+        near_time = slip_time * part ** (1.0 / power)
+    near = difference * part * near_time / (power + 1.0)
+    slip_time = slip_time - near_time
+    instant = np.where(landing, slip_time, step - slip_time)
     riding_from = np.where(
-        landing, breakpoints.position[edges + 1] - belt * step, breakpoints.position[edges]
+        landing, breakpoints.position[edges + 1] - riding * step, breakpoints.position[edges]
     )
     edge_breakpoints = Breakpoints(
-        breakpoints.time[edges] + instant, riding_from + belt * instant, belt, ~landing
+        breakpoints.time[edges] + instant,
+        riding_from + riding * instant + np.where(landing, -near, near),
+        riding + difference * part,
+        ~landing,
     )
     sticking = breakpoints.sticking.copy()
     sticking[edges + 1] = landing
@@ -156,11 +181,17 @@ class _Cubics:
 
 
 def _with_interior_points(
-    breakpoints: Breakpoints, find: Callable[[_Cubics], FloatArray], velocity: float | None = None
+    breakpoints: Breakpoints,
+    find: Callable[[_Cubics], FloatArray],
+    straight: BoolArray,
+    velocity: float | None = None,
 ) -> Breakpoints:
-    """Insert the points that `find` returns for slip, with `velocity` where it is known."""
+    """Insert the points that `find` returns, with `velocity` where it is known.
+
+    Before the breakpoints that are `straight` there are none.
+    """
     cubics = _Cubics.through(breakpoints)
-    u = np.where(breakpoints.sticking[1:], np.nan, find(cubics))
+    u = np.where(straight[1:], np.nan, find(cubics))
     # A jump onto the belt takes no time: there are no points within it.
     at = np.flatnonzero(np.isfinite(u) & (np.diff(breakpoints.time) > 0.0))
     if len(at) == 0:
@@ -172,6 +203,6 @@ def _with_interior_points(
         breakpoints.time[at] + u * step,
         breakpoints.position[at] + step * u * (start + u * (slope / 2.0 + u * curvature / 3.0)),
         reached if velocity is None else np.full(len(at), velocity),
-        np.zeros(len(at), dtype=bool),
+        breakpoints.sticking[at + 1],
     )
     return _insert(breakpoints, at + 1, new)

@@ -15,14 +15,19 @@ class RunMeter:
     """Measures a run from its record: the samples and the control forces."""
 
     def __init__(
-        self, window: int, *, dropped_known: bool = False, observer: RunObserver | None = None
+        self,
+        window: int,
+        *,
+        dropped_known: bool = False,
+        observer: RunObserver | None = None,
+        stick_speed: float = 0.0,
     ) -> None:
         """Average over the last `window` cycles at most; an `observer` receives motion and forces.
 
         `dropped_known` says whether dropped forces are reported; only then is it known which forces
-        acted.
+        acted. `stick_speed` (m/s) as in `SampleMeter`.
         """
-        self.motion = SampleMeter(window, observer)
+        self.motion = SampleMeter(window, observer, stick_speed=stick_speed)
         self.force = ForceMeter()
         """Control force as it was published."""
         self.applied = ForceMeter()

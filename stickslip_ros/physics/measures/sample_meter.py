@@ -1,10 +1,11 @@
 """The measures of a motion from its samples."""
 
 from dataclasses import replace
-from math import inf
+from math import inf, isfinite
 
 import numpy as np
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.breakpoints import breakpoints_from_samples
 from stickslip_ros.physics.measures.cycle_measures import (
     UNBOUNDED_BELT_SPEEDS,
@@ -27,8 +28,19 @@ class SampleMeter:
     longer one starts a new segment.
     """
 
-    def __init__(self, window: int, observer: MotionObserver | None = None) -> None:
-        """Average over the last `window` cycles at most; an `observer` receives the motion."""
+    def __init__(
+        self, window: int, observer: MotionObserver | None = None, *, stick_speed: float = 0.0
+    ) -> None:
+        """Average over the last `window` cycles at most; an `observer` receives the motion.
+
+        The slide sticks at a relative speed of at most `stick_speed` (m/s): 0 for exact samples,
+        otherwise less than the belt speed. Raises InvalidInputError if it is negative or not
+        finite.
+        """
+        if not (isfinite(stick_speed) and stick_speed >= 0.0):
+            raise InvalidInputError(
+                f"stick_speed = {stick_speed} is refused: must be finite and at least 0 (m/s)"
+            )
         self.origin = 0
         """Stamp of time zero for the observer, ns."""
         self.samples = 0
@@ -36,6 +48,7 @@ class SampleMeter:
         self.steps_back = 0
         """Number of samples whose stamp is not later than the previous one."""
         self._observer = observer
+        self._stick_speed = stick_speed
         self._grid = SamplingGrid()
         self._meter = CycleMeter(window)
         self._last: SampleColumns | None = None
@@ -94,6 +107,7 @@ class SampleMeter:
                 samples.position,
                 samples.velocity,
                 samples.belt_velocity,
+                stick_speed=self._stick_speed,
                 exact_times=not jittered,
             )
         if self._last is not None:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.physics.measures.sample_meter import SampleMeter
@@ -398,3 +399,50 @@ def test_two_publishers_on_one_topic_are_noted(size: int) -> None:
     (note,) = meter.report()["notes"]
     assert "200 of 400 samples" in note
     assert "the samples of several plants are mixed" in note
+
+
+def noisy(samples: SampleColumns, error: float) -> SampleColumns:
+    """With velocities that are wrong by `error` at most."""
+    errors = np.random.default_rng(1).uniform(-error, error, len(samples))
+    return replace(samples, velocity=samples.velocity + errors)
+
+
+@given(st.lists(st.integers(1, 7000), max_size=5).map(sorted))
+def test_noisy_samples_stick_near_the_velocity_of_the_belt(starts: list[int]) -> None:
+    """However they are cut into blocks."""
+    samples = noisy(limit_cycle(), 3e-4)
+    exact, meter = SampleMeter(window=20), RunMeter(window=20, stick_speed=1e-3)
+    exact.feed(samples)
+    assert exact.measures().regime is Regime.PURE_SLIP
+    for start, end in zip([0, *starts], [*starts, 7001], strict=True):
+        meter.motion.feed(samples[start:end])
+    measures = meter.motion.measures()
+    (expected,) = (cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.2)
+    assert measures.cycles == 9
+    assert measures.regime is Regime.STICK_SLIP
+    assert measures.amplitude == pytest.approx(expected.amplitude, rel=1e-4)
+    assert measures.period == pytest.approx(expected.period, rel=1e-3)
+    # The slide leaves the belt slowly and is near its velocity for some time.
+    without_noise = SampleMeter(window=20, stick_speed=1e-3)
+    without_noise.feed(limit_cycle())
+    stick_fraction = without_noise.measures().stick_fraction
+    assert stick_fraction is not None
+    assert expected.stick_fraction < stick_fraction < expected.stick_fraction + 0.02
+    assert measures.stick_fraction == pytest.approx(stick_fraction, abs=1e-3)
+
+
+def test_a_slide_that_moves_little_on_a_belt_at_rest_is_stuck() -> None:
+    samples = noisy(still(stamps(100, 1000)), 1e-4)
+    at_rest = replace(samples, belt_velocity=np.zeros(1000))
+    exact, meter = SampleMeter(window=20), SampleMeter(window=20, stick_speed=1e-3)
+    for each in (exact, meter):
+        each.feed(at_rest)
+    assert exact.measures().regime is Regime.PURE_SLIP
+    assert meter.measures().regime is Regime.STUCK
+
+
+@pytest.mark.parametrize("stick_speed", [-1e-9, np.inf, np.nan])
+def test_a_stick_speed_that_is_none_is_refused(stick_speed: float) -> None:
+    for meter in (SampleMeter, RunMeter):
+        with pytest.raises(InvalidInputError, match=r"stick_speed = .* must be finite"):
+            meter(20, stick_speed=stick_speed)
