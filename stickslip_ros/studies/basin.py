@@ -223,7 +223,7 @@ def default_axes(scenario: Scenario, count: int) -> tuple[Axis, Axis]:
     [5, 5]
     """
     drive = scenario.plant.as_drive()
-    bent = drive.friction.static * drive.length_scale
+    bent = max(drive.friction.limits) * drive.length_scale
     reach = 2.0 * max(abs(drive.belt_speed) / drive.angular_frequency, bent)
     middle, speed = drive.equilibrium_position, reach * drive.angular_frequency
     return (

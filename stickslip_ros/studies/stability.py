@@ -60,7 +60,7 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
     if plant.force_jitter > 0.0 and "sampled_loop" not in notes:
         notes["sampled_loop"] = "force_jitter is omitted: the delay of the force is constant here"
     if expansion is None:
-        reach = float(drive.friction.static) * drive.length_scale
+        reach = float(max(drive.friction.limits)) * drive.length_scale
         shown = f"{reach:.4g}" if drive.is_dimensionless else quantity(reach, "m")
         reason = (
             "the belt is at rest, and friction holds the slide anywhere within mu_s N / k = "

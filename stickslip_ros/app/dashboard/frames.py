@@ -110,7 +110,7 @@ def _axes(drive: Drive | None) -> list[tuple[float, str]]:
     """
     largest = (1.0, 1.0, 1.0)
     if drive is not None:
-        friction = abs(float(drive.friction.static)) * drive.normal_force
+        friction = float(max(drive.friction.limits)) * drive.normal_force
         speed = abs(drive.belt_speed) or drive.speed_scale
         largest = (friction / drive.stiffness, speed, friction)
     units = Units.for_drive(drive)

@@ -40,7 +40,7 @@ class Constant:
     """Smallest allowed value."""
     positive: bool
     """Whether the value must be above zero."""
-    whole: bool
+    whole: bool = False
     """Whether it is a whole number that makes the equations, such as a number of elements."""
 
 
