@@ -1,7 +1,7 @@
 """A drive as a hybrid system: slip and stick of the slide, and the modes of its law and courses."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import accumulate
 from math import copysign, inf, ulp
@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import heyoka as hy
 
 from stickslip_ros.physics.model import equations
-from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.course import NoCourse
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
@@ -23,6 +22,7 @@ from stickslip_ros.physics.model.hybrid import (
     structure_number,
     with_switches,
 )
+from stickslip_ros.physics.model.symbols import numbers, structure, with_symbols
 
 POSITION, SPEED, MEMORY = 0, 1, 2
 """Indices of X and Y in a state, and of the first state of the law's memory."""
@@ -103,15 +103,15 @@ class DriveSystem(HybridSystem):
         # Where the switches of law, belt and load start, after the sign.
         self._ends = list(accumulate(map(len, parts[:2]), initial=1))
         self._control_states = slice(MEMORY + len(law.states), None)
-        self.structure = structure_number((_structure(self.drive), _structure(self.control)))
+        self.structure = structure_number((structure(self.drive), structure(self.control)))
         self._steady = isinstance(self.drive.belt, NoCourse)
         self.constants = {
             "damping": self.drive.damping,
             "belt_speed": self.drive.belt_speed,
-            **_numbers(law, "friction"),
-            **_numbers(self.drive.belt, "belt"),
-            **_numbers(self.drive.load, "load"),
-            **(_numbers(self.control, "control") if self.control is not None else {}),
+            **numbers(law, "friction"),
+            **numbers(self.drive.belt, "belt"),
+            **numbers(self.drive.load, "load"),
+            **(numbers(self.control, "control") if self.control is not None else {}),
         }
         self._belt_speed, self._normal_force = self.drive.belt_speed, self.drive.normal_force
         # The speed relative to the belt with which a slide starts to slip.
@@ -323,7 +323,7 @@ class DriveSystem(HybridSystem):
         state = instant.state
         acceleration = (
             abs(self.reaction(instant)) + abs(state[POSITION]) + abs(state[SPEED])
-            + self._forward_limit
+            + max(self._forward_limit, self._backward_limit)
         )  # fmt: skip
         return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
 
@@ -368,9 +368,7 @@ class DriveSystem(HybridSystem):
     def held_force(self, mode: Mode, instant: Instant) -> float:
         """Return the friction force that a slide needs to move with the belt."""
         if self._steady:
-            state = instant.state
-            force = instant.inputs[0] if self.control is None else self.control_force(instant)
-            return self._reaction(state[POSITION], state[SPEED], force)
+            return self.reaction(instant)
         tiny = 1e-30j  # imaginary, so that nothing cancels
         switches = self._by_part(mode.switches).belt
         speed: Any = equations.belt_speed(self.drive, instant.time + tiny, switches)
@@ -393,26 +391,19 @@ class DriveSystem(HybridSystem):
 
     @cached_property
     def _symbolic(self) -> _SymbolicDrive:
-        constants = self.symbols.constants
-
-        def symbols(prefix: str, part: Any) -> Any:
-            names = {name: f"{prefix}.{name}" for name in _values(part)}
-            return replace(part, **{
-                name: tuple(constants[each] for each in _items(dotted, value))
-                if isinstance(value, tuple) else constants[dotted]
-                for (name, dotted), value in zip(names.items(), _values(part).values(), strict=True)
-            })  # fmt: skip
-
-        drive = replace(
-            self.drive,
+        drive, constants = self.drive, self.symbols.constants
+        symbolic = replace(
+            drive,
             damping=constants["damping"],
             belt_speed=constants["belt_speed"],
-            friction=symbols("friction", self.drive.friction),
-            belt=symbols("belt", self.drive.belt),
-            load=symbols("load", self.drive.load),
+            friction=with_symbols(drive.friction, "friction", constants),
+            belt=with_symbols(drive.belt, "belt", constants),
+            load=with_symbols(drive.load, "load", constants),
         )
-        control = None if self.control is None else symbols("control", self.control)
-        return _SymbolicDrive(drive, control)
+        control = self.control
+        return _SymbolicDrive(
+            symbolic, None if control is None else with_symbols(control, "control", constants)
+        )
 
     def _memory(self, instant: Instant) -> Sequence[float]:
         return () if self._sticks else instant.state[MEMORY : self._control_states.start].tolist()
@@ -447,9 +438,7 @@ class DriveSystem(HybridSystem):
         """Return the mode of a slide that has the speed of the belt."""
         if self._sticks:
             if self._plain:
-                normal, state = self._normal_force, instant.state
-                force = instant.inputs[0] if self.control is None else self.control_force(instant)
-                held = self._reaction(state[POSITION], state[SPEED], force)
+                normal, held = self._normal_force, self.reaction(instant)
             else:
                 normal = self.normal_force(mode, instant.time)
                 held = self.held_force(mode, instant)
@@ -482,48 +471,3 @@ def _by_time(drive: Drive, time: Any, switches: Sequence[Any], zero: Any) -> Any
     if not isinstance(speed, hy.expression):
         return zero
     return zero + hy.subs(hy.diff(speed, instant), {instant: time})
-
-
-def _values(part: Any) -> dict[str, Any]:
-    """Return the fields of a part that are numbers, or tuples of them, by name.
-
-    Whole numbers, such as the number of elements, are no constants of the equations.
-    """
-    whole = {name for name, each in constants_of(type(part)).items() if each.whole}
-    values = {each.name: getattr(part, each.name) for each in fields(part)}
-    return {
-        name: value
-        for name, value in values.items()
-        if name not in whole and isinstance(value, int | float | tuple)
-    }
-
-
-def _items(name: str, value: Any) -> dict[str, float]:
-    """Return a number, or the items of a tuple, by name."""
-    if not isinstance(value, tuple):
-        return {name: float(value)}
-    items: tuple[float, ...] = value
-    return {f"{name}[{number}]": float(each) for number, each in enumerate(items)}
-
-
-def _numbers(part: Any, prefix: str) -> dict[str, float]:
-    """Return the constants of a part by name."""
-    return {
-        name: number
-        for field, value in _values(part).items()
-        for name, number in _items(f"{prefix}.{field}", value).items()
-    }
-
-
-def _structure(part: Any) -> Any:
-    """Return what of a part, apart from the numbers in it, makes its equations; hashable."""
-    if not is_dataclass(part):
-        return part
-    values = _values(part)
-    lengths = {name: len(value) for name, value in values.items() if isinstance(value, tuple)}
-    others = {
-        each.name: _structure(getattr(part, each.name))
-        for each in fields(part)
-        if each.name not in values
-    }
-    return type(part), *lengths.items(), *others.items()

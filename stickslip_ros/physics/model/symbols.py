@@ -1,0 +1,63 @@
+"""Parts of a drive with expressions for their constants."""
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+from stickslip_ros.physics.model.constants import constants_of
+
+_Part = TypeVar("_Part")
+
+
+def numbers(part: Any, prefix: str) -> dict[str, float]:
+    """Return the constants of a part by name; those of a table one by one."""
+    return {
+        name: number
+        for field, value in _values(part).items()
+        for name, number in _items(f"{prefix}.{field}", value).items()
+    }
+
+
+def with_symbols(part: _Part, prefix: str, symbols: Mapping[str, Any]) -> _Part:
+    """Return a part with the expressions of these names for its constants, see `numbers`."""
+    changes: dict[str, Any] = {}
+    for field, value in _values(part).items():
+        found = [symbols[name] for name in _items(f"{prefix}.{field}", value)]
+        changes[field] = tuple(found) if isinstance(value, tuple) else found[0]
+    return replace(part, **changes)  # type: ignore[type-var]
+
+
+def structure(part: Any) -> Any:
+    """Return what of a part, apart from the numbers in it, makes its equations; hashable."""
+    if not is_dataclass(part):
+        return part
+    values = _values(part)
+    lengths = {name: len(value) for name, value in values.items() if isinstance(value, tuple)}
+    others = {
+        each.name: structure(getattr(part, each.name))
+        for each in fields(part)
+        if each.name not in values
+    }
+    return type(part), *lengths.items(), *others.items()
+
+
+def _values(part: Any) -> dict[str, Any]:
+    """Return the fields of a part that are numbers, or tuples of them, by name.
+
+    Whole numbers, such as the number of elements, are no constants of the equations.
+    """
+    whole = {name for name, each in constants_of(type(part)).items() if each.whole}
+    values = {each.name: getattr(part, each.name) for each in fields(part)}
+    return {
+        name: value
+        for name, value in values.items()
+        if name not in whole and isinstance(value, int | float | tuple)
+    }
+
+
+def _items(name: str, value: Any) -> dict[str, float]:
+    """Return a number, or the items of a tuple, by name."""
+    if not isinstance(value, tuple):
+        return {name: float(value)}
+    items: tuple[float, ...] = value
+    return {f"{name}[{number}]": float(each) for number, each in enumerate(items)}
