@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 import heyoka as hy
 
 
-class Mode(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Mode:
     """Mode of a hybrid system: a flow, and values that are constant in the mode.
 
     A system of several parts has a mode of each part in `switches`, one after another: the modes of
