@@ -14,10 +14,15 @@ from stickslip_ros.physics.motion import Motion, compiled_flow
 from stickslip_ros.physics.motion.recorded_motion import RecordedMotion
 from stickslip_ros.physics.motion.variational import SensitiveMotion
 from tests.examples import examples
-from tests.physics.parts import Dahl, OneSided, Swing
+from tests.physics.parts import Dahl, Iwan, OneSided, Ramp, Swing
 
-LAWS = [Stribeck(0.4, 0.25, 0.5), Dahl(static=0.4), OneSided(static=0.3)]
-SWINGS = [{}, {"belt": Swing(0.1, 0.2)}, {"load": Swing(0.3, 0.1)}]
+LAWS = [Stribeck(0.4, 0.25, 0.5), Dahl(static=0.4), OneSided(static=0.3), Iwan(static=0.4)]
+SWINGS = [
+    {},
+    {"belt": Swing(0.1, 0.2)},
+    {"load": Swing(0.3, 0.1)},
+    {"belt": Ramp(), "load": Ramp(0.4)},
+]
 
 
 def drive(law, belt_speed=0.3, **courses) -> Drive:
@@ -107,3 +112,25 @@ def test_transition_is_that_of_finite_differences(law) -> None:
     columns = [(end(start + h) - end(start - h)) / 2e-6 for h in 1e-6 * np.eye(motion.order)]
     end(start)
     np.testing.assert_allclose(motion.transition, np.transpose(columns), rtol=1e-5, atol=1e-7)
+
+
+@given(drives, starts)
+@examples(quick=10, thorough=200)
+def test_no_guard_is_passed_over(tested: Drive, start: tuple[float, float]) -> None:
+    motion = Motion(tested, *start)
+    for number in range(1, 201):
+        motion.advance(0.05)
+        time = 0.05 * number
+        belt, load = (
+            course.value(time, course.switches_at(time)) for course in (tested.belt, tested.load)
+        )
+        forward, backward = tested.friction.limits
+        relative_speed = motion.velocity - tested.belt_speed - belt
+        if motion.sticking:
+            assert abs(relative_speed) < 1e-9
+            assert -forward * (1.0 + load) - 1e-9 <= motion.friction_force
+            assert motion.friction_force <= backward * (1.0 + load) + 1e-9
+        elif not tested.friction.states and abs(relative_speed) > 1e-9:
+            assert motion.friction_force * relative_speed < 0.0
+        if isinstance(tested.friction, Dahl | Iwan):
+            assert abs(motion.friction_force) <= 0.4 * (1.0 + load) + 1e-9
