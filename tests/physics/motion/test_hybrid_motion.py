@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Stribeck
 from stickslip_ros.physics.motion import Motion, compiled_flow
 from stickslip_ros.physics.motion.recorded_motion import RecordedMotion
@@ -134,3 +135,28 @@ def test_no_guard_is_passed_over(tested: Drive, start: tuple[float, float]) -> N
             assert motion.friction_force * relative_speed < 0.0
         if isinstance(tested.friction, Dahl | Iwan):
             assert abs(motion.friction_force) <= 0.4 * (1.0 + load) + 1e-9
+
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+
+
+@given(drives, starts, st.sampled_from([None, WashoutGains(0.5, -0.1, -0.05)]))
+@examples(quick=10, thorough=100)
+def test_energy_gained_is_the_work_done(
+    tested: Drive, start: tuple[float, float], control: WashoutGains | None
+) -> None:
+    recorded = RecordedMotion(tested, *start, control=control)
+    recorded.advance(5.0)
+    corners = np.clip(recorded.take_breakpoints().time, 0.0, 5.0)
+    ends = np.unique([*corners, *np.linspace(0.0, 5.0, 201)])
+    motion, time, work = Motion(tested, *start, control=control), 0.0, 0.0
+    for before, after in pairwise(ends.tolist()):
+        for node, weight in zip((1.0 + NODES) / 2.0, WEIGHTS / 2.0, strict=True):
+            instant = before + node * (after - before)
+            motion.advance(instant - time)
+            time, speed = instant, motion.velocity
+            force = motion.friction_force + motion.applied_force - tested.damping * speed
+            work += weight * (after - before) * force * speed
+    motion.advance(5.0 - time)
+    energies = [(x * x + v * v) / 2.0 for x, v in (start, (motion.position, motion.velocity))]
+    assert energies[1] - energies[0] == pytest.approx(work, abs=1e-8)
