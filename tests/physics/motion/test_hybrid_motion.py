@@ -36,7 +36,7 @@ drives = st.builds(
     st.sampled_from([-0.4, 0.0, 0.3]),
     st.sampled_from(SWINGS),
 )
-starts = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+starts = st.tuples(st.floats(-1.0, 1.0), st.sampled_from([-0.4, 0.0, 0.3]) | st.floats(-1.0, 1.0))
 
 
 @given(drives, starts, st.lists(st.floats(0.0, 1.0), max_size=4))
@@ -160,3 +160,8 @@ def test_energy_gained_is_the_work_done(
     motion.advance(5.0 - time)
     energies = [(x * x + v * v) / 2.0 for x, v in (start, (motion.position, motion.velocity))]
     assert energies[1] - energies[0] == pytest.approx(work, abs=1e-8)
+
+
+@pytest.mark.parametrize(("position", "sticks"), [(0.59, 1), (0.61, 0), (-0.29, 1), (-0.31, 0)])
+def test_each_direction_has_its_limit(position: float, sticks: int) -> None:
+    assert Motion(drive(OneSided(static=0.3), 0.0), position, 0.0).sticking == bool(sticks)
