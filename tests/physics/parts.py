@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from math import pi
 from typing import Any, ClassVar
 
+import numpy as np
+
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.course import Course
 from stickslip_ros.physics.model.friction import FrictionLaw
@@ -130,3 +132,38 @@ class Iwan(FrictionLaw):
         self, margin: int, sign: float, switches: Sequence[float]
     ) -> Sequence[float]:
         return (1.0,)
+
+
+@dataclass(frozen=True)
+class Pieces(FrictionLaw):
+    """Falls in a straight line up to a speed, then stays: two pieces."""
+
+    name = "pieces"
+    switches: ClassVar[Sequence[str]] = ("fast",)
+    corner: Any = constant(0.5, "Speed from which the coefficient is constant.", "m/s")
+    drop: Any = constant(0.3, "Share of the coefficient that is lost.")
+
+    def coefficient(self, relative_speed: Any, sign: Any) -> Any:
+        fast = np.abs(relative_speed) >= self.corner
+        return self.friction(relative_speed, sign, (), (1.0 * fast,))
+
+    def friction(
+        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
+    ) -> Any:
+        lost = switches[0] + (1.0 - switches[0]) * sign * relative_speed / self.corner
+        return -sign * self.static * (1.0 - self.drop * lost)
+
+    def margins(
+        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
+    ) -> Sequence[Any]:
+        return ((2.0 * switches[0] - 1.0) * (sign * relative_speed - self.corner),)
+
+    def switches_at(
+        self, relative_speed: float, sign: float, memory: Sequence[float]
+    ) -> Sequence[float]:
+        return (1.0 if abs(relative_speed) >= self.corner else 0.0,)
+
+    def switches_after(
+        self, margin: int, sign: float, switches: Sequence[float]
+    ) -> Sequence[float]:
+        return (1.0 - switches[0],)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import heyoka as hy
 
+from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model import equations
 from stickslip_ros.physics.model.course import NoCourse
 from stickslip_ros.physics.model.drive import Drive
@@ -47,7 +48,11 @@ starts on one. It also keeps rounding from leading back.
 """
 
 _SMALLEST_STEP = 2.0**-35
-"""Change of the belt speed at a corner below which it is rounding, and not a step."""
+"""Speed below which a change of the belt speed at a corner, or a relative speed, is rounding."""
+
+
+_MOST_AT_ONCE = 100
+"""Number of changes of mode at one instant above which there is no end of them."""
 
 
 class _Parts(NamedTuple):
@@ -100,6 +105,7 @@ class DriveSystem(HybridSystem):
         )
         self._reaction = partial(equations.reaction, self.drive)
         self._one_switch = len(self.switches) == 1
+        self.has_parts = not self._one_switch
         # Where the switches of law, belt and load start, after the sign.
         self._ends = list(accumulate(map(len, parts[:2]), initial=1))
         self._control_states = slice(MEMORY + len(law.states), None)
@@ -225,15 +231,14 @@ class DriveSystem(HybridSystem):
         own = self._by_part(mode.switches).belt
         mode = with_switches(mode, self._ends[1], self.drive.belt.switches_after(margin, own))
         belt_speed = self.belt_speed(mode, instant.time)
-        if abs(belt_speed - before) <= _SMALLEST_STEP:
-            if mode.flow != STICK:
-                return mode
+        relative_speed = instant.state[SPEED] - belt_speed
+        if abs(relative_speed) <= _SMALLEST_STEP:
             instant.state[SPEED] = belt_speed
             return self._resting(mode, instant)  # the acceleration of the belt jumps
-        relative_speed = instant.state[SPEED] - belt_speed
-        if relative_speed == 0.0:
-            return self._resting(mode, instant)
-        return self._slip(mode, copysign(1.0, relative_speed), instant)
+        sign = copysign(1.0, relative_speed)
+        if sign == mode.switches[0] and abs(belt_speed - before) <= _SMALLEST_STEP:
+            return mode
+        return self._slip(mode, sign, instant)
 
     def turn_load(self, mode: Mode, instant: Instant, *, margin: int) -> Mode:
         """Enter the mode that follows at a corner, or a step, of the load's course."""
@@ -243,7 +248,7 @@ class DriveSystem(HybridSystem):
 
     def settled(self, mode: Mode | None, instant: Instant) -> Mode:
         """Return stick, or slip in the direction of the relative speed; see the class."""
-        if mode is not None and self._steady:
+        if mode is not None and self._steady and self._one_switch:
             sign = mode.switches[0]
             if sign != 0.0:
                 if (instant.state[SPEED] - self._belt_speed) * sign > 0.0:
@@ -252,6 +257,10 @@ class DriveSystem(HybridSystem):
                 held = self.reaction(instant)
                 if -self._forward_limit <= held <= self._backward_limit:
                     return mode
+        if mode is not None and self.has_parts:
+            following = self.past(mode, instant)
+            if following is not mode:
+                return following
         if mode is None:
             mode = self._starting(instant)
         elif mode.flow == STICK and not self._steady:  # without the rounding of the integration
@@ -265,6 +274,34 @@ class DriveSystem(HybridSystem):
             return settled
         sign = 1.0 if relative_speed > 0.0 else -1.0
         return mode if mode.switches[0] == sign else self._slip(mode, sign, instant)
+
+    def past(self, mode: Mode, instant: Instant) -> Mode:
+        """Return the mode after the margins of law and courses that rounding has put below zero."""
+        drive = self.drive
+        for _ in range(_MOST_AT_ONCE):
+            own, time = self._by_part(mode.switches), instant.time
+            parts = [
+                (self.turn_belt, drive.belt.margins(time, own.belt)),
+                (self.turn_load, drive.load.margins(time, own.load)),
+            ]
+            if mode.flow == SLIP:
+                speed = instant.state[SPEED] - self.belt_speed(mode, time)
+                sign, memory = mode.switches[0], self._memory(instant)
+                law = drive.friction.margins(speed, sign, memory, own.law)
+                parts.append((self.switch_friction, law))
+            passed = [
+                partial(enter, margin=number)
+                for enter, margins in parts
+                for number, margin in enumerate(margins)
+                if margin <= -_HYSTERESIS / 2.0
+            ]
+            if not passed:
+                return mode
+            mode = passed[0](mode, instant)
+        raise RunError(
+            f"the friction law {drive.friction.name}, or a course of belt or load, changes its "
+            f"mode more than {_MOST_AT_ONCE} times at one instant"
+        )
 
     def is_unbounded(self, instant: Instant) -> bool:
         """Return whether the slide is faster than `UNBOUNDED_SPEED`."""

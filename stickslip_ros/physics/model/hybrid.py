@@ -132,6 +132,16 @@ class HybridSystem(ABC):
         """Advance the state for `duration` or up to a guard; return the guard and the time."""
         raise NotImplementedError
 
+    has_parts = False
+    """Whether several margins may fall to zero at one instant, see `past`."""
+
+    def past(self, mode: Mode, instant: Instant) -> Mode:
+        """Return the mode after all margins that are below zero at an instant.
+
+        heyoka finds the first guard of several at one instant; rounding may put the others behind.
+        """
+        return mode
+
     limits_steps = False
     """Whether `longest_step` limits the steps of the integration."""
 

@@ -185,6 +185,8 @@ class HybridMotion:
             if guard is not None:
                 leads = self._entered.leads[guard] if guard != _DIVERGED else _to_the_end
                 following = leads(system, mode, instant)
+                if following is not None and system.has_parts:
+                    following = system.past(following, instant)
             if watched:
                 self._pass(mode, guard, following, now)
             if following is None:
