@@ -81,6 +81,8 @@ class Drive:
     @cached_property
     def dimensionless(self) -> Self:
         """The same drive in these units, eq. 2: m = k = N = 1."""
+        if self.is_dimensionless:
+            return self
         scales = self.scales
         return type(self)(
             mass=1.0,

@@ -109,7 +109,9 @@ class DriveSystem(HybridSystem):
         # Where the switches of law, belt and load start, after the sign.
         self._ends = list(accumulate(map(len, parts[:2]), initial=1))
         self._control_states = slice(MEMORY + len(law.states), None)
-        self.structure = structure_number((structure(self.drive), structure(self.control)))
+        self.structure = structure_number(
+            tuple(map(structure, (law, self.drive.belt, self.drive.load, self.control)))
+        )
         self._steady = isinstance(self.drive.belt, NoCourse)
         self.constants = {
             "damping": self.drive.damping,
@@ -475,7 +477,9 @@ class DriveSystem(HybridSystem):
         """Return the mode of a slide that has the speed of the belt."""
         if self._sticks:
             if self._plain:
-                normal, held = self._normal_force, self.reaction(instant)
+                normal, state = self._normal_force, instant.state
+                force = instant.inputs[0] if self.control is None else self.control_force(instant)
+                held = self._reaction(state[POSITION], state[SPEED], force)
             else:
                 normal = self.normal_force(mode, instant.time)
                 held = self.held_force(mode, instant)

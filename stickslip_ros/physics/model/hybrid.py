@@ -66,6 +66,11 @@ class Flow:
     marks: tuple[Any, ...] = ()
     """Expressions at whose zeros a recorded motion has breakpoints."""
 
+    @cached_property
+    def leads(self) -> tuple[Leads, ...]:
+        """Where each guard leads."""
+        return tuple(guard.leads for guard in self.guards)
+
 
 class Symbols(NamedTuple):
     """The variables of a system, as expressions."""
@@ -163,11 +168,13 @@ class HybridSystem(ABC):
         """The states as variables of expressions."""
         return tuple(hy.expression(name) for name in self.states)
 
-    @cached_property
-    def index(self) -> dict[str, int]:
+    @property
+    def index(self) -> Mapping[str, int]:
         """Index of constants, inputs, switches and of the time at the start, by name."""
-        names = (*self.constants, *self.inputs, *self.switches, "epoch")
-        return {name: number for number, name in enumerate(names)}
+        if self.structure not in _indices:
+            names = (*self.constants, *self.inputs, *self.switches, "epoch")
+            _indices[self.structure] = {name: number for number, name in enumerate(names)}
+        return _indices[self.structure]
 
     @cached_property
     def symbols(self) -> Symbols:
@@ -183,6 +190,7 @@ class HybridSystem(ABC):
 
 
 _flows: dict[tuple[int, str], Flow] = {}
+_indices: dict[int, Mapping[str, int]] = {}
 _structures: dict[Hashable, int] = {}
 
 

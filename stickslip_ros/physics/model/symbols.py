@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
+from functools import cache
 from typing import Any, TypeVar
 
 from stickslip_ros.physics.model.constants import constants_of
@@ -31,14 +32,15 @@ def structure(part: Any) -> Any:
     """Return what of a part, apart from the numbers in it, makes its equations; hashable."""
     if not is_dataclass(part):
         return part
-    values = _values(part)
-    lengths = {name: len(value) for name, value in values.items() if isinstance(value, tuple)}
-    others = {
-        each.name: structure(getattr(part, each.name))
-        for each in fields(part)
-        if each.name not in values
-    }
-    return type(part), *lengths.items(), *others.items()
+    kind = type(part)
+    found: list[Any] = [kind]
+    for name, whole in _fields(kind):
+        value = getattr(part, name)
+        if isinstance(value, tuple) and not whole:
+            found.append(len(value))
+        elif whole or not isinstance(value, int | float):
+            found.append(structure(value))
+    return tuple(found)
 
 
 def _values(part: Any) -> dict[str, Any]:
@@ -46,13 +48,20 @@ def _values(part: Any) -> dict[str, Any]:
 
     Whole numbers, such as the number of elements, are no constants of the equations.
     """
-    whole = {name for name, each in constants_of(type(part)).items() if each.whole}
-    values = {each.name: getattr(part, each.name) for each in fields(part)}
     return {
         name: value
-        for name, value in values.items()
-        if name not in whole and isinstance(value, int | float | tuple)
+        for name, whole in _fields(type(part))
+        if not whole and isinstance(value := getattr(part, name), int | float | tuple)
     }
+
+
+@cache
+def _fields(kind: type) -> tuple[tuple[str, bool], ...]:
+    """Return the names of the fields of a class, and whether each is a whole number."""
+    constants = constants_of(kind)
+    return tuple(
+        (each.name, each.name in constants and constants[each.name].whole) for each in fields(kind)
+    )
 
 
 def _items(name: str, value: Any) -> dict[str, float]:

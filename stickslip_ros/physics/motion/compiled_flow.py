@@ -5,6 +5,7 @@ flow that it enters and gives it back when it ends, so that the next motion of t
 no compilation. An integrator is never shared by two motions.
 """
 
+from array import array
 from collections import defaultdict
 from copy import copy
 from enum import Enum
@@ -12,7 +13,7 @@ from typing import Any
 
 import heyoka as hy
 
-from stickslip_ros.physics.model.hybrid import HybridSystem
+from stickslip_ros.physics.model.hybrid import HybridSystem, Mode
 
 # heyoka warns on standard output, which is for results, where a marker's polynomial is only
 # rounding, as in equilibrium.
@@ -39,21 +40,48 @@ class CompiledFlow:
     Reading or writing an element of a memoryview takes half the time of an array's.
     """
 
-    __slots__ = ("marks", "parameters", "state", "taylor", "variables")
+    __slots__ = (
+        "epoch",
+        "inputs",
+        "marks",
+        "mode",
+        "parameters",
+        "state",
+        "switches",
+        "taylor",
+        "variables",
+    )
 
-    def __init__(self, taylor: Any, states: int) -> None:
-        """Wrap a heyoka integrator whose variables begin with this number of states."""
+    def __init__(self, taylor: Any, system: HybridSystem) -> None:
+        """Wrap a heyoka integrator whose variables begin with the states of a system."""
         self.taylor = taylor
         self.state = taylor.state
         """States and derivatives."""
-        self.variables: memoryview[float] = self.state[:states].data
+        self.variables: memoryview[float] = self.state[: len(system.states)].data
         self.parameters: memoryview[float] = taylor.pars.data
         # heyoka copies its callbacks with the integrator.
         self.marks = [event.callback.found for event in taylor.nt_events]
+        self.mode: Mode | None = None
+        """Mode whose switches are among the parameters."""
+        # heyoka keeps the parameters up to the last one that an equation uses.
+        used, index = len(self.parameters), system.index
+        self.inputs, self.switches = (
+            [(number, index[name]) for number, name in enumerate(names) if index[name] < used]
+            for names in (system.inputs, system.switches)
+        )
+        """Number, and index in the parameters, of the inputs and switches that are used."""
+        self.epoch = index["epoch"] if index["epoch"] < used else None
+        """Index of the time at the start of the integration."""
 
-    def another(self) -> "CompiledFlow":
+    def load(self, constants: "array[float]") -> None:
+        """Set the constants of a system of this structure."""
+        used = min(len(self.parameters), len(constants))
+        self.parameters[:used] = memoryview(constants)[:used]
+        self.mode = None
+
+    def another(self, system: HybridSystem) -> "CompiledFlow":
         """Return an independent integrator of the same flow; it needs no compilation."""
-        return CompiledFlow(copy(self.taylor), len(self.variables))
+        return CompiledFlow(copy(self.taylor), system)
 
     def take_marks(self) -> Marks:
         """Return the marks since the last call, in order of time."""
@@ -85,7 +113,7 @@ class FlowLoans:
             try:
                 flow = shelf.pop()
             except IndexError:
-                flow = _original(system, name, detail).another()
+                flow = _original(system, name, detail).another(system)
             self._borrowed[key] = flow, shelf
         return self._borrowed[key][0]
 
@@ -117,7 +145,7 @@ def _compile(system: HybridSystem, name: str, detail: Detail) -> CompiledFlow:
         ],
         fast_math=True,  # a quarter faster; the error stays below 2e-12 over 190 periods
     )
-    return CompiledFlow(taylor, len(system.states))
+    return CompiledFlow(taylor, system)
 
 
 class _Finder:

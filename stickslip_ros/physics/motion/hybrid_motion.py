@@ -25,37 +25,12 @@ _NO_EVENT = hy.taylor_outcome.time_limit.value
 _NOT_FINITE = hy.taylor_outcome.err_nf_state.value
 
 
+_Prepared = tuple[CompiledFlow | None, tuple[Leads, ...]]
+"""Integrator with the constants of the system, None with a closed form; where its guards lead."""
+
+
 class TooManyStepsError(Exception):
     """Raised when a motion is too stiff to be followed."""
-
-
-class _PreparedFlow:
-    """Flow of a system that a motion may enter: integrator with its constants, and guards."""
-
-    __slots__ = ("epoch", "flow", "inputs", "leads", "mode", "switches")
-
-    def __init__(
-        self, system: HybridSystem, flow: CompiledFlow | None, leads: tuple[Leads, ...]
-    ) -> None:
-        self.flow = flow
-        """Integrator; None if the flow has a closed form."""
-        self.leads = leads
-        """Where each guard leads."""
-        self.mode: Mode | None = None
-        """Mode whose switches the integrator has."""
-        # heyoka keeps the parameters up to the last one that an equation uses.
-        used = 0 if flow is None else len(flow.parameters)
-        index = system.index
-        self.inputs, self.switches = (
-            [(number, index[name]) for number, name in enumerate(names) if index[name] < used]
-            for names in (system.inputs, system.switches)
-        )
-        """Number, and index in the integrator's parameters, of inputs and switches."""
-        self.epoch = index["epoch"] if index["epoch"] < used else None
-        """Index of the time at the start of the integration."""
-        if flow is not None:
-            constants = array("d", list(system.constants.values())[:used])
-            flow.parameters[: len(constants)] = memoryview(constants)
 
 
 class HybridMotion:
@@ -83,13 +58,15 @@ class HybridMotion:
     def _use(self, system: HybridSystem) -> None:
         """Continue with a system that has the same states; its mode is found by `_set_state`."""
         self._system = system
-        self._clocked, self._limits_steps = not system.autonomous, system.limits_steps
-        self._prepared: dict[str, _PreparedFlow] = {}
+        self._clocked = not system.autonomous
+        self._constants = array("d", system.constants.values())
+        self._prepared_by_detail: dict[Detail, dict[str, _Prepared]] = {}
+        self._prepared = self._prepared_by_detail.setdefault(self._detail, {})
 
     def _set_detail(self, detail: Detail) -> None:
         """Continue with another detail."""
         self._detail, self._watched = detail, detail is not Detail.STATES
-        self._prepared.clear()
+        self._prepared = self._prepared_by_detail.setdefault(detail, {})
         self._enter(self._mode)
 
     def _set_state(self, state: list[float]) -> None:
@@ -101,40 +78,38 @@ class HybridMotion:
     def _enter(self, mode: Mode) -> None:
         """Continue in a mode."""
         self._mode = mode
-        try:
-            prepared = self._prepared[mode.flow]
-        except KeyError:
-            prepared = self._prepare(mode)
-        self._entered, self._flow = prepared, prepared.flow
-        if self._flow is None:
+        prepared = self._prepared.get(mode.flow) or self._prepare(mode)
+        self._flow, self._leads = prepared
+        flow = prepared[0]
+        if flow is None:
             return
-        instant, parameters = self._instant, self._flow.parameters
+        instant, parameters = self._instant, flow.parameters
         self._system.separate(mode, instant)
-        for number, index in prepared.inputs:
+        for number, index in flow.inputs:
             parameters[index] = instant.inputs[number]
-        if mode is not prepared.mode:
-            prepared.mode = mode
-            for number, index in prepared.switches:
+        if mode is not flow.mode:
+            flow.mode = mode
+            for number, index in flow.switches:
                 parameters[index] = mode.switches[number]
-        variables = self._flow.variables
+        variables = flow.variables
         if instant.state is not variables:
             variables[:] = instant.state
             instant.state = variables
 
-    def _prepare(self, mode: Mode) -> "_PreparedFlow":
+    def _prepare(self, mode: Mode) -> _Prepared:
         """Load the constants into the integrator of a mode's flow, unless it has a closed form."""
         name, system, flow = mode.flow, self._system, None
         if self._detail is Detail.DERIVATIVES or not system.has_closed_form(mode):
             flow = self._loans.flow(system, name, self._detail)
-        leads = tuple(guard.leads for guard in system.shared_flow(name).guards)
-        prepared = self._prepared[name] = _PreparedFlow(system, flow, leads)
+            flow.load(self._constants)
+        prepared = self._prepared[name] = flow, system.shared_flow(name).leads
         return prepared
 
     def _set_input(self, number: int, value: float) -> None:
         """Hold an input at a value from now on."""
         self._instant.inputs[number] = value
         if self._flow is not None:
-            for used, index in self._entered.inputs:
+            for used, index in self._flow.inputs:
                 if used == number:
                     self._flow.parameters[index] = value
 
@@ -150,7 +125,8 @@ class HybridMotion:
         if mode is not self._mode:
             self._enter(mode)
         epoch, now = instant.time, 0.0
-        while now < duration and not self.unbounded:
+        limits_steps, clocked, has_parts = system.limits_steps, self._clocked, system.has_parts
+        while now < duration:
             end = self._begin(now, duration) if watched else duration
             flow, guard = self._flow, None
             if flow is None:
@@ -159,9 +135,9 @@ class HybridMotion:
             else:
                 taylor = flow.taylor
                 taylor.time = now
-                if self._clocked and self._entered.epoch is not None:
-                    flow.parameters[self._entered.epoch] = epoch
-                if self._limits_steps:
+                if clocked and flow.epoch is not None:
+                    flow.parameters[flow.epoch] = epoch
+                if limits_steps:
                     longest = system.longest_step(instant)
                     reached = taylor.propagate_until(end, self._steps_left, longest)
                 else:
@@ -173,27 +149,29 @@ class HybridMotion:
                 else:
                     taylor.reset_cooldowns()  # the next integration is another phase
                     if outcome == _NOT_FINITE:
-                        guard = self._overflow(flow)
+                        self._overflow(flow)
+                        guard = _DIVERGED
                     elif self._steps_left <= 0:
                         flow.take_marks()  # of a phase that is not reported
                         raise TooManyStepsError
                     else:
                         guard, now = -outcome - 1, taylor.time
-            if self._clocked:
+            if clocked:
                 instant.time = epoch + now
-            following: Mode | None = mode
-            if guard is not None:
-                leads = self._entered.leads[guard] if guard != _DIVERGED else _to_the_end
-                following = leads(system, mode, instant)
-                if following is not None and system.has_parts:
-                    following = system.past(following, instant)
+            if guard is None:
+                if watched:
+                    self._pass(mode, None, mode, now)
+                continue
+            following = None if guard == _DIVERGED else self._leads[guard](system, mode, instant)
+            if has_parts and following is not None:
+                following = system.past(following, instant)
             if watched:
                 self._pass(mode, guard, following, now)
             if following is None:
                 self.unbounded = True
-            elif guard is not None:
-                mode = following
-                self._enter(mode)
+                break
+            mode = following
+            self._enter(mode)
 
     def _begin(self, now: float, end: float) -> float:
         """Take note of the start of a phase; return its latest end. Not called without detail."""
@@ -205,15 +183,10 @@ class HybridMotion:
         `now` is the time since the last advance. It is not called without any detail.
         """
 
-    def _overflow(self, flow: CompiledFlow) -> int:
+    def _overflow(self, flow: CompiledFlow) -> None:
         """End a motion whose rates are no longer finite: its cause exceeds any bound immediately.
 
         The series of the last step still has the state at its start.
         """
         flow.variables[:] = array("d", flow.taylor.tc[: len(flow.variables), 0])
         self._mode = self._system.overflow(self._mode, self._instant)
-        return _DIVERGED
-
-
-def _to_the_end(system: HybridSystem, mode: Mode, instant: Instant) -> None:
-    """Lead to the end of the motion, as a guard does."""

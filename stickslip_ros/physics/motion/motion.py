@@ -204,6 +204,8 @@ class Motion(HybridMotion):
 
     def _change(self, drive: Drive, control: WashoutGains | None) -> None:
         """Continue with another drive and controller; the filter's output does not jump."""
+        if (drive, control) == (self._drive, self._control):
+            return
         old, force = self._drive, self.force
         position, velocity = self.position, self.velocity
         filtered = velocity - self.low_passed if control is not None else 0.0

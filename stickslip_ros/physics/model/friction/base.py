@@ -321,7 +321,8 @@ class FrictionLaw(ABC):
             name: getattr(self, name) * speed**power
             for name, power in self.inverse_speed_power.items()
         }
-        return replace(scaled(self, Scales(length, speed)), **undescribed)
+        law = scaled(self, Scales(length, speed))
+        return replace(law, **undescribed) if undescribed else law
 
     @classmethod
     def constants(cls) -> tuple[str, ...]:
