@@ -1,19 +1,14 @@
 """What the theory covers, and the sentence with which it refuses other drives."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.course import Course
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.equations import WashoutGains
-from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw
-from stickslip_ros.physics.model.functions import sin
 from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.critical_gains import critical_gains
@@ -25,63 +20,20 @@ from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from tests.physics.drives import PAPER
+from tests.physics.parts import Dahl, OneSided, Swing
 
 GAINS = WashoutGains(2.0, -1.0, -1.0)
 
 
-@dataclass(frozen=True)
-class Remembering(FrictionLaw):
-    """Dahl's law with a falling curve would be LuGre's; here the memory alone matters."""
-
-    name = "remembering"
-    states = {"deflection": "m"}  # noqa: RUF012
-    stiffness: Any = constant(5.0, "Stiffness of the bristles.", "1/m", positive=True)
-
-    def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        return -self.static * sign + 0.0 * relative_speed
-
-    def friction(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Any:
-        return -self.stiffness * memory[0]
-
-    def memory_rates(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
-        yielding = self.stiffness * sign * memory[0] / self.static
-        return (relative_speed * (1.0 - yielding),)
-
-    def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
-        return (sign * self.static / self.stiffness,)
-
-
-@dataclass(frozen=True)
-class OneWay(Coulomb):
-    """Coulomb friction that holds better against forward slip."""
-
-    name = "one_way"
-
-    @property
-    def limits(self) -> tuple[Any, Any]:
-        return 1.5 * self.static, self.static
-
-
-@dataclass(frozen=True)
-class Swing(Course):
-    amplitude: float = constant(0.05, "Amplitude.", "value")
-
-    def value(self, time: Any, switches: Sequence[Any]) -> Any:
-        return self.amplitude * sin(time)
-
-
-REMEMBERS = replace(PAPER, friction=Remembering())
-ONE_WAY = replace(PAPER, friction=OneWay())
-LOADED = replace(PAPER, load=Swing())
-CARRIED = replace(PAPER, belt=Swing(), load=Swing())
+SWING = Swing(amplitude=0.05)
+REMEMBERS = replace(PAPER, friction=Dahl(static=0.4, bristle=5.0))
+ONE_WAY = replace(PAPER, friction=OneSided())
+LOADED = replace(PAPER, load=SWING)
+CARRIED = replace(PAPER, belt=SWING, load=SWING)
 
 SENTENCES = {
-    "memory": (REMEMBERS, "the friction law remembering has a memory (deflection)"),
-    "one way": (ONE_WAY, "the friction law one_way differs between forward and backward slip"),
+    "memory": (REMEMBERS, "the friction law dahl has a memory (z)"),
+    "one way": (ONE_WAY, "the friction law one_sided differs between forward and backward slip"),
     "load": (LOADED, "the drive has a course of its load"),
     "belt and load": (CARRIED, "the drive has a course of its belt and its load"),
 }
