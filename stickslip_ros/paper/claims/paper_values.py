@@ -15,10 +15,11 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.claims.claim import Formula, Number
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SLIP, DriveSystem
+from stickslip_ros.physics.model.drive_system import SLIP
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.physics.model.hybrid import Mode
+from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.physics.motion.derivatives import flow_rates, parameter_values
 from stickslip_ros.physics.theory.critical_gains import CriticalGains, critical_gains
@@ -215,7 +216,7 @@ def rates(drive: Drive, states: FloatArray, gains: WashoutGains | None = None) -
 
     n is 2, or 3 with `gains` (SI), for eq. 5 and eq. 19.
     """
-    system = DriveSystem(drive, gains)
+    system = drive_system(drive, gains)
     signs = np.sign(states[1] - system.constants["belt_speed"])
     modes = [parameter_values(system, Mode(SLIP, (sign,)), (0.0,)) for sign in signs.tolist()]
     return flow_rates(system, SLIP).at(states, np.array(modes).T)[0]
@@ -223,4 +224,4 @@ def rates(drive: Drive, states: FloatArray, gains: WashoutGains | None = None) -
 
 def time_dependent() -> bool:
     """Return whether the equations depend on time explicitly."""
-    return not DriveSystem(unit_drive(1.0)).autonomous
+    return not drive_system(unit_drive(1.0)).autonomous

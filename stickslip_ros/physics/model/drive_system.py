@@ -37,9 +37,6 @@ SLIP, STICK = "slip", "stick"
 BELT_REACHED = 0
 """Index of the guard of slip at which the slide reaches the speed of the belt."""
 
-_STUCK, _FORWARD, _BACKWARD = Mode(STICK, (0.0,)), Mode(SLIP, (1.0,)), Mode(SLIP, (-1.0,))
-"""The modes of a drive whose law and courses have none."""
-
 _HYSTERESIS = 2.0**-45
 """Distance behind a guard of a part at which the mode ends.
 
@@ -103,15 +100,12 @@ class DriveSystem(HybridSystem):
                 for name in names
             ),
         )
-        self._reaction = partial(equations.reaction, self.drive)
-        self._one_switch = len(self.switches) == 1
-        self.has_parts = not self._one_switch
+        self.has_parts = len(self.switches) > 1
         # Where the switches of law, belt and load start, after the sign.
         self._ends = list(accumulate(map(len, parts[:2]), initial=1))
         self._control_states = slice(MEMORY + len(law.states), None)
-        self.structure = structure_number(
-            tuple(map(structure, (law, self.drive.belt, self.drive.load, self.control)))
-        )
+        parts = (law, self.drive.belt, self.drive.load, self.control)
+        self.structure = structure_number((type(self), *map(structure, parts)))
         self._steady = isinstance(self.drive.belt, NoCourse)
         self.constants = {
             "damping": self.drive.damping,
@@ -121,20 +115,15 @@ class DriveSystem(HybridSystem):
             **numbers(self.drive.load, "load"),
             **(numbers(self.control, "control") if self.control is not None else {}),
         }
-        self._belt_speed, self._normal_force = self.drive.belt_speed, self.drive.normal_force
-        # The speed relative to the belt with which a slide starts to slip.
-        self._least_speed = max(ulp(self._belt_speed), ulp(1.0))
-        self._plain = self._steady and isinstance(self.drive.load, NoCourse)
-        self._sticks = law.sticks
-        self._forward_limit, self._backward_limit = map(float, law.limits)
+        self.sticks = law.sticks
+        self.forward_limit, self.backward_limit = map(float, law.limits)
         self._characteristic_speed = law.characteristic_speed
         self.limits_steps = law.characteristic_speed != inf
-        self._static_law = None if law.states or law.switches else law.coefficient
 
     @cached_property
     def autonomous(self) -> bool:
         """Whether belt speed and load are constant."""
-        return self._plain
+        return self._steady and isinstance(self.drive.load, NoCourse)
 
     def flow(self, name: str) -> Flow:
         """Return the flow `SLIP` or `STICK`.
@@ -143,6 +132,7 @@ class DriveSystem(HybridSystem):
         the reaction exceeds the limit against backward, and against forward slip. Then come those
         of law, belt and load.
         """
+        kind = type(self)
         state, _, (force,), all_switches, time = self.symbols
         symbolic = self._symbolic
         drive, law = symbolic.drive, symbolic.drive.friction
@@ -156,8 +146,8 @@ class DriveSystem(HybridSystem):
         normal = equations.normal_force(drive, time, switches.load)
         reaction = equations.reaction(drive, state[POSITION], y, force)
         courses = [
-            *_guards(drive.belt.margins(time, switches.belt), DriveSystem.turn_belt),
-            *_guards(drive.load.margins(time, switches.load), DriveSystem.turn_load),
+            *_guards(drive.belt.margins(time, switches.belt), kind.turn_belt),
+            *_guards(drive.load.margins(time, switches.load), kind.turn_load),
         ]
         if name == STICK:
             forward, backward = law.limits
@@ -166,8 +156,8 @@ class DriveSystem(HybridSystem):
             return Flow(
                 rates=(y, belt_acceleration, *control_rates),
                 guards=(
-                    Guard(normal * backward - held, DriveSystem.release_backward),
-                    Guard(normal * forward + held, DriveSystem.release_forward),
+                    Guard(normal * backward - held, kind.release_backward),
+                    Guard(normal * forward + held, kind.release_forward),
                     *courses,
                 ),
                 marks=self._marks_of_stick(y, belt_acceleration),
@@ -184,11 +174,11 @@ class DriveSystem(HybridSystem):
                 *control_rates,
             ),
             guards=(
-                Guard(sign * relative_speed, DriveSystem.reach_belt),
+                Guard(sign * relative_speed, kind.reach_belt),
                 # The slide diverges in the direction of the slip. The margin is of the order of
                 # one, since heyoka's error is relative to the largest of states and events.
-                Guard(1.0 - sign * y / UNBOUNDED_SPEED, DriveSystem.diverge),
-                *_guards(margins, DriveSystem.switch_friction),
+                Guard(1.0 - sign * y / UNBOUNDED_SPEED, kind.diverge),
+                *_guards(margins, kind.switch_friction),
                 *courses,
             ),
             marks=(y, acceleration),
@@ -203,9 +193,8 @@ class DriveSystem(HybridSystem):
 
     def reach_belt(self, mode: Mode, instant: Instant) -> Mode:
         """Stick, or slip on in either direction, where the slide reaches the belt speed."""
-        speed = self._belt_speed if self._steady else self.belt_speed(mode, instant.time)
-        instant.state[SPEED] = speed
-        if self._sticks:
+        instant.state[SPEED] = self.belt_speed(mode, instant.time)
+        if self.sticks:
             return self._resting(mode, instant)
         return self._slip(mode, -mode.switches[0], instant)
 
@@ -250,15 +239,6 @@ class DriveSystem(HybridSystem):
 
     def settled(self, mode: Mode | None, instant: Instant) -> Mode:
         """Return stick, or slip in the direction of the relative speed; see the class."""
-        if mode is not None and self._steady and self._one_switch:
-            sign = mode.switches[0]
-            if sign != 0.0:
-                if (instant.state[SPEED] - self._belt_speed) * sign > 0.0:
-                    return mode
-            elif self.has_closed_form(mode):
-                held = self.reaction(instant)
-                if -self._forward_limit <= held <= self._backward_limit:
-                    return mode
         if mode is not None and self.has_parts:
             following = self.past(mode, instant)
             if following is not mode:
@@ -313,15 +293,14 @@ class DriveSystem(HybridSystem):
         """Move a slide that starts to slip, or sticks near its limit, by rounding errors."""
         state, sign = instant.state, mode.switches[0]
         x, y = state[POSITION], state[SPEED]
-        belt_speed = self._belt_speed if self._steady else self.belt_speed(mode, instant.time)
+        belt_speed = self.belt_speed(mode, instant.time)
         if sign != 0.0 and y != belt_speed:
             return
-        if self._sticks:
-            force = instant.inputs[0] if self.control is None else self.control_force(instant)
-            held = self._reaction(x, y, force) if self._steady else self.held_force(mode, instant)
-            normal = self._normal_force if self._plain else self.normal_force(mode, instant.time)
+        if self.sticks:
+            held, force = self.held_force(mode, instant), self.control_force(instant)
             backward = sign < 0.0 or (sign == 0.0 and held > 0.0)
-            limit = normal * (self._backward_limit if backward else self._forward_limit)
+            limit = self.backward_limit if backward else self.forward_limit
+            limit *= self.normal_force(mode, instant.time)
             margin = 8.0 * ulp(abs(x) + abs(held) + abs(force) + limit)
             if sign == 0.0:
                 if abs(held) > limit - margin:
@@ -329,29 +308,7 @@ class DriveSystem(HybridSystem):
                 return
             if abs(held) < limit + margin:
                 state[POSITION] = x - sign * margin
-        least = self._least_speed if self._steady else max(ulp(belt_speed), ulp(1.0))
-        state[SPEED] = y + sign * least
-
-    def has_closed_form(self, mode: Mode) -> bool:
-        """Return whether the slide moves in a straight line: it sticks, and all is constant."""
-        return mode.flow == STICK and self._plain and self.control is None
-
-    def closed_form(
-        self, mode: Mode, instant: Instant, duration: float
-    ) -> tuple[int | None, float]:
-        """Move with the belt for `duration`, or until the reaction reaches its limit."""
-        state, speed = instant.state, self._belt_speed
-        if speed != 0.0:
-            limit = self._backward_limit if speed > 0.0 else -self._forward_limit
-            limit -= self._reaction(0.0, speed, instant.inputs[0])
-            time = (limit - state[POSITION]) / speed
-            if time < 0.0:  # by rounding
-                time = 0.0
-            if time < duration:
-                state[POSITION] = limit
-                return (0 if speed > 0.0 else 1), time
-        state[POSITION] += speed * duration
-        return None, duration
+        state[SPEED] = y + sign * max(ulp(belt_speed), ulp(1.0))
 
     def longest_step(self, instant: Instant) -> float:
         """Return a time in which the speed changes by the law's characteristic speed at most.
@@ -362,7 +319,7 @@ class DriveSystem(HybridSystem):
         state = instant.state
         acceleration = (
             abs(self.reaction(instant)) + abs(state[POSITION]) + abs(state[SPEED])
-            + max(self._forward_limit, self._backward_limit)
+            + max(self.forward_limit, self.backward_limit)
         )  # fmt: skip
         return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
 
@@ -381,14 +338,10 @@ class DriveSystem(HybridSystem):
 
     def belt_speed(self, mode: Mode, time: float) -> float:
         """Return the speed of the belt."""
-        if self._steady:
-            return self._belt_speed
         return float(equations.belt_speed(self.drive, time, self._by_part(mode.switches).belt))
 
     def normal_force(self, mode: Mode, time: float) -> float:
         """Return the normal force."""
-        if self._plain:
-            return self._normal_force
         return float(equations.normal_force(self.drive, time, self._by_part(mode.switches).load))
 
     def control_force(self, instant: Instant) -> float:
@@ -400,9 +353,8 @@ class DriveSystem(HybridSystem):
 
     def reaction(self, instant: Instant) -> float:
         """Return h = X + 2 beta X' - U."""
-        state = instant.state
-        force = instant.inputs[0] if self.control is None else self.control_force(instant)
-        return self._reaction(state[POSITION], state[SPEED], force)
+        state, force = instant.state, self.control_force(instant)
+        return equations.reaction(self.drive, state[POSITION], state[SPEED], force)
 
     def held_force(self, mode: Mode, instant: Instant) -> float:
         """Return the friction force that a slide needs to move with the belt."""
@@ -419,9 +371,6 @@ class DriveSystem(HybridSystem):
         if sign == 0.0:
             return self.held_force(mode, instant)
         state = instant.state
-        if self._static_law is not None and self._plain:
-            coefficient = self._static_law(state[SPEED] - self._belt_speed, sign)
-            return self._normal_force * float(coefficient)
         belt_speed = self.belt_speed(mode, instant.time)
         coefficient = self.drive.friction.friction(
             state[SPEED] - belt_speed, sign, self._memory(instant), self._law_switches(mode)
@@ -445,7 +394,7 @@ class DriveSystem(HybridSystem):
         )
 
     def _memory(self, instant: Instant) -> Sequence[float]:
-        return () if self._sticks else instant.state[MEMORY : self._control_states.start].tolist()
+        return () if self.sticks else instant.state[MEMORY : self._control_states.start].tolist()
 
     def _law_switches(self, mode: Mode) -> Sequence[float]:
         return mode.switches[1 : self._ends[1]]
@@ -463,8 +412,6 @@ class DriveSystem(HybridSystem):
 
     def _slip(self, mode: Mode, sign: float, instant: Instant) -> Mode:
         """Return slip in a direction; the courses stay in their modes."""
-        if self._one_switch:
-            return _FORWARD if sign > 0.0 else _BACKWARD
         law, state = self.drive.friction, instant.state
         switches: Sequence[float] = ()
         if law.switches:
@@ -475,20 +422,13 @@ class DriveSystem(HybridSystem):
 
     def _resting(self, mode: Mode, instant: Instant) -> Mode:
         """Return the mode of a slide that has the speed of the belt."""
-        if self._sticks:
-            if self._plain:
-                normal, state = self._normal_force, instant.state
-                force = instant.inputs[0] if self.control is None else self.control_force(instant)
-                held = self._reaction(state[POSITION], state[SPEED], force)
-            else:
-                normal = self.normal_force(mode, instant.time)
-                held = self.held_force(mode, instant)
-            if held > normal * self._backward_limit:
+        if self.sticks:
+            normal = self.normal_force(mode, instant.time)
+            held = self.held_force(mode, instant)
+            if held > normal * self.backward_limit:
                 return self._slip(mode, -1.0, instant)
-            if held < -normal * self._forward_limit:
+            if held < -normal * self.forward_limit:
                 return self._slip(mode, 1.0, instant)
-            if self._one_switch:
-                return _STUCK
             if mode.flow == STICK:
                 return mode
             law = (0.0,) * len(self.drive.friction.switches)

@@ -19,9 +19,10 @@ _STEPS_OF_A_PHASE = 10
 """Number of steps that the work around the integration of one phase is worth."""
 
 _DIVERGED = -1
-"""Stands for the guard where the rates are no longer finite."""
+"""Stands for a guard where the rates exceed any bound."""
 
 _NO_EVENT = hy.taylor_outcome.time_limit.value
+_STEP_LIMIT = hy.taylor_outcome.step_limit.value
 _NOT_FINITE = hy.taylor_outcome.err_nf_state.value
 
 
@@ -154,6 +155,8 @@ class HybridMotion:
                     elif self._steps_left <= 0:
                         flow.take_marks()  # of a phase that is not reported
                         raise TooManyStepsError
+                    elif outcome == _STEP_LIMIT:  # the rates leave a step no length
+                        guard, now = _DIVERGED, taylor.time
                     else:
                         guard, now = -outcome - 1, taylor.time
             if clocked:

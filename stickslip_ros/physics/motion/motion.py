@@ -12,6 +12,7 @@ from stickslip_ros.physics.model.drive_system import (
     DriveSystem,
 )
 from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion.compiled_flow import Detail
 from stickslip_ros.physics.motion.hybrid_motion import (
     STEPS_PER_UNIT,
@@ -72,7 +73,7 @@ class Motion(HybridMotion):
     ) -> None:
         self._drive, self._control = drive, control
         self._time = 0.0
-        system = DriveSystem(drive, control)
+        system = drive_system(drive, control)
         state = system.initial_state(position / drive.length_scale, velocity / drive.speed_scale)
         super().__init__(system, state, self._first_detail)
 
@@ -212,7 +213,7 @@ class Motion(HybridMotion):
         x, y, *memory = self._instant.state.tolist()
         law = drive.friction
         self._drive, self._control = drive, control
-        system = DriveSystem(drive, control)
+        system = drive_system(drive, control)
         if drive.speed_scale != old.speed_scale or drive.length_scale != old.length_scale:
             x, y = position / drive.length_scale, velocity / drive.speed_scale
         state = system.initial_state(x, y)

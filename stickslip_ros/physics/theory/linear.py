@@ -14,8 +14,9 @@ import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SLIP, DriveSystem
+from stickslip_ros.physics.model.drive_system import SLIP
 from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion.derivatives import flow_tensors
 from stickslip_ros.physics.theory.equilibrium import equilibria
 from stickslip_ros.physics.theory.requirements import AUTONOMOUS, require
@@ -159,7 +160,7 @@ def _at_equilibrium(
     drive: Drive, gains: WashoutGains | None, belt_speeds: FloatArray
 ) -> tuple[FloatArray, list[FloatArray]]:
     """Return the equilibria at m belt speeds of one sign, (n, m), and the derivatives there."""
-    system = DriveSystem(drive, gains)
+    system = drive_system(drive, gains)
     values = np.zeros((len(system.index), len(belt_speeds)))
     for name, value in system.constants.items():
         values[system.index[name]] = value

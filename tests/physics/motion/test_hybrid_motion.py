@@ -17,6 +17,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.constants import Scales, scaled
 from stickslip_ros.physics.model.course import NO_COURSE, Course
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive_system import DriveSystem
 from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import (
     Coulomb,
@@ -139,6 +140,21 @@ def test_recording_changes_nothing(case: Case) -> None:
     for motion in (recorded, bare):
         motion.advance(8.0 / case.drive.angular_frequency)
     close(case, recorded, bare)
+
+
+@given(cases())
+@examples(quick=15, thorough=300)
+def test_a_plain_drive_moves_as_any_other(case: Case) -> None:
+    """The quick system of a plain drive and the general one describe the same motion."""
+    quick = case.motion()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("stickslip_ros.physics.motion.motion.drive_system", DriveSystem)
+        general = case.motion()
+    for _ in range(8):
+        for motion in (quick, general):
+            motion.advance(1.0 / case.drive.angular_frequency)
+        close(case, quick, general)
+        assert quick.sticking == general.sticking
 
 
 @given(cases())

@@ -1,0 +1,159 @@
+"""The drive of most motions: a static law, constant belt speed and load."""
+
+from functools import partial
+from math import copysign, ulp
+
+from stickslip_ros.physics.model import equations
+from stickslip_ros.physics.model.course import NoCourse
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive_system import (
+    POSITION,
+    SLIP,
+    SPEED,
+    STICK,
+    DriveSystem,
+)
+from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.hybrid import Instant, Mode
+
+_STUCK, _FORWARD, _BACKWARD = Mode(STICK, (0.0,)), Mode(SLIP, (1.0,)), Mode(SLIP, (-1.0,))
+"""All modes of such a drive."""
+
+
+class PlainDriveSystem(DriveSystem):
+    """Drive whose law and courses have no states and no modes: its transitions take half the time.
+
+    Under a held force a slide that sticks moves in a straight line, which is not integrated.
+    """
+
+    def __init__(self, drive: Drive, control: WashoutGains | None = None) -> None:
+        super().__init__(drive, control)
+        self._reaction = partial(equations.reaction, self.drive)
+        self._speed = self.drive.belt_speed
+        # The speed relative to the belt with which a slide starts to slip.
+        self._least_speed = max(ulp(self._speed), ulp(1.0))
+        self._coefficient = self.drive.friction.coefficient
+
+    def belt_speed(self, mode: Mode, time: float) -> float:
+        """Return the speed of the belt."""
+        return self._speed
+
+    def normal_force(self, mode: Mode, time: float) -> float:
+        """Return the normal force: one, by its scale."""
+        return 1.0
+
+    def reaction(self, instant: Instant) -> float:
+        """Return h = X + 2 beta X' - U."""
+        state = instant.state
+        force = instant.inputs[0] if self.control is None else self.control_force(instant)
+        return self._reaction(state[POSITION], state[SPEED], force)
+
+    def held_force(self, mode: Mode, instant: Instant) -> float:
+        """Return the friction force of a slide that sticks: the reaction."""
+        return self.reaction(instant)
+
+    def friction_force(self, mode: Mode, instant: Instant) -> float:
+        """Return the friction force on the slide."""
+        sign = mode.switches[0]
+        if sign == 0.0:
+            return self.reaction(instant)
+        return float(self._coefficient(instant.state[SPEED] - self._speed, sign))
+
+    def settled(self, mode: Mode | None, instant: Instant) -> Mode:
+        """Return stick, or slip in the direction of the relative speed."""
+        relative_speed = instant.state[SPEED] - self._speed
+        if relative_speed > 0.0:
+            return _FORWARD
+        if relative_speed < 0.0:
+            return _BACKWARD
+        held = self.reaction(instant)
+        if held > self.backward_limit:
+            return _BACKWARD
+        if held < -self.forward_limit:
+            return _FORWARD
+        if mode is _STUCK and self.control is not None:
+            self.separate(mode, instant)
+        return _STUCK
+
+    def reach_belt(self, mode: Mode, instant: Instant) -> Mode:
+        """Stick, or slip on in either direction, where the slide reaches the belt speed."""
+        instant.state[SPEED] = self._speed
+        held = self.reaction(instant)
+        if held > self.backward_limit:
+            return _BACKWARD
+        return _FORWARD if held < -self.forward_limit else _STUCK
+
+    def release_backward(self, mode: Mode, instant: Instant) -> Mode:
+        """Slip backward where the reaction exceeds its limit."""
+        return _BACKWARD
+
+    def release_forward(self, mode: Mode, instant: Instant) -> Mode:
+        """Slip forward where the reaction falls below its limit."""
+        return _FORWARD
+
+    def overflow(self, mode: Mode, instant: Instant) -> Mode:
+        """Set the speed at which a motion counts as unbounded; see `DriveSystem.overflow`."""
+        super().overflow(mode, instant)
+        return _FORWARD if instant.state[SPEED] > 0.0 else _BACKWARD
+
+    def separate(self, mode: Mode, instant: Instant) -> None:
+        """Move a slide that starts to slip, or sticks near its limit, by rounding errors."""
+        state, sign = instant.state, mode.switches[0]
+        y = state[SPEED]
+        if sign != 0.0 and y != self._speed:
+            return
+        x = state[POSITION]
+        force = instant.inputs[0] if self.control is None else self.control_force(instant)
+        held = self._reaction(x, y, force)
+        backward = sign < 0.0 or (sign == 0.0 and held > 0.0)
+        limit = self.backward_limit if backward else self.forward_limit
+        margin = 8.0 * ulp(abs(x) + abs(held) + abs(force) + limit)
+        if sign == 0.0:
+            if abs(held) > limit - margin:
+                state[POSITION] = x - copysign(margin, held)
+            return
+        if abs(held) < limit + margin:
+            state[POSITION] = x - sign * margin
+        state[SPEED] = y + sign * self._least_speed
+
+    def has_closed_form(self, mode: Mode) -> bool:
+        """Return whether the slide moves in a straight line: it sticks under a held force."""
+        return mode.flow == STICK and self.control is None
+
+    def closed_form(
+        self, mode: Mode, instant: Instant, duration: float
+    ) -> tuple[int | None, float]:
+        """Move with the belt for `duration`, or until the reaction reaches its limit."""
+        state, speed = instant.state, self._speed
+        if speed != 0.0:
+            limit = self.backward_limit if speed > 0.0 else -self.forward_limit
+            limit -= self._reaction(0.0, speed, instant.inputs[0])
+            time = (limit - state[POSITION]) / speed
+            if time < 0.0:  # by rounding
+                time = 0.0
+            if time < duration:
+                state[POSITION] = limit
+                return (0 if speed > 0.0 else 1), time
+        state[POSITION] += speed * duration
+        return None, duration
+
+
+def drive_system(drive: Drive, control: WashoutGains | None = None) -> DriveSystem:
+    """Return the system of a drive with a held force or with continuous control.
+
+    Parameters
+    ----------
+    drive : Drive
+        Drive in SI units.
+    control : WashoutGains, optional
+        Continuous controller in SI units, eq. 19. By default the force is the input `force`.
+
+    Returns
+    -------
+    DriveSystem
+        System, dimensionless.
+    """
+    law, courses = drive.friction, (drive.belt, drive.load)
+    constant = all(isinstance(course, NoCourse) for course in courses)
+    plain = constant and not law.states and not law.switches
+    return PlainDriveSystem(drive, control) if plain else DriveSystem(drive, control)
