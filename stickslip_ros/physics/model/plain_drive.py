@@ -72,7 +72,7 @@ class PlainDriveSystem(DriveSystem):
         if held < -self.forward_limit:
             return _FORWARD
         if mode is _STUCK and self.control is not None:
-            self.separate(mode, instant)
+            self.separate(_STUCK, instant)
         return _STUCK
 
     def reach_belt(self, mode: Mode, instant: Instant) -> Mode:
