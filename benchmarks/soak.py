@@ -228,7 +228,10 @@ def _burning(count: int) -> Generator[None]:
 
 
 def _look_at_memory(pid: int, memory: dict[str, list[int]]) -> None:
-    for name, process in _processes(pid):
+    processes = list(_processes(pid))
+    if len(processes) < len(memory):  # the nodes have ended, and the command reads the bag
+        return
+    for name, process in processes:
         try:
             pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
         except (OSError, IndexError):  # it has ended
