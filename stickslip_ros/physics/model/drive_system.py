@@ -34,9 +34,6 @@ UNBOUNDED_SPEED = 1e3
 SLIP, STICK = "slip", "stick"
 """The flows of a drive. In slip the first switch is sgn(v_r), in stick it is 0."""
 
-BELT_REACHED = 0
-"""Index of the guard of slip at which the slide reaches the speed of the belt."""
-
 _HYSTERESIS = 2.0**-45
 """Distance behind a guard of a part at which the mode ends.
 

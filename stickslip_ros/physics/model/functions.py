@@ -18,16 +18,6 @@ def exp(x: Any) -> Any:
     return _function("exp", x)
 
 
-def log(x: Any) -> Any:
-    """Return the natural logarithm of a float, an array or an expression."""
-    return _function("log", x)
-
-
 def sin(x: Any) -> Any:
     """Return the sine of a float, an array or an expression."""
     return _function("sin", x)
-
-
-def tanh(x: Any) -> Any:
-    """Return the hyperbolic tangent of a float, an array or an expression."""
-    return _function("tanh", x)

@@ -21,7 +21,7 @@ _STUCK, _FORWARD, _BACKWARD = Mode(STICK, (0.0,)), Mode(SLIP, (1.0,)), Mode(SLIP
 
 
 class PlainDriveSystem(DriveSystem):
-    """Drive whose law and courses have no states and no modes: its transitions take half the time.
+    """Drive whose law and courses have no states and no modes: a motion takes half the time.
 
     Under a held force a slide that sticks moves in a straight line, which is not integrated.
     """

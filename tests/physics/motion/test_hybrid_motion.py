@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from math import nextafter
@@ -167,6 +168,14 @@ def test_an_equal_drive_changes_nothing(case: Case) -> None:
             motion.drive = case.drive
         motion.advance(3.0 / case.drive.angular_frequency)
     close(case, changed, kept)
+
+
+def test_a_change_of_the_drive_keeps_the_time_of_its_courses() -> None:
+    drive = drive_of(LAWS[0], 0.3, (Ramp(height=0.1, start=1.0, duration=2.0), NO_COURSE))
+    motion = Motion(drive, 0.0, 0.0)
+    motion.advance(2.0)
+    motion.drive = replace(drive, mass=16.0)
+    assert motion.belt_speed == pytest.approx(0.35, rel=1e-12)
 
 
 @given(cases(), cases())
