@@ -14,8 +14,8 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.portraits import Portrait, PortraitCase, portraits
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
 from stickslip_ros.progress import Progress
 from stickslip_ros.studies.bifurcation import COURSE, BifurcationDiagram, bifurcation_diagram

@@ -8,8 +8,8 @@ import numpy as np
 
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures, Regime
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.motion import RecordedMotion
 
 PERIODS = 300.0

@@ -8,14 +8,19 @@ from typing import Any, Self
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.installed_packages import prefixes
+from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.scenarios import ros_yaml
+from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
 from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE
 from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import (
+    CONTROLLER_PARAMETERS,
+    DEFAULT_LAW,
     NODE_PARAMETERS,
     AnalyzerParameters,
+    ControllerParameters,
     PlantParameters,
-    WashoutControllerParameters,
+    controller_node,
 )
 from stickslip_ros.scenarios.sections import PARAMETERS_KEY, ScenarioFile, read_file
 from stickslip_ros.tables import TextTable
@@ -49,8 +54,8 @@ class Scenario:
     """Overrides, as NODE.PARAMETER=VALUE, that the values already contain."""
     plant: PlantParameters
     """Parameters of the plant node."""
-    washout_controller: WashoutControllerParameters
-    """Parameters of the washout controller node."""
+    controller: ControllerParameters
+    """Parameters of the controller node in use; also an attribute by the name of the node."""
     analyzer: AnalyzerParameters
     """Parameters of the analyzer node."""
     path: Path = field(compare=False)
@@ -60,21 +65,46 @@ class Scenario:
     sources: Mapping[str, str] = field(default_factory=dict[str, str], compare=False, repr=False)
     """Source of each value, by NODE.PARAMETER: `FILE`, `BASE` or `OVERRIDE`; defaults are not
     listed."""
+    other_controllers: Mapping[str, ControllerParameters] = field(
+        default_factory=dict[str, ControllerParameters], compare=False, repr=False
+    )
+    """Parameters of other controllers that the file has sections for, by control law."""
     bases: tuple[Path, ...] = field(default=(), compare=False, repr=False)
     """The files that complete the scenario file, the nearest first."""
+
+    def __getattr__(self, name: str) -> Any:
+        controller = self.__dict__.get("controller")
+        if controller is not None and name == controller.node:
+            return controller
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+    @property
+    def control_law(self) -> ControlLaw | None:
+        """Control law with its constants; None without control."""
+        return self.controller.as_law() if self.plant.expects_control else None
+
+    @property
+    def nodes(self) -> tuple[str, ...]:
+        """Names of the nodes: plant, the controller in use, and analyzer."""
+        return "plant", self.controller.node, "analyzer"
 
     @property
     def given(self) -> frozenset[str]:
         """NODE.PARAMETER of each parameter that the file, its base or an override sets."""
-        return frozenset(self.sources)
+        return frozenset(name for name in self.sources if name.partition(".")[0] in self.nodes)
 
     @property
     def left_to_defaults(self) -> list[str]:
         """Parameters of drive, rate and controller left at their defaults, as NODE.PARAMETER."""
         names = [f"plant.{name}" for name in (*self.plant.drive_names(), "rate")]
         if self.plant.expects_control:
-            names += [f"washout_controller.{name}" for name in self.washout_controller.law_names()]
+            names += self.controller_names
         return [name for name in names if name not in self.sources]
+
+    @property
+    def controller_names(self) -> list[str]:
+        """Constants of the control law, as NODE.PARAMETER."""
+        return [f"{self.controller.node}.{name}" for name in self.controller.law_names()]
 
     def as_dict(self) -> dict[str, dict[str, Any]]:
         """Return the parameters of every node.
@@ -84,7 +114,7 @@ class Scenario:
         dict[str, dict[str, Any]]
             Values by node and flat name, for example `["plant"]["friction.static"]`.
         """
-        return {node: getattr(self, node).flat() for node in NODE_PARAMETERS}
+        return {node: getattr(self, node).flat() for node in self.nodes}
 
     def changed(self, values: Mapping[str, Any]) -> Self:
         """Return the scenario with other values of some parameters.
@@ -108,11 +138,12 @@ class Scenario:
         for target, value in values.items():
             node, _, parameter = target.partition(".")
             by_node.setdefault(node, {})[parameter] = value
-        changes: dict[str, Any] = {
-            node: NODE_PARAMETERS[node].validated({**self._flat[node], **new}, node)
-            for node, new in by_node.items()
-        }
-        return replace(self, **changes)
+        return self._replaced(
+            {
+                node: NODE_PARAMETERS[node].validated({**self._values_of(node), **new}, node)
+                for node, new in by_node.items()
+            }
+        )
 
     def overridden(self, overrides: Sequence[str]) -> Self:
         """Return the scenario with further overrides.
@@ -138,19 +169,65 @@ class Scenario:
             node, parameter, value = parse_override(override)
             by_node.setdefault(node, {})[parameter] = value
             texts[node] = f"{texts.get(node, '')} {override:.80}"
-        changes: dict[str, Any] = {
-            node: NODE_PARAMETERS[node].validated(
-                {**self._flat[node], **new}, f"{self.path} with{texts[node]}, {node}"
-            )
-            for node, new in by_node.items()
-        }
+        changed = self._replaced(
+            {
+                node: NODE_PARAMETERS[node].validated(
+                    {**self._values_of(node), **new}, f"{self.path} with{texts[node]}, {node}"
+                )
+                for node, new in by_node.items()
+            }
+        )
         given = {f"{node}.{name}" for node, new in by_node.items() for name in new}
         return replace(
-            self,
+            changed,
             overrides=(*self.overrides, *overrides),
             sources={**self.sources, **dict.fromkeys(given, OVERRIDE)},
-            **changes,
         )
+
+    def with_controller(self, law: str) -> Self:
+        """Return the scenario with another controller.
+
+        Parameters
+        ----------
+        law : str
+            Name of the control law. Its parameters are those of the scenario file; the others have
+            their defaults.
+
+        Returns
+        -------
+        Scenario
+            The changed copy.
+
+        Raises
+        ------
+        InvalidInputError
+            If there is no control law of that name.
+        """
+        if known_law(law) == self.controller.law:
+            return self
+        others = {**self.other_controllers, self.controller.law: self.controller}
+        controller = others.pop(law, None) or CONTROLLER_PARAMETERS[law]()
+        overrides = [each for each in self.overrides if not each.startswith(self.controller.node)]
+        return replace(
+            self,
+            controller=controller,
+            other_controllers=others,
+            overrides=tuple(overrides),
+        )
+
+    def _values_of(self, node: str) -> dict[str, Any]:
+        """Return the values of a node; raises InvalidInputError for a controller not in use."""
+        if node not in self._flat:
+            raise InvalidInputError(
+                f"{node}: is not the controller in use, which is {self.controller.node}"
+            )
+        return self._flat[node]
+
+    def _replaced(self, nodes: Mapping[str, Any]) -> Self:
+        """Return the scenario with other parameters of some nodes."""
+        own = self.controller.node
+        changes = {"controller" if node == own else node: each for node, each in nodes.items()}
+        return replace(self, **changes)
 
     def __repr__(self) -> str:
         return "\n".join(self._table().lines())
@@ -162,7 +239,7 @@ class Scenario:
         """Return the parameters of the drive and its controller, and others that are given."""
         shown = [f"plant.{name}" for name in (*self.plant.drive_names(), "rate")]
         if self.plant.expects_control:
-            shown += [f"washout_controller.{name}" for name in self.washout_controller.law_names()]
+            shown += self.controller_names
         shown += sorted(self.given.difference(shown))
         dimensionless = self.plant.as_drive().is_dimensionless
         rows: list[list[str]] = []
@@ -219,6 +296,7 @@ def load_scenario(
     namespace: str = DEFAULT_NAMESPACE,
     *,
     base: str | None = None,
+    controller: str | None = None,
     other_nodes: bool = False,
 ) -> Scenario:
     """Load a scenario by its name in config/ or by its path.
@@ -235,6 +313,9 @@ def load_scenario(
         Name or path of the scenario that supplies the parameters that the file omits. By default
         it is the one that the file's own section `scenario` names; without a base these parameters
         have their defaults.
+    controller : str or None
+        Name of the control law in use. By default it is the one whose section the file has, or
+        else its base, and the washout law without such a section.
     other_nodes : bool
         Whether sections of unknown nodes are ignored instead of refused.
 
@@ -263,6 +344,7 @@ def load_scenario(
             raise InvalidInputError(f"{path}: base {below} leads back to itself")
         files.append(read_file(below, namespace))
         below = _path_of_base(files[-1])
+    law = _law_in_use(files, namespace) if controller is None else known_law(controller)
     values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
     sources: dict[str, str] = {}
     other_sections: list[str] = []
@@ -277,17 +359,52 @@ def load_scenario(
     models: dict[str, Any] = {
         node: NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
         for node, parameters in values.items()
+        if parameters or node in ("plant", controller_node(law), "analyzer")
     }
     scenario = Scenario(
         name=path.stem,
+        plant=models["plant"],
+        controller=models[controller_node(law)],
+        analyzer=models["analyzer"],
         overrides=(),
         path=path,
         other_sections=tuple(other_sections),
         sources=sources,
+        other_controllers={
+            other: models[controller_node(other)]
+            for other in CONTROLLER_PARAMETERS
+            if other != law and controller_node(other) in models
+        },
         bases=tuple(file.path for file in files[1:]),
-        **models,
     )
     return scenario.overridden(overrides) if overrides else scenario
+
+
+def known_law(name: str) -> str:
+    """Return the name of a control law; raises InvalidInputError if there is none of that name."""
+    if name in CONTROLLER_PARAMETERS:
+        return name
+    if name in CONTROLLERS.refused:
+        raise InvalidInputError(f"control law {name} is refused: {CONTROLLERS.refused[name]}")
+    every = f"the known names are {', '.join(CONTROLLER_PARAMETERS)}"
+    raise InvalidInputError(
+        f"unknown control law {name:.80}; {did_you_mean(name, CONTROLLER_PARAMETERS, every)}"
+    )
+
+
+def _law_in_use(files: Sequence[ScenarioFile], namespace: str) -> str:
+    """Return the control law that the nearest file with a section of a controller names."""
+    for file in files:
+        named = file.named_nodes(namespace)
+        laws = [law for law in CONTROLLER_PARAMETERS if controller_node(law) in named]
+        if len(laws) > 1:
+            raise InvalidInputError(
+                f"{file.path}: has sections for the controllers "
+                f"{' and '.join(map(controller_node, laws))}: name the control law to use"
+            )
+        if laws:
+            return laws[0]
+    return DEFAULT_LAW
 
 
 def config_directories() -> list[Path]:

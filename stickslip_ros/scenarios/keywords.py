@@ -1,7 +1,7 @@
 """Parameters by keyword: `friction_static` for plant.friction.static."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -17,12 +17,12 @@ def keyword_of(parameter: str) -> str:
     return parameter.partition(".")[2].replace(".", "_")
 
 
-def parameter_of(keyword: str) -> str:
-    """Return NODE.PARAMETER for a keyword.
+def parameter_of(keyword: str, nodes: Sequence[str]) -> str:
+    """Return NODE.PARAMETER for a keyword, of one of the `nodes`.
 
     Raises InvalidInputError for one that no node has, or that several nodes have.
     """
-    known = _parameters()
+    known = _parameters(tuple(nodes))
     found: list[str] = [*known.get(keyword, ())]
     if not found:
         raise InvalidInputError(
@@ -42,17 +42,17 @@ def override(parameter: str, value: Any) -> str:
     return f"{parameter}={_written(value)}"
 
 
-def overrides_of(values: Mapping[str, Any]) -> list[str]:
+def overrides_of(values: Mapping[str, Any], nodes: Sequence[str]) -> list[str]:
     """Return the texts NODE.PARAMETER=VALUE for values by keyword."""
-    return [override(parameter_of(keyword), value) for keyword, value in values.items()]
+    return [override(parameter_of(keyword, nodes), value) for keyword, value in values.items()]
 
 
 @cache
-def _parameters() -> Mapping[str, tuple[str, ...]]:
+def _parameters(nodes: tuple[str, ...]) -> Mapping[str, tuple[str, ...]]:
     """Return NODE.PARAMETER of each keyword."""
     found: dict[str, tuple[str, ...]] = {}
-    for node, model in NODE_PARAMETERS.items():
-        for name in known_parameters(model):
+    for node in nodes:
+        for name in known_parameters(NODE_PARAMETERS[node]):
             parameter = f"{node}.{name}"
             keyword = keyword_of(parameter)
             found[keyword] = (*found.get(keyword, ()), parameter)

@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, create_model, model_validator
 
+from stickslip_ros.physics.loop.controller import Controller
+from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.model.constants import Constant, constants_of
+from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
-from stickslip_ros.scenarios.friction_laws import REFUSED_LAWS, add_laws_of_other_packages
+from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, add_laws_of_other_packages
 from stickslip_ros.scenarios.pace import Pace
 from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field
 from stickslip_ros.scenarios.validation import ParameterGroup, refused
@@ -38,8 +40,8 @@ _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
 def _known_law(name: str) -> str:
     if name in LAWS:
         return name
-    if name in REFUSED_LAWS:
-        raise refused(REFUSED_LAWS[name])
+    if name in FRICTION_LAWS.refused:
+        raise refused(FRICTION_LAWS.refused[name])
     raise ValueError(f"no law {name}")
 
 
@@ -54,23 +56,25 @@ def _constants_of_laws() -> dict[str, Any]:
             constants.setdefault(name, constant)
             laws.setdefault(name, []).append(law.name)
     return {
-        name: (int if constant.whole else float, _field_of(constant, laws[name]))
+        name: _field_of(constant, laws[name] if len(laws[name]) < len(LAWS) else [])
         for name, constant in constants.items()
     }
 
 
-def _field_of(constant: Constant, laws: list[str]) -> Any:
+def _field_of(constant: Constant, laws: list[str] | None = None) -> Any:
+    """Return type and description of a parameter for a constant, for some `laws` only."""
     meaning = constant.meaning
-    if len(laws) < len(LAWS):
+    if laws:
         meaning = f"{meaning.removesuffix('.')} ({', '.join(laws)})."
     least = max(constant.at_least, SMALLEST if constant.positive else -inf)
     bounds: dict[str, Any] = {} if least == -inf else {"ge": least}
     default: Any = constant.default
     if constant.whole:
         bounds = {bound: ceil(value) for bound, value in bounds.items()}
-    return field(
-        int(default) if constant.whole else float(default), meaning, constant.unit, **bounds
-    )
+        return int, field(int(default), meaning, constant.unit, **bounds)
+    if isinf(default):
+        bounds["allow_inf_nan"] = True
+    return float, field(float(default), meaning, constant.unit, **bounds)
 
 
 add_laws_of_other_packages()
@@ -281,27 +285,107 @@ class PlantParameters(NodeParameters):
         )
 
 
-class WashoutControllerParameters(NodeParameters):
-    """Parameters of the washout controller node."""
+class ReferenceParameters(ParameterGroup):
+    """Reference that the controller follows."""
 
-    corner_frequency: float = field(2.0, "Cutoff frequency d of the filter.", "rad/s", ge=SMALLEST)
-    linear_gain: float = field(-1.0, "Linear gain k1; a negative gain removes energy.", "N s/m")
-    cubic_gain: float = field(-1.0, "Cubic gain k2.", "N s^3/m^3")
-    force_limit: float = field(
-        float("inf"), "Largest magnitude of the force.", "N", ge=0.0, allow_inf_nan=True
+    kind: ReferenceKind = field(
+        ReferenceKind.NONE,
+        "Source: none, the topic `reference`, or a time course (step, ramp, sine, trapezoid).",
+        choices=ReferenceKind,
+        strict=False,
+        fixed=Fixed.ACTIVE,
     )
-    start_after: float = field(
-        0.0, "Time after the first sample during which the force is zero.", "s", ge=0.0
+    amplitude: float = field(0.0, "Largest displacement of the course.", "m")
+    start: float = field(0.0, "Simulated time at which the course starts.", "s", ge=0.0, le=1e9)
+    duration: float = field(
+        float("inf"),
+        "Duration of the course; of a ramp, the time of its rise.",
+        "s",
+        ge=0.0,
+        allow_inf_nan=True,
+    )
+    frequency: float = field(
+        1.0,
+        "Frequency of the sine; one over the time of each rise and fall of the trapezoid.",
+        "Hz",
+        ge=SMALLEST,
+        le=1e9,
     )
 
-    def as_washout(self) -> WashoutParameters:
-        """Return the constants of the control law."""
-        return WashoutParameters(**{name: getattr(self, name) for name in self.law_names()})
+    @model_validator(mode="after")
+    def _course_is_possible(self) -> Self:
+        """Refuse constants that do not make a course, under their names as parameters."""
+        refusal = ReferenceCourse(**dict(self)).refusal()
+        if refusal is not None:
+            raise ValueError(f"reference.{refusal}")
+        return self
 
-    @classmethod
-    def law_names(cls) -> list[str]:
+
+class ControllerParameters(NodeParameters):
+    """Parameters of a controller node: those of its control law; see `controller_model`."""
+
+    law: str
+    """Name of the control law."""
+
+    @model_validator(mode="after")
+    def _constants_fit_together(self) -> Self:
+        """Refuse constants that the law refuses."""
+        refusal = self.as_law().refusal()
+        if refusal is not None:
+            raise ValueError(refusal)
+        return self
+
+    @property
+    def node(self) -> str:
+        """Name of the node and of its section."""
+        return controller_node(self.law)
+
+    def as_law(self) -> ControlLaw:
+        """Return the control law with its constants."""
+        known = type(self).model_fields
+        law = CONTROL_LAWS[self.law]
+        return law(**{name: getattr(self, name) for name in law.constants() if name in known})
+
+    def as_reference(self) -> ReferenceCourse:
+        """Return the reference; of kind NONE for a law that follows none."""
+        given: ReferenceParameters | None = getattr(self, "reference", None)
+        return ReferenceCourse() if given is None else ReferenceCourse(**dict(given))
+
+    def as_controller(self, state: tuple[float, ...] | None = None) -> Controller:
+        """Return the controller, with the state of its law at the first sample."""
+        return Controller(self.as_law(), self.as_reference(), state)
+
+    def law_names(self) -> list[str]:
         """Return the names of the constants of the control law."""
-        return [name for name in cls.model_fields if name not in NodeParameters.model_fields]
+        return CONTROL_LAWS[self.law].constants()
+
+
+def controller_node(law: str) -> str:
+    """Return the name of the node, and of the section, of a control law."""
+    return f"{law}_controller"
+
+
+def controller_model(law: type[ControlLaw]) -> type[ControllerParameters]:
+    """Return the parameters of the controller node of a law."""
+    described = constants_of(law)
+    fields: dict[str, Any] = {
+        name: _field_of(described[name])
+        for name in law.constants()
+        if not isinstance(described[name].default, tuple)
+    }
+    if law.follows_reference:
+        fields["reference"] = ReferenceParameters, ReferenceParameters()
+    own_law = field(
+        law.name, "Control law of the node.", fixed=Fixed.CONFIGURED, choices=[law.name]
+    )
+    model = create_model(
+        "ControllerParameters",
+        __base__=ControllerParameters,
+        law=(Literal[law.name], own_law),
+        **fields,
+    )
+    model.__doc__ = f"Parameters of the {controller_node(law.name)} node."
+    return model
 
 
 class AnalyzerParameters(NodeParameters):
@@ -369,9 +453,17 @@ class ReplayParameters(NodeParameters):
     clock: bool = field(False, "Publish recorded time on /clock.", fixed=Fixed.CONFIGURED)
 
 
+DEFAULT_LAW = next(iter(CONTROL_LAWS))
+"""Control law of a scenario that names none."""
+
+CONTROLLER_PARAMETERS: dict[str, type[ControllerParameters]] = {
+    name: controller_model(law) for name, law in CONTROL_LAWS.items()
+}
+"""The parameter model of the controller node of each control law, by name of the law."""
+
 NODE_PARAMETERS: dict[str, type[NodeParameters]] = {
     "plant": PlantParameters,
-    "washout_controller": WashoutControllerParameters,
+    **{controller_node(name): model for name, model in CONTROLLER_PARAMETERS.items()},
     "analyzer": AnalyzerParameters,
 }
-"""The parameter model of each node, by node name."""
+"""The parameter model of each node, by node name; a run has one of the controllers."""

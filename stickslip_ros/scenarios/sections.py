@@ -32,6 +32,15 @@ class ScenarioFile(NamedTuple):
     base: str | None
     """Name or path of the scenario that supplies the omitted parameters."""
 
+    def named_nodes(self, namespace: str) -> set[str]:
+        """Return the names of the nodes that have a section of their own in `namespace`."""
+        return {
+            name
+            for pattern, _ in self.sections
+            for _, _, name in [pattern.rpartition("/")]
+            if "*" not in name and section_matches(pattern, f"{namespace.rstrip('/')}/{name}")
+        }
+
     def apply(self, set_value: SetValue, namespace: str, *, other_nodes: bool) -> list[str]:
         """Pass each parameter of the nodes in `namespace` to `set_value`.
 

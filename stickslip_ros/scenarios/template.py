@@ -20,9 +20,9 @@ def commented_file(scenario: Scenario, heading: str) -> str:
     """
     lines = [part for line in heading.splitlines() for part in _comment(line, "")]
     values = scenario.as_dict()
-    for node, model in NODE_PARAMETERS.items():
+    for node, own in values.items():
         lines += ["", f"/**/{node}:", f"  {PARAMETERS_KEY}:"]
-        lines += _section(own_first(model), values[node])
+        lines += _section(own_first(NODE_PARAMETERS[node]), own)
     return "\n".join(lines) + "\n"
 
 

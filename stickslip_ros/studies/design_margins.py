@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.studies.design_task import Task

@@ -9,9 +9,9 @@ from typing import Self
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.studies.controller_trial import Vibration
 from stickslip_ros.studies.design_task import Task

@@ -26,7 +26,7 @@ from stickslip_ros.paper.claims.paper_values import (
 from stickslip_ros.paper.claims.summaries import VIBRATING, amplitude, border, falling, listed
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.theory.hopf import hopf_points
 

@@ -14,9 +14,9 @@ import numpy.typing as npt
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.claims.claim import Formula, Number
 from stickslip_ros.paper.figures import unit_drive
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SLIP
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.physics.model.hybrid import Mode
 from stickslip_ros.physics.model.plain_drive import drive_system

@@ -29,7 +29,7 @@ from stickslip_ros.paper.claims.paper_values import (
 )
 from stickslip_ros.paper.claims.summaries import complex_number, falling, listed
 from stickslip_ros.paper.figures import unit_drive
-from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.theory.hopf import crossing_speed, hopf_points
 from stickslip_ros.physics.theory.linear import hurwitz_determinants
 from stickslip_ros.physics.theory.roots import zero_between

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from stickslip_ros.physics.model.disturbance import Disturbance
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.samples import Sample
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -73,6 +74,8 @@ class SampledLoop:
         Whether a controller is expected: then missing forces count as late.
     disturbance : Disturbance, optional
         Disturbance force of the scenario. By default there is none.
+    sensor : Sensor, optional
+        Sensor that measures the samples. By default it is exact.
     overtaken : callable, optional
         Called as overtaken(stamp, force) for each force that was accepted and will never act,
         because a newer one came or arrived before it: the stamp (ns) of the sample that it answers,
@@ -86,6 +89,7 @@ class SampledLoop:
 
     >>> from stickslip_ros.physics.loop.sampled_loop import SampledLoop
     >>> from stickslip_ros.physics.model.drive import Drive
+    from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.motion import Motion
     >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
@@ -112,6 +116,7 @@ class SampledLoop:
         hold_late: bool = False,
         expects_control: bool = True,
         disturbance: Disturbance | None = None,
+        sensor: Sensor = EXACT_SENSOR,
         overtaken: Callable[[int, float], None] = lambda stamp, force: None,
         advance: Callable[[float], None] | None = None,
     ) -> None:
@@ -154,10 +159,14 @@ class SampledLoop:
         """Disturbance force from the present sample to the next, N."""
         self._next_drive: Drive | None = None
         self._next_start: tuple[float, float] | None = None
+        self._sensor = sensor
+        self._measure = sensor.start(self.period)
         self.sample_number = 0
         """Number of the present sample."""
-        self.sample = self._take_sample(0.0)
-        """The present sample."""
+        self.true_sample = self._take_sample(0.0)
+        """The present sample as it is."""
+        self.sample = self._measured(self.true_sample)
+        """The present sample as the sensor measures it."""
 
     @property
     def answered(self) -> bool:
@@ -269,12 +278,22 @@ class SampledLoop:
         else:
             self._send(number, force)
             now = self._deliver()
-        motion.force = self._acting + self.disturbance
+        motion.set_forces(self._acting, self.disturbance)
         self._advance((1.0 - now) * period)
         belt_position = self.sample.belt_position + motion.drive.belt_speed * period
         self.sample_number += 1
-        sample = self.sample = self._take_sample(belt_position)
+        sample = self.true_sample = self._take_sample(belt_position)
+        if self._measure is not None:
+            sample = self._measured(sample)
+        self.sample = sample
         return sample
+
+    def _measured(self, sample: Sample) -> Sample:
+        """Return a sample as the sensor measures it."""
+        if self._measure is None:
+            return sample
+        position, velocity = self._measure(self.sample_number, sample.position, sample.velocity)
+        return sample._replace(position=position, velocity=velocity)
 
     def _deliver(self) -> float:
         """Apply the forces that arrive in the present period; return when the newest one does.
@@ -287,7 +306,7 @@ class SampledLoop:
             _, instant, force, answered = under_way.popleft()
             self._acting_number = max(self._acting_number, answered)
             if instant > now:
-                motion.force = self._acting + self.disturbance
+                motion.set_forces(self._acting, self.disturbance)
                 self._advance((instant - now) * self.period)
                 now = instant
             self._acting = force
@@ -322,6 +341,7 @@ class SampledLoop:
         if self._next_start is not None:
             start, self._next_start = self._next_start, None
             motion.restart(*start)
+            self._measure = self._sensor.start(self.period)
             friction_force = motion.friction_force
         scenario = self.scenario_disturbance.force(number, self.period)
         self.disturbance = scenario + self.asked_disturbance

@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from stickslip_ros.physics.loop.controller import Controller, answer
 from stickslip_ros.physics.loop.motion_tracer import MotionTracer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
-from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver, RunObserver
-from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.progress import Progress
 
@@ -27,7 +27,7 @@ def measure_block(
 def simulate_sampled(
     loop: SampledLoop,
     motion: RecordedMotion,
-    washout: Washout | None,
+    controller: Controller | None,
     duration: float,
     meter: CycleMeter,
     progress: Progress = lambda _: None,
@@ -42,7 +42,7 @@ def simulate_sampled(
         Loop to advance.
     motion : RecordedMotion
         Motion of `loop`.
-    washout : Washout or None
+    controller : Controller or None
         Controller that answers the samples; None for no control.
     duration : float
         Simulated time, s; rounded to whole samples.
@@ -53,8 +53,7 @@ def simulate_sampled(
     observer : MotionObserver, optional
         Receives the motion in blocks.
     recorder : TrajectoryRecorder, optional
-        Takes each sample with the control force that answers it, except for the last sample, which
-        is not answered here.
+        Takes each sample with the control force that answers it.
 
     Returns
     -------
@@ -72,8 +71,7 @@ def simulate_sampled(
 
     >>> from stickslip_ros.physics.loop.sampled_loop import SampledLoop
     >>> from stickslip_ros.physics.loop.simulation import simulate_sampled
-    >>> from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
-    >>> from stickslip_ros.physics.measures import CycleMeter
+    >>>     >>> from stickslip_ros.physics.measures import CycleMeter
     >>> from stickslip_ros.physics.model.drive import Drive
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.motion import RecordedMotion
@@ -81,49 +79,46 @@ def simulate_sampled(
     ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
     >>> motion = RecordedMotion(drive, position=0.0, velocity=0.0)
     >>> loop = SampledLoop(motion, rate=1000.0, start=0)
-    >>> washout = Washout(WashoutParameters(20.0, linear_gain=-3000.0, cubic_gain=0.0))
+    >>> washout = Controller(Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0))
     >>> simulate_sampled(loop, motion, washout, 5.0, CycleMeter(20)).regime.value
     'equilibrium'
     """
     samples = round(duration / loop.period)
-    sample = loop.sample
     for number in range(1, samples + 1):
-        force = None
-        if washout is not None:
-            force = washout.answer(sample.stamp, sample.velocity)
-            if force is not None:
-                loop.offer(sample.stamp, force)
+        force = answer(loop, controller)
         if recorder is not None:
-            recorder.take(sample, force or 0.0)
-        sample = loop.advance()
+            recorder.take(loop.true_sample, force)
+        loop.advance()
         if number % 1000 == 0 or number == samples or motion.unbounded:
             measure_block(motion, meter, observer)
             progress(number / samples)
             if motion.unbounded:
                 meter.report_run_away()
                 break
+    if recorder is not None:
+        recorder.take(loop.true_sample, answer(loop, controller))
     return meter.measures()
 
 
 def simulate_continuous(
     motion: RecordedMotion,
-    washout: WashoutParameters | None,
+    law: ControlLaw | None,
     duration: float,
     meter: CycleMeter,
     progress: Progress = lambda _: None,
     observer: RunObserver | None = None,
     recorder: TrajectoryRecorder | None = None,
 ) -> Measures:
-    """Simulate a motion with the washout law acting without sampling (eq. 19), and measure it.
+    """Simulate a motion with a control law acting without sampling (eq. 19), and measure it.
 
-    The filter runs from the start, and the gains act after `washout.start_after`.
+    The states of the law run from the start, and the force acts after `law.start_after`.
 
     Parameters
     ----------
     motion : RecordedMotion
-        Motion, with continuous control unless `washout` is None.
-    washout : WashoutParameters or None
-        Constants of the controller; None for no control. `force_limit` is not used.
+        Motion, with continuous control unless `law` is None.
+    law : ControlLaw or None
+        Control law that has equations; None for no control. `force_limit` is not used.
     duration : float
         Simulated time, s.
     meter : CycleMeter
@@ -150,14 +145,14 @@ def simulate_continuous(
     A washout controller without sampling suppresses the vibration:
 
     >>> from stickslip_ros.physics.loop.simulation import simulate_continuous
-    >>> from stickslip_ros.physics.loop.washout import WashoutParameters
     >>> from stickslip_ros.physics.measures import CycleMeter
+    >>> from stickslip_ros.physics.model.control import Washout
     >>> from stickslip_ros.physics.model.drive import Drive
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.motion import RecordedMotion
     >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
     ...               belt_speed=0.04, friction=Stribeck(0.4, 0.25, 0.05))
-    >>> washout = WashoutParameters(20.0, linear_gain=-3000.0, cubic_gain=0.0)
+    >>> washout = Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0)
     >>> motion = RecordedMotion(drive, 0.0, 0.0, control=washout.gains)
     >>> simulate_continuous(motion, washout, 5.0, CycleMeter(20)).regime.value
     'equilibrium'
@@ -166,14 +161,13 @@ def simulate_continuous(
     advance = motion.advance if tracer is None else tracer.advance
     if recorder is not None:
         advance = recorder.sampling(motion, advance)
-    free = duration if washout is None else min(washout.start_after, duration)
+    control = None if law is None else law.continuous
+    free = duration if law is None else min(law.start_after, duration)
     block = 10.0 * motion.drive.natural_period
     done = 0.0
-    for length, share in ((free, 0.0), (duration - free, 1.0)):
-        if washout is not None:
-            motion.control = WashoutGains(
-                washout.corner_frequency, share * washout.linear_gain, share * washout.cubic_gain
-            )
+    for length, acts in ((free, False), (duration - free, True)):
+        if control is not None:
+            motion.control = control if acts else control.silenced()
         end = done + length
         while done < end and not motion.unbounded:
             step = min(block, end - done)

@@ -5,6 +5,7 @@ from functools import cached_property
 from math import pi, sqrt
 from typing import Self
 
+from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
 from stickslip_ros.physics.model.constants import Scales, scaled
 from stickslip_ros.physics.model.course import NO_COURSE, Course
 from stickslip_ros.physics.model.friction import FrictionLaw
@@ -47,6 +48,8 @@ class Drive:
     """Course added to the belt speed, m/s."""
     load: Course = NO_COURSE
     """Course added to the normal force, N."""
+    actuator: Actuator = IDEAL_ACTUATOR
+    """Actuator that exerts the control force."""
 
     @cached_property
     def angular_frequency(self) -> float:
@@ -93,6 +96,7 @@ class Drive:
             friction=self.friction.scaled(self.speed_scale, self.length_scale),
             belt=scaled(self.belt, scales, "m/s"),
             load=scaled(self.load, scales, "N"),
+            actuator=scaled(self.actuator, scales),
         )
 
     @property

@@ -11,9 +11,9 @@ import heyoka as hy
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model import equations
+from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.course import NoCourse
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.hybrid import (
     Flow,
     Guard,
@@ -62,13 +62,14 @@ class _SymbolicDrive:
     """The drive and its control with expressions for their constants."""
 
     drive: Drive
-    control: WashoutGains | None
+    control: ContinuousControl | None
 
 
 class DriveSystem(HybridSystem):
     """Drive, dimensionless (see `Drive`), with a held force or with continuous control.
 
-    The states are X, Y = X', the memory of the friction law and the states of the controller. In
+    The states are X, Y = X', the memory of the friction law, the states of the controller and those
+    of the actuator. In
     slip the slide follows eq. 5; where it reaches the speed of the belt it sticks if its law can
     hold it, -mu_forward N <= h <= mu_backward N with the reaction h. Otherwise it passes that speed
     or slips the other way. In stick it moves with the belt until the reaction leaves these limits.
@@ -77,17 +78,26 @@ class DriveSystem(HybridSystem):
     ----------
     drive : Drive
         Drive in SI units.
-    control : WashoutGains, optional
-        Continuous controller in SI units, eq. 19. By default the force is the input `force`.
+    control : ContinuousControl, optional
+        Continuous controller in SI units, eq. 19; it acts without the actuator. By default the
+        force is the input `force`. An actuator with states receives that input, and the input
+        `disturbance` is added to its force.
     """
 
-    def __init__(self, drive: Drive, control: WashoutGains | None = None) -> None:
+    def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
         self.drive = drive.dimensionless
         self.control = None if control is None else control.scaled(drive)
         law = self.drive.friction
         control_states = () if self.control is None else self.control.states
-        self.states = ("x", "y", *(f"friction.{name}" for name in law.states), *control_states)
-        self.inputs = ("force",)
+        self.states = (
+            "x",
+            "y",
+            *(f"friction.{name}" for name in law.states),
+            *control_states,
+            *(f"actuator.{name}" for name in self.drive.actuator.states),
+        )
+        self.has_actuator = len(self.drive.actuator.states) > 0
+        self.inputs = ("force", "disturbance") if self.has_actuator else ("force",)
         parts = (law.switches, self.drive.belt.switches, self.drive.load.switches)
         self.switches = (
             "sign",
@@ -100,8 +110,11 @@ class DriveSystem(HybridSystem):
         self.has_parts = len(self.switches) > 1
         # Where the switches of law, belt and load start, after the sign.
         self._ends = list(accumulate(map(len, parts[:2]), initial=1))
-        self._control_states = slice(MEMORY + len(law.states), None)
-        parts = (law, self.drive.belt, self.drive.load, self.control)
+        first = MEMORY + len(law.states)
+        self.control_states = slice(first, first + len(control_states))
+        """The states of the controller, in a state."""
+        self._actuator_states = slice(self.control_states.stop, None)
+        parts = (law, self.drive.belt, self.drive.load, self.drive.actuator, self.control)
         self.structure = structure_number((type(self), *map(structure, parts)))
         self._steady = isinstance(self.drive.belt, NoCourse)
         self.constants = {
@@ -110,6 +123,7 @@ class DriveSystem(HybridSystem):
             **numbers(law, "friction"),
             **numbers(self.drive.belt, "belt"),
             **numbers(self.drive.load, "load"),
+            **numbers(self.drive.actuator, "actuator"),
             **(numbers(self.control, "control") if self.control is not None else {}),
         }
         self.sticks = law.sticks
@@ -130,18 +144,25 @@ class DriveSystem(HybridSystem):
         of law, belt and load.
         """
         kind = type(self)
-        state, _, (force,), all_switches, time = self.symbols
+        state, _, inputs, all_switches, time = self.symbols
         symbolic = self._symbolic
         drive, law = symbolic.drive, symbolic.drive.friction
         switches, sign = self._by_part(all_switches), all_switches[0]
-        y, memory = state[SPEED], state[MEMORY : self._control_states.start]
-        own = state[self._control_states]
+        x, y = state[POSITION], state[SPEED]
+        memory = state[MEMORY : self.control_states.start]
+        own, held = state[self.control_states], state[self._actuator_states]
+        force = inputs[0]
+        part_rates = ()
         if symbolic.control is not None:
-            force = symbolic.control.control_force(y, own)
-        control_rates = () if symbolic.control is None else symbolic.control.state_rates(y, own)
+            force = symbolic.control.control_force(x, y, own)
+            part_rates = tuple(symbolic.control.state_rates(x, y, own))
+        if self.has_actuator:
+            part_rates += tuple(drive.actuator.state_rates(inputs[0], held))
+            if symbolic.control is None:
+                force = drive.actuator.force(inputs[0], held) + inputs[1]
         belt_speed = equations.belt_speed(drive, time, switches.belt)
         normal = equations.normal_force(drive, time, switches.load)
-        reaction = equations.reaction(drive, state[POSITION], y, force)
+        reaction = equations.reaction(drive, x, y, force)
         courses = [
             *_guards(drive.belt.margins(time, switches.belt), kind.turn_belt),
             *_guards(drive.load.margins(time, switches.load), kind.turn_load),
@@ -151,7 +172,7 @@ class DriveSystem(HybridSystem):
             belt_acceleration = _by_time(drive, time, switches.belt, 0.0 * y)
             held = reaction if self._steady else reaction + drive.mass * belt_acceleration
             return Flow(
-                rates=(y, belt_acceleration, *control_rates),
+                rates=(y, belt_acceleration, *part_rates),
                 guards=(
                     Guard(normal * backward - held, kind.release_backward),
                     Guard(normal * forward + held, kind.release_forward),
@@ -168,7 +189,7 @@ class DriveSystem(HybridSystem):
                 y,
                 acceleration,
                 *law.memory_rates(relative_speed, sign, memory, switches.law),
-                *control_rates,
+                *part_rates,
             ),
             guards=(
                 Guard(sign * relative_speed, kind.reach_belt),
@@ -327,11 +348,15 @@ class DriveSystem(HybridSystem):
         return self._slip(mode, sign, instant)
 
     def initial_state(self, position: float, velocity: float) -> list[float]:
-        """Return the state at the start: the memory is that of the law, the controller at rest."""
+        """Return the state at the start: the memory is that of the law, the controller at rest.
+
+        The actuator gives no force.
+        """
         law, control = self.drive.friction, self.control
         memory = law.initial_memory(velocity - self.drive.belt_speed)
-        own = [velocity / control.corner_frequency] if control is not None else []
-        return [position, velocity, *map(float, memory), *own]
+        own = control.rest(position, velocity) if control is not None else ()
+        without = (0.0,) * len(self.drive.actuator.states)
+        return [position, velocity, *map(float, memory), *own, *without]
 
     def belt_speed(self, mode: Mode, time: float) -> float:
         """Return the speed of the belt."""
@@ -342,11 +367,15 @@ class DriveSystem(HybridSystem):
         return float(equations.normal_force(self.drive, time, self._by_part(mode.switches).load))
 
     def control_force(self, instant: Instant) -> float:
-        """Return the force on the slide: the input, or that of the continuous controller."""
-        if self.control is None:
-            return instant.inputs[0]
-        state = instant.state
-        return self.control.control_force(state[SPEED], state[self._control_states])
+        """Return the force on the slide: held, with the actuator, or continuous control."""
+        state, inputs = instant.state, instant.inputs
+        if self.control is not None:
+            own = state[self.control_states]
+            return self.control.control_force(state[POSITION], state[SPEED], own)
+        if self.has_actuator:
+            held = state[self._actuator_states].tolist()
+            return float(self.drive.actuator.force(inputs[0], held)) + inputs[1]
+        return inputs[0]
 
     def reaction(self, instant: Instant) -> float:
         """Return h = X + 2 beta X' - U."""
@@ -384,6 +413,7 @@ class DriveSystem(HybridSystem):
             friction=with_symbols(drive.friction, "friction", constants),
             belt=with_symbols(drive.belt, "belt", constants),
             load=with_symbols(drive.load, "load", constants),
+            actuator=with_symbols(drive.actuator, "actuator", constants),
         )
         control = self.control
         return _SymbolicDrive(
@@ -391,7 +421,7 @@ class DriveSystem(HybridSystem):
         )
 
     def _memory(self, instant: Instant) -> Sequence[float]:
-        return () if self.sticks else instant.state[MEMORY : self._control_states.start].tolist()
+        return () if self.sticks else instant.state[MEMORY : self.control_states.start].tolist()
 
     def _law_switches(self, mode: Mode) -> Sequence[float]:
         return mode.switches[1 : self._ends[1]]

@@ -1,9 +1,10 @@
-"""The drive of most motions: a static law, constant belt speed and load."""
+"""The drive of most motions: a static law, constant belt speed and load, no actuator states."""
 
 from functools import partial
 from math import copysign, ulp
 
 from stickslip_ros.physics.model import equations
+from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.course import NoCourse
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import (
@@ -13,7 +14,6 @@ from stickslip_ros.physics.model.drive_system import (
     STICK,
     DriveSystem,
 )
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.hybrid import Instant, Mode
 
 _STUCK, _FORWARD, _BACKWARD = Mode(STICK, (0.0,)), Mode(SLIP, (1.0,)), Mode(SLIP, (-1.0,))
@@ -26,7 +26,7 @@ class PlainDriveSystem(DriveSystem):
     Under a held force a slide that sticks moves in a straight line, which is not integrated.
     """
 
-    def __init__(self, drive: Drive, control: WashoutGains | None = None) -> None:
+    def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
         super().__init__(drive, control)
         self._reaction = partial(equations.reaction, self.drive)
         self._speed = self.drive.belt_speed
@@ -138,14 +138,14 @@ class PlainDriveSystem(DriveSystem):
         return None, duration
 
 
-def drive_system(drive: Drive, control: WashoutGains | None = None) -> DriveSystem:
+def drive_system(drive: Drive, control: ContinuousControl | None = None) -> DriveSystem:
     """Return the system of a drive with a held force or with continuous control.
 
     Parameters
     ----------
     drive : Drive
         Drive in SI units.
-    control : WashoutGains, optional
+    control : ContinuousControl, optional
         Continuous controller in SI units, eq. 19. By default the force is the input `force`.
 
     Returns
@@ -155,5 +155,5 @@ def drive_system(drive: Drive, control: WashoutGains | None = None) -> DriveSyst
     """
     law, courses = drive.friction, (drive.belt, drive.load)
     constant = all(isinstance(course, NoCourse) for course in courses)
-    plain = constant and not law.states and not law.switches
+    plain = constant and not law.states and not law.switches and not drive.actuator.states
     return PlainDriveSystem(drive, control) if plain else DriveSystem(drive, control)

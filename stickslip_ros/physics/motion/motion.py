@@ -1,8 +1,11 @@
 """The stick-slip motion of a drive with a held force or with continuous control."""
 
+from array import array
+from collections.abc import Sequence
 from typing import ClassVar
 
 from stickslip_ros.errors import RunError
+from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import (
     MEMORY,
@@ -11,7 +14,6 @@ from stickslip_ros.physics.model.drive_system import (
     STICK,
     DriveSystem,
 )
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion.compiled_flow import Detail
 from stickslip_ros.physics.motion.hybrid_motion import (
@@ -22,9 +24,6 @@ from stickslip_ros.physics.motion.hybrid_motion import (
 
 _LARGEST_FORCE = 1e100
 """Largest dimensionless force; a larger one is clipped to it: both make the motion unbounded."""
-
-_W = -1
-"""Index of the state of the washout filter."""
 
 
 class Motion(HybridMotion):
@@ -42,15 +41,16 @@ class Motion(HybridMotion):
         Displacement of the slide at the start, m.
     velocity : float
         Velocity of the slide at the start, m/s.
-    control : WashoutGains, optional
-        Controller that acts without sampling, eq. 19; its filter starts at rest. By default the
+    control : ContinuousControl, optional
+        Controller that acts without sampling, eq. 19; it starts at rest. By default the
         force is `force`.
 
     Examples
     --------
     The first millisecond of a slide that starts at rest:
 
-    >>> from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.control import ContinuousControl
+    from stickslip_ros.physics.model.drive import Drive
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.motion import Motion
     >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
@@ -69,7 +69,7 @@ class Motion(HybridMotion):
         drive: Drive,
         position: float,
         velocity: float,
-        control: WashoutGains | None = None,
+        control: ContinuousControl | None = None,
     ) -> None:
         self._drive, self._control = drive, control
         self._time = 0.0
@@ -78,7 +78,7 @@ class Motion(HybridMotion):
         super().__init__(system, state, self._first_detail)
 
     def restart(self, position: float, velocity: float) -> None:
-        """Set the state of the slide; force and gains are kept, and the filter is at rest.
+        """Set the state of the slide; force and gains are kept, and the controller is at rest.
 
         Parameters
         ----------
@@ -101,50 +101,72 @@ class Motion(HybridMotion):
         self._change(drive, self._control)
 
     @property
-    def control(self) -> WashoutGains | None:
-        """Continuous controller, SI units; the output of its filter does not jump at a change."""
+    def control(self) -> ContinuousControl | None:
+        """Continuous controller, SI units; its state as of the sampled law is kept at a change."""
         return self._control
 
     @control.setter
-    def control(self, control: WashoutGains | None) -> None:
+    def control(self, control: ContinuousControl | None) -> None:
         if (control is None) != (self._control is None):
             raise TypeError("a motion has continuous control from its start, or never")
         self._change(self._drive, control)
 
     @property
     def force(self) -> float:
-        """Control and disturbance force on the slide, N; held until you set it again."""
+        """Force on the slide, N, held until you set it again; the command of an actuator's lag."""
         return self._instant.inputs[0] * self._drive.normal_force
 
     @force.setter
     def force(self, force: float) -> None:
+        self._hold(0, force)
+
+    def set_forces(self, control: float, disturbance: float) -> None:
+        """Set the control force and the disturbance force, held until you set them again.
+
+        Parameters
+        ----------
+        control : float
+            Control force, N. An actuator with states receives it as its command.
+        disturbance : float
+            Disturbance force on the slide, N.
+        """
+        if self._system.has_actuator:
+            self._hold(0, control)
+            self._hold(1, disturbance)
+        else:
+            self._hold(0, control + disturbance)
+
+    def _hold(self, number: int, force: float) -> None:
         scaled = force / self._drive.normal_force
         if not -_LARGEST_FORCE <= scaled <= _LARGEST_FORCE:
             scaled = max(-_LARGEST_FORCE, min(_LARGEST_FORCE, scaled))
-        self._set_input(0, scaled)
+        self._set_input(number, scaled)
 
     @property
     def applied_force(self) -> float:
         """Present force on the slide, N: the held one, or that of the continuous controller."""
-        if self._control is not None:
-            return self._control.force(self.velocity - self.low_passed)
-        return self.force
+        return self._system.control_force(self._instant) * self._drive.normal_force
 
     @property
-    def low_passed(self) -> float:
-        """Low-passed speed in the washout filter, d w of eq. 17, m/s; with control only."""
-        return self._instant.state[_W] * self._low_passed_scale
+    def control_state(self) -> tuple[float, ...]:
+        """State of the continuous controller, SI units, as that of the sampled law."""
+        state = self._instant.state[self._system.control_states].tolist()
+        return tuple(
+            each * scale for each, scale in zip(state, self._control_scales(), strict=True)
+        )
 
-    @low_passed.setter
-    def low_passed(self, low_passed: float) -> None:
-        self._instant.state[_W] = low_passed / self._low_passed_scale
+    @control_state.setter
+    def control_state(self, control_state: Sequence[float]) -> None:
+        self._instant.state[self._system.control_states] = array(
+            "d",
+            [
+                each / scale
+                for each, scale in zip(control_state, self._control_scales(), strict=True)
+            ],
+        )
 
-    @property
-    def _low_passed_scale(self) -> float:
-        control = self._system.control
-        if control is None:
-            raise TypeError("a motion without continuous control has no filter")
-        return control.corner_frequency * self._drive.speed_scale
+    def _control_scales(self) -> Sequence[float]:
+        return () if self._control is None else self._control.state_scales(self._drive)
 
     @property
     def position(self) -> float:
@@ -203,13 +225,13 @@ class Motion(HybridMotion):
             ) from None
         self._time += duration
 
-    def _change(self, drive: Drive, control: WashoutGains | None) -> None:
-        """Continue with another drive and controller; the filter's output does not jump."""
+    def _change(self, drive: Drive, control: ContinuousControl | None) -> None:
+        """Continue with another drive and controller, in the same state of slide and law."""
         if (drive, control) == (self._drive, self._control):
             return
         old, force = self._drive, self.force
         position, velocity = self.position, self.velocity
-        filtered = velocity - self.low_passed if control is not None else 0.0
+        control_state = self.control_state
         x, y, *memory = self._instant.state.tolist()
         law = drive.friction
         self._drive, self._control = drive, control
@@ -221,8 +243,11 @@ class Motion(HybridMotion):
             for number, unit in enumerate(law.states.values()):
                 ratio = drive.scales.factor(unit) / old.scales.factor(unit)
                 state[MEMORY + number] = memory[number] * ratio
-        if system.control is not None:
-            state[_W] = (y - filtered / drive.speed_scale) / system.control.corner_frequency
+        if control is not None:
+            state[system.control_states] = [
+                each / scale
+                for each, scale in zip(control_state, control.state_scales(drive), strict=True)
+            ]
         self._use(system)
         self._instant.time = self._time * drive.angular_frequency
         self.force = force

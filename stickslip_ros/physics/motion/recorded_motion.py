@@ -4,9 +4,9 @@ import numpy as np
 
 from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
+from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import POSITION, SPEED, STICK
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.hybrid import Mode
 from stickslip_ros.physics.motion.compiled_flow import Detail
 from stickslip_ros.physics.motion.motion import Motion
@@ -23,7 +23,7 @@ class RecordedMotion(Motion):
         Displacement of the slide at the start, m.
     velocity : float
         Velocity of the slide at the start, m/s.
-    control : WashoutGains, optional
+    control : ContinuousControl, optional
         Controller that acts without sampling; see `Motion`.
 
     Examples
@@ -49,7 +49,7 @@ class RecordedMotion(Motion):
         drive: Drive,
         position: float,
         velocity: float,
-        control: WashoutGains | None = None,
+        control: ContinuousControl | None = None,
     ) -> None:
         self._recorded: list[tuple[float, float, float, bool]] = []
         self._breakpoint_time = 0.0

@@ -4,9 +4,9 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
+from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SLIP, SPEED
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.hybrid import Mode
 from stickslip_ros.physics.motion.compiled_flow import Detail
 from stickslip_ros.physics.motion.derivatives import flow_rates, parameter_values
@@ -35,7 +35,7 @@ class SensitiveMotion(RecordedMotion):
 
     _first_detail = Detail.DERIVATIVES
 
-    def __init__(self, drive: Drive, gains: WashoutGains | None = None) -> None:
+    def __init__(self, drive: Drive, gains: ContinuousControl | None = None) -> None:
         """Start at rest at X = 0, with continuous control if `gains` (SI) are given."""
         self.transition: FloatArray = np.empty((0, 0))
         """Derivatives of the state (rows) by the state at the start (columns)."""

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, replace
 
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
 from stickslip_ros.physics.theory.requirements import AUTONOMOUS, STATIC, require
@@ -50,7 +50,7 @@ def critical_gains(drive: Drive, gains: WashoutGains) -> CriticalGains | None:
     The system of the paper:
 
     >>> from stickslip_ros.physics.model.drive import Drive
-    >>> from stickslip_ros.physics.model.equations import WashoutGains
+    >>> from stickslip_ros.physics.model.control import WashoutGains
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.theory.critical_gains import critical_gains
     >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,

@@ -13,9 +13,10 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
-from stickslip_ros.physics.model.equations import WashoutGains, acceleration, reaction
+from stickslip_ros.physics.model.equations import acceleration, reaction
 from stickslip_ros.physics.motion.recorded_motion import RecordedMotion
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,

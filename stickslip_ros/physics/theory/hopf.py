@@ -7,9 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.linear import Expansion, expand, hurwitz_determinants, jacobians
 from stickslip_ros.physics.theory.requirements import AUTONOMOUS, require
 from stickslip_ros.physics.theory.roots import zero_between

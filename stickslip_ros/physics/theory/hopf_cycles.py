@@ -6,9 +6,9 @@ from math import pi, sqrt
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.physics.theory.hopf import ComplexPair
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, shoot
@@ -44,7 +44,7 @@ def limit_cycle_from_hopf(drive: Drive, gains: WashoutGains) -> LimitCycle | Non
     The system of the paper, at a linear gain just above the critical one of -0.9353:
 
     >>> from stickslip_ros.physics.model.drive import Drive
-    >>> from stickslip_ros.physics.model.equations import WashoutGains
+    >>> from stickslip_ros.physics.model.control import WashoutGains
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
     >>> drive = Drive(mass=1.0, damping=0.02, stiffness=1.0, normal_force=1.0,

@@ -16,9 +16,9 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.measures.cycle_measures import EQUILIBRIUM_SPEED, CycleMeter, Measures
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED, UNBOUNDED_SPEED
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.motion.variational import SensitiveMotion, TooStiffError
 from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.cycle_bounds import (

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SLIP
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion.derivatives import flow_tensors
 from stickslip_ros.physics.theory.equilibrium import equilibria

@@ -16,8 +16,8 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.loop.sampled_loop import whole_and_rest
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.requirements import AUTONOMOUS, STATIC, require
 
@@ -73,7 +73,7 @@ class LinearSampledLoop:
     The slide of a machine tool, sampled at 1 kHz without delay:
 
     >>> from stickslip_ros.physics.model.drive import Drive
-    >>> from stickslip_ros.physics.model.equations import WashoutGains
+    >>> from stickslip_ros.physics.model.control import WashoutGains
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
     >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,

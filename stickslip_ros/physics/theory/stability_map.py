@@ -6,8 +6,8 @@ from typing import Self
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 

@@ -1,0 +1,193 @@
+"""What a control law is: a force for each sample, and, where it has equations, their form."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.constants import constant, constants_of
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.samples import Sample
+
+State = tuple[float, ...]
+"""State of a control law between samples."""
+
+
+class Reference(NamedTuple):
+    """Motion that a control law is to follow, at one instant; None for what is not given."""
+
+    position: float | None = None
+    """Displacement, m."""
+    velocity: float | None = None
+    """Velocity, m/s."""
+    acceleration: float | None = None
+    """Acceleration, m/s^2."""
+
+
+NO_REFERENCE = Reference()
+"""The reference where there is none."""
+
+
+class LinearFeedback(NamedTuple):
+    """A sampled control law near the equilibrium: z' = A z + B (x, y), u = C z + D (x, y).
+
+    z is the deviation of the law's state from its value at the equilibrium, and x and y those of
+    displacement and velocity; SI units.
+    """
+
+    state: FloatArray
+    """A, shape (n, n) for n states."""
+    input: FloatArray
+    """B, shape (n, 2)."""
+    output: FloatArray
+    """C, shape (n,)."""
+    direct: FloatArray
+    """D, shape (2,)."""
+
+
+class ContinuousControl(Protocol):
+    """A control law as equations: the force, and the rates of its states, without sampling.
+
+    It is a frozen dataclass of its constants. The equations accept floats, arrays and heyoka
+    expressions. All values are in SI units, or dimensionless after `scaled`.
+    """
+
+    states: ClassVar[Sequence[str]]
+    """Names of the states."""
+
+    def scaled(self, drive: Drive) -> Self:
+        """Return the same control with dimensionless constants, in the scales of `drive`."""
+        ...
+
+    def silenced(self) -> Self:
+        """Return a control with the same states that gives no force."""
+        ...
+
+    def rest(self, position: Any, speed: Any) -> Sequence[Any]:
+        """Return the states of a control at rest, where the slide has kept its state for long."""
+        ...
+
+    def state_rates(self, position: Any, speed: Any, states: Sequence[Any]) -> Sequence[Any]:
+        """Return the rates of the states."""
+        ...
+
+    def control_force(self, position: Any, speed: Any, states: Sequence[Any]) -> Any:
+        """Return the force on the slide."""
+        ...
+
+    def state_scales(self, drive: Drive) -> Sequence[float]:
+        """Return the factor from each dimensionless state to the sampled law's, in SI units."""
+        ...
+
+    def bound(self, speed: Any) -> Any:
+        """Return forces on the speed that give a cycle at least the energy that the control gives.
+
+        An array of the shape of `speed`; infinite where no bound is known.
+        """
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControlLaw(ABC):
+    """Control law: the force that answers a sample of the drive.
+
+    A law is a frozen dataclass of its constants, each described by `constant`, in SI units. Its
+    state is a tuple of floats that it receives and returns. A `Controller` gives it one sample
+    after the other; it limits the force to `force_limit`, and sends none during `start_after`.
+
+    Examples
+    --------
+    A law in one file:
+
+    >>> from dataclasses import dataclass
+    >>> from typing import ClassVar
+    >>> from stickslip_ros.physics.model.constants import constant
+    >>> from stickslip_ros.physics.model.control import ControlLaw
+    >>> @dataclass(frozen=True)
+    ... class Brake(ControlLaw):
+    ...     name: ClassVar[str] = "brake"
+    ...     gain: float = constant(1.0, "Force per velocity.", "N s/m", at_least=0.0)
+    ...
+    ...     def respond(self, state, elapsed, sample, reference):
+    ...         return -self.gain * sample.velocity, state
+    >>> sorted(Brake.constants())
+    ['force_limit', 'gain', 'start_after']
+    """
+
+    name: ClassVar[str]
+    """Name in parameters, options and names of nodes."""
+    follows_reference: ClassVar[bool] = False
+    """Whether the law uses a reference; then its controller has the parameters `reference.*`."""
+    state_units: ClassVar[Mapping[str, str | None]] = {}
+    """Unit of each state, by name."""
+
+    force_limit: float = constant(inf, "Largest magnitude of the force.", "N", at_least=0.0)
+    """Largest magnitude of the force, N."""
+    start_after: float = constant(
+        0.0, "Time after the first sample during which the force is zero.", "s", at_least=0.0
+    )
+    """Time from the first sample during which the force is zero, s."""
+
+    @classmethod
+    def constants(cls) -> list[str]:
+        """Return the names of the constants, the law's own first."""
+        common = constants_of(ControlLaw)
+        return sorted(constants_of(cls), key=lambda name: name in common)
+
+    def refusal(self) -> str | None:
+        """Return why the constants do not fit together, as a sentence, or None."""
+        return None
+
+    def initial_state(self, sample: Sample, reference: Reference) -> State:
+        """Return the state at the first sample.
+
+        Parameters
+        ----------
+        sample : Sample
+            First sample.
+        reference : Reference
+            Reference at that sample.
+
+        Returns
+        -------
+        tuple of float
+            State; by default the law has none.
+        """
+        return ()
+
+    @abstractmethod
+    def respond(
+        self, state: State, elapsed: float, sample: Sample, reference: Reference
+    ) -> tuple[float, State]:
+        """Return the force for a sample, and the state after it.
+
+        Parameters
+        ----------
+        state : tuple of float
+            State after the last sample; at the first one that of `initial_state`.
+        elapsed : float
+            Time since the last sample, s; 0 at the first one.
+        sample : Sample
+            Sample to answer. A law uses stamp, position and velocity, which are what a sensor
+            measures.
+        reference : Reference
+            Reference at that sample.
+
+        Returns
+        -------
+        force : float
+            Control force, N.
+        state : tuple of float
+            State after the sample.
+        """
+
+    @property
+    def continuous(self) -> ContinuousControl | None:
+        """The law as equations, eq. 19; None for a law that is defined for samples only."""
+        return None
+
+    def linear(self, period: float) -> LinearFeedback | None:
+        """Return the law near the equilibrium for a sample period (s), or None if not linear."""
+        return None
