@@ -188,6 +188,6 @@ class ControlLaw(ABC):
         """The law as equations, eq. 19; None for a law that is defined for samples only."""
         return None
 
-    def linear(self, period: float) -> LinearFeedback | None:
+    def linear_feedback(self, period: float) -> LinearFeedback | None:
         """Return the law near the equilibrium for a sample period (s), or None if not linear."""
         return None

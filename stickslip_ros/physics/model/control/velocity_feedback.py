@@ -184,7 +184,7 @@ class VelocityFeedback(ControlLaw):
         """
         return self.position_gain * sample.position + self.velocity_gain * sample.velocity, state
 
-    def linear(self, period: float) -> LinearFeedback:
+    def linear_feedback(self, period: float) -> LinearFeedback:
         """Return the law itself, which is linear.
 
         Parameters

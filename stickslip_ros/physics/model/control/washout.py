@@ -158,6 +158,27 @@ class WashoutGains:
         """
         return (self.corner_frequency / drive.angular_frequency * drive.speed_scale,)
 
+    def linear_feedback(self, period: float) -> LinearFeedback:
+        """Return the sampled controller near the equilibrium: z' = z + q (y - z), u = k1 (y - z).
+
+        Parameters
+        ----------
+        period : float
+            Sample period T, s; q = 1 - exp(-d T).
+
+        Returns
+        -------
+        LinearFeedback
+            Controller with the one state z.
+        """
+        step, gain = -expm1(-self.corner_frequency * period), self.linear
+        return LinearFeedback(
+            np.array([[1.0 - step]]),
+            np.array([[0.0, step]]),
+            np.array([-gain]),
+            np.array([0.0, gain]),
+        )
+
     def bound(self, speed: Any) -> Any:
         """Return forces on the speed that give a cycle at least the energy of the controller.
 
@@ -269,23 +290,17 @@ class Washout(ControlLaw):
         low_passed -= expm1(-self.corner_frequency * elapsed) * (held - low_passed)
         return self.gains.force(velocity - low_passed), (low_passed, velocity)
 
-    def linear(self, period: float) -> LinearFeedback:
-        """Return the law near the equilibrium: z' = z + q (y - z), u = k1 (y - z).
+    def linear_feedback(self, period: float) -> LinearFeedback:
+        """Return the law near the equilibrium; see `WashoutGains.linear_feedback`.
 
         Parameters
         ----------
         period : float
-            Sample period T, s; q = 1 - exp(-d T).
+            Sample period T, s.
 
         Returns
         -------
         LinearFeedback
             Law with the one state z.
         """
-        step, gain = -expm1(-self.corner_frequency * period), self.linear_gain
-        return LinearFeedback(
-            np.array([[1.0 - step]]),
-            np.array([[0.0, step]]),
-            np.array([-gain]),
-            np.array([0.0, gain]),
-        )
+        return self.gains.linear_feedback(period)
