@@ -15,7 +15,7 @@ from stickslip_ros.studies.settling import CYCLES
 from stickslip_ros.studies.study import Point, Study
 
 POSITION, VELOCITY = "plant.initial.position", "plant.initial.velocity"
-"""Parameters that define a start; the washout filter starts at rest."""
+"""Parameters that define a start; the control law starts in its initial state."""
 
 
 @dataclass(frozen=True)

@@ -180,7 +180,7 @@ class Journal:
                 break
             try:
                 read = _parsed(line)
-                end = None if read["end"] is None else MotionState(*read["end"])
+                end = None if read["end"] is None else MotionState.from_json(read["end"])
                 indices = [Point.from_json(values).number for values in read["points"]]
                 if not 0 <= min(indices) <= max(indices) < self.study.plan.size:
                     raise ValueError

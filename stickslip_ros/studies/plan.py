@@ -19,7 +19,7 @@ from stickslip_ros.text import did_you_mean
 MOST_POINTS = 1_000_000_000
 """Largest number of points of a study, since its results must fit into a file."""
 
-_NODES = ("plant", "washout_controller")
+_NODES = tuple(node for node in NODE_PARAMETERS if node != "analyzer")
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Axis:
     """
 
     parameter: str
-    """NODE.PARAMETER, a number of plant or washout_controller."""
+    """NODE.PARAMETER, a number of the plant or a controller."""
     first: float
     """First value, in the unit of the parameter."""
     last: float

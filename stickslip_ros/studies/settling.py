@@ -1,17 +1,23 @@
 """The motion that a drive settles on from one start: a point of a sweep or basin study."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.loop.controller import (
+    Controller,
+    ReferenceSource,
+    answer,
+    no_reference,
+)
 from stickslip_ros.physics.loop.simulation import measure_block, simulate_sampled
-from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, CycleMeter, Measures, Regime
 from stickslip_ros.physics.measures.observer import MeasuredMotion
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import ContinuousControl, ControlLaw
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
@@ -33,8 +39,14 @@ class MotionState:
     """Displacement, m."""
     velocity: float
     """Velocity, m/s."""
-    low_passed: float | None = None
-    """Low-pass state of the washout filter, m/s; None: equal to the velocity, no output."""
+    control: tuple[float, ...] | None = None
+    """State of the control law; None: its initial state."""
+
+    @classmethod
+    def from_json(cls, values: Sequence[Any]) -> Self:
+        """Return the state of the values of a tuple that went through JSON."""
+        position, velocity, control = values
+        return cls(position, velocity, None if control is None else tuple(control))
 
 
 @dataclass(frozen=True)
@@ -42,10 +54,12 @@ class ControlledDrive:
     """A drive with its control and sampling, if any."""
 
     drive: Drive
-    washout: WashoutParameters | None = None
-    """The controller; None: no control."""
+    law: ControlLaw | None = None
+    """The control law; None: no control."""
     sampled: PlantParameters | None = None
     """Sampling of the loop; None: no sampling, and continuous control (eq. 19)."""
+    reference: ReferenceSource = no_reference
+    """Reference of the control law."""
 
     @classmethod
     def from_scenario(cls, scenario: Scenario, *, continuous: bool = False) -> "ControlledDrive":
@@ -55,25 +69,32 @@ class ControlledDrive:
         Raises InvalidInputError if continuous control does not support the scenario.
         """
         plant = scenario.plant
-        washout = scenario.washout_controller.as_washout() if plant.expects_control else None
+        law = scenario.control_law
         if continuous:
             check_continuous(scenario)
         drive = plant.as_drive()
-        if washout is not None and washout.start_after > LONGEST * drive.natural_period:
+        if law is not None and law.start_after > LONGEST * drive.natural_period:
             raise InvalidInputError(
-                f"washout_controller.start_after = {washout.start_after:g} s: in a study it must "
-                f"be at most {LONGEST:g} natural periods"
+                f"{scenario.controller.node}.start_after = {law.start_after:g} s: in a study it "
+                f"must be at most {LONGEST:g} natural periods"
             )
         disturbed = plant.disturbance.kind != "none"
-        sampled = not continuous and (washout is not None or disturbed)
-        return cls(drive, washout, plant if sampled else None)
+        sampled = not continuous and (law is not None or disturbed)
+        reference = scenario.controller.as_reference()
+        return cls(drive, law, plant if sampled else None, reference)
 
 
 def check_continuous(scenario: Scenario) -> None:
     """Raise InvalidInputError if continuous control does not support the scenario."""
-    plant, washout = scenario.plant, scenario.washout_controller
+    plant, controller = scenario.plant, scenario.controller
+    law = scenario.control_law
+    if law is not None and law.continuous is None:
+        raise InvalidInputError(
+            f"the control law {law.name} is defined for samples only: it has no continuous form"
+        )
+    limit = float("inf") if law is None else law.force_limit
     for name, value, needed in (
-        ("washout_controller.force_limit", washout.force_limit, float("inf")),
+        (f"{controller.node}.force_limit", limit, float("inf")),
         ("plant.force_delay", plant.force_delay, 0.0),
         ("plant.force_jitter", plant.force_jitter, 0.0),
         ("plant.disturbance.kind", str(plant.disturbance.kind), "none"),
@@ -105,33 +126,33 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) ->
 
     Raises RunError if the motion is too stiff to integrate.
     """
-    drive, washout = case.drive, case.washout
-    control = washout.gains if washout is not None and case.sampled is None else None
+    drive, law = case.drive, case.law
+    control = law.continuous if law is not None and case.sampled is None else None
     motion = RecordedMotion(drive, start.position, start.velocity, control)
     motion.recording = False
     motion.take_breakpoints()  # the start is not part of what is measured
     loading = 0.0 if drive.belt_speed == 0.0 else loading_time(drive)
     transient = course.transient * drive.natural_period
-    controlled = washout is not None or case.sampled is not None
+    controlled = law is not None or case.sampled is not None
     if controlled:  # otherwise one step covers the stick phase on a slow belt
         loading = min(loading, 50.0 * drive.natural_period)
         transient += loading
     # The first and the last cycle are incomplete.
     cycles = max(course.cycles, LEAST_CYCLES) + 2
     block = cycles * drive.natural_period
-    law = loop = None
+    controller = loop = None
     if case.sampled is not None:
         loop = case.sampled.as_loop(motion)
         block = max(block, loop.period)
-        if washout is not None:
-            law = Washout(washout, start.low_passed)
-            simulate_sampled(loop, motion, law, washout.start_after, CycleMeter(1))
+        if law is not None:
+            controller = Controller(law, case.reference, start.control)
+            simulate_sampled(loop, motion, controller, law.start_after, CycleMeter(1))
 
         def advance(duration: float, section: _Section) -> None:
-            simulate_sampled(loop, motion, law, duration, section.meter, observer=section)
+            simulate_sampled(loop, motion, controller, duration, section.meter, observer=section)
     else:
-        if washout is not None:
-            _begin_control(motion, washout, start)
+        if law is not None and control is not None:
+            _start_control(motion, control, law.start_after, start)
 
         def advance(duration: float, section: _Section) -> None:
             motion.advance(duration)
@@ -162,21 +183,23 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) ->
         measures = section.meter.measures()
         if _is_settled(measures) and _alike(before, measures):
             break
-    low_passed = motion.low_passed if control is not None else None
-    if law is not None and loop is not None:
-        law.answer(loop.sample.stamp, loop.sample.velocity)
-        low_passed = law.low_passed
-    return section.settled(MotionState(motion.position, motion.velocity, low_passed))
+    state = motion.control_state if control is not None else None
+    if controller is not None and loop is not None:
+        answer(loop, controller)
+        state = controller.state
+    return section.settled(MotionState(motion.position, motion.velocity, state))
 
 
-def _begin_control(motion: RecordedMotion, washout: WashoutParameters, start: MotionState) -> None:
-    """Run the filter alone for `start_after`, then activate the controller."""
-    none = WashoutGains(washout.corner_frequency, 0.0, 0.0)
-    motion.control = washout.gains if washout.start_after == 0.0 else none
-    motion.low_passed = start.velocity if start.low_passed is None else start.low_passed
-    if washout.start_after > 0.0:
-        motion.advance(washout.start_after)
-        motion.control = washout.gains
+def _start_control(
+    motion: RecordedMotion, control: ContinuousControl, start_after: float, start: MotionState
+) -> None:
+    """Run the states of the control alone for `start_after` (s), then let its force act."""
+    motion.control = control if start_after == 0.0 else control.silenced()
+    if start.control is not None:
+        motion.control_state = start.control
+    if start_after > 0.0:
+        motion.advance(start_after)
+        motion.control = control
 
 
 def _is_settled(measures: Measures) -> bool:

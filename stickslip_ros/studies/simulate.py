@@ -6,7 +6,6 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.motion_tracer import MotionTracer
 from stickslip_ros.physics.loop.simulation import simulate_continuous, simulate_sampled
 from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
-from stickslip_ros.physics.loop.washout import Washout
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import RunObserver
 from stickslip_ros.physics.motion import RecordedMotion
@@ -42,20 +41,15 @@ def simulate(
     if continuous:
         check_continuous(scenario)
     plant = scenario.plant
-    washout = scenario.washout_controller.as_washout() if plant.expects_control else None
-    control = washout.gains if continuous and washout is not None else None
+    law = scenario.control_law
+    control = law.continuous if continuous and law is not None else None
     motion = RecordedMotion(
         plant.as_drive(), plant.initial.position, plant.initial.velocity, control
     )
     meter = CycleMeter(scenario.analyzer.window)
     if continuous:
-        return simulate_continuous(motion, washout, duration, meter, progress, observer, recorder)
+        return simulate_continuous(motion, law, duration, meter, progress, observer, recorder)
     tracer = None if observer is None else MotionTracer(motion, observer)
     loop = plant.as_loop(motion, advance=None if tracer is None else tracer.advance)
-    law = None if washout is None else Washout(washout)
-    measures = simulate_sampled(loop, motion, law, duration, meter, progress, tracer, recorder)
-    if recorder is not None:
-        sample = loop.sample
-        force = None if law is None else law.answer(sample.stamp, sample.velocity)
-        recorder.take(sample, force or 0.0)
-    return measures
+    controller = None if law is None else scenario.controller.as_controller()
+    return simulate_sampled(loop, motion, controller, duration, meter, progress, tracer, recorder)

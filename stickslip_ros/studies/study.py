@@ -146,8 +146,8 @@ def _compute_point(
     """Return a computed point, and the state in which the next one of a chain starts."""
     try:
         case, initial = study.case(index)
-        if start is not None and case.washout is not None:
-            case = replace(case, washout=replace(case.washout, start_after=0.0))
+        if start is not None and case.law is not None:
+            case = replace(case, law=replace(case.law, start_after=0.0))
         settled = settle(case, start or initial, study.course)
     except (StickslipError, ArithmeticError) as error:
         nothing = Measures(None, None, None, None, None, None, 0, None)

@@ -58,7 +58,7 @@ def sweep_study(
     """
     if not 1 <= len(axes) <= 2:
         raise InvalidInputError(f"{len(axes)} parameters: a sweep is over one or two")
-    without = [axis for axis in axes if axis.parameter.startswith("washout_controller.")]
+    without = [axis for axis in axes if not axis.parameter.startswith("plant.")]
     if without and not scenario.plant.expects_control:
         raise InvalidInputError(f"{without[0]}: without control there is no controller")
     study = Study(scenario, Grid(tuple(axes), carry), course or SettlingCourse(), continuous)
