@@ -10,6 +10,7 @@ NAME = MANIFEST.findtext("name")
 
 EXECUTABLES = {
     "plant_node": "stickslip_ros.nodes.plant:main",
+    "controller_node": "stickslip_ros.nodes.controller:main",
     "washout_controller_node": "stickslip_ros.nodes.washout_controller:main",
     "analyzer_node": "stickslip_ros.nodes.analyzer:main",
     "replay_node": "stickslip_ros.nodes.replay:main",

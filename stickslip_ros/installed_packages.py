@@ -36,7 +36,7 @@ def find_executable(name: str) -> Path:
     package, _, executable = name.partition("/")
     if not package or not executable or "/" in executable:
         raise InvalidInputError(
-            f"{name}: must be PACKAGE/EXECUTABLE, such as stickslip_ros/washout_controller_node, "
+            f"{name}: must be PACKAGE/EXECUTABLE, such as stickslip_ros/controller_node, "
             "or the path of a Python script"
         )
     prefix = next((p for p in prefixes() if (p / _MARKERS / package).is_file()), None)

@@ -4,7 +4,13 @@ import os
 import signal
 import sys
 
-NODE_SCRIPTS = ("plant_node", "washout_controller_node", "analyzer_node", "replay_node")
+NODE_SCRIPTS = (
+    "plant_node",
+    "controller_node",
+    "washout_controller_node",
+    "analyzer_node",
+    "replay_node",
+)
 """Installed scripts that start a node."""
 
 

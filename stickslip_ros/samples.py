@@ -37,6 +37,21 @@ class Sample(NamedTuple):
     """Velocity of the belt, m/s."""
 
 
+class Reference(NamedTuple):
+    """Motion that a control law is to follow, at one instant; None for what is not given."""
+
+    position: float | None = None
+    """Displacement, m."""
+    velocity: float | None = None
+    """Velocity, m/s."""
+    acceleration: float | None = None
+    """Acceleration, m/s^2."""
+
+
+NO_REFERENCE = Reference()
+"""The reference where there is none."""
+
+
 @dataclass(frozen=True, eq=False)
 class SampleColumns(Table):
     """Consecutive samples: the fields of `Sample` as arrays of shape (samples,).
@@ -73,6 +88,18 @@ class SampleColumns(Table):
         for column in (self.velocity, self.belt_velocity):
             believed &= np.abs(column) <= LARGEST
         return believed
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceColumns(Table):
+    """Consecutive references of the slide, as arrays of shape (references,); NaN for no value."""
+
+    stamp: IntArray
+    """Stamps, ns."""
+    position: FloatArray
+    """Displacement, m."""
+    velocity: FloatArray
+    """Velocity, m/s."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,23 +19,24 @@ from stickslip_ros.bags.mcap_file import McapFile
 from stickslip_ros.bags.metadata import metadata_faults
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.cdr import Refused
-from stickslip_ros.messages.codec import joint_states_in, wrenches_in
+from stickslip_ros.messages.codec import joint_states_in, references_in, wrenches_in
 from stickslip_ros.messages.topics import (
     APPLIED_DISTURBANCE,
     CONTROL_FORCE,
     DROPPED_FORCE,
     JOINT_STATES,
     RECORDED_TOPICS,
+    REFERENCE,
     Topic,
 )
-from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.samples import ForceColumns, ReferenceColumns, SampleColumns
 from stickslip_ros.text import printable
 
 _PACKED = ".mcap.zstd"
 """Suffix of the files that rosbag2 compressed as a whole."""
 
 
-ColumnsT = TypeVar("ColumnsT", SampleColumns, ForceColumns)
+ColumnsT = TypeVar("ColumnsT", SampleColumns, ForceColumns, ReferenceColumns)
 _Decode = Callable[[bytes, IntArray, IntArray], tuple[ColumnsT, Refused]]
 
 
@@ -156,6 +157,11 @@ class Recording:
     def dropped_forces(self) -> ForceColumns:
         """All control forces that did not act, as sent; raises BagError as `blocks` does."""
         return self._whole(DROPPED_FORCE, wrenches_in)
+
+    @cached_property
+    def references(self) -> ReferenceColumns:
+        """All references of the controller; raises BagError as `blocks` does."""
+        return self._whole(REFERENCE, references_in)
 
     @property
     def dropped_known(self) -> bool:

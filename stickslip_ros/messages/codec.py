@@ -8,11 +8,12 @@ field.
 import reprlib
 import struct
 from collections.abc import Sequence
+from math import isnan
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.errors import MessageError
 from stickslip_ros.messages.cdr import LITTLE_ENDIAN, Decoder, Layout, Refused, decode, joined
-from stickslip_ros.samples import ForceColumns, Sample, SampleColumns
+from stickslip_ros.samples import ForceColumns, Reference, ReferenceColumns, Sample, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
 SLIDE = "slide"
@@ -31,6 +32,7 @@ _JOINT_STATE = struct.Struct("<4s iI 5s3x 14s2x 9s3x I2d I4x2d I4x2d")
 _JOINT_STATE_FRAME = _name("")
 _JOINT_STATE_SLIDE = struct.pack("<I", 2) + _name(SLIDE)
 _JOINT_STATE_BELT = _name(BELT)
+_REFERENCE_JOINT = _JOINT_STATE_FRAME + bytes(3) + struct.pack("<I", 1) + _name(SLIDE) + bytes(2)
 _JOINT_STATE_CONSTANTS = (
     LITTLE_ENDIAN,
     _JOINT_STATE_FRAME,
@@ -76,6 +78,23 @@ def pack_joint_state(
         )
     except struct.error as error:
         raise _unpackable("joint state", stamp, error) from error
+
+
+def pack_reference(stamp: int, reference: Reference) -> bytes:
+    """Serialize a sensor_msgs/msg/JointState of the joint `slide`; stamp in ns, values in SI units.
+
+    What the reference does not give is empty; there is no field for the acceleration. Raises
+    MessageError for a stamp outside ROS time (32-bit seconds).
+    """
+    try:
+        message = _STAMP.pack(LITTLE_ENDIAN, *divmod(stamp, NANOSECONDS)) + _REFERENCE_JOINT
+    except struct.error as error:
+        raise _unpackable("reference", stamp, error) from error
+    for value in (reference.position, reference.velocity):
+        message += struct.pack("<I", value is not None)
+        if value is not None:  # aligned to 8 bytes from the end of the encapsulation
+            message += bytes((len(LITTLE_ENDIAN) - len(message)) % 8) + struct.pack("<d", value)
+    return message + struct.pack("<I", 0)
 
 
 def pack_wrench(stamp: int, force_x: float) -> bytes:
@@ -134,6 +153,18 @@ def unpack_joint_state(data: bytes) -> Sample:
     return Sample(stamp, *values)
 
 
+def unpack_reference(data: bytes) -> tuple[int, Reference]:
+    """Read stamp (ns) and reference of the slide from a serialized sensor_msgs/msg/JointState.
+
+    Positions or velocities may be empty, and NaN is the same as none. Raises MessageError for other
+    bytes, and if the slide is not among the joints.
+    """
+    stamp, (position, velocity) = _reference_layout(data).read(data)
+    return stamp, Reference(
+        None if isnan(position) else position, None if isnan(velocity) else velocity
+    )
+
+
 def unpack_wrench(data: bytes) -> tuple[int, float]:
     """Read the stamp (ns) and `force.x` (N) from a serialized geometry_msgs/msg/WrenchStamped.
 
@@ -180,6 +211,12 @@ def wrenches_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[ForceColum
     return ForceColumns(stamp, *values), refused
 
 
+def references_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[ReferenceColumns, Refused]:
+    """Decode the serialized references `data[begin[i] : end[i]]`; also return what is refused."""
+    stamp, values, refused = decode(data, begin, end, _reference_layout, 2)
+    return ReferenceColumns(stamp, *values), refused
+
+
 def _unpackable(kind: str, stamp: int, error: struct.error) -> MessageError:
     return MessageError(
         f"a {kind} with the stamp {stamp} ns cannot be serialized ({error}); "
@@ -190,10 +227,7 @@ def _unpackable(kind: str, stamp: int, error: struct.error) -> MessageError:
 def _joint_state_layout(data: bytes) -> Layout:
     message = Decoder(data, "joint state")
     stamp = message.header_stamp()
-    joints = message.count()
-    if joints > _MOST_JOINTS:
-        raise MessageError(f"a joint state has {joints} joints; must be at most {_MOST_JOINTS}")
-    names = [message.string() for _ in range(joints)]
+    names = _joints(message, "joint state")
     shown = reprlib.repr(names)
     (position, positions), (velocity, velocities), (effort, efforts) = (
         message.doubles(message.count()) for _ in range(3)
@@ -220,6 +254,33 @@ def _joint_state_layout(data: bytes) -> Layout:
             velocity + belt,
         ],
     )
+
+
+def _reference_layout(data: bytes) -> Layout:
+    message = Decoder(data, "reference")
+    stamp = message.header_stamp()
+    names = _joints(message, "reference")
+    shown = reprlib.repr(names)
+    if SLIDE not in names:
+        raise MessageError(f"a reference names the joints {shown}; {SLIDE} must be among them")
+    slide = 8 * names.index(SLIDE)
+    places: list[int | None] = []
+    for what in ("positions", "velocities"):
+        place, count = message.doubles(message.count())
+        if count not in (0, len(names)):
+            raise MessageError(
+                f"a reference of the joints {shown} has {count} {what}; must be one for each "
+                "joint, or none"
+            )
+        places.append(place + slide if count else None)
+    return Layout(message, stamp, places)
+
+
+def _joints(message: Decoder, kind: str) -> list[str]:
+    joints = message.count()
+    if joints > _MOST_JOINTS:
+        raise MessageError(f"a {kind} has {joints} joints; must be at most {_MOST_JOINTS}")
+    return [message.string() for _ in range(joints)]
 
 
 def _wrench_layout(data: bytes) -> Layout:

@@ -7,7 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from stickslip_ros.messages.codec import unpack_header, unpack_joint_state, unpack_wrench
+from stickslip_ros.messages.codec import (
+    unpack_header,
+    unpack_joint_state,
+    unpack_reference,
+    unpack_wrench,
+)
 
 MessageT = TypeVar("MessageT")
 
@@ -45,6 +50,15 @@ CONTROL_FORCE = Topic(
     meaning="Control force on the slide, `wrench.force.x` N, with the stamp of the state that it "
     "answers.",
     decode=unpack_wrench,
+)
+REFERENCE = Topic(
+    "reference",
+    "sensor_msgs/msg/JointState",
+    DEEP,
+    meaning="Motion that the controller follows: joint `slide`, `position` m, `velocity` m/s; each "
+    "may be empty. From another node it holds until the next message; a controller with a course "
+    "of its own publishes it with the stamp of each state that it answers.",
+    decode=unpack_reference,
 )
 DISTURBANCE_FORCE = Topic(
     "disturbance_force",
@@ -109,6 +123,7 @@ TOPICS = (
     DISTURBANCE_FORCE,
     APPLIED_DISTURBANCE,
     DROPPED_FORCE,
+    REFERENCE,
     AMPLITUDE,
     STICK_FRACTION,
     FREQUENCY,
@@ -116,5 +131,7 @@ TOPICS = (
     DIAGNOSTICS,
     CLOCK,
 )
-RECORDED_TOPICS = (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE, DROPPED_FORCE)
+RECORDED_TOPICS = (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE, DROPPED_FORCE, REFERENCE)
 """Topics that the analyzer records."""
+RECORDED_IF_PUBLISHED = (DROPPED_FORCE, REFERENCE)
+"""Those that a bag has only if a node publishes them."""

@@ -31,7 +31,9 @@ from stickslip_ros.messages.topics import (
     FREQUENCY,
     JOINT_STATES,
     RECORDED,
+    RECORDED_IF_PUBLISHED,
     RECORDED_TOPICS,
+    REFERENCE,
     STICK_FRACTION,
     Topic,
 )
@@ -40,11 +42,11 @@ from stickslip_ros.nodes.base.managed import ERROR, OK, Diagnosis, ManagedNode, 
 from stickslip_ros.nodes.base.polling import waiting_messages
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.base.ros_topics import qos_profile
-from stickslip_ros.nodes.base.service_call import parameters_call
+from stickslip_ros.nodes.base.service_call import ServiceCall, parameters_call
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters
-from stickslip_ros.stamps import END_OF_TIME
+from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 from stickslip_ros.text import quantity
 from stickslip_ros.versions import versions
 
@@ -52,6 +54,10 @@ ColumnsT = TypeVar("ColumnsT")
 
 VERDICT_TIME = 0.05
 """Time, s, in which a plant that has dropped forces reports the last ones, too."""
+
+_REFERENCE_AGE = 60 * NANOSECONDS
+"""Time, ns, by which the stamp of a reference of the run may differ from that of the newest sample.
+"""
 
 
 class _Message(NamedTuple):
@@ -86,15 +92,14 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._bag_failure = ""
         self._recorder: Recorder | None = None
         self._flushed_at = time.monotonic()
+        self._published = set[str]()
         if self.parameters.bag:
             self._open_bag()
         # The plant waits for the recorder while this publisher exists.
         self._recorded = self.advertise(RECORDED)
-        self._parameter_calls = [
-            parameters_call(self, node, list(known_parameters(model)), partial(self._keep, node))
-            for node, model in NODE_PARAMETERS.items()
-            if node != "analyzer"
-        ]
+        self._parameter_calls: dict[str, ServiceCall] = {}
+        self._ask_for_parameters("plant")
+        self._controllers = 0
         self._to_measure: dict[Topic[Any], list[bytes]] = {
             JOINT_STATES: [],
             CONTROL_FORCE: [],
@@ -104,6 +109,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             topic: self.keep(self.create_polled_subscription(topic, qos_profile(topic)))
             for topic in RECORDED_TOPICS
         }
+        self._look_for_controllers()
         self._periodic = [
             self.keep(self.every(self._batch_period, partial(self._if_active, self._take_in))),
             self.keep(self.every(0.1, partial(self._if_active, self._measure))),
@@ -120,7 +126,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         report = self._meter.report()
         for end in (self._recorded, *self._listening.values(), *self._periodic):
             self.release(end)
-        for call in self._parameter_calls:
+        for call in self._parameter_calls.values():
             call.close()
         self._keep("report", report)
         self._record(Recorder.close)
@@ -161,16 +167,19 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def _take_in(self) -> None:
         """Record the messages received since the last call, and keep them for the measures."""
         taken = {topic: self._take(topic) for topic in RECORDED_TOPICS}
-        # The bag has this topic only if the plant publishes it: otherwise drops are unknown.
-        if not self._meter.dropped_known and (
-            taken[DROPPED_FORCE] or self._listening[DROPPED_FORCE].get_publisher_count() > 0
-        ):
-            self._meter.dropped_known = True
-            self._record(lambda recorder: self._add_topic(recorder, DROPPED_FORCE))
+        for topic in RECORDED_IF_PUBLISHED:
+            if topic.name not in self._published and (
+                taken[topic] or self._listening[topic].get_publisher_count() > 0
+            ):
+                self._published.add(topic.name)
+                self._record(lambda recorder, topic=topic: self._add_topic(recorder, topic))
+        # Without this topic drops are unknown.
+        self._meter.dropped_known = DROPPED_FORCE.name in self._published
         states = taken[JOINT_STATES]
         if states and states[-1].stamp != self._newest_recorded:
             self._newest_recorded = states[-1].stamp
             self._recorded.publish(pack_header(self._newest_recorded))
+        taken[REFERENCE] = [self._within_the_run(message) for message in taken[REFERENCE]]
         self._write(heapq.merge(*taken.values(), key=attrgetter("stamp")))
         # Flush now if the next call would be too late.
         now = time.monotonic()
@@ -188,13 +197,40 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             except MessageError as error:
                 self.dropped.add(f"{topic.name}: {error}")
                 continue
-            if not 0 < stamp < END_OF_TIME:
+            if topic is not REFERENCE and not 0 < stamp < END_OF_TIME:
                 self.dropped.add(f"{topic.name}: a message with the stamp {stamp} ns")
                 continue
             taken.append(_Message(topic, stamp, data))
         if topic in self._to_measure:
             self._to_measure[topic] += [message.data for message in taken]
         return taken
+
+    def _within_the_run(self, message: _Message) -> _Message:
+        """Return a reference with the time of the run: its publisher may have any clock, or none.
+
+        A stamp that is not of the run is replaced by that of the newest sample.
+        """
+        newest = max(self._newest_recorded, 1)
+        in_run = newest - _REFERENCE_AGE <= message.stamp <= newest + _REFERENCE_AGE
+        return message if in_run else message._replace(stamp=newest)
+
+    def _ask_for_parameters(self, node: str) -> None:
+        """Ask a node for its parameters, to be kept in the bag."""
+        names = list(known_parameters(NODE_PARAMETERS[node]))
+        self._parameter_calls[node] = parameters_call(self, node, names, partial(self._keep, node))
+
+    def _look_for_controllers(self) -> None:
+        """Ask each controller of this package for its parameters, once it publishes forces."""
+        count = self._listening[CONTROL_FORCE].get_publisher_count()
+        if count == self._controllers:
+            return
+        self._controllers = count
+        own = self.get_namespace()
+        for publisher in self.get_publishers_info_by_topic(CONTROL_FORCE.name):
+            node = publisher.node_name
+            here = publisher.node_namespace == own and node in NODE_PARAMETERS
+            if here and node not in self._parameter_calls:
+                self._ask_for_parameters(node)
 
     def _measure(self) -> None:
         states = self._columns(JOINT_STATES, joint_state_columns)
@@ -209,7 +245,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         forces = self._columns(CONTROL_FORCE, wrench_columns)
         dropped = self._columns(DROPPED_FORCE, wrench_columns)
         self._meter.feed_forces(forces, dropped)
-        for call in self._parameter_calls:
+        self._look_for_controllers()
+        for call in self._parameter_calls.values():
             call.pursue()
 
     def _log_measures(self) -> None:
@@ -250,7 +287,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         )
         try:
             for topic in RECORDED_TOPICS:
-                if topic is not DROPPED_FORCE:
+                if topic not in RECORDED_IF_PUBLISHED:
                     self._add_topic(recorder, topic)
         except BagError:  # on a full disk; another attempt may follow immediately
             shutil.rmtree(recorder.directory, ignore_errors=True)

@@ -122,10 +122,11 @@ class _Supervisor:
         # The analyzer subscribes when it becomes active; its writers check that it is matched.
         for node in nodes[1:]:
             parameters[node]["wait_for"] = [other for other in nodes if other != node]
-        if "washout_controller" in nodes:
-            self._controller = f"{self._namespace.rstrip('/')}/washout_controller"
+        ours = self._scenario.controller.node
+        if ours in nodes:
+            self._controller = f"{self._namespace.rstrip('/')}/{ours}"
         if self._user_controller is not None:
-            nodes.remove("washout_controller")
+            nodes.remove(ours)
         try:
             # It is removed once the nodes have read it: a killed run could not remove it later.
             with tempfile.TemporaryDirectory(prefix="stickslip_ros_") as directory:
@@ -166,9 +167,13 @@ class _Supervisor:
     def _spawn(self, nodes: Iterable[str], file: Path) -> None:
         self._signal_handlers[signal.SIGTSTP] = signal.signal(signal.SIGTSTP, self._suspend)
         arguments = [*ROS_ARGUMENTS, "--params-file", str(file), "-r", f"__ns:={self._namespace}"]
+        controller = self._scenario.controller
         for name in nodes:
-            module = f"stickslip_ros.nodes.{name}"
-            self._processes[name] = start_child([sys.executable, "-m", module, *arguments])
+            command = [sys.executable, "-m", f"stickslip_ros.nodes.{name}", *arguments]
+            if name == controller.node:
+                law = ["-p", f"law:={controller.law}"]
+                command[2:] = ["stickslip_ros.nodes.controller", *arguments, *law]
+            self._processes[name] = start_child(command)
 
     def _suspend(self, *_: object) -> None:
         """Stop this process on Ctrl-Z; the signal does not reach the nodes."""

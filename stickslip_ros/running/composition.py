@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import redirect_stderr
+from functools import partial
 from typing import Any
 
 from rclpy.context import Context
@@ -13,16 +14,17 @@ from rclpy.parameter import Parameter
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import ManagedNode
+from stickslip_ros.nodes.controller import ControllerNode
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.running.spinner import Spinner
+from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, controller_node
 
 NODE_CLASSES: dict[str, Callable[..., ManagedNode[Any]]] = {
     "analyzer": AnalyzerNode,
-    "washout_controller": WashoutControllerNode,
     "plant": PlantNode,
+    **{controller_node(law): partial(ControllerNode, law) for law in CONTROLLER_PARAMETERS},
 }
-"""Class of each node of `LOOP_NODES`, by name."""
+"""What makes each node of a loop, by name."""
 
 
 class Composition:

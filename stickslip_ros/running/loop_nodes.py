@@ -5,9 +5,6 @@ from typing import Any
 
 from stickslip_ros.scenarios.files import Scenario
 
-LOOP_NODES = ("analyzer", "washout_controller", "plant")
-"""Names of all nodes, in the order of activation; `stickslip_ros.nodes` has a module of each."""
-
 
 def node_parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
     """Return the parameters of the nodes that a scenario needs, in the order of activation.
@@ -16,8 +13,6 @@ def node_parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
     """
     values = scenario.as_dict()
     values["analyzer"]["bag"] = str(bag)
-    return {
-        node: {**values[node], "autostart": False}
-        for node in LOOP_NODES
-        if node != "washout_controller" or scenario.plant.expects_control
-    }
+    controllers = [scenario.controller.node] if scenario.plant.expects_control else []
+    nodes = ["analyzer", *controllers, "plant"]
+    return {node: {**values[node], "autostart": False} for node in nodes}

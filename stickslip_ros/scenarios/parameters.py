@@ -293,7 +293,7 @@ class ReferenceParameters(ParameterGroup):
         "Source: none, the topic `reference`, or a time course (step, ramp, sine, trapezoid).",
         choices=ReferenceKind,
         strict=False,
-        fixed=Fixed.ACTIVE,
+        fixed=Fixed.CONFIGURED,
     )
     amplitude: float = field(0.0, "Largest displacement of the course.", "m")
     start: float = field(0.0, "Simulated time at which the course starts.", "s", ge=0.0, le=1e9)
@@ -324,8 +324,9 @@ class ReferenceParameters(ParameterGroup):
 class ControllerParameters(NodeParameters):
     """Parameters of a controller node: those of its control law; see `controller_model`."""
 
-    law: str
-    """Name of the control law."""
+    law: str = field(
+        next(iter(CONTROL_LAWS)), "Control law.", fixed=Fixed.CONFIGURED, choices=CONTROL_LAWS
+    )
 
     @model_validator(mode="after")
     def _constants_fit_together(self) -> Self:

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from inspect import Parameter, signature
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import rclpy
 from rclpy.exceptions import InvalidNamespaceException
@@ -27,13 +27,16 @@ from stickslip_ros.running.loop_nodes import node_parameters
 from stickslip_ros.running.user_controller import ControllerProcess, ControllerThread
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
+from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
 from stickslip_ros.testing.result import Diagnostics, RunResult, result_of
 from stickslip_ros.text import shown
 
-Controller = Callable[..., Node] | Sequence[str] | Literal["washout", "external"] | None
+Controller = Callable[..., Node] | Sequence[str] | str | None
 """The controller of a loop: a class or function that makes an rclpy node, a command that starts
-one, the washout controller of this package ("washout"), a node that the test starts itself
-("external"), or none (None)."""
+one, the controller of the scenario ("scenario"), the name of a control law such as
+"velocity_feedback", a node that the test starts itself ("external"), or none (None)."""
+
+_OF_SCENARIO, _EXTERNAL = "scenario", "external"
 
 _OF_A_TEST = ("plant.pace=lockstep", "plant.reply_timeout=5.0")
 """Defaults that the caller may override; a busy machine is never delayed for this timeout."""
@@ -70,9 +73,9 @@ class ClosedLoop:
     *overrides : str
         Parameters as NODE.PARAMETER=VALUE.
     controller : Controller
-        A class or function that makes an rclpy node, a command as a list of strings, "washout",
-        "external", or None. "washout" starts no controller if the scenario sets
-        `plant.expects_control` to false.
+        A class or function that makes an rclpy node, a command as a list of strings, the name of a
+        control law, "scenario", "external", or None. A law starts no controller if the scenario
+        sets `plant.expects_control` to false.
     namespace : str
         ROS namespace of the drive.
     bag : str or os.PathLike or None
@@ -99,7 +102,7 @@ class ClosedLoop:
         self,
         scenario: str | PathLike[str],
         *overrides: str,
-        controller: Controller = "washout",
+        controller: Controller = _OF_SCENARIO,
         namespace: str = DEFAULT_NAMESPACE,
         bag: str | PathLike[str] | None = None,
     ) -> None:
@@ -108,14 +111,16 @@ class ClosedLoop:
         """The controller's node while the loop is open, if it runs in this process."""
         _check_controller(controller)
         self._to_control = controller
+        self._is_law = isinstance(controller, str) and controller != _EXTERNAL
+        self._law = controller if self._is_law and controller != _OF_SCENARIO else None
         self._name_or_path = fspath(scenario)
         self._overrides = {_target(text): text for text in (*_OF_A_TEST, *overrides)}
         if controller is None:
             self._overrides.setdefault(_EXPECTS_CONTROL, f"{_EXPECTS_CONTROL}=false")
         self.scenario = self._load(self._overrides)
         """The current scenario, including changes by `set` and `disturb`."""
-        if controller == "washout" and not self.scenario.plant.expects_control:
-            self._to_control = None
+        if self._is_law and not self.scenario.plant.expects_control:
+            self._to_control, self._is_law = None, False
         self._bag = None if bag is None else Path(bag)
         if self._bag is not None:
             check_new_bag(self._bag)
@@ -150,8 +155,8 @@ class ClosedLoop:
             self.context = opened.enter_context(ros_context(self._domain, self.ros_arguments))
             opened.callback(self._forget)  # while ROS still runs
             parameters = node_parameters(self.scenario, self._bag_of_run)
-            if self._to_control != "washout":
-                parameters.pop("washout_controller", None)
+            if not self._is_law:
+                parameters.pop(self.scenario.controller.node, None)
             self._nodes = Composition(self.context, parameters)
             opened.callback(self._nodes.close)
             self._start_controller(opened)
@@ -284,7 +289,8 @@ class ClosedLoop:
             self._name_or_path,
             list(overrides.values()),
             self.namespace,
-            other_nodes=self._to_control not in ("washout", None),
+            controller=self._law,
+            other_nodes=not self._is_law and self._to_control is not None,
         )
         if self._to_control is None and scenario.plant.expects_control:
             raise InvalidInputError(
@@ -306,7 +312,7 @@ class ClosedLoop:
             self._running = ControllerThread(self.controller)
             opened.callback(self._running.close)
             self._running.start()
-        elif self._to_control not in ("washout", "external", None):
+        elif self._to_control is not None and not isinstance(self._to_control, str):
             command = list(self._to_control)
             # In rcl, later parameters take precedence: those of the command must.
             at = command.index("--ros-args") if "--ros-args" in command else len(command)
@@ -334,9 +340,9 @@ class ClosedLoop:
     def _close_the_loop(self, nodes: Composition) -> None:
         """Activate the plant as soon as plant and controller have discovered each other."""
         listeners = ["analyzer"]
-        if self._to_control == "washout":
-            listeners.append("washout_controller")
-            controller = nodes.nodes["washout_controller"]
+        if self._is_law:
+            listeners.append(self.scenario.controller.node)
+            controller = nodes.nodes[self.scenario.controller.node]
             if not controller.active:
                 nodes.activate(controller)
         elif self._to_control is not None:
@@ -418,7 +424,9 @@ def _takes_context(make: Callable[..., Node]) -> bool:
 
 
 def _check_controller(controller: object) -> None:
-    if callable(controller) or controller in ("washout", "external", None):
+    if callable(controller) or controller in (_OF_SCENARIO, _EXTERNAL, None):
+        return
+    if isinstance(controller, str) and controller in CONTROLLER_PARAMETERS:
         return
     if isinstance(controller, Sequence) and not isinstance(controller, str | bytes):
         command = list[Any](controller)
@@ -426,7 +434,8 @@ def _check_controller(controller: object) -> None:
             return
     raise InvalidInputError(
         f"controller = {controller!r} is refused: must be a class or function that makes an rclpy "
-        "node, a command as a list of strings, 'washout', 'external' or None"
+        "node, a command as a list of strings, the name of a control law "
+        f"({', '.join(CONTROLLER_PARAMETERS)}), 'scenario', 'external' or None"
     )
 
 

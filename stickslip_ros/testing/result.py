@@ -70,7 +70,7 @@ class RunResult:
     lost_samples: int
     """Number of samples missing in `states`; always 0 in lockstep."""
     diagnostics: dict[str, Diagnostics]
-    """Diagnostics by node name: plant and, if it ran, washout_controller."""
+    """Diagnostics by node name: plant and, if it ran, the controller."""
 
     @property
     def time(self) -> FloatArray:

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.model.control import NO_REFERENCE, ControlLaw, Reference
-from stickslip_ros.samples import Sample
+from stickslip_ros.physics.model.control import ControlLaw
+from stickslip_ros.samples import NO_REFERENCE, Reference, Sample
 
 ReferenceSource = Callable[[float], Reference]
 """Returns the reference at a time since the first sample, s."""
@@ -49,7 +49,8 @@ class Controller:
         """Control law; a new one acts from the next sample on, with the state of the last."""
         self.reference = NO_REFERENCE
         """Reference at the newest sample."""
-        self._reference_at = reference
+        self.follows = reference
+        """Returns the reference at a time (s) since the first sample."""
         self._first_state = state
         self.state: tuple[float, ...] = state or ()
         """State of the law after the newest sample."""
@@ -81,7 +82,7 @@ class Controller:
             elapsed = 0.0
         elif stamp > last:
             elapsed = (stamp - last) * 1e-9
-            self.reference = self._reference_at((stamp - self._first_stamp) * 1e-9)
+            self.reference = self.follows((stamp - self._first_stamp) * 1e-9)
         else:
             return self._answer_older(sample, last)
         self._stamp = stamp
@@ -96,7 +97,7 @@ class Controller:
 
     def _start(self, sample: Sample) -> None:
         self._stamp = self._first_stamp = sample.stamp
-        self.reference = self._reference_at(0.0)
+        self.reference = self.follows(0.0)
         first_state, self._first_state = self._first_state, None
         if first_state is None:
             first_state = self.law.initial_state(sample, self.reference)
@@ -114,7 +115,7 @@ class Controller:
         if stamp == newest:
             return None
         self._older = sample
-        return Controller(self.law, self._reference_at).answer(sample) if stamp <= first else None
+        return Controller(self.law, self.follows).answer(sample) if stamp <= first else None
 
 
 def answer(loop: SampledLoop, controller: Controller | None) -> float:

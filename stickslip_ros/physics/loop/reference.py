@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from math import cos, isfinite, pi, sin
 
-from stickslip_ros.physics.model.control import NO_REFERENCE, Reference
+from stickslip_ros.samples import NO_REFERENCE, Reference
 
 
 class ReferenceKind(StrEnum):

@@ -1,14 +1,9 @@
 """The control laws: one file each, and one entry each in `CONTROL_LAWS`."""
 
-from stickslip_ros.physics.model.control.base import (
-    NO_REFERENCE,
-    ContinuousControl,
-    ControlLaw,
-    LinearFeedback,
-    Reference,
-)
+from stickslip_ros.physics.model.control.base import ContinuousControl, ControlLaw, LinearFeedback
 from stickslip_ros.physics.model.control.velocity_feedback import StateFeedback, VelocityFeedback
 from stickslip_ros.physics.model.control.washout import Washout, WashoutGains
+from stickslip_ros.samples import NO_REFERENCE, Reference
 
 CONTROL_LAWS: dict[str, type[ControlLaw]] = {law.name: law for law in (Washout, VelocityFeedback)}
 """Every control law by its name; the first is the default.

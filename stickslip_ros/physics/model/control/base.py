@@ -9,25 +9,10 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.constants import constant, constants_of
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.samples import Sample
+from stickslip_ros.samples import Reference, Sample
 
 State = tuple[float, ...]
 """State of a control law between samples."""
-
-
-class Reference(NamedTuple):
-    """Motion that a control law is to follow, at one instant; None for what is not given."""
-
-    position: float | None = None
-    """Displacement, m."""
-    velocity: float | None = None
-    """Velocity, m/s."""
-    acceleration: float | None = None
-    """Acceleration, m/s^2."""
-
-
-NO_REFERENCE = Reference()
-"""The reference where there is none."""
 
 
 class LinearFeedback(NamedTuple):

@@ -7,9 +7,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.control.base import ControlLaw, LinearFeedback, Reference, State
+from stickslip_ros.physics.model.control.base import ControlLaw, LinearFeedback, State
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.samples import Sample
+from stickslip_ros.samples import Reference, Sample
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class VelocityFeedback(ControlLaw):
     --------
     >>> from stickslip_ros.physics.loop.controller import Controller
     >>> from stickslip_ros.physics.model.control import VelocityFeedback
-    >>> from stickslip_ros.samples import Sample
+    >>> from stickslip_ros.samples import Reference, Sample
     >>> controller = Controller(VelocityFeedback(velocity_gain=-500.0))
     >>> controller.answer(Sample(0, 1e-4, 0.04, 0.0, 0.0, 0.04))
     -20.0

@@ -9,9 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.control.base import ControlLaw, LinearFeedback, Reference, State
+from stickslip_ros.physics.model.control.base import ControlLaw, LinearFeedback, State
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.samples import Sample
+from stickslip_ros.samples import Reference, Sample
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ class Washout(ControlLaw):
     --------
     >>> from stickslip_ros.physics.loop.controller import Controller
     >>> from stickslip_ros.physics.model.control import Washout
-    >>> from stickslip_ros.samples import Sample
+    >>> from stickslip_ros.samples import Reference, Sample
     >>> washout = Controller(Washout(corner_frequency=20.0, linear_gain=-3000.0, cubic_gain=0.0))
     >>> sample = Sample(0, 0.0, 0.04, 0.0, 0.0, 0.04)
     >>> washout.answer(sample)

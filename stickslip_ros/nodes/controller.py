@@ -1,0 +1,132 @@
+"""Controller node: answers every joint state with the force of a control law.
+
+The parameter `law` chooses the law, and with it the name of the node, LAW_controller, and its
+parameters; `stickslip list` prints the laws and `docs/parameters.md` their parameters.
+"""
+
+import sys
+from math import isfinite
+from typing import Any
+
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.messages.codec import pack_reference, pack_wrench
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
+from stickslip_ros.nodes.base.duplicate_publishers import duplicate_publishers
+from stickslip_ros.nodes.base.managed import OK, Diagnosis, ManagedNode, diagnosis
+from stickslip_ros.nodes.base.process import run_node
+from stickslip_ros.nodes.base.ros_errors import first_line
+from stickslip_ros.physics.loop.controller import ReferenceSource
+from stickslip_ros.physics.loop.reference import ReferenceKind
+from stickslip_ros.samples import LARGEST, NO_REFERENCE, Reference, Sample
+from stickslip_ros.scenarios.files import known_law
+from stickslip_ros.scenarios.parameters import (
+    CONTROLLER_PARAMETERS,
+    DEFAULT_LAW,
+    ControllerParameters,
+    controller_node,
+)
+
+
+class ControllerNode(ManagedNode[ControllerParameters]):
+    """Subscribes to joint_states and publishes control_force with the stamp of each sample.
+
+    It publishes its reference, or subscribes to that of another node.
+    """
+
+    def __init__(self, law: str, **options: Any) -> None:
+        super().__init__(controller_node(law), CONTROLLER_PARAMETERS[law], **options)
+
+    def connect(self) -> None:
+        """Publish forces; subscribe to the newest joint state and reference only."""
+        self._force = self.advertise(CONTROL_FORCE)
+        self.subscribe(JOINT_STATES, self._on_joint_state, depth=1)
+        kind = self.parameters.as_reference().kind
+        self._given = NO_REFERENCE
+        self._reference = None
+        if kind is ReferenceKind.TOPIC:
+            self.subscribe(REFERENCE, self._on_reference, depth=1, while_active=False)
+        elif kind is not ReferenceKind.NONE:
+            self._reference = self.advertise(REFERENCE)
+
+    def start(self) -> None:
+        """Start the law on the next joint state."""
+        self._controller = self.parameters.as_controller()
+        self._controller.follows = self._followed()
+        self._answered = 0
+
+    def apply_parameters(self) -> None:
+        """Use new constants from the next joint state on."""
+        if self.active:
+            self._controller.law = self.parameters.as_law()
+            self._controller.follows = self._followed()
+
+    def diagnose(self) -> Diagnosis:
+        """Return how many joint states were answered, and problems with the others."""
+        if not self.active:
+            return OK, "", {}
+        return diagnosis(
+            [self.dropped.complaint, *duplicate_publishers(self, JOINT_STATES, REFERENCE)],
+            {"answered": self._answered, **self.dropped.figures},
+        )
+
+    def _followed(self) -> ReferenceSource:
+        course = self.parameters.as_reference()
+        return (lambda _: self._given) if course.kind is ReferenceKind.TOPIC else course
+
+    def _on_joint_state(self, sample: Sample) -> None:
+        stamp, controller = sample.stamp, self._controller
+        for what, value, unit in (
+            ("velocity", sample.velocity, "m/s"),
+            ("position", sample.position, "m"),
+        ):
+            if not abs(value) <= LARGEST:
+                self.dropped.add(f"a joint state stamped {stamp} ns with the {what} {value} {unit}")
+                return
+        force = controller.answer(sample)
+        if force is None:
+            self.dropped.add(f"a joint state stamped {stamp} ns, not later than the last one")
+        elif not isfinite(force):
+            self.dropped.add(f"to the velocity {sample.velocity} m/s the force would be {force} N")
+        else:
+            if self._reference is not None:
+                self._reference.publish(pack_reference(stamp, controller.reference))
+            self._force.publish(pack_wrench(stamp, force))
+            self._answered += 1
+
+    def _on_reference(self, stamped: tuple[int, Reference]) -> None:
+        stamp, reference = stamped
+        if not all(abs(value or 0.0) <= LARGEST for value in reference):
+            self.dropped.add(
+                f"a reference stamped {stamp} ns with the position {reference.position} m and the "
+                f"velocity {reference.velocity} m/s"
+            )
+            return
+        self._given = reference
+
+
+def _chosen() -> ControllerNode:
+    """Return the node of the law that the parameter `law` names."""
+    try:
+        asked = Node(
+            "controller",
+            start_parameter_services=False,
+            enable_rosout=False,
+            automatically_declare_parameters_from_overrides=True,
+        )
+    except (ParameterException, ValueError) as error:
+        raise InvalidInputError(first_line(error)) from None
+    law = asked.get_parameter("law").value if asked.has_parameter("law") else DEFAULT_LAW
+    asked.destroy_node()
+    return ControllerNode(known_law(str(law)))
+
+
+def main() -> None:
+    """Run the node as a process."""
+    sys.exit(run_node(_chosen, ControllerParameters))
+
+
+if __name__ == "__main__":
+    main()
