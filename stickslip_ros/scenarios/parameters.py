@@ -8,10 +8,11 @@ import re
 from collections.abc import Callable
 from dataclasses import fields
 from math import ceil, inf, isinf, pi, sqrt
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, create_model, model_validator
 
+from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
@@ -335,6 +336,8 @@ class ControllerParameters(NodeParameters):
         if refusal is not None:
             raise ValueError(refusal)
         return self
+
+    as_washout: ClassVar[Renamed] = Renamed("as_law")
 
     @property
     def node(self) -> str:

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError, RunError
+from stickslip_ros.physics.loop.controller import answer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.loop.washout import Washout
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.studies.simulate import simulate
 
@@ -54,14 +54,12 @@ def test_the_trajectory_is_that_of_the_loop() -> None:
     plant = drive.plant
     motion = Motion(plant.as_drive(), 0.0, 0.01)
     loop: SampledLoop = plant.as_loop(motion)
-    law = Washout(drive.washout_controller.as_washout())
+    controller = drive.controller.as_controller()
     rows: list[tuple[float, ...]] = []
     for _ in range(501):
         sample = loop.sample
-        force = law.answer(sample.stamp, sample.velocity)
-        assert force is not None
+        force = answer(loop, controller)
         rows.append((*sample[1:4], force, *sample[4:]))
-        loop.offer(sample.stamp, force)
         loop.advance()
     found = ss.simulate(drive, duration=0.5).trajectory
     assert np.array_equal(found.time, np.arange(501) / 1000.0)

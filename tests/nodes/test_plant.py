@@ -29,10 +29,10 @@ from stickslip_ros.messages.topics import (
 from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.physics.loop.controller import answer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.loop.washout import Washout
 from stickslip_ros.physics.motion.motion import Motion
-from stickslip_ros.scenarios.parameters import PlantParameters, WashoutControllerParameters
+from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, PlantParameters
 from tests.nodes.graph import Graph
 
 SECOND = 1_000_000_000
@@ -73,10 +73,10 @@ def test_jittered_forces_act_as_they_do_without_ros(graph: Graph) -> None:
 
     motion = Motion(PlantParameters().as_drive(), 0.0, 0.0)
     loop = SampledLoop(motion, 100.0, SECOND, **network)
-    law = Washout(WashoutControllerParameters().as_washout())
+    controller = CONTROLLER_PARAMETERS["washout"]().as_controller()
     positions = [loop.sample.position]
     for _ in range(300):
-        loop.offer(loop.sample.stamp, law.answer(loop.sample.stamp, loop.sample.velocity) or 0.0)
+        answer(loop, controller)
         positions.append(loop.advance().position)
     columns, _ = joint_state_columns(heard)
     assert columns.position.tolist() == positions

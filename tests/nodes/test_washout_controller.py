@@ -10,11 +10,17 @@ from stickslip_ros.messages.codec import pack_joint_state, unpack_wrench
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
-from stickslip_ros.scenarios.parameters import WashoutControllerParameters
+from stickslip_ros.physics.loop.controller import Controller
+from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.samples import Sample
+from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
 from tests.nodes.graph import Graph
 
 SECOND = 1_000_000_000
+
+
+def _sample(stamp: int, velocity: float) -> Sample:
+    return Sample(stamp, 0.0, velocity, 0.0, 0.0, 0.4)
 
 
 class Loop:
@@ -46,10 +52,10 @@ class Loop:
 
 def test_each_state_is_answered_with_the_force_of_the_law(graph: Graph) -> None:
     loop = Loop(graph, corner_frequency=3.0, linear_gain=-2.0, cubic_gain=-0.5)
-    law = Washout(WashoutParameters(3.0, -2.0, -0.5))
+    law = Controller(Washout(3.0, -2.0, -0.5))
     for number, velocity in enumerate((0.1, 0.3, -0.2, 0.05)):
         stamp = SECOND + number * 7_000_000
-        assert loop.answer(stamp, velocity) == (stamp, law.answer(stamp, velocity))
+        assert loop.answer(stamp, velocity) == (stamp, law.answer(_sample(stamp, velocity)))
     assert unpack_wrench(loop.forces[0])[1] == 0.0
 
 
@@ -67,14 +73,14 @@ def test_what_is_not_a_finite_state_is_dropped_and_diagnosed(graph: Graph) -> No
 
 def test_a_state_older_than_the_last_is_dropped_and_the_filter_goes_on(graph: Graph) -> None:
     loop = Loop(graph)
-    law = Washout(WashoutControllerParameters().as_washout())
+    law = CONTROLLER_PARAMETERS["washout"]().as_controller()
     for number, velocity in enumerate((0.1, 0.3, -0.2)):
         stamp = SECOND + number * SECOND // 100
-        assert loop.answer(stamp, velocity) == (stamp, law.answer(stamp, velocity))
+        assert loop.answer(stamp, velocity) == (stamp, law.answer(_sample(stamp, velocity)))
     loop.send(SECOND + SECOND // 100, 0.3)
     graph.wait_until(lambda: "not later than the last" in loop.controller.diagnose()[1], "dropped")
     later = 2 * SECOND
-    assert loop.answer(later, 0.4) == (later, law.answer(later, 0.4))
+    assert loop.answer(later, 0.4) == (later, law.answer(_sample(later, 0.4)))
     assert len(loop.forces) == 4
 
 

@@ -108,7 +108,7 @@ def test_a_scenario_is_found_by_its_path_too(name: str) -> None:
 
 def test_the_drive_and_the_controller_of_a_scenario() -> None:
     scenario = load_scenario("feed_drive")
-    drive, washout = scenario.plant.as_drive(), scenario.washout_controller.as_washout()
+    drive, washout = scenario.plant.as_drive(), scenario.washout_controller.as_law()
     assert (drive.mass, drive.damping, drive.stiffness) == (100.0, 200.0, 1e6)
     assert (drive.normal_force, drive.belt_speed) == (1000.0, 0.04)
     assert vars(drive.friction) == {"static": 0.4, "minimum": 0.25, "minimum_speed": 0.05}

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear
 from stickslip_ros.scenarios.files import Scenario
@@ -232,20 +232,20 @@ def test_the_filter_is_carried_on(continuous: bool) -> None:
     exact = 1e-9 if continuous else 1e-3
     assert halves.end.position == pytest.approx(once.end.position, abs=exact)
     assert halves.end.velocity == pytest.approx(once.end.velocity, abs=exact)
-    assert halves.end.low_passed == pytest.approx(once.end.low_passed, abs=exact)
+    assert halves.end.control == pytest.approx(once.end.control, abs=exact)
     rested = settle(
         case,
-        replace(settle(case, MotionState(0.1, 0.05), SettlingCourse(4.0, 1)).end, low_passed=None),
+        replace(settle(case, MotionState(0.1, 0.05), SettlingCourse(4.0, 1)).end, control=None),
         SettlingCourse(4.0, 1),
     )
-    assert rested.end.low_passed != pytest.approx(once.end.low_passed, abs=10 * exact)
+    assert rested.end.control != pytest.approx(once.end.control, abs=10 * exact)
 
 
 def test_a_free_motion_is_carried_on() -> None:
     once, halves = _in_two_halves(ControlledDrive(PAPER))
     assert halves.end.position == pytest.approx(once.end.position, abs=1e-9)
     assert halves.end.velocity == pytest.approx(once.end.velocity, abs=1e-9)
-    assert halves.end.low_passed is None
+    assert halves.end.control is None
 
 
 def test_on_a_belt_at_rest_the_slide_sticks_where_friction_holds_it() -> None:
@@ -284,7 +284,7 @@ def test_however_slow_the_belt_is_its_cycles_are_waited_for(belt_speed: float) -
 
 
 def test_a_slide_that_only_rode_the_belt_is_not_in_equilibrium() -> None:
-    washout = WashoutParameters(corner_frequency=2.0, linear_gain=0.0, cubic_gain=0.0)
+    washout = Washout(corner_frequency=2.0, linear_gain=0.0, cubic_gain=0.0)
     settled = settle(ControlledDrive(replace(PAPER, belt_speed=1e-6), washout))
     assert settled.measures.regime is None
     assert not settled.steady

@@ -122,13 +122,13 @@ def test_the_filter_is_carried_on_and_the_control_does_not_restart() -> None:
     scenario = paper("plant.rate=20.0", "washout_controller.start_after=100.0")
     gain = Axis("washout_controller.linear_gain", -2.0, -1.9, 2)
     study = Study(scenario, Grid((gain,), Carry.UP), SettlingCourse(5.0, 1))
-    start = MotionState(scenario.plant.as_drive().equilibrium_position, 0.0, 0.0)
+    start = MotionState(scenario.plant.as_drive().equilibrium_position, 0.0, (0.0, 0.0))
     at_rest = compute(study, [1], start).points[0].measures
     assert at_rest.regime is Regime.EQUILIBRIUM
     # Without control that is not stable; with it, a filter that is not at rest pushes.
     alone = compute(study, [1], None).points[0].measures
     pushed = compute(
-        replace(study, course=SettlingCourse(0.0, 1)), [1], replace(start, low_passed=1.0)
+        replace(study, course=SettlingCourse(0.0, 1)), [1], replace(start, control=(1.0, 0.0))
     )
     assert alone.amplitude is not None
     assert alone.amplitude > 1e-3
