@@ -71,7 +71,9 @@ def simulate_sampled(
 
     >>> from stickslip_ros.physics.loop.sampled_loop import SampledLoop
     >>> from stickslip_ros.physics.loop.simulation import simulate_sampled
-    >>>     >>> from stickslip_ros.physics.measures import CycleMeter
+    >>> from stickslip_ros.physics.loop.controller import Controller
+    >>> from stickslip_ros.physics.measures import CycleMeter
+    >>> from stickslip_ros.physics.model.control import Washout
     >>> from stickslip_ros.physics.model.drive import Drive
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.motion import RecordedMotion
