@@ -19,6 +19,11 @@ else:  # at run time the base class adds nothing, and its import takes as long a
 
 _MODEL = "stickslip_ros.physics.model"
 _LOOP = "stickslip_ros.physics.loop"
+_WASHOUT = {
+    "WashoutParameters": f"{_MODEL}.control.Washout",
+    "Washout": f"{_LOOP}.controller.Controller",
+}
+_GAINS = {"WashoutGains": f"{_MODEL}.control.WashoutGains"}
 
 MOVED: dict[str, dict[str, str]] = {
     "stickslip_ros.bags.messages": {
@@ -38,17 +43,10 @@ MOVED: dict[str, dict[str, str]] = {
     "stickslip_ros.physics.knots": {
         "Knots": "stickslip_ros.physics.measures.breakpoints.Breakpoints",
     },
-    **dict.fromkeys(
-        ("stickslip_ros.physics.washout", f"{_LOOP}.washout"),
-        {
-            "WashoutParameters": f"{_MODEL}.control.Washout",
-            "Washout": f"{_LOOP}.controller.Controller",
-        },
-    ),
-    **dict.fromkeys(
-        ("stickslip_ros.physics.equations", f"{_MODEL}.equations"),
-        {"WashoutGains": f"{_MODEL}.control.WashoutGains"},
-    ),
+    "stickslip_ros.physics.washout": _WASHOUT,
+    f"{_LOOP}.washout": _WASHOUT,
+    "stickslip_ros.physics.equations": _GAINS,
+    f"{_MODEL}.equations": _GAINS,
     "stickslip_ros.physics.sampled_loop": {
         "SampledLoop": f"{_LOOP}.sampled_loop.SampledLoop",
         "Sample": "stickslip_ros.samples.Sample",

@@ -50,8 +50,8 @@ class SampledLoop:
     independent from sample to sample; it depends only on n and `force_jitter_seed`. Forces with
     jitter therefore arrive at uneven intervals, and may overtake one another: then the newer force
     acts, and the older one, which arrives after it, is lost. Without jitter the delay is constant:
-    force n acts from n T + delay to (n + 1) T + delay. The actuator of the drive limits a force when
-    it arrives.
+    force n acts from n T + delay to (n + 1) T + delay. The actuator of the drive limits a force
+    when it arrives.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ class SampledLoop:
         Verdict
             ACCEPTED, or the reason why the force will not act.
         """
-        number = self.number(stamp)
+        number = self.sample_number if stamp == self.sample.stamp else self.number(stamp)
         refusal = self._refusal(number, stamp, force)
         if refusal is None:
             if self._newest[0] > self._sent_number:
@@ -281,7 +281,8 @@ class SampledLoop:
             now = self._deliver()
         motion.set_forces(self._acting, self.disturbance)
         self._advance((1.0 - now) * period)
-        belt_position = self.sample.belt_position + motion.drive.belt_speed * period
+        last = self.sample
+        belt_position = last.belt_position + last.belt_velocity * period
         self.sample_number += 1
         sample = self.true_sample = self._take_sample(belt_position)
         if self._measure is not None:

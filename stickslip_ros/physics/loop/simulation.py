@@ -87,7 +87,7 @@ def simulate_sampled(
     """
     samples = round(duration / loop.period)
     for number in range(1, samples + 1):
-        force = answer(loop, controller)
+        force = 0.0 if controller is None else answer(loop, controller)
         if recorder is not None:
             recorder.take(loop.true_sample, force)
         loop.advance()

@@ -10,8 +10,8 @@ class Actuator:
     """What exerts the control force on the slide; it exerts exactly what is commanded.
 
     An actuator is a frozen dataclass of its constants, each described by `constant`. They become
-    the parameters `actuator.*` of the plant. A command passes `limiter` when it arrives. An actuator
-    with `states`, such as a lag, is then a part of the drive: its equations accept floats and
+    the parameters `actuator.*` of the plant. A command passes `limiter` when it arrives. An
+    actuator with `states`, such as a lag, is a part of the drive: its equations accept floats and
     heyoka expressions, in the scales of the drive. A disturbance does not pass the actuator.
     """
 

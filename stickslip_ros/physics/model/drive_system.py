@@ -69,9 +69,10 @@ class DriveSystem(HybridSystem):
     """Drive, dimensionless (see `Drive`), with a held force or with continuous control.
 
     The states are X, Y = X', the memory of the friction law, the states of the controller and those
-    of the actuator. In slip the slide follows eq. 5; where it reaches the speed of the belt it sticks if its law can
-    hold it, -mu_forward N <= h <= mu_backward N with the reaction h. Otherwise it passes that speed
-    or slips the other way. In stick it moves with the belt until the reaction leaves these limits.
+    of the actuator. In slip the slide follows eq. 5; where it reaches the speed of the belt it
+    sticks if its law can hold it, -mu_forward N <= h <= mu_backward N with the reaction h.
+    Otherwise it passes that speed or slips the other way. In stick it moves with the belt until the
+    reaction leaves these limits.
 
     Parameters
     ----------

@@ -132,16 +132,20 @@ class Motion(HybridMotion):
             Disturbance force on the slide, N.
         """
         if self._system.has_actuator:
-            self._hold(0, control)
             self._hold(1, disturbance)
         else:
-            self._hold(0, control + disturbance)
+            control += disturbance
+        self._hold(0, control)
 
     def _hold(self, number: int, force: float) -> None:
         scaled = force / self._drive.normal_force
         if not -_LARGEST_FORCE <= scaled <= _LARGEST_FORCE:
             scaled = max(-_LARGEST_FORCE, min(_LARGEST_FORCE, scaled))
-        self._set_input(number, scaled)
+        self._instant.inputs[number] = scaled
+        if self._flow is not None:
+            for used, index in self._flow.inputs:
+                if used == number:
+                    self._flow.parameters[index] = scaled
 
     @property
     def _forces(self) -> tuple[float, float]:
