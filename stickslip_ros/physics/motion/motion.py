@@ -148,10 +148,9 @@ class Motion(HybridMotion):
                     self._flow.parameters[index] = scaled
 
     @property
-    def _forces(self) -> tuple[float, float]:
-        """Held control and disturbance force, N; without actuator states the first is the sum."""
-        control, *disturbance = self._instant.inputs
-        return control * self._drive.normal_force, sum(disturbance) * self._drive.normal_force
+    def disturbance(self) -> float:
+        """Held disturbance force, N; 0 without actuator states, where it is a part of `force`."""
+        return sum(self._instant.inputs[1:]) * self._drive.normal_force
 
     @property
     def applied_force(self) -> float:
@@ -240,7 +239,7 @@ class Motion(HybridMotion):
         """Continue with another drive and controller, in the same state of all parts."""
         if (drive, control) == (self._drive, self._control):
             return
-        old, forces = self._drive, self._forces
+        old, force, disturbance = self._drive, self.force, self.disturbance
         position, velocity = self.position, self.velocity
         control_state = self.control_state
         lagging = self._instant.state[self._system.actuator_states].tolist()
@@ -266,5 +265,5 @@ class Motion(HybridMotion):
         self._use(system)
         self._instant.time = self._time * drive.angular_frequency
         self._instant.inputs = [0.0] * len(system.inputs)
-        self.set_forces(*forces)
+        self.set_forces(force, disturbance)
         self._set_state(state)
