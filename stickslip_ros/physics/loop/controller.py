@@ -50,7 +50,8 @@ class Controller:
         """Control law; a new one acts from the next sample on, with the state of the last."""
         self.reference = NO_REFERENCE
         """Reference at the newest sample."""
-        self._reference_at = reference
+        self.follows = reference
+        """Returns the reference at a time (s) since the first sample."""
         self._first_state = state
         self.state: tuple[float, ...] = state or ()
         """State of the law after the newest sample."""
@@ -83,7 +84,7 @@ class Controller:
         elif stamp > last:
             elapsed = (stamp - last) * 1e-9
             if law.follows_reference:
-                self.reference = self._reference_at((stamp - self._first_stamp) * 1e-9)
+                self.reference = self.follows((stamp - self._first_stamp) * 1e-9)
         else:
             return self._answer_older(sample, last)
         self._stamp = stamp
@@ -99,7 +100,7 @@ class Controller:
     def _start(self, sample: Sample) -> None:
         self._stamp = self._first_stamp = sample.stamp
         if self.law.follows_reference:
-            self.reference = self._reference_at(0.0)
+            self.reference = self.follows(0.0)
         first_state, self._first_state = self._first_state, None
         if first_state is None:
             first_state = self.law.initial_state(sample, self.reference)
@@ -117,7 +118,7 @@ class Controller:
         if stamp == newest:
             return None
         self._older = sample
-        return Controller(self.law, self._reference_at).answer(sample) if stamp <= first else None
+        return Controller(self.law, self.follows).answer(sample) if stamp <= first else None
 
 
 def answer(loop: SampledLoop, controller: Controller | None) -> float:

@@ -157,6 +157,17 @@ def test_a_single_older_sample_leaves_it_alone(
         assert disturbed.state == undisturbed.state
 
 
+@laws
+def test_two_older_samples_with_a_newer_one_between_leave_it_alone(law: ControlLaw) -> None:
+    undisturbed, disturbed = Controller(law, RAMP), Controller(law, RAMP)
+    for number in range(1, 8):
+        sample = at(number * MILLISECOND, 0.1 * number, -0.2 * number)
+        assert disturbed.answer(sample) == undisturbed.answer(sample)
+        assert disturbed.state == undisturbed.state
+        if number > 2:
+            assert disturbed.answer(at((number - 1) * MILLISECOND, 3.0, 3.0)) is None
+
+
 @pytest.mark.parametrize(
     ("law", "changed"),
     [
