@@ -269,7 +269,8 @@ def test_cutting_a_motion_anywhere_changes_nothing(
 @pytest.mark.parametrize("duration", [0.5, 2.0, 7.0])
 def test_transition_is_that_of_finite_differences(law: object, duration: float) -> None:
     """The derivatives jump where the slide sticks, and where the lagged force releases it."""
-    motion = SensitiveMotion(replace(LAG, friction=law))  # type: ignore[arg-type]
+    motion = SensitiveMotion(replace(PAPER, friction=law))  # type: ignore[arg-type]
+    motion.drive = replace(motion.drive, actuator=LAG.actuator)
     motion.set_forces(-0.3, 0.1)
     start = np.array([0.1, 0.1, *([0.001] * (motion.order - 3)), 0.5])
 
