@@ -412,9 +412,11 @@ def controller_model(law: type[ControlLaw]) -> type[ControllerParameters]:
     own_law = field(
         law.name, "Control law of the node.", fixed=Fixed.CONFIGURED, choices=[law.name]
     )
+    title = "".join(word.capitalize() for word in law.name.split("_"))
     model = create_model(
-        "ControllerParameters",
+        f"{title}ControllerParameters",
         __base__=ControllerParameters,
+        __module__=__name__,
         law=(Literal[law.name], own_law),
         **fields,
     )
@@ -494,6 +496,15 @@ CONTROLLER_PARAMETERS: dict[str, type[ControllerParameters]] = {
     name: controller_model(law) for name, law in CONTROL_LAWS.items()
 }
 """The parameter model of the controller node of each control law, by name of the law."""
+
+
+def __getattr__(name: str) -> Any:
+    """Return the model of a controller by the name of its class, as pickle looks for it."""
+    for model in CONTROLLER_PARAMETERS.values():
+        if model.__name__ == name:
+            return model
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 NODE_PARAMETERS: dict[str, type[NodeParameters]] = {
     "plant": PlantParameters,
