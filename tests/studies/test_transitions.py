@@ -135,8 +135,8 @@ def test_a_gain_that_only_its_last_determinant_likes_is_not_stable() -> None:
     overrides = ["washout_controller.corner_frequency=20", "washout_controller.linear_gain=60"]
     scenario = load_scenario("paper", [*overrides, "plant.belt_speed=0.2"])
     case = ControlledDrive.from_scenario(scenario, continuous=True)
-    assert case.washout is not None
-    expansion = expand(case.drive, case.washout.gains)
+    assert case.law is not None
+    expansion = expand(case.drive, case.law.continuous)
     assert expansion is not None
     assert hurwitz_determinants(expansion.jacobian)[-1] > 0.0
     assert not expansion.stable

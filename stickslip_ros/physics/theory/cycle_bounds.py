@@ -90,7 +90,8 @@ def least_cycle(drive: Drive, gains: ContinuousControl | None = None) -> float |
     speed, force = _net_force(drive)
     if gains is not None:
         force = force + gains.scaled(drive).bound(speed)
-    gaining = np.abs(speed)[speed * force > 0.0]
+    with np.errstate(invalid="ignore"):  # an infinite bound at rest
+        gaining = np.abs(speed)[speed * force > 0.0]
     return None if len(gaining) == 0 else 0.95 * float(gaining.min())
 
 
