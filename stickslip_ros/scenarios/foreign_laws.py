@@ -125,7 +125,8 @@ CONTROLLERS = LawFamily(
     ControlLaw,
     CONTROL_LAWS,
     reserved={
-        "law", "as_law", "law_names", "reference", "autostart", "wait_for", "use_sim_time",
+        "law", "node", "reference", "as_law", "as_reference", "as_controller", "law_names",
+        "autostart", "wait_for", "use_sim_time",
         *dir(ParameterGroup),
     },
     one_namespace=False,
