@@ -165,7 +165,7 @@ class Axis:
             every = f"numbers of {node} are {', '.join(sorted(_numbers(node)))}"
             raise InvalidInputError(
                 f"{self.parameter:.80}: unknown parameter; "
-                + did_you_mean(f"{node}.{name}", _numbers(*_NODES), every)
+                + did_you_mean(f"{node}.{name}", _numbers(node), every)
             )
         if known[name].kind not in (int, float):
             raise InvalidInputError(f"{self.parameter}: is not a number, so it has no range")

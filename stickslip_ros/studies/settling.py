@@ -14,6 +14,7 @@ from stickslip_ros.physics.loop.controller import (
     answer,
     no_reference,
 )
+from stickslip_ros.physics.loop.reference import ReferenceKind
 from stickslip_ros.physics.loop.simulation import measure_block, simulate_sampled
 from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, CycleMeter, Measures, Regime
 from stickslip_ros.physics.measures.observer import MeasuredMotion
@@ -80,8 +81,20 @@ class ControlledDrive:
             )
         disturbed = plant.disturbance.kind != "none"
         sampled = not continuous and (law is not None or disturbed)
+        check_reference(scenario)
         reference = scenario.controller.as_reference()
-        return cls(drive, law, plant if sampled else None, reference)
+        follows = law is not None and law.follows_reference
+        return cls(drive, law, plant if sampled else None, reference if follows else no_reference)
+
+
+def check_reference(scenario: Scenario) -> None:
+    """Raise InvalidInputError if the controller needs a reference from a topic."""
+    kind = scenario.controller.as_reference().kind
+    if scenario.plant.expects_control and kind is ReferenceKind.TOPIC:
+        raise InvalidInputError(
+            f"{scenario.controller.node}.reference.kind = {kind} is refused: without nodes there "
+            "are no topics"
+        )
 
 
 def check_continuous(scenario: Scenario) -> None:

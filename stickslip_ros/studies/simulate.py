@@ -12,7 +12,7 @@ from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.options import DEFAULT_PERIODS
-from stickslip_ros.studies.settling import check_continuous
+from stickslip_ros.studies.settling import check_continuous, check_reference
 
 
 def default_duration(scenario: Scenario) -> float:
@@ -38,6 +38,7 @@ def simulate(
     """
     if not 0.0 <= duration < float("inf"):
         raise InvalidInputError(f"a duration of {duration:g} s: must be finite, 0 or more")
+    check_reference(scenario)
     if continuous:
         check_continuous(scenario)
     plant = scenario.plant

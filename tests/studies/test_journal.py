@@ -331,7 +331,7 @@ def test_memory_is_a_few_numbers_for_each_piece(
         try:
             for first in range(0, count, piece):
                 points = [point._replace(number=first + n) for n in range(piece)]
-                journal.add(Piece(points, MotionState(0.1 + first, 0.2 + first, 0.3 + first)))
+                journal.add(Piece(points, MotionState(0.1 + first, 0.2 + first, (0.3 + first,))))
             taken = tracemalloc.take_snapshot()
         finally:
             tracemalloc.stop()

@@ -116,7 +116,7 @@ MIXED: list[tuple[ControlledDrive, MotionState]] = [
     (ControlledDrive(replace(PAPER, belt_speed=-0.3)), REST),
     (STIFF, REST),
     (_case(*WEAK), REST),
-    (_case(*WEAK, "plant.force_delay=0.07", "plant.force_jitter=0.09"), MotionState(0.0, 0.2, 0.1)),
+    (_case(*WEAK, "plant.force_delay=0.07", "plant.force_jitter=0.09"), MotionState(0.0, 0.2, (0.1, 0.0))),
     (_case("washout_controller.linear_gain=50.0"), REST),  # runs away
     (
         _case(
@@ -129,7 +129,7 @@ MIXED: list[tuple[ControlledDrive, MotionState]] = [
     (_case(*WEAK, continuous=True), REST),
     (
         _case(*WEAK, "washout_controller.start_after=7.0", continuous=True),
-        MotionState(0.1, 0.2, -0.3),
+        MotionState(0.1, 0.2, (-0.3,)),
     ),
     (_case("washout_controller.linear_gain=50.0", continuous=True), REST),  # runs away
     (_case(continuous=True, friction=Exponential(0.4, 0.25, 0.1, 0.0)), MotionState(0.3, 0.1)),
