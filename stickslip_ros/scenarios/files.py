@@ -219,7 +219,9 @@ class Scenario:
             return self
         others = {**self.other_controllers, self.controller.law: self.controller}
         controller = others.pop(law, None) or CONTROLLER_PARAMETERS[law]()
-        overrides = [each for each in self.overrides if not each.startswith(self.controller.node)]
+        overrides = [
+            each for each in self.overrides if not each.startswith(f"{self.controller.node}.")
+        ]
         return replace(
             self,
             controller=controller,

@@ -14,7 +14,7 @@ from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
 from stickslip_ros.scenarios.parameter_field import LARGEST, SMALLEST
 from stickslip_ros.scenarios.validation import ParameterGroup
 
-_Law = TypeVar("_Law", FrictionLaw, ControlLaw)
+_Law = TypeVar("_Law", bound=FrictionLaw | ControlLaw)
 
 
 @dataclass

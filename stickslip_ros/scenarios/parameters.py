@@ -402,22 +402,20 @@ def controller_node(law: str) -> str:
 def controller_model(law: type[ControlLaw]) -> type[ControllerParameters]:
     """Return the parameters of the controller node of a law."""
     described = constants_of(law)
-    fields: dict[str, Any] = {
-        name: _field_of(described[name])
-        for name in law.constants()
-        if not isinstance(described[name].default, tuple)
-    }
-    if law.follows_reference:
-        fields["reference"] = ReferenceParameters, ReferenceParameters()
     own_law = field(
         law.name, "Control law of the node.", fixed=Fixed.CONFIGURED, choices=[law.name]
     )
+    fields: dict[str, Any] = {"law": (Literal[law.name], own_law)}
+    for name in law.constants():
+        if not isinstance(described[name].default, tuple):
+            fields[name] = _field_of(described[name])
+    if law.follows_reference:
+        fields["reference"] = ReferenceParameters, ReferenceParameters()
     title = "".join(word.capitalize() for word in law.name.split("_"))
     model = create_model(
         f"{title}ControllerParameters",
         __base__=ControllerParameters,
         __module__=__name__,
-        law=(Literal[law.name], own_law),
         **fields,
     )
     model.__doc__ = f"Parameters of the {controller_node(law.name)} node."
