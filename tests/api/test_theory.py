@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 
 import stickslip_ros as ss
 from stickslip_ros.errors import InvalidInputError, RunError
+from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.stability import stability
 
 
@@ -26,6 +27,14 @@ def test_stability_is_that_of_the_command_twice() -> None:
 def test_without_control_there_is_no_map() -> None:
     with pytest.raises(InvalidInputError, match="nothing to draw: the scenario has no controller"):
         ss.stability(ss.scenario("paper", expects_control=False)).plot()
+
+
+def test_under_another_control_law_there_is_no_map_and_no_design() -> None:
+    scenario = load_scenario("feed_drive", controller="velocity_feedback")
+    with pytest.raises(InvalidInputError, match="nothing to draw: this exists for the washout law"):
+        ss.stability(scenario).plot()
+    with pytest.raises(InvalidInputError, match="control law = velocity_feedback is refused"):
+        ss.design(scenario, force_limit=200.0)
 
 
 def test_a_design_runs_and_keeps_to_its_limit() -> None:

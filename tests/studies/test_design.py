@@ -181,7 +181,7 @@ def test_the_cubic_gain_is_within_what_the_friction_law_bears() -> None:
         motion = RecordedMotion(FEED_DRIVE, 0.0, speed)
         loop = SampledLoop(motion, 1000.0, LOCKSTEP_START)
         free = replace(controller, force_limit=inf, start_after=0.0)
-        measures = simulate_sampled(loop, motion, Washout(free), 8.0, CycleMeter(5))
+        measures = simulate_sampled(loop, motion, Controller(free), 8.0, CycleMeter(5))
         assert measures.regime is Regime.EQUILIBRIUM
 
 

@@ -67,17 +67,17 @@ class SensitiveMotion(RecordedMotion):
         """Derivative of the state by dimensionless time."""
         return self._rates(self._mode)[0]
 
-    def state_at(self, position: float, control_state: float | Sequence[float]) -> FloatArray:
+    def state_at(self, position: float, filter_states: float | Sequence[float]) -> FloatArray:
         """Return the state at rest at a position (m), with these states of the control.
 
         They are given times N/k, so that W of eq. 17 is in m; one number applies to all.
         """
         scale = self._drive.length_scale
         state = np.array(self._system.initial_state(position / scale, 0.0))
-        state[self._system.control_states] = np.asarray(control_state) / scale
+        state[self._system.control_states] = np.asarray(filter_states) / scale
         return state
 
-    def control_state_of(self, state: FloatArray) -> FloatArray:
+    def filter_states_of(self, state: FloatArray) -> FloatArray:
         """Return the states of the control in a state; none without control."""
         return state[self._system.control_states]
 

@@ -55,7 +55,7 @@ class LimitCycle:
 
     position: float
     """Displacement at the turning point, m."""
-    control_state: tuple[float, ...]
+    filter_states: tuple[float, ...]
     """States of the control at the turning point, times the unit of displacement, N/k."""
     period: float
     """Period, s."""
@@ -67,7 +67,7 @@ class LimitCycle:
     @property
     def filter_state(self) -> float | None:
         """The state of control that has one, such as W of eq. 17, m; None for any other."""
-        return self.control_state[0] if len(self.control_state) == 1 else None
+        return self.filter_states[0] if len(self.filter_states) == 1 else None
 
     @property
     def stable(self) -> bool:
@@ -499,7 +499,7 @@ def _cycle(motion: SensitiveMotion, shot: _Shot) -> LimitCycle | None:
         return None
     return LimitCycle(
         position=float(start[0]) * drive.length_scale,
-        control_state=tuple((motion.control_state_of(start) * drive.length_scale).tolist()),
+        filter_states=tuple((motion.filter_states_of(start) * drive.length_scale).tolist()),
         period=period,
         multipliers=shot.multipliers(),
         measures=replace(measures, steady=True, trend=None),

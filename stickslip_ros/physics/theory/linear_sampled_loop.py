@@ -15,7 +15,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.sampled_loop import whole_and_rest
-from stickslip_ros.physics.model.control import LinearFeedback, WashoutGains
+from stickslip_ros.physics.model.control import LinearFeedback
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.gain_intervals import (
     GainBoundary,
@@ -231,7 +231,7 @@ class LinearSampledLoop:
         boundary = GainBoundary(self.jacobian, self.held, self.delay[0], self.period, scaled)
         return boundary.stable_intervals(
             self.drive.normal_force / self.drive.speed_scale,
-            lambda gain: self.spectral_radius(WashoutGains(corner_frequency, gain, 0.0)),
+            lambda gain: float(self._radii(corner_frequency, np.array([gain]))[0]),
         )
 
     def critical_linear_gain(self, corner_frequency: float) -> float | None:

@@ -94,7 +94,7 @@ def test_its_limit_cycle_is_that_of_that_drive(drive: Drive, gains: StateFeedbac
     assert (found is None) == (expected is None)
     if found is None or expected is None:
         return
-    assert found.control_state == ()
+    assert found.filter_states == ()
     assert found.filter_state is None
     assert found.period == pytest.approx(expected.period, rel=1e-9)
     assert found.position == pytest.approx(expected.position, rel=1e-8)
@@ -133,12 +133,12 @@ def cycle_with_lags() -> LimitCycle:
 
 def test_a_cycle_with_two_states_closes() -> None:
     cycle = cycle_with_lags()
-    assert len(cycle.control_state) == 2
+    assert len(cycle.filter_states) == 2
     assert cycle.filter_state is None
     assert len(cycle.multipliers) == 3
     motion = SensitiveMotion(PAPER, LAGS)
-    start = motion.state_at(cycle.position, cycle.control_state)
-    assert start[2:].tolist() == list(cycle.control_state)
+    start = motion.state_at(cycle.position, cycle.filter_states)
+    assert start[2:].tolist() == list(cycle.filter_states)
     motion.start(start)
     motion.advance(cycle.period)
     assert motion.state == pytest.approx(start, abs=1e-11)
@@ -146,11 +146,11 @@ def test_a_cycle_with_two_states_closes() -> None:
 
 def test_a_guess_of_two_states_leads_to_it() -> None:
     cycle = cycle_with_lags()
-    guess = [1.02 * state for state in cycle.control_state]
+    guess = [1.02 * state for state in cycle.filter_states]
     found = shoot(PAPER, 1.02 * cycle.position, cycle.period, gains=LAGS, filter_state=guess)
     assert found is not None
     assert found.period == pytest.approx(cycle.period, rel=1e-10)
-    assert found.control_state == pytest.approx(cycle.control_state, rel=1e-9)
+    assert found.filter_states == pytest.approx(cycle.filter_states, rel=1e-9)
 
 
 def test_fast_lags_are_velocity_feedback() -> None:
