@@ -21,7 +21,9 @@ PUBLISHED = (
     "docs/**/*.png",
     "docs/**/*.svg",
     "docs/site.css",
+    "examples/**/*.md",
     "examples/**/*.py",
+    "examples/**/*.toml",
     "examples/**/*.ipynb",
     "examples/**/*.png",
 )

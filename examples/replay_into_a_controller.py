@@ -12,7 +12,9 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from stickslip_ros.bags import Recording
-from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
+from stickslip_ros.physics.loop.controller import Controller
+from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.samples import Sample
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "build")
 folder.mkdir(parents=True, exist_ok=True)
@@ -21,17 +23,18 @@ with Recording(Path(__file__).parents[1] / "bags" / "reference") as recording:
     states, forces = recording.joint_states, recording.control_forces
     table = recording.metadata("stickslip_ros/washout_controller")
 names = ("corner_frequency", "linear_gain", "cubic_gain", "force_limit", "start_after")
-recorded = WashoutParameters(**{name: json.loads(table[name]) for name in names})
+recorded = Washout(**{name: json.loads(table[name]) for name in names})
 doubled = replace(recorded, linear_gain=2.0 * recorded.linear_gain)
 
 time = 1e-9 * (states.stamp - states.stamp[0])
-samples = list(zip(states.stamp.tolist(), states.velocity.tolist(), strict=True))
+columns = [column.tolist() for column in vars(states).values()]
+samples = [Sample(*values) for values in zip(*columns, strict=True)]
 figure = Figure(figsize=(8.0, 3.6), layout="constrained")
 axes = figure.subplots()
-for parameters in (doubled, recorded):
-    washout = Washout(parameters)
-    answers = [washout.answer(*sample) for sample in samples]
-    axes.plot(time, answers, lw=1.0, label=f"linear gain {parameters.linear_gain:.0f} N s/m")
+for law in (doubled, recorded):
+    controller = Controller(law)
+    answers = [controller.answer(sample) for sample in samples]
+    axes.plot(time, answers, lw=1.0, label=f"linear gain {law.linear_gain:.0f} N s/m")
 assert answers[: len(forces.force)] == forces.force.tolist()
 axes.set(xlim=(2.4, 3.0), xlabel="time (s)", ylabel="control force (N)")
 axes.legend()

@@ -20,7 +20,7 @@ SCRIPTS = sorted(
 )
 NOTEBOOKS = sorted(path.stem for path in EXAMPLES.glob("notebooks/*.ipynb"))
 # Those that read a bag or only simulate a little; the others take several seconds each.
-QUICK = {"read_a_bag", "replay_into_a_controller", "simulate_and_plot"}
+QUICK = {"position_servo", "read_a_bag", "replay_into_a_controller", "simulate_and_plot"}
 ELSEWHERE = {"compare_controllers"}  # test_controllers.py
 
 
@@ -31,8 +31,8 @@ def run(script: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_there_are_as_many_as_the_page_says() -> None:
-    assert (len(SCRIPTS), len(NODES), len(NOTEBOOKS)) == (11, 2, 3)
-    assert "Eleven scripts, two controllers and three notebooks" in PAGE
+    assert (len(SCRIPTS), len(NODES), len(NOTEBOOKS)) == (12, 2, 3)
+    assert "Twelve scripts, two controllers and three notebooks" in PAGE
 
 
 @pytest.mark.parametrize("script", sorted(QUICK))

@@ -43,7 +43,18 @@ class ContinuousControl(Protocol):
     """Names of the states."""
 
     def scaled(self, drive: Drive) -> Self:
-        """Return the same control with dimensionless constants, in the scales of `drive`."""
+        """Return the same control with dimensionless constants, in the scales of `drive`.
+
+        Parameters
+        ----------
+        drive : Drive
+            Drive that defines the scales.
+
+        Returns
+        -------
+        ContinuousControl
+            The same control, dimensionless.
+        """
         ...
 
     def silenced(self) -> Self:
@@ -51,25 +62,81 @@ class ContinuousControl(Protocol):
         ...
 
     def rest(self, position: Any, speed: Any) -> Sequence[Any]:
-        """Return the states of a control at rest, where the slide has kept its state for long."""
+        """Return the states of a control at rest, where the slide has kept its state for long.
+
+        Parameters
+        ----------
+        position, speed : float, array or expression
+            Displacement x and speed y of the slide.
+
+        Returns
+        -------
+        sequence
+            Values of `states`.
+        """
         ...
 
     def state_rates(self, position: Any, speed: Any, states: Sequence[Any]) -> Sequence[Any]:
-        """Return the rates of the states."""
+        """Return the rates of the states.
+
+        Parameters
+        ----------
+        position, speed : float, array or expression
+            Displacement x and speed y of the slide.
+        states : sequence of float, array or expression
+            Values of `states`.
+
+        Returns
+        -------
+        sequence
+            Rates, in the order of `states`.
+        """
         ...
 
     def control_force(self, position: Any, speed: Any, states: Sequence[Any]) -> Any:
-        """Return the force on the slide."""
+        """Return the force on the slide.
+
+        Parameters
+        ----------
+        position, speed : float, array or expression
+            Displacement x and speed y of the slide.
+        states : sequence of float, array or expression
+            Values of `states`.
+
+        Returns
+        -------
+        float, array or expression
+            Force.
+        """
         ...
 
     def state_scales(self, drive: Drive) -> Sequence[float]:
-        """Return the factor from each dimensionless state to the sampled law's, in SI units."""
+        """Return the factor from each dimensionless state to the sampled law's, in SI units.
+
+        Parameters
+        ----------
+        drive : Drive
+            Drive that defines the scales.
+
+        Returns
+        -------
+        sequence of float
+            Factors, in the order of `states`.
+        """
         ...
 
     def bound(self, speed: Any) -> Any:
         """Return forces on the speed that give a cycle at least the energy that the control gives.
 
-        An array of the shape of `speed`; infinite where no bound is known.
+        Parameters
+        ----------
+        speed : ndarray
+            Speeds y of the slide.
+
+        Returns
+        -------
+        ndarray
+            Forces, shape of `speed`; infinite where no bound is known.
         """
         ...
 
@@ -104,7 +171,10 @@ class ControlLaw(ABC):
     name: ClassVar[str]
     """Name in parameters, options and names of nodes."""
     follows_reference: ClassVar[bool] = False
-    """Whether the law uses a reference; then its controller has the parameters `reference.*`."""
+    """Whether the law uses a reference: its controller has the parameters `reference.*`.
+
+    A law that does not follow a reference receives none.
+    """
     state_units: ClassVar[Mapping[str, str | None]] = {}
     """Unit of each state, by name."""
 
@@ -174,5 +244,16 @@ class ControlLaw(ABC):
         return None
 
     def linear_feedback(self, period: float) -> LinearFeedback | None:
-        """Return the law near the equilibrium for a sample period (s), or None if not linear."""
+        """Return the sampled law near the equilibrium.
+
+        Parameters
+        ----------
+        period : float
+            Sample period, s.
+
+        Returns
+        -------
+        LinearFeedback or None
+            Law near the equilibrium; None if it is not linear there.
+        """
         return None
