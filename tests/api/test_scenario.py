@@ -16,6 +16,7 @@ from stickslip_ros.studies.columns import COLUMNS
 EVERY = [
     f"{node}.{name}" for node, model in NODE_PARAMETERS.items() for name in known_parameters(model)
 ]
+OF_PAPER = load_scenario("paper").nodes
 SHIPPED = Path(__file__).parents[2] / "config"
 SHARED = {"autostart", "wait_for", "use_sim_time"}
 
@@ -49,23 +50,27 @@ def test_a_keyword_is_the_text_that_it_stands_for() -> None:
 @pytest.mark.parametrize("parameter", EVERY)
 def test_every_parameter_has_a_keyword_of_its_own(parameter: str) -> None:
     keyword = keyword_of(parameter)
+    node = parameter.partition(".")[0]
+    nodes = OF_PAPER if node in OF_PAPER else ("plant", node, "analyzer")
     assert keyword.isidentifier()
     assert keyword not in COLUMNS
     if keyword in SHARED:
         with pytest.raises(
             InvalidInputError, match=r"several nodes .*; write plant.* or .*analyzer"
         ):
-            parameter_of(keyword)
+            parameter_of(keyword, nodes)
     else:
-        assert parameter_of(keyword) == parameter
+        assert parameter_of(keyword, nodes) == parameter
 
 
 @pytest.mark.parametrize("parameter", [name for name in EVERY if keyword_of(name) not in SHARED])
 def test_every_default_can_be_given_by_keyword(parameter: str) -> None:
-    scenario = load_scenario("paper")
     node, _, name = parameter.partition(".")
+    law = None if node in OF_PAPER else node.removesuffix("_controller")
+    scenario = load_scenario("paper", controller=law)
     value = scenario.as_dict()[node][name]
-    assert ss.scenario("paper", **{keyword_of(parameter): value}).as_dict() == scenario.as_dict()
+    found = ss.scenario("paper", controller=law, **{keyword_of(parameter): value})
+    assert found.as_dict() == scenario.as_dict()
 
 
 @pytest.mark.parametrize(
@@ -100,7 +105,8 @@ def test_numbers_of_numpy_are_numbers() -> None:
     found = ss.scenario("paper", belt_speed=np.float64(0.1), window=np.int64(7), mass=2)
     assert (found.plant.belt_speed, found.analyzer.window, found.plant.mass) == (0.1, 7, 2.0)
     assert found.overrides == ("plant.belt_speed=0.1", "analyzer.window=7", "plant.mass=2")
-    assert overrides_of({"force_limit": float("inf")}) == ["washout_controller.force_limit=inf"]
+    limit = "washout_controller.force_limit=inf"
+    assert overrides_of({"force_limit": float("inf")}, OF_PAPER) == [limit]
 
 
 def test_a_scenario_can_be_changed_again() -> None:
@@ -141,3 +147,29 @@ def test_it_says_what_is_left_to_defaults(tmp_path: Path) -> None:
     rows = [line.split() for line in repr(ss.scenario(file)).splitlines()]
     assert ["plant.mass", "2", "kg"] in rows
     assert ["plant.stiffness", "1", "N/m", "default"] in rows
+
+
+def test_the_controller_is_chosen_and_its_constants_are_keywords() -> None:
+    found = ss.scenario("paper", controller="velocity_feedback", velocity_gain=-0.5)
+    assert found == load_scenario(
+        "paper",
+        ["velocity_feedback_controller.velocity_gain=-0.5"],
+        controller="velocity_feedback",
+    )
+    assert found.controller.node == "velocity_feedback_controller"
+    again = ss.scenario(ss.scenario("paper"), controller="velocity_feedback", velocity_gain=-0.5)
+    assert again.as_dict() == found.as_dict()
+    assert ss.scenario(again, controller="washout").as_dict() == ss.scenario("paper").as_dict()
+    with pytest.raises(InvalidInputError, match="unknown control law wash; did you mean washout"):
+        ss.scenario("paper", controller="wash")
+
+
+def test_a_keyword_of_a_controller_that_is_not_in_use_names_both() -> None:
+    with pytest.raises(InvalidInputError) as refused:
+        ss.scenario("paper", velocity_gain=-1.0)
+    assert str(refused.value) == (
+        "velocity_gain: is a parameter of velocity_feedback_controller, and the controller in use "
+        "is washout_controller"
+    )
+    with pytest.raises(InvalidInputError, match="linear_gain: is a parameter of washout_control"):
+        ss.sweep(ss.scenario("paper", controller="velocity_feedback"), linear_gain=(-1.0, 0.0, 2))

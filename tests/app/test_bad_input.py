@@ -36,7 +36,10 @@ from tests.app.conftest import Run
         ),
         (("run", "paper", "--bag", "/proc/none/bag"), ("/proc/none/bag",)),
         (("run", "paper", "--bag", "."), ("exists already",)),
-        (("run", "paper", "--controller", "damper"), ("--controller damper", "PACKAGE/EXECUTABLE")),
+        (
+            ("run", "paper", "--controller", "damper"),
+            ("--controller: unknown control law damper", "known names are washout, "),
+        ),
         (
             ("run", "paper", "--controller", "stickslip/x"),
             ("no package stickslip", "mean stickslip_ros?"),

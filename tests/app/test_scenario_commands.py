@@ -10,7 +10,6 @@ import pytest
 import yaml
 
 from stickslip_ros.scenarios.files import load_scenario, shipped_scenarios
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from tests.app.conftest import Run
 from tests.scenarios.conftest import read_by_ros  # noqa: F401 - a fixture used here
 
@@ -24,7 +23,7 @@ def test_list_names_what_can_be_given_by_name(stickslip: Run) -> None:
     assert shown["feed_drive"].startswith("The slide of a machine tool: 100 kg, 16 Hz")
     assert shown["stribeck"].startswith("Cubic Stribeck law")
     assert "parameters: static, minimum, minimum_speed" in [line.strip() for line in lines]
-    assert "linear_gain" in lines[-1]
+    assert any("linear_gain" in line for line in lines)
     found = json.loads(stickslip("list", "--json").stdout)
     assert [scenario["name"] for scenario in found["scenarios"]] == list(shipped_scenarios())
     assert "plant.friction.slope" in found["friction_laws"][2]["parameters"]
@@ -83,9 +82,9 @@ def test_new_writes_a_file_that_is_the_scenario(
     assert mine.left_to_defaults == []
     text = (tmp_path / "mine.yaml").read_text()
     assert max(map(len, text.splitlines())) <= 100
-    for node, model in NODE_PARAMETERS.items():
-        for parameter in load_scenario(source).as_dict()[node]:
-            assert f"{parameter.rpartition('.')[2]}:" in text, (model, parameter)
+    for node, values in load_scenario(source).as_dict().items():
+        for parameter in values:
+            assert f"{parameter.rpartition('.')[2]}:" in text, (node, parameter)
     assert "    # Mass of the slide. [kg, above 0]\n    mass: " in text
     assert stickslip("simulate", "mine.yaml", "--duration", "1", "--json").returncode == 0
 

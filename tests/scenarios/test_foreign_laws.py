@@ -22,7 +22,7 @@ from stickslip_ros.scenarios.foreign_laws import (
     add_laws_of_other_packages,
 )
 from stickslip_ros.scenarios.parameter_field import parameters_of
-from stickslip_ros.scenarios.parameters import ControllerParameters
+from stickslip_ros.scenarios.parameters import NodeParameters
 from tests.scenarios.foreign_laws import BRAKE, FALLING, write_package
 
 Install = Callable[..., None]
@@ -262,8 +262,10 @@ STRENGTH = '    strength: Any = constant(1.0, "Force per velocity", "N s/m", at_
                 f'{STRENGTH}\n    {name}: Any = constant(1.0, "Gain.")',
                 f"has a constant {name}: the name cannot be that of a parameter",
             )
-            for name in sorted({*dir(ControllerParameters), *ControllerParameters.model_fields})
-            if not name.startswith("_")
+            for name in (
+                *("law", "reference", *NodeParameters.model_fields),
+                *("node", "as_law", "as_reference", "as_controller", "law_names", "copy"),
+            )
         ),
     ],
 )

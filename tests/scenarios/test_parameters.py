@@ -54,6 +54,12 @@ UNITS: dict[str, dict[str, str | None]] = {
         "force_limit": "N",
         "start_after": "s",
     },
+    "velocity_feedback_controller": {
+        "velocity_gain": "N s/m",
+        "position_gain": "N/m",
+        "force_limit": "N",
+        "start_after": "s",
+    },
     "analyzer": {"bag": None, "window": "cycles", "flush_period": "s", "compression": None},
 }
 # Those that the scenario `paper` does not give.
@@ -70,12 +76,14 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "disturbance.kind": "none",
     },
     "washout_controller": {"force_limit": float("inf")},
+    "velocity_feedback_controller": {"force_limit": float("inf"), "position_gain": 0.0},
     "analyzer": {"bag": "", "window": 20, "flush_period": 1.0, "compression": "lz4"},
 }
 # Only while a node is not active; every physical parameter and gain can be set at any time.
 FIXED: dict[str, set[str]] = {
     "plant": {"rate", "pace"},
     "washout_controller": set(),
+    "velocity_feedback_controller": set(),
     "analyzer": {"bag", "window"},
 }
 nodes = pytest.mark.parametrize("node", NODE_PARAMETERS)

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from tests.scenarios.conftest import ReadByRos
 from tests.scenarios.files import refusal, scenario_file, section
 
@@ -45,7 +46,7 @@ def test_a_section_that_matches_no_node_is_refused(
     path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))
     message = refusal(path, namespace=namespace)
     assert message.startswith(f"{path}: section /{pattern.strip('/')} matches no node")
-    assert f"the nodes in namespace {namespace} are plant, washout_controller, analyzer" in message
+    assert f"the nodes in namespace {namespace} are {', '.join(NODE_PARAMETERS)}" in message
 
 
 def test_sections_of_other_nodes_are_left_alone_where_there_may_be_some(tmp_path: Path) -> None:

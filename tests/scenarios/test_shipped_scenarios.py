@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from stickslip_ros.scenarios.files import load_scenario, parameter_file
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, NODE_PARAMETERS
 from stickslip_ros.scenarios.ros_yaml import number_in
 
 ROOT = Path(__file__).parents[2]
@@ -96,9 +96,10 @@ def test_no_other_scenarios_are_shipped() -> None:
 
 
 def test_the_defaults_are_those_of_the_paper() -> None:
-    scenario = load_scenario("paper")
-    for node, model in NODE_PARAMETERS.items():
-        assert getattr(scenario, node) == model()
+    for law in CONTROLLER_PARAMETERS:
+        scenario = load_scenario("paper", controller=law)
+        for node in scenario.nodes:
+            assert getattr(scenario, node) == NODE_PARAMETERS[node]()
 
 
 @pytest.mark.parametrize("name", SHIPPED)
