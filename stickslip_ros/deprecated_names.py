@@ -19,6 +19,11 @@ else:  # at run time the base class adds nothing, and its import takes as long a
 
 _MODEL = "stickslip_ros.physics.model"
 _LOOP = "stickslip_ros.physics.loop"
+_WASHOUT = {
+    "WashoutParameters": f"{_MODEL}.control.Washout",
+    "Washout": f"{_LOOP}.controller.Controller",
+}
+_GAINS = {"WashoutGains": f"{_MODEL}.control.WashoutGains"}
 
 MOVED: dict[str, dict[str, str]] = {
     "stickslip_ros.bags.messages": {
@@ -38,10 +43,10 @@ MOVED: dict[str, dict[str, str]] = {
     "stickslip_ros.physics.knots": {
         "Knots": "stickslip_ros.physics.measures.breakpoints.Breakpoints",
     },
-    "stickslip_ros.physics.washout": {
-        name: f"{_LOOP}.washout.{name}" for name in ("WashoutParameters", "Washout")
-    },
-    "stickslip_ros.physics.equations": {"WashoutGains": f"{_MODEL}.equations.WashoutGains"},
+    "stickslip_ros.physics.washout": _WASHOUT,
+    f"{_LOOP}.washout": _WASHOUT,
+    "stickslip_ros.physics.equations": _GAINS,
+    f"{_MODEL}.equations": _GAINS,
     "stickslip_ros.physics.sampled_loop": {
         "SampledLoop": f"{_LOOP}.sampled_loop.SampledLoop",
         "Sample": "stickslip_ros.samples.Sample",
@@ -63,6 +68,12 @@ MOVED: dict[str, dict[str, str]] = {
     },
 }
 
+ADAPTERS = {
+    f"{_MODEL}.control.Washout": f"{_LOOP}.washout.OldWashoutParameters",
+    f"{_LOOP}.controller.Controller": f"{_LOOP}.washout.OldWashout",
+}
+"""What an old name stands for, by its new place, where arguments or methods have changed."""
+
 
 def moved_from(module: str) -> Callable[[str], Any]:
     """Return the `__getattr__` of a module from which names of `MOVED` were moved."""
@@ -71,8 +82,8 @@ def moved_from(module: str) -> Callable[[str], Any]:
         now = MOVED[module].get(name)
         if now is None:
             raise AttributeError(f"module {module!r} has no attribute {name!r}")
-        home, _, new_name = now.rpartition(".")
         _warn(f"{module}.{name}", now)
+        home, _, new_name = ADAPTERS.get(now, now).rpartition(".")
         return getattr(import_module(home), new_name)
 
     return get

@@ -16,6 +16,7 @@ def scenario(
     /,
     *overrides: str,
     base: str | Path | None = None,
+    controller: str | None = None,
     **parameters: Any,
 ) -> Scenario:
     """Return a scenario, with some parameters changed.
@@ -30,10 +31,13 @@ def scenario(
     base : str or Path, optional
         Scenario that gives the parameters that the file omits, by its name or path. By default
         this is the one that the section `scenario` of the file names.
+    controller : str, optional
+        Name of the control law in use, such as `"velocity_feedback"`. By default it is the one that
+        the file, or else its base, has a section for.
     **parameters : Any
         Values in SI units. The keyword is the parameter's name with `_` for each `.`, such as
-        `belt_speed`, `friction_static` or `initial_position`, where only one of plant, controller
-        and analyzer has such a parameter. Keywords act after texts.
+        `belt_speed`, `friction_static` or `initial_position`, where only one of plant, analyzer
+        and the controller in use has such a parameter. Keywords act after texts.
 
     Returns
     -------
@@ -43,8 +47,8 @@ def scenario(
     Raises
     ------
     InvalidInputError
-        If the scenario, a parameter or a value is not allowed, or if several nodes have a keyword's
-        parameter.
+        If the scenario, the controller, a parameter or a value is not allowed, or if several nodes
+        have a keyword's parameter.
 
     Examples
     --------
@@ -52,15 +56,19 @@ def scenario(
     >>> drive = ss.scenario("feed_drive", belt_speed=0.03, friction_static=0.35)
     >>> drive.plant.belt_speed, drive.plant.friction.static
     (0.03, 0.35)
-    >>> ss.scenario(drive, "washout_controller.linear_gain=-2000").washout_controller.linear_gain
+    >>> damped = ss.scenario(drive, controller="velocity_feedback", velocity_gain=-2000)
+    >>> damped.control_law.velocity_gain
     -2000.0
     """
-    texts = [*overrides, *overrides_of(parameters)]
     if not isinstance(name_or_path, Scenario):
-        return load_scenario(str(name_or_path), texts, base=None if base is None else str(base))
-    if base is not None:
+        own_base = None if base is None else str(base)
+        chosen = load_scenario(str(name_or_path), base=own_base, controller=controller)
+    elif base is not None:
         raise InvalidInputError(f"base = {base}: {name_or_path.name} is loaded, and needs no base")
-    return name_or_path.overridden(texts)
+    else:
+        chosen = name_or_path if controller is None else name_or_path.with_controller(controller)
+    texts = [*overrides, *overrides_of(parameters, chosen.nodes)]
+    return chosen.overridden(texts) if texts else chosen
 
 
 def as_scenario(given: ScenarioLike) -> Scenario:

@@ -304,12 +304,13 @@ def sweep(
     """
     if carry is not None and carry not in list(Carry):
         raise InvalidInputError(f"carry = {shown(carry)} is refused: must be up, down or both")
+    chosen = as_scenario(scenario)
     study = sweep_study(
-        as_scenario(scenario),
+        chosen,
         [
             *map(Axis.parse, axes),
             *(
-                _axis(keyword, parameter_of(keyword), given)
+                _axis(keyword, parameter_of(keyword, chosen.nodes), given)
                 for keyword, given in parameters.items()
             ),
         ],

@@ -8,7 +8,6 @@ from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
 from stickslip_ros.api.frames import Quantity, data_frame
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.plots.design_table import CHECKS, design_tables
 from stickslip_ros.plots.stability_table import stability_tables
 from stickslip_ros.plots.units import Units
@@ -111,8 +110,8 @@ class Proposal(Shown):
     """The task, the proposal and its checks."""
 
     @property
-    def controller(self) -> WashoutParameters | None:
-        """The proposed constants of the washout controller; None if there are none."""
+    def controller(self) -> designing.DesignedLaw | None:
+        """The proposed constants of the controller; None if there are none."""
         return self.design.controller
 
     @property
@@ -221,7 +220,8 @@ def design(
     Raises
     ------
     InvalidInputError
-        If an argument is not allowed.
+        If an argument is not allowed, or if the scenario's controller is one of another control law
+        than that whose gains a design proposes.
 
     Examples
     --------
@@ -232,7 +232,7 @@ def design(
     """
     chosen = as_scenario(scenario)
     if force_limit is not None:
-        chosen = chosen.overridden([override("washout_controller.force_limit", force_limit)])
+        chosen = chosen.overridden([override(f"{chosen.controller.node}.force_limit", force_limit)])
     task = designing.Task.from_scenario(chosen, _range(belt_speed))
     return Proposal(designing.design(task, progress))
 

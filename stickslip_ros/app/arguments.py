@@ -3,8 +3,9 @@
 import argparse
 import sys
 import warnings
-from collections.abc import Collection, Generator
+from collections.abc import Callable, Collection, Generator
 from contextlib import contextmanager
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from stickslip_ros.scenarios.files import Scenario
+
+DEFAULT_CONTROLLER = "(default: the one that the scenario has a section for)"
+"""What --controller is by default, for its help."""
 
 _FIGURE_FILES = (".png", ".svg", ".pdf")
 
@@ -53,12 +57,26 @@ def add_scenario_file(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_scenario(parser: argparse.ArgumentParser) -> Any:
-    """Add SCENARIO, what modifies it, and --no-control; return the exclusive group of the last."""
+def add_scenario(parser: argparse.ArgumentParser) -> None:
+    """Add SCENARIO, what modifies it, --no-control and --controller."""
     add_scenario_file(parser)
+    add_law(add_control(parser))
+
+
+def add_control(parser: argparse.ArgumentParser) -> Any:
+    """Add --no-control; return its group, for options that exclude it."""
     control = parser.add_mutually_exclusive_group()
     control.add_argument("--no-control", action="store_true", help="run without the controller")
     return control
+
+
+def add_law(container: Any) -> None:
+    """Add --controller, the name of a control law, to a parser or a group."""
+    container.add_argument(
+        "--controller",
+        metavar="NAME",
+        help=f"control law, as `stickslip list` prints it {DEFAULT_CONTROLLER}",
+    )
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
@@ -211,11 +229,12 @@ def scenario_of(
     namespace: str = DEFAULT_NAMESPACE,
     other_nodes: bool = False,
     unused: Collection[str] = (),
+    replaced: bool = False,
 ) -> "Scenario":
     """Return the scenario that was asked for, `overrides` applied after those given.
 
     A sentence on standard error names the values that are left to their defaults, except those that
-    are `unused` (NODE.PARAMETER).
+    are `unused` (NODE.PARAMETER). The controller can be `replaced` by one that is no control law.
     """
     with interrupts_kept():
         from stickslip_ros.scenarios.files import load_scenario
@@ -223,9 +242,16 @@ def scenario_of(
         from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
     control = ["plant.expects_control=false"] if arguments.no_control else []
     asked = [*arguments.overrides, *control, *overrides]
-    scenario = load_scenario(
-        arguments.scenario, asked, namespace, base=arguments.base, other_nodes=other_nodes
+    load = partial(
+        load_scenario,
+        arguments.scenario,
+        asked,
+        namespace,
+        base=arguments.base,
+        other_nodes=other_nodes,
     )
+    controlled = not (arguments.no_control or replaced)
+    scenario = with_law(load, None if replaced else arguments.controller, needed=controlled)
     values = scenario.as_dict()
     defaults: list[str] = []
     for full_name in scenario.left_to_defaults:
@@ -240,6 +266,49 @@ def scenario_of(
         )
         print(printable(sentence), file=sys.stderr)
     return scenario
+
+
+def with_law(
+    load: "Callable[..., Scenario]", controller: str | None, *, needed: bool = True
+) -> "Scenario":
+    """Load a scenario with the control law that --controller names.
+
+    If no controller is `needed`, one of several that the file has a section for will do.
+    """
+    from stickslip_ros.scenarios.files import SeveralControllersError, known_law
+
+    if controller is not None:
+        with naming("--controller:"):
+            if is_program(controller):
+                raise InvalidInputError(
+                    f"{controller} is refused: must be the name of a control law; only "
+                    "`stickslip run` starts scripts and executables"
+                )
+            known_law(controller)
+    try:
+        return load(controller=controller)
+    except SeveralControllersError as error:
+        if not needed:
+            return load(controller=error.laws[0])
+        raise InvalidInputError(f"{error}, by --controller NAME") from None
+
+
+def is_program(controller: str) -> bool:
+    """Return whether --controller names a script or PACKAGE/EXECUTABLE instead of a control law."""
+    return "/" in controller or controller.endswith(".py")
+
+
+def law_constants(*needed: str) -> list[str]:
+    """Return NODE.PARAMETER of the constants of every control law, except those `needed`."""
+    from stickslip_ros.physics.model.control import CONTROL_LAWS
+    from stickslip_ros.scenarios.parameters import controller_node
+
+    return [
+        f"{controller_node(name)}.{constant}"
+        for name, law in CONTROL_LAWS.items()
+        for constant in law.constants()
+        if constant not in needed
+    ]
 
 
 def made_of(scenario: "Scenario") -> dict[str, Any]:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _DESCRIPTION = f"""Find the motion that each initial state leads to, and the share of initial
 states for each motion (basin stability), over a grid or a random sample. An initial state is a
-displacement and a velocity of the slide; the washout filter is at rest. Each motion is followed
+displacement and a velocity of the slide; the controller is at rest. Each motion is followed
 until it is steady, for at most {BASIN_COURSE.patience} transients."""
 
 

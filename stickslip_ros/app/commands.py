@@ -23,7 +23,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
 EXAMPLES: dict[str, str] = {
     "run": "stickslip run feed_drive --duration 10 --dashboard",
     "dashboard": "stickslip dashboard --namespace feed_drive",
-    "set": "stickslip set plant.belt_speed=0.03 washout_controller.linear_gain=-2000",
+    "set": "stickslip set plant.belt_speed=0.03 plant.damping=200",
     "replay": "stickslip replay bags/reference --rate 2",
     "simulate": "stickslip simulate feed_drive -p plant.belt_speed=0.03 --duration 10",
     "sweep": "stickslip sweep paper --no-control --over plant.belt_speed=0.02:0.6:300 "

@@ -8,7 +8,7 @@ from stickslip_ros.app.commands import COMMANDS
 ParserOf = Callable[[str], argparse.ArgumentParser]
 """Returns the parser of a command by its name."""
 
-_FILES = ("BAG", "CONTROLLER", "DIR", "FILE", "OUT")
+_FILES = ("BAG", "DIR", "FILE", "OUT")
 """Metavars of files and directories."""
 
 _PARAMETERS = ("NODE.PARAMETER=VALUE", "NODE.PARAMETER=A:B:COUNT")
@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _script(shell: str, parser_of: ParserOf) -> str:
     from stickslip_ros.scenarios.files import shipped_scenarios
-    from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+    from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, NODE_PARAMETERS
     from stickslip_ros.scenarios.template import own_first
 
     parameters = {
@@ -121,6 +121,7 @@ def _script(shell: str, parser_of: ParserOf) -> str:
             for name, choices in values.items()
             if choices
         ),
+        "@LAWS@": _words(CONTROLLER_PARAMETERS),
         "@SCENARIOS@": _words(shipped_scenarios()),
         "@PARAMETERS@": _words(f"{name}=" for name in parameters),
     }
@@ -155,6 +156,8 @@ def _completed(action: argparse.Action) -> str:
         return f"words={_words(action.choices)}"
     if action.metavar in _PARAMETERS:
         return "kind=parameters"
+    if action.metavar in ("CONTROLLER", "NAME"):
+        return "words=@LAWS@" + (" kind=files" if action.metavar == "CONTROLLER" else "")
     if action.metavar == "SCENARIO":
         return "kind=scenarios"
     return "kind=files" if action.metavar in _FILES else "kind="

@@ -1,4 +1,4 @@
-"""`make demo`: the washout filter suppresses the vibration of a feed drive, over ROS topics."""
+"""`make demo`: a controller suppresses the vibration of a feed drive, over ROS topics."""
 
 import sys
 
@@ -38,13 +38,14 @@ def main() -> None:
 
 def _demonstrate() -> None:
     scenario = load_scenario(_SCENARIO, ["plant.pace=lockstep", f"plant.duration={_DURATION}"])
-    switched_on = scenario.washout_controller.start_after
+    switched_on = scenario.controller.as_law().start_after
+    controller = scenario.controller.node.replace("_", " ")
     bag = default_bag(_SCENARIO)
     with loading_ros():
         from stickslip_ros.nodes.base.network import keep_on_this_machine
     reach = keep_on_this_machine(network=False)
     print(
-        f"{_DURATION:g} s of {_SCENARIO} in lockstep: plant, washout controller and analyzer as "
+        f"{_DURATION:g} s of {_SCENARIO} in lockstep: plant, {controller} and analyzer as "
         f"ROS 2 nodes, {reach}; the controller acts from {switched_on:g} s on"
     )
     results, interrupted = record(scenario, bag, composed=True)

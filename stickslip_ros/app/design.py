@@ -14,6 +14,7 @@ from stickslip_ros.app.arguments import (
     add_scenario,
     check_figure,
     check_new,
+    law_constants,
     made_of,
     scenario_of,
     write_figure,
@@ -29,10 +30,9 @@ if TYPE_CHECKING:
     from stickslip_ros.studies.design import Design
 
 _DESCRIPTION = """Propose a cutoff frequency and gains that suppress the vibration within a force
-limit. The scenario gives the drive, rate and force_delay; the force limit is
-washout_controller.force_limit (-p washout_controller.force_limit=200). The gains of the scenario
-are not used. The proposal is verified by simulation, at several belt speeds and phases of the
-vibration."""
+limit. The scenario gives the drive, rate, force_delay and the force_limit of the controller. The
+gains of the scenario are not used. The proposal is verified by simulation, at several belt speeds
+and phases of the vibration."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,10 +60,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     with interrupts_kept():
-        from stickslip_ros.plots.design_table import CONTROLLER, design_tables
+        from stickslip_ros.plots.design_table import design_tables
         from stickslip_ros.studies.design import Task, design
-    proposed = [f"washout_controller.{name}" for name in CONTROLLER if name != "force_limit"]
-    scenario = scenario_of(arguments, unused=proposed)
+    scenario = scenario_of(arguments, unused=law_constants("force_limit", "start_after"))
     task = Task.from_scenario(scenario, _belt_speeds(arguments.belt_speed))
     if arguments.out is not None:
         check_new("--out", arguments.out)

@@ -7,7 +7,7 @@ from itertools import chain, repeat
 from pathlib import Path
 from shutil import get_terminal_size
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app.arguments import add_json
 from stickslip_ros.app.optional_dependencies import interrupts_kept
@@ -15,12 +15,17 @@ from stickslip_ros.app.output import print_json
 from stickslip_ros.text import printable
 from stickslip_ros.versions import versions
 
+if TYPE_CHECKING:
+    from stickslip_ros.physics.model.control import ControlLaw
+    from stickslip_ros.physics.model.friction import FrictionLaw
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.description = (
         "List the shipped scenarios, which commands take by name, the friction laws "
-        "(plant.friction.law) and the control laws, with the parameters that each law uses."
+        "(plant.friction.law) and the control laws (--controller), with the parameters that each "
+        "law uses."
     )
     add_json(parser)
 
@@ -28,34 +33,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     with interrupts_kept():
+        from stickslip_ros.physics.model.control import CONTROL_LAWS
         from stickslip_ros.physics.model.friction import LAWS
         from stickslip_ros.scenarios.files import shipped_scenarios
-        from stickslip_ros.scenarios.friction_laws import REFUSED_LAWS
-        from stickslip_ros.scenarios.parameters import WashoutControllerParameters
-    for name, reason in REFUSED_LAWS.items():
-        print(printable(f"friction law {name} is refused: {reason}"), file=sys.stderr)
+        from stickslip_ros.scenarios.foreign_laws import CONTROLLERS, FRICTION_LAWS
+        from stickslip_ros.scenarios.parameters import controller_node
+    for kind, family in (("friction law", FRICTION_LAWS), ("control law", CONTROLLERS)):
+        for name, reason in family.refused.items():
+            print(printable(f"{kind} {name} is refused: {reason}"), file=sys.stderr)
     scenarios = [_scenario(name, path) for name, path in shipped_scenarios().items()]
-    friction_laws: list[dict[str, Any]] = [
-        {
-            "name": name,
-            "description": (getdoc(law) or "").partition("\n")[0],
-            "parameters": [f"plant.friction.{constant}" for constant in law.constants()],
-        }
-        for name, law in LAWS.items()
-    ]
-    washout: dict[str, Any] = {
-        "name": "washout",
-        "description": "Washout filter with linear and cubic velocity feedback.",
-        "parameters": [
-            f"washout_controller.{name}" for name in WashoutControllerParameters.law_names()
-        ],
-    }
+    friction_laws = [_law(law, "plant.friction") for law in LAWS.values()]
+    control_laws = [_law(law, controller_node(name)) for name, law in CONTROL_LAWS.items()]
     if arguments.json:
         print_json(
             {
                 "scenarios": scenarios,
                 "friction_laws": friction_laws,
-                "control_laws": [washout],
+                "control_laws": control_laws,
                 "versions": versions(),
             }
         )
@@ -63,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     _print("scenarios", {each["name"]: [each["description"]] for each in scenarios})
     for heading, laws in (
         ("friction laws, plant.friction.law", friction_laws),
-        ("control laws", [washout]),
+        ("control laws, --controller", control_laws),
     ):
         print()
         _print(
@@ -91,6 +85,14 @@ def _scenario(name: str, path: Path) -> dict[str, str]:
     from stickslip_ros.scenarios.sections import leading_comment
 
     return {"name": name, "description": leading_comment(path), "path": str(path)}
+
+
+def _law(law: "type[FrictionLaw | ControlLaw]", group: str) -> dict[str, Any]:
+    return {
+        "name": law.name,
+        "description": (getdoc(law) or "").partition("\n")[0],
+        "parameters": [f"{group}.{constant}" for constant in law.constants()],
+    }
 
 
 def _short(parameters: list[str]) -> str:

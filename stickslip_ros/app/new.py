@@ -2,9 +2,10 @@
 
 import argparse
 import shlex
+from functools import partial
 from pathlib import Path
 
-from stickslip_ros.app.arguments import check_new, writing
+from stickslip_ros.app.arguments import add_law, check_new, with_law, writing
 from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.text import printable
@@ -30,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SCENARIO",
         help="scenario whose values the file starts with, by name or path (default: %(default)s)",
     )
+    add_law(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -41,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     if path.suffix not in _ENDINGS:
         raise InvalidInputError(f"{path}: must end in {' or '.join(_ENDINGS)}")
     check_new("FILE", path)
-    scenario = load_scenario(arguments.source)
+    scenario = with_law(partial(load_scenario, arguments.source), arguments.controller)
     command = printable(shlex.join(["stickslip", "simulate", str(path)]))
     title = f"{path.stem}: a drive with the values of {scenario.name}, to be edited."
     with writing("FILE", path), path.open("x", encoding="utf-8") as file:

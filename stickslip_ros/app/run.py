@@ -14,10 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.arguments import (
+    DEFAULT_CONTROLLER,
+    add_control,
     add_json,
     add_namespace,
     add_network,
-    add_scenario,
+    add_scenario_file,
+    is_program,
+    law_constants,
     made_of,
     namespace_of,
     naming,
@@ -40,13 +44,14 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    control = add_scenario(parser)
+    add_scenario_file(parser)
+    control = add_control(parser)
     control.add_argument(
         "--controller",
         metavar="CONTROLLER",
-        help="start this controller instead of the washout controller: a Python script, or "
-        "PACKAGE/EXECUTABLE as for `ros2 run`; arguments after -- are passed to it, as in "
-        "-- --ros-args -p gain:=3.0",
+        help="controller: a control law by its name (`stickslip list` prints them), a Python "
+        f"script, or PACKAGE/EXECUTABLE as for `ros2 run` {DEFAULT_CONTROLLER}; arguments after "
+        "-- are passed to a script or executable, as in -- --ros-args -p gain:=3.0",
     )
     control.add_argument(
         "--external-controller",
@@ -88,7 +93,6 @@ def run(arguments: argparse.Namespace) -> int:
     with interrupts_kept():
         from stickslip_ros.bags.recorder import check_new_bag
         from stickslip_ros.plots.units import Units
-        from stickslip_ros.scenarios.parameters import WashoutControllerParameters
     overrides: list[str] = []
     if arguments.pace is not None:
         overrides.append(f"plant.pace={arguments.pace}")
@@ -96,13 +100,13 @@ def run(arguments: argparse.Namespace) -> int:
         overrides.append(f"plant.duration={arguments.duration!r}")
     namespace = namespace_of(arguments.namespace)
     controller = _other_controller(arguments)
-    law_of_ours = [f"washout_controller.{name}" for name in WashoutControllerParameters.law_names()]
     scenario = scenario_of(
         arguments,
         *overrides,
         namespace=namespace,
         other_nodes=controller is not None,
-        unused=[] if controller is None else law_of_ours,
+        unused=[] if controller is None else law_constants(),
+        replaced=controller is not None,
     )
     if controller is not None and not scenario.plant.expects_control:
         raise InvalidInputError(
@@ -240,13 +244,15 @@ def _bag_of(scenario: "Scenario") -> Path | None:
 
 def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
     """Return the command of the controller in place of ours, empty if it is started elsewhere."""
-    if arguments.controller is not None:
+    asked: str | None = arguments.controller
+    if asked is not None and is_program(asked):
         with naming("--controller"):
-            return [str(find_executable(arguments.controller)), *arguments.further]
+            return [str(find_executable(asked)), *arguments.further]
     if arguments.further:
+        given = "which is not given" if asked is None else f"and {asked} is a control law"
         raise InvalidInputError(
-            f"-- {shlex.join(arguments.further)}: arguments after -- are for --controller, "
-            "which is not given"
+            f"-- {shlex.join(arguments.further)}: arguments after -- are for a script or "
+            f"executable of --controller, {given}"
         )
     return [] if arguments.external_controller else None
 

@@ -12,7 +12,7 @@ from stickslip_ros.text import printable, shown
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.description = (
-        "Set parameters of the plant, the washout controller or the analyzer while they run. All "
+        "Set parameters of the plant, the controller or the analyzer while they run. All "
         "values for one node are set together, or none. A node refuses what is out of bounds, and "
         "what cannot be changed in its present state."
     )

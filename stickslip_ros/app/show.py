@@ -1,9 +1,10 @@
 """`stickslip show`: every parameter of a scenario, and where its value comes from."""
 
 import argparse
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.arguments import add_json, add_scenario_file
+from stickslip_ros.app.arguments import add_json, add_law, add_scenario_file, with_law
 from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_json, print_table
 from stickslip_ros.text import printable
@@ -11,9 +12,6 @@ from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
     from stickslip_ros.scenarios.files import Scenario
-
-_OF_THE_LOOP = ("plant", "washout_controller")
-"""Nodes whose parameters have no unit where the drive is dimensionless."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "the value comes from: the file, its base, an override (-p), or the default."
     )
     add_scenario_file(parser)
+    add_law(parser)
     add_json(parser)
 
 
@@ -31,11 +30,15 @@ def run(arguments: argparse.Namespace) -> int:
     with interrupts_kept():
         from stickslip_ros.plots.units import Units
         from stickslip_ros.scenarios.files import load_scenario
-        from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
-    scenario = load_scenario(
-        arguments.scenario, arguments.overrides, base=arguments.base, other_nodes=True
+    load = partial(
+        load_scenario,
+        arguments.scenario,
+        arguments.overrides,
+        base=arguments.base,
+        other_nodes=True,
     )
-    found = {node: _parameters(scenario, node) for node in NODE_PARAMETERS}
+    scenario = with_law(load, arguments.controller)
+    found = {node: _parameters(scenario, node) for node in scenario.nodes}
     bases = [str(path) for path in scenario.bases]
     if arguments.json:
         print_json(
@@ -53,7 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
     print(printable(f"{scenario.name}: {', completed by '.join([str(scenario.path), *bases])}"))
     units = Units.for_drive(scenario.plant.as_drive())
     for node, parameters in found.items():
-        unit = units.of_unit if node in _OF_THE_LOOP else str
+        # Where the drive is dimensionless, so are the parameters of the loop.
+        unit = str if node == "analyzer" else units.of_unit
         rows = [
             [name, _text(row["value"]), unit(row["unit"] or ""), row["source"]]
             for name, row in parameters.items()

@@ -36,14 +36,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         required=True,
         metavar="NODE.PARAMETER=A:B:COUNT",
-        help="COUNT values from A to B of a parameter of plant or washout_controller, SI units, as "
+        help="COUNT values from A to B of a parameter of the plant or the controller, SI units, as "
         "in --over plant.belt_speed=0.02:0.6:1000; A:B:COUNT:log for a geometric sequence. A "
         "second --over gives a map",
     )
     parser.add_argument(
         "--carry",
         choices=[str(carry) for carry in Carry],
-        help="start each point in the final state of its neighbour, filter included, with the "
+        help="start each point in the final state of its neighbour, controller included, with the "
         "(last) parameter going up, down or both, which shows hysteresis (default: start every "
         "point in the scenario's initial state)",
     )

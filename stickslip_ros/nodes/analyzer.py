@@ -211,7 +211,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         A stamp that is not of the run is replaced by that of the newest sample.
         """
         newest = max(self._newest_recorded, 1)
-        in_run = newest - _REFERENCE_AGE <= message.stamp <= newest + _REFERENCE_AGE
+        in_run = message.stamp > 0 and abs(message.stamp - newest) <= _REFERENCE_AGE
         return message if in_run else message._replace(stamp=newest)
 
     def _ask_for_parameters(self, node: str) -> None:

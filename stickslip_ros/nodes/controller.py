@@ -77,19 +77,19 @@ class ControllerNode(ManagedNode[ControllerParameters]):
         return (lambda _: self._given) if course.kind is ReferenceKind.TOPIC else course
 
     def _on_joint_state(self, sample: Sample) -> None:
-        stamp, controller = sample.stamp, self._controller
-        for what, value, unit in (
-            ("velocity", sample.velocity, "m/s"),
-            ("position", sample.position, "m"),
-        ):
-            if not abs(value) <= LARGEST:
-                self.dropped.add(f"a joint state stamped {stamp} ns with the {what} {value} {unit}")
-                return
+        stamp, position, velocity = sample.stamp, sample.position, sample.velocity
+        if not (abs(velocity) <= LARGEST and abs(position) <= LARGEST):
+            self.dropped.add(
+                f"a joint state stamped {stamp} ns with the position {position} m and the velocity "
+                f"{velocity} m/s"
+            )
+            return
+        controller = self._controller
         force = controller.answer(sample)
         if force is None:
             self.dropped.add(f"a joint state stamped {stamp} ns, not later than the last one")
         elif not isfinite(force):
-            self.dropped.add(f"to the velocity {sample.velocity} m/s the force would be {force} N")
+            self.dropped.add(f"to the velocity {velocity} m/s the force would be {force} N")
         else:
             if self._reference is not None:
                 self._reference.publish(pack_reference(stamp, controller.reference))

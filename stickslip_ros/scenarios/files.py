@@ -32,6 +32,18 @@ FILE, BASE, OVERRIDE, DEFAULT = "file", "base", "override", "default"
 _NAMED_BY_PATH = "a file is given by its path ending in .yaml"
 
 
+class SeveralControllersError(InvalidInputError):
+    """A scenario file with sections for several controllers, loaded without the law to use."""
+
+    def __init__(self, path: Path, laws: Sequence[str]) -> None:
+        super().__init__(
+            f"{path}: has sections for the controllers "
+            f"{' and '.join(map(controller_node, laws))}: name the control law to use"
+        )
+        self.laws = laws
+        """Names of the control laws."""
+
+
 @dataclass(frozen=True, repr=False)
 class Scenario:
     """The parameters of every node in one run, and their source.
@@ -207,7 +219,9 @@ class Scenario:
             return self
         others = {**self.other_controllers, self.controller.law: self.controller}
         controller = others.pop(law, None) or CONTROLLER_PARAMETERS[law]()
-        overrides = [each for each in self.overrides if not each.startswith(self.controller.node)]
+        overrides = [
+            each for each in self.overrides if not each.startswith(f"{self.controller.node}.")
+        ]
         return replace(
             self,
             controller=controller,
@@ -315,7 +329,7 @@ def load_scenario(
         have their defaults.
     controller : str or None
         Name of the control law in use. By default it is the one whose section the file has, or
-        else its base, and the washout law without such a section.
+        else its base, and the first of `CONTROL_LAWS` without such a section.
     other_nodes : bool
         Whether sections of unknown nodes are ignored instead of refused.
 
@@ -398,10 +412,7 @@ def _law_in_use(files: Sequence[ScenarioFile], namespace: str) -> str:
         named = file.named_nodes(namespace)
         laws = [law for law in CONTROLLER_PARAMETERS if controller_node(law) in named]
         if len(laws) > 1:
-            raise InvalidInputError(
-                f"{file.path}: has sections for the controllers "
-                f"{' and '.join(map(controller_node, laws))}: name the control law to use"
-            )
+            raise SeveralControllersError(file.path, laws)
         if laws:
             return laws[0]
     return DEFAULT_LAW

@@ -14,7 +14,7 @@ from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
 from stickslip_ros.scenarios.parameter_field import LARGEST, SMALLEST
 from stickslip_ros.scenarios.validation import ParameterGroup
 
-_Law = TypeVar("_Law", FrictionLaw, ControlLaw)
+_Law = TypeVar("_Law", bound=FrictionLaw | ControlLaw)
 
 
 @dataclass
@@ -125,7 +125,8 @@ CONTROLLERS = LawFamily(
     ControlLaw,
     CONTROL_LAWS,
     reserved={
-        "law", "as_law", "law_names", "reference", "autostart", "wait_for", "use_sim_time",
+        "law", "node", "reference", "as_law", "as_reference", "as_controller", "law_names",
+        "autostart", "wait_for", "use_sim_time",
         *dir(ParameterGroup),
     },
     one_namespace=False,

@@ -25,6 +25,14 @@ def parameter_of(keyword: str, nodes: Sequence[str]) -> str:
     known = _parameters(tuple(nodes))
     found: list[str] = [*known.get(keyword, ())]
     if not found:
+        unused = [node for node in NODE_PARAMETERS if node not in nodes]
+        owners = [node for node in unused if keyword in _parameters((node,))]
+        if owners:
+            in_use = next(node for node in nodes if node not in ("plant", "analyzer"))
+            raise InvalidInputError(
+                f"{keyword}: is a parameter of {' and '.join(owners)}, and the controller in use "
+                f"is {in_use}"
+            )
         raise InvalidInputError(
             f"{keyword:.80}: no node has such a parameter; "
             + did_you_mean(keyword, known, "docs/parameters.md has them all")

@@ -16,11 +16,13 @@ from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
+from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.constants import Constant, constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
+from stickslip_ros.physics.model.sensor import Sensor
 from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, add_laws_of_other_packages
 from stickslip_ros.scenarios.pace import Pace
 from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field
@@ -62,7 +64,14 @@ def _constants_of_laws() -> dict[str, Any]:
     }
 
 
-def _field_of(constant: Constant, laws: list[str] | None = None) -> Any:
+def _group_of(part: type, fixed: Fixed) -> type[ParameterGroup]:
+    """Return the parameters for the constants of a part of the plant."""
+    constants = constants_of(part).items()
+    described: dict[str, Any] = {name: _field_of(each, fixed=fixed) for name, each in constants}
+    return create_model(part.__name__, __base__=ParameterGroup, **described)
+
+
+def _field_of(constant: Constant, laws: list[str] | None = None, fixed: Fixed = Fixed.NEVER) -> Any:
     """Return type and description of a parameter for a constant, for some `laws` only."""
     meaning = constant.meaning
     if laws:
@@ -72,10 +81,10 @@ def _field_of(constant: Constant, laws: list[str] | None = None) -> Any:
     default: Any = constant.default
     if constant.whole:
         bounds = {bound: ceil(value) for bound, value in bounds.items()}
-        return int, field(int(default), meaning, constant.unit, **bounds)
+        return int, field(int(default), meaning, constant.unit, fixed=fixed, **bounds)
     if isinf(default):
         bounds["allow_inf_nan"] = True
-    return float, field(float(default), meaning, constant.unit, **bounds)
+    return float, field(float(default), meaning, constant.unit, fixed=fixed, **bounds)
 
 
 add_laws_of_other_packages()
@@ -155,6 +164,14 @@ class NodeParameters(ParameterGroup):
         return self
 
 
+class SensorParameters(_group_of(Sensor, Fixed.ACTIVE)):
+    """Constants of the sensor."""
+
+
+class ActuatorParameters(_group_of(Actuator, Fixed.NEVER)):
+    """Constants of the actuator."""
+
+
 class PlantParameters(NodeParameters):
     """Parameters of the plant node."""
 
@@ -218,6 +235,10 @@ class PlantParameters(NodeParameters):
     )
     publish_clock: bool = field(False, "Publish simulated time on /clock.", fixed=Fixed.CONFIGURED)
     disturbance: DisturbanceParameters = DisturbanceParameters()
+    if constants_of(Sensor):
+        sensor: SensorParameters = SensorParameters()
+    if constants_of(Actuator):
+        actuator: ActuatorParameters = ActuatorParameters()
 
     @model_validator(mode="after")
     def _delay_is_bounded(self) -> Self:
@@ -249,7 +270,15 @@ class PlantParameters(NodeParameters):
     def as_drive(self) -> Drive:
         """Return the drive."""
         values = {name: getattr(self, name) for name in _OF_DRIVE}
-        return Drive(**values, friction=self.friction.as_law())
+        return Drive(**values, friction=self.friction.as_law(), actuator=self.as_actuator())
+
+    def as_actuator(self) -> Actuator:
+        """Return the actuator."""
+        return Actuator(**dict(getattr(self, "actuator", ())))
+
+    def as_sensor(self) -> Sensor:
+        """Return the sensor."""
+        return Sensor(**dict(getattr(self, "sensor", ())))
 
     def drive_names(self) -> list[str]:
         """Return the flat names of the drive's parameters, with those of its friction law."""
@@ -281,6 +310,7 @@ class PlantParameters(NodeParameters):
             hold_late=hold_late,
             expects_control=self.expects_control,
             disturbance=self.as_disturbance(),
+            sensor=self.as_sensor(),
             overtaken=overtaken,
             advance=advance,
         )
@@ -372,20 +402,20 @@ def controller_node(law: str) -> str:
 def controller_model(law: type[ControlLaw]) -> type[ControllerParameters]:
     """Return the parameters of the controller node of a law."""
     described = constants_of(law)
-    fields: dict[str, Any] = {
-        name: _field_of(described[name])
-        for name in law.constants()
-        if not isinstance(described[name].default, tuple)
-    }
-    if law.follows_reference:
-        fields["reference"] = ReferenceParameters, ReferenceParameters()
     own_law = field(
         law.name, "Control law of the node.", fixed=Fixed.CONFIGURED, choices=[law.name]
     )
+    fields: dict[str, Any] = {"law": (Literal[law.name], own_law)}
+    for name in law.constants():
+        if not isinstance(described[name].default, tuple):
+            fields[name] = _field_of(described[name])
+    if law.follows_reference:
+        fields["reference"] = ReferenceParameters, ReferenceParameters()
+    title = "".join(word.capitalize() for word in law.name.split("_"))
     model = create_model(
-        "ControllerParameters",
+        f"{title}ControllerParameters",
         __base__=ControllerParameters,
-        law=(Literal[law.name], own_law),
+        __module__=__name__,
         **fields,
     )
     model.__doc__ = f"Parameters of the {controller_node(law.name)} node."
@@ -464,6 +494,15 @@ CONTROLLER_PARAMETERS: dict[str, type[ControllerParameters]] = {
     name: controller_model(law) for name, law in CONTROL_LAWS.items()
 }
 """The parameter model of the controller node of each control law, by name of the law."""
+
+
+def __getattr__(name: str) -> Any:
+    """Return the model of a controller by the name of its class, as pickle looks for it."""
+    for model in CONTROLLER_PARAMETERS.values():
+        if model.__name__ == name:
+            return model
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
 
 NODE_PARAMETERS: dict[str, type[NodeParameters]] = {
     "plant": PlantParameters,

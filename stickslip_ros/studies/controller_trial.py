@@ -1,27 +1,28 @@
-"""Trials of a washout controller: simulated vibrations while the control is switched on."""
+"""Trials of a control law: simulated vibrations while the control is switched on."""
 
 from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil, hypot, inf
+from math import ceil, hypot, inf, nan
 from typing import Any
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.loop.controller import Controller, answer
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import ControlLaw, WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
 from stickslip_ros.physics.theory.linear_sampled_loop import SETTLED
+from stickslip_ros.samples import Sample
 from stickslip_ros.stamps import NANOSECONDS
 
 FILTER_SETTLED = 5.0
-"""Time after which the start of the washout filter no longer matters, in 1/d."""
+"""Time after which the start of the filter of eq. 17 no longer matters, in 1/d."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Vibration:
         return self.period is not None
 
     def filtered(self, corner_frequency: float) -> FloatArray:
-        """Return the output of a settled washout filter for the velocity, m/s.
+        """Return the output of a settled filter of eq. 17 for the velocity, m/s.
 
         `corner_frequency` is in rad/s. The whole cycles are treated as a periodic sequence, and
         the filter's response is applied to each harmonic.
@@ -66,8 +67,15 @@ class Vibration:
         return np.fft.irfft(differences / (forward - np.exp(-corner_frequency / self.rate)), count)
 
     def peak_force(self, gains: WashoutGains) -> float:
-        """Return the largest force, N, of a washout controller activated at the worst phase."""
-        return float(np.abs(gains.force(self.filtered(gains.corner_frequency))).max(initial=0.0))
+        """Return the largest force, N, of a controller activated at the worst phase."""
+        return float(np.abs(self._force(gains)).max(initial=0.0))
+
+    def worst_sample(self, gains: WashoutGains) -> int:
+        """Return the row of the sample at which that force is largest."""
+        return int(np.argmax(np.abs(self._force(gains))))
+
+    def _force(self, gains: WashoutGains) -> FloatArray:
+        return gains.force(self.filtered(gains.corner_frequency))
 
     @cached_property
     def _harmonics(self) -> tuple[Any, Any]:
@@ -129,44 +137,52 @@ class Bench:
         return Vibration(drive, self._rate, found.regime, found.period, position, velocity)
 
     def catch(
-        self, vibration: Vibration, washout: WashoutParameters, phases: int, patience: float
+        self,
+        vibration: Vibration,
+        law: ControlLaw,
+        settling: float,
+        worst: int,
+        phases: int,
+        patience: float,
     ) -> Iterator[Outcome]:
-        """Activate the control, its filter settled, at `phases` phases of a vibration.
+        """Activate the control, its state settled, at `phases` phases of a vibration.
 
-        One more trial activates it where this gives the largest force. The vibration has
+        The state settles in `settling` (s). One more trial activates the control at the sample
+        `worst` of the vibration, for example where this gives the largest force. The vibration has
         `patience` (s) to settle. The force is not limited.
         """
         count = len(vibration.velocity)
         assert vibration.period is not None
-        law = Washout(replace(washout, force_limit=inf, start_after=0.0))
-        settled = ceil(FILTER_SETTLED / washout.corner_frequency * self._rate / count) * count
+        controller = Controller(replace(law, force_limit=inf, start_after=0.0))
+        settled = ceil(settling * self._rate / count) * count
         cycle = vibration.period * self._rate
-        force = law.parameters.gains.force(vibration.filtered(washout.corner_frequency))
         rows = {int(phase * cycle / phases) for phase in range(phases)}
-        due = {settled + row for row in rows | {int(np.argmax(np.abs(force)))}}
+        due = {settled + row for row in rows | {worst}}
         for number in range(max(due) + 1):
             row = number % count
-            stamp, velocity = self._stamp(number), float(vibration.velocity[row])
+            stamp = self._stamp(number)
+            start = float(vibration.position[row]), float(vibration.velocity[row])
             if number in due:
-                start = (float(vibration.position[row]), velocity)
-                yield self._run(vibration.drive, copy(law), stamp, start, patience, vibration.size)
-            law.answer(stamp, velocity)
+                trial = copy(controller)
+                yield self._run(vibration.drive, trial, stamp, start, patience, vibration.size)
+            controller.answer(_sample(vibration.drive, stamp, *start))
 
-    def throw(
-        self, drive: Drive, washout: WashoutParameters, speed: float, patience: float
-    ) -> list[Outcome]:
+    def throw(self, drive: Drive, law: ControlLaw, speed: float, patience: float) -> list[Outcome]:
         """Start the slide from its equilibrium at `speed` (m/s) in either direction.
 
-        Each start is tried with a filter that was at rest and with one that starts with the slide.
+        Each start is tried with a law that saw the slide at rest before, and with one that starts
+        with the slide.
         """
         outcomes: list[Outcome] = []
+        rest = drive.equilibrium_position
         for velocity in (speed, -speed):
             for resting in (True, False):
-                law = Washout(replace(washout, start_after=0.0))
+                controller = Controller(replace(law, start_after=0.0))
                 if resting:
-                    law.answer(self._stamp(0), 0.0)
-                start = (drive.equilibrium_position, velocity)
-                outcomes.append(self._run(drive, law, self._stamp(1), start, patience, speed))
+                    controller.answer(_sample(drive, self._stamp(0), rest, 0.0))
+                start = rest, velocity
+                stamp = self._stamp(1)
+                outcomes.append(self._run(drive, controller, stamp, start, patience, speed))
         return outcomes
 
     def _stamp(self, number: int) -> int:
@@ -175,7 +191,7 @@ class Bench:
     def _run(
         self,
         drive: Drive,
-        law: Washout,
+        controller: Controller,
         stamp: int,
         start: tuple[float, float],
         patience: float,
@@ -189,7 +205,7 @@ class Bench:
         peak, last, recent = 0.0, 0, 0.0
         samples = max(ceil(patience * self._rate), calm)
         while True:
-            sample, number = loop.sample, loop.sample_number
+            sample, number = loop.true_sample, loop.sample_number
             distance = hypot(omega * (sample.position - equilibrium), sample.velocity)
             if distance > SETTLED * size:
                 last = number
@@ -197,10 +213,7 @@ class Bench:
                 recent = max(recent, distance)
             if loop.unbounded or number - last > calm or number >= samples:
                 break
-            force = law.answer(sample.stamp, sample.velocity)
-            assert force is not None
-            peak = max(peak, abs(force))
-            loop.offer(sample.stamp, force)
+            peak = max(peak, abs(answer(loop, controller)))
             loop.advance()
         settled = loop.sample_number - last > calm and not loop.unbounded
         return Outcome(
@@ -219,3 +232,8 @@ def _measured(motion: RecordedMotion, loading: float) -> Measures:
     if motion.unbounded:
         meter.report_run_away()
     return meter.measures()
+
+
+def _sample(drive: Drive, stamp: int, position: float, velocity: float) -> Sample:
+    """Return a sample without what a controller does not use."""
+    return Sample(stamp, position, velocity, nan, nan, drive.belt_speed)

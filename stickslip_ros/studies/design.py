@@ -1,20 +1,20 @@
-"""Design of a washout controller: the gains that damp fastest within a force limit.
+"""Design of a controller: the gains that damp fastest within a force limit.
 
 The proposal comes from the linear sampled loop and from the vibration without control. It is then
 checked by simulation of the drive, sampled, held and delayed as between the nodes.
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from math import copysign, inf, isinf, sqrt
 
-from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.physics.theory.stability_map import StabilityMap
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario, parameter_file
 from stickslip_ros.scenarios.keywords import override
+from stickslip_ros.scenarios.parameters import controller_node
 from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench, Vibration
 from stickslip_ros.studies.design_checks import (
     Check,
@@ -24,7 +24,7 @@ from stickslip_ros.studies.design_checks import (
 )
 from stickslip_ros.studies.design_margins import Margins, little_margin, margins
 from stickslip_ros.studies.design_search import CUBIC_SHARES, RESERVE, Candidates, rounded
-from stickslip_ros.studies.design_task import Task
+from stickslip_ros.studies.design_task import DesignedLaw, Task
 
 _SHARE_OF_VIBRATIONS = 0.1
 """Approximate share of the work that goes into the vibrations without control."""
@@ -36,7 +36,7 @@ class Design:
 
     task: Task
     """The task."""
-    controller: WashoutParameters | None = None
+    controller: DesignedLaw | None = None
     """The proposed controller; None if no gains meet the task."""
     remark: str | None = None
     """Why there is no proposal, or a caution about it."""
@@ -58,7 +58,7 @@ class Design:
             return None
         (low, high), own = self.task.belt_speeds, scenario.plant.belt_speed
         proposed = {
-            f"washout_controller.{name}": value for name, value in asdict(self.controller).items()
+            f"{scenario.controller.node}.{name}": value for name, value in self._constants.items()
         }
         proposed["plant.belt_speed"] = copysign(min(max(abs(own), low), high), own)
         return scenario.overridden([override(name, value) for name, value in proposed.items()])
@@ -72,10 +72,17 @@ class Design:
         if self.controller is None:
             return None
         if self.scenario is None:
-            return parameter_file({"washout_controller": asdict(self.controller)})
+            node = controller_node(self.controller.name)
+            return parameter_file({node: self._constants})
         nodes = self.scenario.as_dict()
         del nodes["analyzer"]["bag"]
         return parameter_file(nodes)
+
+    @property
+    def _constants(self) -> dict[str, float]:
+        """Constants of the proposal by name; none without one."""
+        names = self.controller.constants() if self.controller is not None else []
+        return {name: getattr(self.controller, name) for name in names}
 
     def map_around(self) -> StabilityMap | None:
         """Return the stability map of the slowest loop around the proposal.
@@ -161,7 +168,7 @@ def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Desi
         if gains is None:
             return Design(task, remark=failure or candidates.why_none())
         waits = FILTER_SETTLED / gains.corner_frequency if gains.linear != 0.0 else 0.0
-        controller = WashoutParameters(
+        controller = DesignedLaw(
             corner_frequency=gains.corner_frequency,
             linear_gain=gains.linear,
             cubic_gain=gains.cubic,

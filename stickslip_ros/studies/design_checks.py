@@ -4,13 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
-from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.linear_sampled_loop import settling_time
 from stickslip_ros.progress import Progress
-from stickslip_ros.studies.controller_trial import Bench
+from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench
 from stickslip_ros.studies.design_search import Candidates
-from stickslip_ros.studies.design_task import Task
+from stickslip_ros.studies.design_task import DesignedLaw, Task
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class Check:
 
 
 def check_at_speed(
-    bench: Bench, candidates: Candidates, index: int, controller: WashoutParameters
+    bench: Bench, candidates: Candidates, index: int, controller: DesignedLaw
 ) -> Check:
     """Return the check of the controller at one of the belt speeds."""
     loop, vibration = candidates.loops[index], candidates.vibrations[index]
@@ -46,7 +45,9 @@ def check_at_speed(
     peaks: list[float] = []
     if vibration.vibrates:
         patience = 5.0 * predicted + 20.0 * loop.drive.natural_period
-        for outcome in bench.catch(vibration, controller, 4, patience):
+        settling = FILTER_SETTLED / controller.corner_frequency
+        worst = vibration.worst_sample(gains)
+        for outcome in bench.catch(vibration, controller, settling, worst, 4, patience):
             peaks.append(outcome.peak_force)
             if outcome.settling_time is None:
                 slowest = None
@@ -77,11 +78,11 @@ def failure_of(task: Task, check: Check) -> str | None:
 
 
 def throw_from_high_speeds(
-    task: Task, bench: Bench, drives: Sequence[Drive], controller: WashoutParameters, done: Progress
+    task: Task, bench: Bench, drives: Sequence[Drive], controller: DesignedLaw, done: Progress
 ) -> tuple[str | None, str | None]:
     """Return a remark on motions with a fast start, and how the controller fails, if it does."""
 
-    def escapes(drive: Drive, speed: float, controller: WashoutParameters) -> bool:
+    def escapes(drive: Drive, speed: float, controller: DesignedLaw) -> bool:
         patience = 20.0 * drive.natural_period
         return any(outcome.grows for outcome in bench.throw(drive, controller, speed, patience))
 

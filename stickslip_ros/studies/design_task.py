@@ -8,9 +8,13 @@ import numpy as np
 
 from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.options import OWN_SPEED_RANGE
+
+DesignedLaw = Washout
+"""The control law whose gains a design proposes."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +57,18 @@ class Task:
         Raises
         ------
         InvalidInputError
-            If the speeds are not a range above zero, or if they are omitted and the scenario's
-            belt is at rest.
+            If the speeds are not a range above zero, if they are omitted and the scenario's belt
+            is at rest, or if a design does not cover the scenario's control law.
         """
-        plant = scenario.plant
-        if not plant.expects_control:
+        plant, law = scenario.plant, scenario.control_law
+        if law is None:
             raise InvalidInputError(
                 "plant.expects_control = False: without control there are no gains"
+            )
+        if not isinstance(law, DesignedLaw):
+            raise InvalidInputError(
+                f"control law = {law.name} is refused: must be {DesignedLaw.name}, "
+                "whose gains a design proposes"
             )
         if belt_speeds is None:
             own = abs(plant.belt_speed)
@@ -73,7 +82,7 @@ class Task:
             raise InvalidInputError(
                 f"belt speeds {low:g} to {high:g} m/s: must be finite, above zero, the lower first"
             )
-        limit = scenario.washout_controller.force_limit
+        limit = law.force_limit
         return cls(plant.as_drive(), plant.rate, plant.force_delay, limit, (low, high), scenario)
 
     def drives(self) -> list[Drive]:

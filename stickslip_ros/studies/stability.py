@@ -7,11 +7,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
-from stickslip_ros.physics.theory.critical_gains import critical_gains
+from stickslip_ros.physics.theory.critical_gains import critical_gains, why_no_linear_gain
+from stickslip_ros.physics.theory.gain_intervals import gains_of, why_no_gains
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
 from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycle_of_run, limit_cycles
@@ -19,6 +20,7 @@ from stickslip_ros.physics.theory.linear import Expansion, expand
 from stickslip_ros.physics.theory.linear_sampled_loop import (
     LONGEST_DELAY,
     LinearSampledLoop,
+    not_linear,
     why_no_linear_loop,
 )
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
@@ -32,30 +34,27 @@ Notes = dict[str, str]
 
 _NO_CONTROL = "the scenario has no controller"
 
-_SAMPLED_LOOP = (
-    "spectral_radius",
-    "stable",
-    "decay_rate",
-    "settling_time",
-    "critical_linear_gain",
-    "stable_linear_gains",
-)
+_GAINS = ("critical_linear_gain", "first_lyapunov_coefficient", "critical_cubic_gain")
+
+_SAMPLED_GAINS = ("critical_linear_gain", "stable_linear_gains")
+
+_SAMPLED_LOOP = ("spectral_radius", "stable", "decay_rate", "settling_time", *_SAMPLED_GAINS)
 
 
 def stability(scenario: Scenario) -> tuple[Section, Notes]:
     """Return the theoretical quantities of the scenario, in SI units, and notes on them."""
     plant = scenario.plant
     drive = plant.as_drive()
-    gains = scenario.washout_controller.as_washout().gains if plant.expects_control else None
+    law = scenario.control_law
     notes: Notes = {}
     expansion = expand(drive)
     found: Section = {
         "equilibrium_position": drive.equilibrium_position if expansion else None,
         "open_loop": _open_loop(drive, expansion, notes),
         "sticking": _sticking(drive, notes),
-        "closed_loop": _closed_loop(drive, gains, notes),
-        "sampled_loop": _sampled_loop(drive, gains, plant.rate, plant.force_delay, notes),
-        "closed_forms": _closed_forms(drive, gains),
+        "closed_loop": _closed_loop(drive, law, notes),
+        "sampled_loop": _sampled_loop(drive, law, plant.rate, plant.force_delay, notes),
+        "closed_forms": _closed_forms(drive, law),
     }
     if plant.force_jitter > 0.0 and "sampled_loop" not in notes:
         notes["sampled_loop"] = "force_jitter is omitted: the delay of the force is constant here"
@@ -152,90 +151,97 @@ def _sticking(drive: Drive, notes: Notes) -> Section:
     }
 
 
-def _closed_loop(drive: Drive, gains: WashoutGains | None, notes: Notes) -> Section:
-    names = ("critical_linear_gain", "first_lyapunov_coefficient", "critical_cubic_gain")
-    if gains is None:
-        notes["closed_loop"] = _NO_CONTROL
-        nothing = _eigenvalues(drive, None) | dict.fromkeys(names)
-        return {**nothing, **_hopf_points([]), "limit_cycles": []}
-    expansion = expand(drive, gains)
-    critical = critical_gains(drive, gains)
-    values = (None, None, None)
-    if critical is not None:
-        values = (critical.linear, critical.first_lyapunov_coefficient, critical.cubic)
-    elif expansion is not None:
-        notes |= dict.fromkeys(
-            (f"closed_loop.{name}" for name in names), _why_no_gain(drive, gains)
+def _closed_loop(drive: Drive, law: ControlLaw | None, notes: Notes) -> Section:
+    control = None if law is None else law.continuous
+    if law is None or control is None:
+        notes["closed_loop"] = (
+            _NO_CONTROL
+            if law is None
+            else f"the control law {law.name} has no equations for continuous control"
         )
-    points = hopf_points(drive, gains)
+        nothing = _eigenvalues(drive, None) | dict.fromkeys(_GAINS)
+        return {**nothing, **_hopf_points([]), "limit_cycles": []}
+    expansion = expand(drive, control)
+    points = hopf_points(drive, control)
     if not points:
         notes["closed_loop.hopf_speeds"] = (
             "with these gains no pair of eigenvalues crosses the imaginary axis at any belt speed"
         )
-    possible = limit_cycle_from_hopf(drive, gains), limit_cycle_of_run(drive, 0.0, gains=gains)
+    possible = limit_cycle_from_hopf(drive, control), limit_cycle_of_run(drive, 0.0, gains=control)
     cycles = [cycle for cycle in possible if cycle is not None]
     if len(cycles) > 1 and isclose(cycles[0].position, cycles[1].position, rel_tol=1e-6):
         cycles.pop()
     if not cycles:
+        started = " or from the Hopf point at the critical linear gain" if gains_of(law) else ""
         notes["closed_loop.limit_cycles"] = (
-            "none found from rest at zero displacement or from the Hopf point at the critical "
-            "linear gain; there is no search for others, and none in a very stiff loop"
+            f"none found from rest at zero displacement{started}; there is no search for others, "
+            "and none in a very stiff loop"
         )
     return {
         **_eigenvalues(drive, expansion),
-        **dict(zip(names, values, strict=True)),
+        **_critical_gains(drive, law, notes),
         **_hopf_points(points),
         "limit_cycles": [_cycle(cycle) for cycle in cycles],
     }
 
 
-def _why_no_gain(drive: Drive, gains: WashoutGains) -> str:
-    expansion = expand(drive)
-    assert expansion is not None
-    product = expansion.jacobian[SPEED, SPEED] * gains.scaled(drive).corner_frequency
-    return (
-        "no linear gain stabilises the equilibrium: by the Routh-Hurwitz criterion p d must be "
-        f"below 1 and is {product:.4g} (p the slope of friction less damping, d the cutoff "
-        "frequency, dimensionless)"
-    )
+def _critical_gains(drive: Drive, law: ControlLaw, notes: Notes) -> Section:
+    gains = gains_of(law)
+    critical = None if gains is None else critical_gains(drive, gains)
+    if critical is not None:
+        values = critical.linear, critical.first_lyapunov_coefficient, critical.cubic
+        return dict(zip(_GAINS, values, strict=True))
+    reason = why_no_gains(law) if gains is None else why_no_linear_gain(drive, gains)
+    if reason is not None:
+        notes |= dict.fromkeys((f"closed_loop.{name}" for name in _GAINS), reason)
+    return dict.fromkeys(_GAINS)
 
 
 def _sampled_loop(
-    drive: Drive, gains: WashoutGains | None, rate: float, force_delay: float, notes: Notes
+    drive: Drive, law: ControlLaw | None, rate: float, force_delay: float, notes: Notes
 ) -> Section:
-    loop = LinearSampledLoop.from_drive(drive, rate, force_delay)
-    if gains is None or loop is None:
-        reason = why_no_linear_loop(drive, rate, force_delay)
-        notes["sampled_loop"] = _NO_CONTROL if gains is None else reason or ""
+    if law is None:
+        notes["sampled_loop"] = _NO_CONTROL
         return dict.fromkeys(_SAMPLED_LOOP)
-    radius = loop.spectral_radius(gains)
-    intervals = loop.stable_linear_gains(gains.corner_frequency)
-    if not intervals:
+    loop = LinearSampledLoop.from_drive(drive, rate, force_delay)
+    if loop is None or law.linear_feedback(1.0 / rate) is None:
+        reason = why_no_linear_loop(drive, rate, force_delay)
+        notes["sampled_loop"] = reason or not_linear(law.name)
+        return dict.fromkeys(_SAMPLED_LOOP)
+    radius = loop.spectral_radius(law)
+    if radius >= 1.0:
+        notes["sampled_loop.settling_time"] = "a deviation from the equilibrium grows"
+    values = radius, radius < 1.0, loop.decay_rate(law), loop.settling_time(law)
+    return dict(zip(_SAMPLED_LOOP, (*values, *_sampled_gains(loop, law, notes)), strict=True))
+
+
+def _sampled_gains(
+    loop: LinearSampledLoop, law: ControlLaw, notes: Notes
+) -> tuple[float | None, list[list[float]] | None]:
+    """Return the critical linear gain and the stable intervals."""
+    gains = gains_of(law)
+    reason = why_no_gains(law)
+    intervals = [] if gains is None else loop.stable_linear_gains(gains.corner_frequency)
+    if gains is not None and not intervals:
         reason = (
             "no linear gain stabilises the equilibrium at this rate and delay with a cutoff "
             f"frequency of {gains.corner_frequency:g} rad/s"
         )
-        for name in ("critical_linear_gain", "stable_linear_gains"):
-            notes[f"sampled_loop.{name}"] = reason
-    if radius >= 1.0:
-        notes["sampled_loop.settling_time"] = "a deviation from the equilibrium grows"
-    values = (
-        radius,
-        radius < 1.0,
-        loop.decay_rate(gains),
-        loop.settling_time(gains),
-        loop.critical_linear_gain(gains.corner_frequency),
-        [[interval.low, interval.high] for interval in intervals],
-    )
-    return dict(zip(_SAMPLED_LOOP, values, strict=True))
+    if reason is not None:
+        notes |= dict.fromkeys((f"sampled_loop.{name}" for name in _SAMPLED_GAINS), reason)
+    if gains is None:
+        return None, None
+    critical = loop.critical_linear_gain(gains.corner_frequency)
+    return critical, [[interval.low, interval.high] for interval in intervals]
 
 
-def _closed_forms(drive: Drive, gains: WashoutGains | None) -> Section | None:
+def _closed_forms(drive: Drive, law: ControlLaw | None) -> Section | None:
     """Return the closed forms of the cubic Stribeck law, in the same units; omit missing ones."""
     cubic = CubicLoop.from_drive(drive)
     if cubic is None:
         return None
     speed, force = drive.speed_scale, drive.normal_force
+    gains = gains_of(law)
 
     forms: Section = {
         "equilibrium_position": copysign(drive.length_scale, drive.belt_speed) * cubic.equilibrium,
@@ -275,10 +281,11 @@ def _cycle(cycle: LimitCycle) -> Section:
 
 def why_no_stability_map(scenario: Scenario) -> str | None:
     """Return why there is no linear sampled loop for a map; None if there is one."""
-    plant = scenario.plant
-    if not plant.expects_control:
+    plant, law = scenario.plant, scenario.control_law
+    if law is None:
         return _NO_CONTROL
-    return why_no_linear_loop(plant.as_drive(), plant.rate, plant.force_delay)
+    no_loop = why_no_linear_loop(plant.as_drive(), plant.rate, plant.force_delay)
+    return no_loop or why_no_gains(law)
 
 
 def stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]:
@@ -287,9 +294,10 @@ def stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]
     Call it only if `why_no_stability_map` returns None.
     """
     plant = scenario.plant
-    drive, gains = plant.as_drive(), scenario.washout_controller.as_washout().gains
+    drive, gains = plant.as_drive(), gains_of(scenario.control_law)
     loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay)
     assert loop is not None
+    assert gains is not None
     rates = plant.rate * np.array((0.1, 0.3, 1.0))
     latest = min(0.2 * drive.natural_period, LONGEST_DELAY / rates.max())
     delays = np.linspace(0.0, latest, 41)

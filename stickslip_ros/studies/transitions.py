@@ -48,18 +48,22 @@ def hopf_margin(case: ControlledDrive, *, coarse: bool = False) -> float:
     """Return a margin above zero if the equilibrium is stable, and zero at the Hopf bifurcation.
 
     Without sampling it is the smallest Hurwitz determinant: of two or three eigenvalues only a pair
-    can cross, because their product is not zero. For a sampled loop it is one minus the spectral
-    radius, with `coarse` that of a similar loop of lower order. NaN on a belt at rest, and for a
-    loop that is not linear near the equilibrium or changes from sample to sample.
+    can cross, unless a gain of the displacement makes their product zero. For a sampled loop it is
+    one minus the spectral radius, with `coarse` that of a similar loop of lower order. NaN on a
+    belt at rest, for continuous control by a law without equations, and for a loop that is not
+    linear near the equilibrium or changes from sample to sample.
     """
-    drive, washout, plant = case.drive, case.washout, case.sampled
-    if washout is None or plant is None:
-        expansion = expand(drive, None if washout is None else washout.gains)
+    drive, law, plant = case.drive, case.law, case.sampled
+    if law is None or plant is None:
+        control = None if law is None else law.continuous
+        expansion = expand(drive, control) if law is None or control is not None else None
         return nan if expansion is None else float(hurwitz_determinants(expansion.jacobian).min())
     loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay)
-    if loop is None or plant.force_jitter > 0.0 or washout.force_limit == 0.0:
+    if loop is None or plant.force_jitter > 0.0 or law.force_limit == 0.0:
         return nan
-    return 1.0 - (loop.coarsened() if coarse else loop).spectral_radius(washout.gains)
+    if law.linear_feedback(1.0 / plant.rate) is None:
+        return nan
+    return 1.0 - (loop.coarsened() if coarse else loop).spectral_radius(law)
 
 
 def stick_margin(case: ControlledDrive) -> float:
@@ -68,7 +72,7 @@ def stick_margin(case: ControlledDrive) -> float:
     NaN on a belt at rest, and under control or a disturbance, for which there is no theory.
     """
     drive = case.drive
-    if case.washout is not None or case.sampled is not None or drive.belt_speed == 0.0:
+    if case.law is not None or case.sampled is not None or drive.belt_speed == 0.0:
         return nan
     return tanh(release_margin(replace(drive, belt_speed=abs(drive.belt_speed))))
 

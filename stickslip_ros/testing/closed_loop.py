@@ -112,7 +112,8 @@ class ClosedLoop:
         _check_controller(controller)
         self._to_control = controller
         self._is_law = isinstance(controller, str) and controller != _EXTERNAL
-        self._law = controller if self._is_law and controller != _OF_SCENARIO else None
+        named = isinstance(controller, str) and controller not in (_OF_SCENARIO, _EXTERNAL)
+        self._law = str(controller) if named else None
         self._name_or_path = fspath(scenario)
         self._overrides = {_target(text): text for text in (*_OF_A_TEST, *overrides)}
         if controller is None:

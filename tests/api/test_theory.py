@@ -33,7 +33,7 @@ def test_a_design_runs_and_keeps_to_its_limit() -> None:
     other = ss.design("feed_drive", belt_speed=(0.03, 0.04), force_limit=200.0)
     assert one.controller == other.controller
     scenario = one.scenario
-    assert scenario.washout_controller.as_washout() == one.controller
+    assert scenario.controller.as_law() == one.controller
     assert scenario.washout_controller.force_limit == 200.0
     run = ss.simulate(ss.scenario(scenario, start_after=3.0), duration=8)
     assert run.measures.regime == "equilibrium"

@@ -8,7 +8,7 @@ import pytest
 
 from stickslip_ros.paper.portraits import SETTLED, Portrait, PortraitCase, portraits
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.equations import WashoutGains
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Linear
 from stickslip_ros.physics.motion.motion import Motion
 from tests.physics.drives import LIMIT_CYCLES, PAPER, LimitCycle

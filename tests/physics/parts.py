@@ -1,4 +1,4 @@
-"""Friction laws and courses of the tests: memory, limits by direction, pieces, corners."""
+"""Parts of the tests: friction laws, courses, control laws and an actuator."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,10 +7,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.constants import constant
+from stickslip_ros.physics.model.control import ControlLaw, LinearFeedback, Reference
 from stickslip_ros.physics.model.course import Course
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.physics.model.functions import sin
+from stickslip_ros.samples import Sample
 
 
 @dataclass(frozen=True)
@@ -167,3 +171,92 @@ class Pieces(FrictionLaw):
         self, margin: int, sign: float, switches: Sequence[float]
     ) -> Sequence[float]:
         return (1.0 - switches[0],)
+
+
+@dataclass(frozen=True)
+class TwoLags:
+    """Force k2 b by two states in a row: a' = d (y - a), b' = d (a - b), and k1 y."""
+
+    states: ClassVar[Sequence[str]] = ("a", "b")
+    rate: Any
+    gain: Any
+    lagging: Any
+
+    def scaled(self, drive: Drive) -> "TwoLags":
+        unit = drive.normal_force / drive.speed_scale
+        return TwoLags(self.rate / drive.angular_frequency, self.gain / unit, self.lagging / unit)
+
+    def silenced(self) -> "TwoLags":
+        return TwoLags(self.rate, 0.0, 0.0)
+
+    def rest(self, position: Any, speed: Any) -> Sequence[Any]:
+        return speed, speed
+
+    def state_rates(self, position: Any, speed: Any, states: Sequence[Any]) -> Sequence[Any]:
+        first, second = states
+        return self.rate * (speed - first), self.rate * (first - second)
+
+    def control_force(self, position: Any, speed: Any, states: Sequence[Any]) -> Any:
+        return self.gain * speed + self.lagging * states[1]
+
+    def state_scales(self, drive: Drive) -> Sequence[float]:
+        return (drive.speed_scale, drive.speed_scale)
+
+    def bound(self, speed: Any) -> Any:
+        return np.full(np.shape(speed), np.inf)
+
+
+@dataclass(frozen=True)
+class TwoStates(ControlLaw):
+    """Two sampled states that see displacement and velocity: z' = A z + B (x, y), u = C z + D y."""
+
+    name: ClassVar[str] = "two_states"
+    gain: float = constant(-0.3, "Gain of the velocity.", "N s/m")
+    pull: float = constant(0.2, "Gain of the displacement in the first state.")
+
+    @property
+    def matrices(self) -> LinearFeedback:
+        return LinearFeedback(
+            np.array([[0.7, 0.1], [-0.2, 0.5]]),
+            np.array([[self.pull, 0.1], [0.0, -0.3]]),
+            np.array([0.4, -0.15]),
+            np.array([0.05, self.gain]),
+        )
+
+    def respond(
+        self, state: tuple[float, ...], elapsed: float, sample: Sample, reference: Reference
+    ) -> tuple[float, tuple[float, ...]]:
+        own, seen = self.matrices, np.array([sample.position, sample.velocity])
+        before = np.array(state)
+        after = own.state @ before + own.input @ seen
+        return float(own.output @ before + own.direct @ seen), tuple(after.tolist())
+
+    def linear_feedback(self, period: float) -> LinearFeedback:
+        return self.matrices
+
+
+@dataclass(frozen=True)
+class Switching(ControlLaw):
+    """A force that only has the sign of the velocity: not linear, and no equations."""
+
+    name: ClassVar[str] = "switching"
+    size: float = constant(0.1, "Size of the force.", "N")
+
+    def respond(
+        self, state: tuple[float, ...], elapsed: float, sample: Sample, reference: Reference
+    ) -> tuple[float, tuple[float, ...]]:
+        return -float(np.sign(sample.velocity)) * self.size, state
+
+
+@dataclass(frozen=True)
+class Lag(Actuator):
+    """Force that follows the command with a lag of first order."""
+
+    states: ClassVar[Sequence[str]] = ("force",)
+    rate: float = constant(3.0, "Inverse of the lag.", "value")
+
+    def state_rates(self, held: Any, states: Sequence[Any]) -> Sequence[Any]:
+        return (self.rate * (held - states[0]),)
+
+    def force(self, held: Any, states: Sequence[Any]) -> Any:
+        return states[0]

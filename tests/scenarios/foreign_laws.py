@@ -1,7 +1,9 @@
-"""Packages with friction laws of their own, written into a directory of the path."""
+"""Packages with laws of their own, written into a directory of the path."""
 
 from collections.abc import Mapping
 from pathlib import Path
+
+from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS
 
 FALLING = '''
 """A law of another package: the linear law, with a constant of its own name."""
@@ -29,9 +31,39 @@ class Falling(FrictionLaw):
         return f"fall = {self.fall} must not exceed 10 static = 10.0" if self.fall > 10.0 else None
 '''
 
+BRAKE = '''
+"""A control law of another package: a damper with an offset."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from stickslip_ros.physics.model.constants import constant
+from stickslip_ros.physics.model.control import ControlLaw
+
+
+@dataclass(frozen=True)
+class Brake(ControlLaw):
+    """Force against the velocity."""
+
+    name: ClassVar[str] = "brake"
+    strength: Any = constant(1.0, "Force per velocity", "N s/m", at_least=0.0)
+
+    def respond(self, state: Any, elapsed: Any, sample: Any, reference: Any) -> Any:
+        """Return the force."""
+        return -self.strength * sample.velocity, state
+
+    def refusal(self) -> str | None:
+        """Refuse a strength above 1e6."""
+        return None if self.strength <= 1e6 else f"strength = {self.strength} must not exceed 1e6"
+'''
+
 
 def write_package(
-    directory: Path, package: str, modules: Mapping[str, str], laws: Mapping[str, str]
+    directory: Path,
+    package: str,
+    modules: Mapping[str, str],
+    laws: Mapping[str, str],
+    group: str = FRICTION_LAWS.group,
 ) -> None:
     """Write what an installation leaves: modules, and the entry points of the laws."""
     for name, text in modules.items():
@@ -41,5 +73,5 @@ def write_package(
     (described / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
     lines = [f"{name} = {place}" for name, place in laws.items()]
     (described / "entry_points.txt").write_text(
-        "\n".join(["[stickslip_ros.friction_laws]", *lines, "", "[other]", "x = no:Thing", ""])
+        "\n".join([f"[{group}]", *lines, "", "[other]", "x = no:Thing", ""])
     )

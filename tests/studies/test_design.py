@@ -10,15 +10,16 @@ import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.loop.simulation import simulate_sampled
-from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
+from stickslip_ros.physics.model.control import Washout, WashoutGains
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.design import Design, Task, design, margins
 from tests.physics.drives import FEED_DRIVE
@@ -31,29 +32,29 @@ designed = lru_cache(design)
 """Several tests look at the same design."""
 
 
-class RecordingWashout(Washout):
+class RecordingController(Controller):
     """Keeps the largest force it asked for."""
 
     peak = 0.0
 
-    def answer(self, stamp: int, velocity: float) -> float | None:
-        force = super().answer(stamp, velocity)
+    def answer(self, sample: Sample) -> float | None:
+        force = super().answer(sample)
         self.peak = max(self.peak, abs(force or 0.0))
         return force
 
 
 def controlled(
-    drive: Drive, task: Task, controller: WashoutParameters, duration: float
+    drive: Drive, task: Task, controller: Washout, duration: float
 ) -> tuple[Measures, float]:
     """Run the drive from rest, the controller coming on as it says; return measures and peak."""
     motion = RecordedMotion(drive, 0.0, 0.0)
     loop = SampledLoop(motion, task.rate, LOCKSTEP_START, force_delay=task.force_delay)
-    washout = RecordingWashout(controller)
+    washout = RecordingController(controller)
     measures = simulate_sampled(loop, motion, washout, duration, CycleMeter(5))
     return measures, washout.peak
 
 
-def proposal(found: Design) -> WashoutParameters:
+def proposal(found: Design) -> Washout:
     assert found.controller is not None, found.remark
     return found.controller
 
@@ -284,7 +285,7 @@ def test_the_parameter_file_is_one(tmp_path: Path) -> None:
     found = designed(replace(FEED, force_limit=200.0))
     assert found.parameter_file is not None
     read = load_scenario(scenario_file(tmp_path, found.parameter_file))
-    assert read.washout_controller.as_washout() == found.controller
+    assert read.controller.as_law() == found.controller
 
 
 @pytest.mark.parametrize(
@@ -304,14 +305,12 @@ def test_of_a_scenario_it_is_that_scenario_with_the_gains(
 ) -> None:
     overrides = (f"plant.belt_speed={belt_speed}", "plant.mass=90", "analyzer.window=7")
     scenario = load_scenario("feed_drive", overrides)
-    text = Design(
-        Task.from_scenario(scenario, belt_speeds), WashoutParameters(3.0, -2.0, 0.0)
-    ).parameter_file
+    text = Design(Task.from_scenario(scenario, belt_speeds), Washout(3.0, -2.0, 0.0)).parameter_file
     assert text is not None
     read = load_scenario(scenario_file(tmp_path, text))
     assert (read.plant.mass, read.plant.stiffness, read.analyzer.window) == (90.0, 1e6, 7)
     assert read.plant.belt_speed == written
-    assert read.washout_controller.as_washout() == WashoutParameters(3.0, -2.0, 0.0)
+    assert read.controller.as_law() == Washout(3.0, -2.0, 0.0)
     names = {name for name, value in scenario.as_dict()["plant"].items() if value != []}
     assert all(f'"{name}":' in text for name in names)
 

@@ -116,7 +116,10 @@ MIXED: list[tuple[ControlledDrive, MotionState]] = [
     (ControlledDrive(replace(PAPER, belt_speed=-0.3)), REST),
     (STIFF, REST),
     (_case(*WEAK), REST),
-    (_case(*WEAK, "plant.force_delay=0.07", "plant.force_jitter=0.09"), MotionState(0.0, 0.2, (0.1, 0.0))),
+    (
+        _case(*WEAK, "plant.force_delay=0.07", "plant.force_jitter=0.09"),
+        MotionState(0.0, 0.2, (0.1, 0.0)),
+    ),
     (_case("washout_controller.linear_gain=50.0"), REST),  # runs away
     (
         _case(

@@ -64,7 +64,9 @@ def test_a_controller_of_ones_own_acts_as_it_does_without_ros() -> None:
         controllers.Informed,
         controllers.Managed,
         WashoutControllerNode,
+        "scenario",
         "washout",
+        "velocity_feedback",
     ],
 )
 def test_every_kind_of_controller_answers_every_sample(controller: Any) -> None:

@@ -44,7 +44,12 @@ from stickslip_ros.nodes.base.service_call import ANSWER_TIME, ServiceCall, para
 from stickslip_ros.running.controller_search import DASHBOARD
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.parameter_field import known_parameters
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.scenarios.parameters import (
+    CONTROLLER_PARAMETERS,
+    DEFAULT_LAW,
+    NODE_PARAMETERS,
+    controller_node,
+)
 from stickslip_ros.stamps import NANOSECONDS
 
 SILENCE = 2.5
@@ -57,6 +62,9 @@ ABSENT = "not found"
 
 LONGEST_TAP = 1e6
 """Longest duration of an impulse in simulated time, s."""
+
+_LAWS = {controller_node(law): law for law in CONTROLLER_PARAMETERS}
+"""Control law of each controller node."""
 
 _ANSWER_TIMEOUT = 10.0
 _CYCLES_KEPT = 200
@@ -96,8 +104,10 @@ class ListenerNode(PollingNode):
         """Listen in a namespace; pass states, forces and dropped forces to `show`, in blocks."""
         super().__init__(DASHBOARD, namespace=namespace, context=context)
         self._show = show
-        self.health: Mapping[str, Health] = {node: Health() for node in NODE_PARAMETERS}
-        """Health by the node's name relative to the namespace."""
+        self.health: Mapping[str, Health] = {node: Health() for node in ("analyzer", "plant")}
+        """Health by the node's name relative to the namespace; controllers once heard."""
+        self.law = DEFAULT_LAW
+        """Control law of the controller that was heard, the default law until one is heard."""
         self.parameters: Mapping[str, Mapping[str, Any]] = {node: {} for node in NODE_PARAMETERS}
         """Current parameters by node and flat name, as far as they are known."""
         self.cycles: dict[Topic[Any], deque[float]] = {}
@@ -134,6 +144,11 @@ class ListenerNode(PollingNode):
         )
         self._every(0.02, self._take)
         self._every(0.1, self._watch)
+
+    @property
+    def controller(self) -> str:
+        """Name of the controller relative to the namespace."""
+        return controller_node(self.law)
 
     def set_parameter(self, node: str, name: str, value: Any) -> Answer:
         """Set a parameter of a node while it runs."""
@@ -298,6 +313,8 @@ class ListenerNode(PollingNode):
         if before is None and len(self.health) >= 50:  # any participant may publish any name
             return
         before = before or Health()
+        if node in _LAWS and self.health.get(self.controller, Health()).state in (ABSENT, SILENT):
+            self.law = _LAWS[node]
         restarted = state == before.state and _has_restarted(before.figures, figures)
         if restarted:
             self.events.append((time.time(), f"{node} restarted"))

@@ -17,20 +17,18 @@ from stickslip_ros.app.dashboard.frames import PERIODS, Frames
 from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, Health, ListenerNode
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.model.constants import constants_of
+from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.style import BLUE, GREY, ORANGE
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.parameter_field import Fixed, known_parameters
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
-
-_CONTROLLER = "washout_controller"
-_FIRST = (
-    "plant.belt_speed",
-    f"{_CONTROLLER}.linear_gain",
-    f"{_CONTROLLER}.cubic_gain",
-    f"{_CONTROLLER}.corner_frequency",
+from stickslip_ros.scenarios.parameter_field import Fixed, Parameter, known_parameters
+from stickslip_ros.scenarios.parameters import (
+    CONTROLLER_PARAMETERS,
+    NODE_PARAMETERS,
+    controller_node,
 )
-"""Parameters with their own field; the others are selected from a list."""
+
 _REFRESH = 0.25
 
 
@@ -64,6 +62,8 @@ class _Page:
         self._busy = False
         self._newest_event = 0.0
         self._tap_scales: tuple[float, float] | None = None
+        self._law: str | None = None
+        self._fields: list[_ParameterField] = []
         with ui.row().classes("w-full items-center"):
             ui.label(listener.get_namespace()).classes("text-2xl font-bold")
             self._regime = ui.badge("").classes("text-base")
@@ -85,7 +85,8 @@ class _Page:
             with ui.column().classes("w-full lg:w-1/3"):
                 self._add_measures()
                 self._add_control()
-                self._add_parameters()
+                with _card("Parameters"):
+                    self._parameters = ui.column().classes("w-full gap-2")
                 with _card("Events"):
                     self._events = ui.log(max_lines=100).classes("w-full h-40")
         # Otherwise the scroll area is as wide as its longest line.
@@ -122,7 +123,7 @@ class _Page:
 
     def _add_control(self) -> None:
         with _card("Control"):
-            self._switch = ui.switch("washout controller")
+            self._switch = ui.switch()
             self._switch.on("update:model-value", self._switch_control, [None])  # by the user only
             self._switch_refusal = _refusal()
             with ui.row().classes("items-end"):
@@ -132,19 +133,25 @@ class _Page:
                 ui.button("Reset", on_click=self._reset)
             self._act_refusal = _refusal()
 
-    def _add_parameters(self) -> None:
+    def _show_controller(self, law: str) -> None:
+        """Label the switch, and add the fields of the plant and the controller of a law."""
+        self._law = law
+        node = controller_node(law)
+        self._switch.text = node.replace("_", " ")
+        first = ["plant.belt_speed", *(f"{node}.{name}" for name in _own_constants(law))]
         others = [
-            f"{node}.{parameter.name}"
-            for node in ("plant", _CONTROLLER)
-            for parameter in known_parameters(NODE_PARAMETERS[node]).values()
-            if parameter.kind is float and parameter.fixed is Fixed.NEVER
+            f"{each}.{name}"
+            for each in ("plant", node)
+            for name, parameter in known_parameters(NODE_PARAMETERS[each]).items()
+            if _is_adjustable(parameter)
         ]
-        with _card("Parameters"):
+        self._parameters.clear()
+        with self._parameters:
             self._fields = [
-                _ParameterField(self._listener, name, lambda n=name: n) for name in _FIRST
+                _ParameterField(self._listener, name, lambda n=name: n) for name in first
             ]
             chosen = ui.select(
-                [name for name in others if name not in _FIRST], label="another parameter"
+                [name for name in others if name not in first], label="another parameter"
             )
             chosen.classes("w-full").props("dense")
             self._fields.append(_ParameterField(self._listener, "value", lambda: chosen.value))
@@ -177,9 +184,11 @@ class _Page:
             ):
                 field.value = float(f"{scale / 4.0:.2g}")
                 field.props["label"] = label
+        if self._law != listener.law:
+            self._show_controller(listener.law)
         for field in self._fields:
             field.refresh(units)
-        there = listener.health[_CONTROLLER].state not in (ABSENT, SILENT)
+        there = self._state_of_controller() not in (ABSENT, SILENT)
         self._switch.set_enabled(there and not self._busy)
         if not self._busy:
             self._switch.set_value(self._is_active())
@@ -195,7 +204,7 @@ class _Page:
         return [
             f"{node} {health.state}"
             for node, health in self._listener.health.items()
-            if health.state == SILENT or (health.state == ABSENT and node != _CONTROLLER)
+            if health.state in (ABSENT, SILENT)
         ]
 
     def _show_regime(self, analyzer: Health) -> None:
@@ -211,7 +220,10 @@ class _Page:
         self._regime.style(f"background-color: {colour} !important")
 
     def _is_active(self) -> bool:
-        return self._listener.health[_CONTROLLER].state == "active"
+        return self._state_of_controller() == "active"
+
+    def _state_of_controller(self) -> str:
+        return self._listener.health.get(self._listener.controller, Health()).state
 
     def _switch_control(self, event: GenericEventArguments) -> Awaitable[None] | None:
         """Read the request from the event, since a refresh may set the switch back."""
@@ -224,7 +236,8 @@ class _Page:
 
     async def _pursue_control(self, active: bool) -> None:
         try:
-            await _report(self._listener.set_active(_CONTROLLER, active), self._switch_refusal)
+            answer = self._listener.set_active(self._listener.controller, active)
+            await _report(answer, self._switch_refusal)
             deadline = time.monotonic() + 3.0
             while active != self._is_active() and time.monotonic() < deadline:
                 await asyncio.sleep(_REFRESH)
@@ -291,6 +304,21 @@ class _ParameterField:
         unit = units.of_unit(known_parameters(NODE_PARAMETERS[node])[name].unit or "")
         number = f"{value:g}" if isinstance(value, float) else value
         return "unknown" if value is None else f"now {number} {unit}".rstrip()
+
+
+def _own_constants(law: str) -> list[str]:
+    """Return the adjustable parameters of a controller that are constants of its own law only."""
+    common = constants_of(ControlLaw)
+    parameters = known_parameters(CONTROLLER_PARAMETERS[law])
+    return [
+        name
+        for name in CONTROL_LAWS[law].constants()
+        if name not in common and name in parameters and _is_adjustable(parameters[name])
+    ]
+
+
+def _is_adjustable(parameter: Parameter) -> bool:
+    return parameter.kind is float and parameter.fixed is Fixed.NEVER
 
 
 async def _report(answer: Answer, refusal: ui.label) -> None:

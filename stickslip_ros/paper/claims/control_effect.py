@@ -178,7 +178,7 @@ def _largest_cubic_gain(belt_speed: float, corner_frequency: float, speed: float
     def stays(cubic: float) -> bool:
         gains = WashoutGains(corner_frequency, 0.0, cubic)
         motion = Motion(unit_drive(belt_speed), 0.0, speed, gains)
-        motion.low_passed = 0.0
+        motion.control_state = (0.0,)
         motion.advance(100.0)
         return not motion.unbounded
 

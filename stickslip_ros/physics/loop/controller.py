@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.model.control import ControlLaw
-from stickslip_ros.samples import NO_REFERENCE, Reference, Sample
+from stickslip_ros.physics.model.control import NO_REFERENCE, ControlLaw, Reference
+from stickslip_ros.samples import Sample
 
 ReferenceSource = Callable[[float], Reference]
 """Returns the reference at a time since the first sample, s."""
@@ -25,7 +25,8 @@ class Controller:
     law : ControlLaw
         Control law.
     reference : callable, optional
-        Returns the reference at a time (s) since the first sample. By default there is none.
+        Returns the reference at a time (s) since the first sample, for a law that follows one. By
+        default there is none.
     state : tuple of float, optional
         State of the law at the first sample. By default it is `ControlLaw.initial_state`.
 
@@ -82,7 +83,8 @@ class Controller:
             elapsed = 0.0
         elif stamp > last:
             elapsed = (stamp - last) * 1e-9
-            self.reference = self.follows((stamp - self._first_stamp) * 1e-9)
+            if law.follows_reference:
+                self.reference = self.follows((stamp - self._first_stamp) * 1e-9)
         else:
             return self._answer_older(sample, last)
         self._stamp = stamp
@@ -97,7 +99,8 @@ class Controller:
 
     def _start(self, sample: Sample) -> None:
         self._stamp = self._first_stamp = sample.stamp
-        self.reference = self.follows(0.0)
+        if self.law.follows_reference:
+            self.reference = self.follows(0.0)
         first_state, self._first_state = self._first_state, None
         if first_state is None:
             first_state = self.law.initial_state(sample, self.reference)

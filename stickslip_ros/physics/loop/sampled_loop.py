@@ -50,7 +50,8 @@ class SampledLoop:
     independent from sample to sample; it depends only on n and `force_jitter_seed`. Forces with
     jitter therefore arrive at uneven intervals, and may overtake one another: then the newer force
     acts, and the older one, which arrives after it, is lost. Without jitter the delay is constant:
-    force n acts from n T + delay to (n + 1) T + delay.
+    force n acts from n T + delay to (n + 1) T + delay. The actuator of the drive limits a force
+    when it arrives.
 
     Parameters
     ----------
@@ -89,7 +90,6 @@ class SampledLoop:
 
     >>> from stickslip_ros.physics.loop.sampled_loop import SampledLoop
     >>> from stickslip_ros.physics.model.drive import Drive
-    from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.motion import Motion
     >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
@@ -159,14 +159,15 @@ class SampledLoop:
         """Disturbance force from the present sample to the next, N."""
         self._next_drive: Drive | None = None
         self._next_start: tuple[float, float] | None = None
+        self._limiter = motion.drive.actuator.limiter
         self._sensor = sensor
         self._measure = sensor.start(self.period)
         self.sample_number = 0
         """Number of the present sample."""
         self.true_sample = self._take_sample(0.0)
-        """The present sample as it is."""
+        """State of slide and belt at the present sample."""
         self.sample = self._measured(self.true_sample)
-        """The present sample as the sensor measures it."""
+        """The present sample, as the sensor measures it."""
 
     @property
     def answered(self) -> bool:
@@ -208,7 +209,7 @@ class SampledLoop:
         Verdict
             ACCEPTED, or the reason why the force will not act.
         """
-        number = self.number(stamp)
+        number = self.sample_number if stamp == self.sample.stamp else self.number(stamp)
         refusal = self._refusal(number, stamp, force)
         if refusal is None:
             if self._newest[0] > self._sent_number:
@@ -237,7 +238,7 @@ class SampledLoop:
         Parameters
         ----------
         drive : Drive
-            New drive; the slide keeps its position and velocity.
+            New drive; the slide keeps its position and velocity, and its actuator its state.
         """
         self._next_drive = drive
 
@@ -259,7 +260,7 @@ class SampledLoop:
         Returns
         -------
         Sample
-            State of slide and belt at the next sample.
+            State of slide and belt at the next sample, as the sensor measures it.
 
         Raises
         ------
@@ -274,13 +275,14 @@ class SampledLoop:
             self._sent_number = number
         now = 0.0
         if self._immediate:
-            self._acting = force
+            self._acting = force if self._limiter is None else self._limiter(force)
         else:
             self._send(number, force)
             now = self._deliver()
         motion.set_forces(self._acting, self.disturbance)
         self._advance((1.0 - now) * period)
-        belt_position = self.sample.belt_position + motion.drive.belt_speed * period
+        last = self.sample
+        belt_position = last.belt_position + last.belt_velocity * period
         self.sample_number += 1
         sample = self.true_sample = self._take_sample(belt_position)
         if self._measure is not None:
@@ -309,7 +311,7 @@ class SampledLoop:
                 motion.set_forces(self._acting, self.disturbance)
                 self._advance((instant - now) * self.period)
                 now = instant
-            self._acting = force
+            self._acting = force if self._limiter is None else self._limiter(force)
         return now
 
     def _send(self, answered: int, force: float) -> None:
@@ -338,6 +340,7 @@ class SampledLoop:
         friction_force = motion.friction_force
         if self._next_drive is not None:
             motion.drive, self._next_drive = self._next_drive, None
+            self._limiter = motion.drive.actuator.limiter
         if self._next_start is not None:
             start, self._next_start = self._next_start, None
             motion.restart(*start)

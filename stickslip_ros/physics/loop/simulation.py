@@ -71,7 +71,9 @@ def simulate_sampled(
 
     >>> from stickslip_ros.physics.loop.sampled_loop import SampledLoop
     >>> from stickslip_ros.physics.loop.simulation import simulate_sampled
-    >>>     >>> from stickslip_ros.physics.measures import CycleMeter
+    >>> from stickslip_ros.physics.loop.controller import Controller
+    >>> from stickslip_ros.physics.measures import CycleMeter
+    >>> from stickslip_ros.physics.model.control import Washout
     >>> from stickslip_ros.physics.model.drive import Drive
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.motion import RecordedMotion
@@ -85,7 +87,7 @@ def simulate_sampled(
     """
     samples = round(duration / loop.period)
     for number in range(1, samples + 1):
-        force = answer(loop, controller)
+        force = 0.0 if controller is None else answer(loop, controller)
         if recorder is not None:
             recorder.take(loop.true_sample, force)
         loop.advance()

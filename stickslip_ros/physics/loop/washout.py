@@ -1,54 +1,60 @@
-"""The names of version 0.1 for the washout law."""
+"""The washout controller under its names of version 0.1."""
 
-import warnings
-from typing import Any
+from math import inf, nan
 
+from stickslip_ros.deprecated_names import moved_from
 from stickslip_ros.physics.loop.controller import Controller
-from stickslip_ros.physics.model.control import Washout as _Law
+from stickslip_ros.physics.model.control import Washout as WashoutLaw
 from stickslip_ros.samples import Sample
 
-
-def __getattr__(name: str) -> Any:
-    if name == "WashoutParameters":
-        _warn("WashoutParameters", "stickslip_ros.physics.model.control.Washout")
-        return _Law
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = moved_from(__name__)
 
 
-class Washout:
-    """Washout controller of version 0.1; use `Controller` with the law."""
+class OldWashoutParameters(WashoutLaw):
+    """The washout law with the arguments of version 0.1."""
 
-    def __init__(self, parameters: _Law, low_passed: float | None = None) -> None:
-        _warn("Washout", "stickslip_ros.physics.loop.controller.Controller")
-        state = None if low_passed is None else (low_passed, low_passed)
-        self._controller = Controller(parameters, state=state)
+    def __init__(
+        self,
+        corner_frequency: float,
+        linear_gain: float,
+        cubic_gain: float,
+        force_limit: float = inf,
+        start_after: float = 0.0,
+    ) -> None:
+        super().__init__(
+            corner_frequency,
+            linear_gain,
+            cubic_gain,
+            force_limit=force_limit,
+            start_after=start_after,
+        )
+
+
+class OldWashout(Controller):
+    """The washout controller of version 0.1, which answers velocities."""
+
+    law: WashoutLaw
+
+    def __init__(self, parameters: WashoutLaw, low_passed: float | None = None) -> None:
+        # The first sample replaces the held velocity.
+        super().__init__(parameters, state=None if low_passed is None else (low_passed, 0.0))
 
     @property
-    def parameters(self) -> _Law:
-        """Control law."""
-        law = self._controller.law
-        assert isinstance(law, _Law)
-        return law
+    def parameters(self) -> WashoutLaw:
+        """Constants of the law."""
+        return self.law
 
     @parameters.setter
-    def parameters(self, parameters: _Law) -> None:
-        self._controller.law = parameters
+    def parameters(self, parameters: WashoutLaw) -> None:
+        self.law = parameters
 
     @property
     def low_passed(self) -> float:
         """Low-passed speed z at the newest measurement, m/s."""
-        state = self._controller.state
-        return state[0] if state else 0.0
+        return self.state[0] if self.state else 0.0
 
-    def answer(self, stamp: int, velocity: float) -> float | None:
-        """Return the force (N) for a stamp (ns) and a velocity (m/s), or None for no answer."""
-        nan = float("nan")
-        return self._controller.answer(Sample(stamp, nan, velocity, nan, nan, nan))
-
-
-def _warn(old: str, new: str) -> None:
-    warnings.warn(
-        f"{__name__}.{old} is now {new}; the old name will be removed in 0.3",
-        DeprecationWarning,
-        stacklevel=3,
-    )
+    def answer(self, sample: Sample | int, velocity: float = nan) -> float | None:
+        """Return the force (N) for a stamp (ns) and a velocity (m/s), or for a sample."""
+        if not isinstance(sample, Sample):
+            sample = Sample(sample, nan, velocity, nan, nan, nan)
+        return super().answer(sample)

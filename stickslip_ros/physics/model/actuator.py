@@ -1,8 +1,8 @@
 """The actuator between the control force that is commanded and the force on the slide."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -10,28 +10,20 @@ class Actuator:
     """What exerts the control force on the slide; it exerts exactly what is commanded.
 
     An actuator is a frozen dataclass of its constants, each described by `constant`. They become
-    the parameters `actuator.*` of the plant. A command passes `limited` when it arrives. An
-    actuator with `states`, such as a lag, is then a part of the drive: its equations accept floats
-    and heyoka expressions, in the scales of the drive. A disturbance does not pass the actuator.
+    the parameters `actuator.*` of the plant. A command passes `limiter` when it arrives. An
+    actuator with `states`, such as a lag, is a part of the drive: its equations accept floats and
+    heyoka expressions, in the scales of the drive. A disturbance does not pass the actuator.
     """
 
-    states: ClassVar[Sequence[str]] = ()
-    """Names of the states, forces that start from zero."""
+    @property
+    def states(self) -> Sequence[str]:
+        """Names of the states: forces, zero at the start. The constants may decide about them."""
+        return ()
 
-    def limited(self, command: float) -> float:
-        """Return the force that is held for a command.
-
-        Parameters
-        ----------
-        command : float
-            Commanded force, N.
-
-        Returns
-        -------
-        float
-            Held force, N.
-        """
-        return command
+    @property
+    def limiter(self) -> Callable[[float], float] | None:
+        """What turns a command (N) into the force (N) that is held; None if they are equal."""
+        return None
 
     def state_rates(self, held: Any, states: Sequence[Any]) -> Sequence[Any]:
         """Return the rates of the states.
@@ -39,7 +31,7 @@ class Actuator:
         Parameters
         ----------
         held : float or expression
-            Held force.
+            Held force, see `limiter`.
         states : sequence of float or expression
             Values of `states`.
 
@@ -56,7 +48,7 @@ class Actuator:
         Parameters
         ----------
         held : float or expression
-            Held force.
+            Held force, see `limiter`.
         states : sequence of float or expression
             Values of `states`.
 

@@ -69,10 +69,10 @@ class DriveSystem(HybridSystem):
     """Drive, dimensionless (see `Drive`), with a held force or with continuous control.
 
     The states are X, Y = X', the memory of the friction law, the states of the controller and those
-    of the actuator. In
-    slip the slide follows eq. 5; where it reaches the speed of the belt it sticks if its law can
-    hold it, -mu_forward N <= h <= mu_backward N with the reaction h. Otherwise it passes that speed
-    or slips the other way. In stick it moves with the belt until the reaction leaves these limits.
+    of the actuator. In slip the slide follows eq. 5; where it reaches the speed of the belt it
+    sticks if its law can hold it, -mu_forward N <= h <= mu_backward N with the reaction h.
+    Otherwise it passes that speed or slips the other way. In stick it moves with the belt until the
+    reaction leaves these limits.
 
     Parameters
     ----------
@@ -113,9 +113,10 @@ class DriveSystem(HybridSystem):
         first = MEMORY + len(law.states)
         self.control_states = slice(first, first + len(control_states))
         """The states of the controller, in a state."""
-        self._actuator_states = slice(self.control_states.stop, None)
+        self.actuator_states = slice(self.control_states.stop, len(self.states))
+        """The states of the actuator, in a state."""
         parts = (law, self.drive.belt, self.drive.load, self.drive.actuator, self.control)
-        self.structure = structure_number((type(self), *map(structure, parts)))
+        self.structure = structure_number((type(self), self.states, *map(structure, parts)))
         self._steady = isinstance(self.drive.belt, NoCourse)
         self.constants = {
             "damping": self.drive.damping,
@@ -150,16 +151,16 @@ class DriveSystem(HybridSystem):
         switches, sign = self._by_part(all_switches), all_switches[0]
         x, y = state[POSITION], state[SPEED]
         memory = state[MEMORY : self.control_states.start]
-        own, held = state[self.control_states], state[self._actuator_states]
+        own, lagging = state[self.control_states], state[self.actuator_states]
         force = inputs[0]
         part_rates = ()
         if symbolic.control is not None:
             force = symbolic.control.control_force(x, y, own)
             part_rates = tuple(symbolic.control.state_rates(x, y, own))
         if self.has_actuator:
-            part_rates += tuple(drive.actuator.state_rates(inputs[0], held))
+            part_rates += tuple(drive.actuator.state_rates(inputs[0], lagging))
             if symbolic.control is None:
-                force = drive.actuator.force(inputs[0], held) + inputs[1]
+                force = drive.actuator.force(inputs[0], lagging) + inputs[1]
         belt_speed = equations.belt_speed(drive, time, switches.belt)
         normal = equations.normal_force(drive, time, switches.load)
         reaction = equations.reaction(drive, x, y, force)
@@ -373,8 +374,8 @@ class DriveSystem(HybridSystem):
             own = state[self.control_states]
             return self.control.control_force(state[POSITION], state[SPEED], own)
         if self.has_actuator:
-            held = state[self._actuator_states].tolist()
-            return float(self.drive.actuator.force(inputs[0], held)) + inputs[1]
+            lagging = state[self.actuator_states].tolist()
+            return float(self.drive.actuator.force(inputs[0], lagging)) + inputs[1]
         return inputs[0]
 
     def reaction(self, instant: Instant) -> float:

@@ -106,14 +106,6 @@ class HybridMotion:
         prepared = self._prepared[name] = flow, system.shared_flow(name).leads
         return prepared
 
-    def _set_input(self, number: int, value: float) -> None:
-        """Hold an input at a value from now on."""
-        self._instant.inputs[number] = value
-        if self._flow is not None:
-            for used, index in self._flow.inputs:
-                if used == number:
-                    self._flow.parameters[index] = value
-
     def _advance(self, duration: float) -> None:
         """Integrate over a duration; stop early if the motion becomes unbounded."""
         system, instant, watched = self._system, self._instant, self._watched

@@ -49,8 +49,7 @@ class Motion(HybridMotion):
     --------
     The first millisecond of a slide that starts at rest:
 
-    >>> from stickslip_ros.physics.model.control import ContinuousControl
-    from stickslip_ros.physics.model.drive import Drive
+    >>> from stickslip_ros.physics.model.drive import Drive
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.motion import Motion
     >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
@@ -78,7 +77,9 @@ class Motion(HybridMotion):
         super().__init__(system, state, self._first_detail)
 
     def restart(self, position: float, velocity: float) -> None:
-        """Set the state of the slide; force and gains are kept, and the controller is at rest.
+        """Set the state of the slide; forces and gains are kept, the controller is at rest.
+
+        An actuator with states gives no force.
 
         Parameters
         ----------
@@ -93,7 +94,7 @@ class Motion(HybridMotion):
 
     @property
     def drive(self) -> Drive:
-        """Drive in motion; a new one keeps the position and velocity of the slide."""
+        """Drive in motion; a new one keeps position, velocity, held forces and actuator states."""
         return self._drive
 
     @drive.setter
@@ -113,7 +114,7 @@ class Motion(HybridMotion):
 
     @property
     def force(self) -> float:
-        """Force on the slide, N, held until you set it again; the command of an actuator's lag."""
+        """Held force on the slide, N; an actuator with states receives it as its command."""
         return self._instant.inputs[0] * self._drive.normal_force
 
     @force.setter
@@ -131,16 +132,25 @@ class Motion(HybridMotion):
             Disturbance force on the slide, N.
         """
         if self._system.has_actuator:
-            self._hold(0, control)
             self._hold(1, disturbance)
         else:
-            self._hold(0, control + disturbance)
+            control += disturbance
+        self._hold(0, control)
 
     def _hold(self, number: int, force: float) -> None:
         scaled = force / self._drive.normal_force
         if not -_LARGEST_FORCE <= scaled <= _LARGEST_FORCE:
             scaled = max(-_LARGEST_FORCE, min(_LARGEST_FORCE, scaled))
-        self._set_input(number, scaled)
+        self._instant.inputs[number] = scaled
+        if self._flow is not None:
+            for used, index in self._flow.inputs:
+                if used == number:
+                    self._flow.parameters[index] = scaled
+
+    @property
+    def disturbance(self) -> float:
+        """Held disturbance force, N; 0 without actuator states, where it is a part of `force`."""
+        return sum(self._instant.inputs[1:]) * self._drive.normal_force
 
     @property
     def applied_force(self) -> float:
@@ -226,12 +236,13 @@ class Motion(HybridMotion):
         self._time += duration
 
     def _change(self, drive: Drive, control: ContinuousControl | None) -> None:
-        """Continue with another drive and controller, in the same state of slide and law."""
+        """Continue with another drive and controller, in the same state of all parts."""
         if (drive, control) == (self._drive, self._control):
             return
-        old, force = self._drive, self.force
+        old, force, disturbance = self._drive, self.force, self.disturbance
         position, velocity = self.position, self.velocity
         control_state = self.control_state
+        lagging = self._instant.state[self._system.actuator_states].tolist()
         x, y, *memory = self._instant.state.tolist()
         law = drive.friction
         self._drive, self._control = drive, control
@@ -248,7 +259,11 @@ class Motion(HybridMotion):
                 each / scale
                 for each, scale in zip(control_state, control.state_scales(drive), strict=True)
             ]
+        if drive.actuator.states == old.actuator.states:
+            ratio = old.normal_force / drive.normal_force
+            state[system.actuator_states] = [each * ratio for each in lagging]
         self._use(system)
         self._instant.time = self._time * drive.angular_frequency
-        self.force = force
+        self._instant.inputs = [0.0] * len(system.inputs)
+        self.set_forces(force, disturbance)
         self._set_state(state)

@@ -1,9 +1,13 @@
 """The motion and its derivatives by the state at its start."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
+from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SLIP, SPEED
@@ -36,13 +40,16 @@ class SensitiveMotion(RecordedMotion):
     _first_detail = Detail.DERIVATIVES
 
     def __init__(self, drive: Drive, gains: ContinuousControl | None = None) -> None:
-        """Start at rest at X = 0, with continuous control if `gains` (SI) are given."""
+        """Start at rest at X = 0, with continuous control if `gains` (SI) are given.
+
+        The actuator has no part in it.
+        """
         self.transition: FloatArray = np.empty((0, 0))
         """Derivatives of the state (rows) by the state at the start (columns)."""
         self.landed = False
         """Whether the slide has stuck since the start."""
         self._effort = self._begun = 0.0
-        super().__init__(drive, 0.0, 0.0, gains)
+        super().__init__(replace(drive, actuator=IDEAL_ACTUATOR), 0.0, 0.0, gains)
         self.start(np.zeros(self.order))
 
     @property
@@ -52,7 +59,7 @@ class SensitiveMotion(RecordedMotion):
 
     @property
     def state(self) -> FloatArray:
-        """X, Y, the memory of the law and, with continuous control, W."""
+        """X, Y, the memory of the law and, with continuous control, its states."""
         return np.array(self._instant.state)
 
     @property
@@ -60,13 +67,19 @@ class SensitiveMotion(RecordedMotion):
         """Derivative of the state by dimensionless time."""
         return self._rates(self._mode)[0]
 
-    def state_at(self, position: float, filter_state: float) -> FloatArray:
-        """Return the state at rest at a position (m), with the filter state W (m) under control."""
+    def state_at(self, position: float, control_state: float | Sequence[float]) -> FloatArray:
+        """Return the state at rest at a position (m), with these states of the control.
+
+        They are given times N/k, so that W of eq. 17 is in m; one number applies to all.
+        """
         scale = self._drive.length_scale
-        state = self._system.initial_state(position / scale, 0.0)
-        if self._control is not None:
-            state[-1] = filter_state / scale
-        return np.array(state)
+        state = np.array(self._system.initial_state(position / scale, 0.0))
+        state[self._system.control_states] = np.asarray(control_state) / scale
+        return state
+
+    def control_state_of(self, state: FloatArray) -> FloatArray:
+        """Return the states of the control in a state; none without control."""
+        return state[self._system.control_states]
 
     def start(self, state: FloatArray) -> None:
         """Start again at `state`, at time zero and without breakpoints."""

@@ -1,9 +1,11 @@
-"""Critical gains of the loop with the washout controller without sampling, eq. 19."""
+"""The theory of gains without sampling: critical gains of the loop of eq. 19."""
 
 from dataclasses import dataclass, replace
 
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import ContinuousControl, WashoutGains
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive_system import SPEED
+from stickslip_ros.physics.theory.gain_intervals import covered_gains
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
 from stickslip_ros.physics.theory.requirements import AUTONOMOUS, STATIC, require
@@ -24,21 +26,21 @@ class CriticalGains:
     """Cubic gain at which sigma changes sign, N s^3/m^3; below it small vibrations are stable."""
 
 
-def critical_gains(drive: Drive, gains: WashoutGains) -> CriticalGains | None:
+def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | None:
     """Return the critical gains for a cutoff frequency and a cubic gain.
 
     Parameters
     ----------
     drive : Drive
         Drive in SI units.
-    gains : WashoutGains
-        Controller in SI units; its linear gain is not used.
+    gains : ContinuousControl
+        Continuous control in SI units: `WashoutGains`, whose linear gain is not used.
 
     Returns
     -------
     CriticalGains or None
-        Critical gains in SI units; None if the belt is at rest, or if no linear gain stabilises the
-        equilibrium.
+        Critical gains in SI units; None if the belt is at rest, if no linear gain stabilises the
+        equilibrium, or for any other control.
 
     Raises
     ------
@@ -60,10 +62,11 @@ def critical_gains(drive: Drive, gains: WashoutGains) -> CriticalGains | None:
     (-0.935296, 31.468)
     """
     require("the critical gain", drive, AUTONOMOUS, STATIC)
-    linear = _critical_linear_gain(drive, gains)
-    if linear is None:
+    own = covered_gains(gains)
+    linear = None if own is None else _critical_linear_gain(drive, own)
+    if own is None or linear is None:
         return None
-    critical = replace(gains, linear=linear)
+    critical = replace(own, linear=linear)
     sigma = _sigma(drive, critical)
     # sigma is affine in the cubic gain: only the third derivatives contain it, linearly. With a
     # large one the rounding of the other terms does not matter.
@@ -72,6 +75,22 @@ def critical_gains(drive: Drive, gains: WashoutGains) -> CriticalGains | None:
     slope = with_large - without
     cubic = 0.0 - without / slope * large if slope != 0.0 else None
     return CriticalGains(linear, sigma, cubic)
+
+
+def why_no_linear_gain(drive: Drive, gains: WashoutGains) -> str | None:
+    """Return why no linear gain stabilises the equilibrium on a moving belt; None on one at rest.
+
+    The sentence is for a drive without critical gains.
+    """
+    expansion = expand(drive)
+    if expansion is None:
+        return None
+    product = expansion.jacobian[SPEED, SPEED] * gains.scaled(drive).corner_frequency
+    return (
+        "no linear gain stabilises the equilibrium: by the Routh-Hurwitz criterion p d must be "
+        f"below 1 and is {product:.4g} (p the slope of friction less damping, d the cutoff "
+        "frequency, dimensionless)"
+    )
 
 
 def _critical_linear_gain(drive: Drive, gains: WashoutGains) -> float | None:

@@ -6,6 +6,7 @@ g(y) = mu(y - v0) - mu(-v0) - 2 beta y, and the energy (x^2 + x'^2) / 2 changes 
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import sqrt
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
 from stickslip_ros.physics.model.equations import acceleration, reaction
@@ -39,12 +40,23 @@ def release_position(drive: Drive) -> float:
     return (limit - reaction(drive, 0.0, drive.belt_speed, 0.0)) / drive.stiffness
 
 
-def longest_return(drive: Drive) -> float:
+def longest_return(drive: Drive, control: ContinuousControl | None = None) -> float:
     """Return a time (s) within which a slide comes back if it ever does; the belt moves.
 
     It may stick, and creep at a similar speed, as far as static friction can bend the spring.
+    Continuous control that pushes a slide at rest softens or stiffens the spring.
     """
+    if control is not None:
+        drive = replace(drive, stiffness=drive.stiffness * _static_stiffness(drive, control))
     return 4.0 * drive.natural_period + 2.0 * loading_time(drive)
+
+
+def _static_stiffness(drive: Drive, control: ContinuousControl) -> float:
+    """Return the share of the stiffness that is left under control at rest; 1 if it is none."""
+    own = control.scaled(drive)
+    at_zero, at_one = (float(own.control_force(x, 0.0, own.rest(x, 0.0))) for x in (0.0, 1.0))
+    left = 1.0 - (at_one - at_zero)
+    return left if left > 0.0 else 1.0
 
 
 def loading_time(drive: Drive) -> float:
@@ -57,7 +69,8 @@ def follow(motion: RecordedMotion) -> Iterator[Breakpoints]:
     """Yield all breakpoints of a recording `motion` so far, repeatedly, up to `longest_return`."""
     drive = motion.drive
     breakpoints, now = Breakpoints.empty(), 0.0
-    while now < longest_return(drive) and not motion.unbounded:
+    longest = longest_return(drive, motion.control)
+    while now < longest and not motion.unbounded:
         step = max(now, drive.natural_period) / 4.0
         motion.advance(step)
         now += step
@@ -65,32 +78,21 @@ def follow(motion: RecordedMotion) -> Iterator[Breakpoints]:
         yield breakpoints
 
 
-def least_cycle(drive: Drive, gains: WashoutGains | None = None) -> float | None:
+def least_cycle(drive: Drive, gains: ContinuousControl | None = None) -> float | None:
     """Return the least speed, dimensionless, at which energy may be gained; the belt moves.
 
     It is the speed in the open loop, where every cycle turns at least as far from the equilibrium,
-    or with `gains` (SI) of eq. 19. None if there is no such speed: on a cycle the gain balances the
-    loss, so that there is no cycle up to `UNBOUNDED_SPEED`, unless energy is conserved. Raises
-    InvalidInputError for a drive that it does not cover, see `requirements`.
+    or under continuous control with `gains` (SI). None if there is no such speed: on a cycle the
+    gain balances the loss, so that there is no cycle up to `UNBOUNDED_SPEED`, unless energy is
+    conserved. Raises InvalidInputError for a drive that it does not cover, see `requirements`.
     """
     require("the energy of a cycle", drive, AUTONOMOUS, STATIC, SYMMETRIC)
     speed, force = _net_force(drive)
     if gains is not None:
-        force += _control_bound(gains.scaled(drive), speed)
-    gaining = np.abs(speed)[speed * force > 0.0]
+        force = force + gains.scaled(drive).bound(speed)
+    with np.errstate(invalid="ignore"):  # an infinite bound at rest
+        gaining = np.abs(speed)[speed * force > 0.0]
     return None if len(gaining) == 0 else 0.95 * float(gaining.min())
-
-
-def _control_bound(gains: WashoutGains, speed: FloatArray) -> FloatArray:
-    """Return forces on the speed that give a cycle at least the energy that the controller gives.
-
-    With v = w' and d w the parts of y that pass the filter and do not, both periodic, int v w = 0:
-    int v y = int v^2 <= int y^2. Where k2 < 0, by Young's inequality
-    -int v^3 y = -int (v^4 + v^3 d w) <= (27/256) int (d w)^4 <= (27/256) int y^4.
-    Otherwise, by Hoelder's, int v^3 y <= 8 int y^4, since v is at most twice as large as y in L^4.
-    """
-    cubic = -27.0 / 256.0 * gains.cubic if gains.cubic < 0.0 else 8.0 * gains.cubic
-    return max(gains.linear, 0.0) * speed + cubic * speed**3
 
 
 def largest_cycle(drive: Drive) -> float | None:

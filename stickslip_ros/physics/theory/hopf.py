@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.theory.linear import Expansion, expand, hurwitz_determinants, jacobians
@@ -63,7 +63,7 @@ class ComplexPair:
         return cls(value.real, value.imag, right[:, upper], left)
 
 
-def hopf_points(drive: Drive, gains: WashoutGains | None = None) -> list[HopfPoint]:
+def hopf_points(drive: Drive, gains: ContinuousControl | None = None) -> list[HopfPoint]:
     """Return the Hopf points over the belt speed.
 
     It covers every friction law, at constant belt speed and normal force. The search covers belt
@@ -73,8 +73,8 @@ def hopf_points(drive: Drive, gains: WashoutGains | None = None) -> list[HopfPoi
     ----------
     drive : Drive
         Drive in SI units; its belt speed is not used.
-    gains : WashoutGains, optional
-        Continuous controller of eq. 19 in SI units. By default the loop is open.
+    gains : ContinuousControl, optional
+        Continuous control in SI units, such as that of eq. 19. By default the loop is open.
 
     Returns
     -------
@@ -181,5 +181,7 @@ def crossing_speed(expansion: Expansion) -> float | None:
     return float((pair.left.conj() @ expansion.jacobian_by_belt_speed @ pair.right).real)
 
 
-def _hopf_margins(drive: Drive, gains: WashoutGains | None, belt_speeds: FloatArray) -> FloatArray:
+def _hopf_margins(
+    drive: Drive, gains: ContinuousControl | None, belt_speeds: FloatArray
+) -> FloatArray:
     return hurwitz_determinants(jacobians(drive, gains, belt_speeds))[:, -1]

@@ -6,10 +6,11 @@ from math import pi, sqrt
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import ContinuousControl, WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.theory.critical_gains import critical_gains
+from stickslip_ros.physics.theory.gain_intervals import covered_gains
 from stickslip_ros.physics.theory.hopf import ComplexPair
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, shoot
 from stickslip_ros.physics.theory.linear import expand
@@ -18,7 +19,7 @@ _STEPS = 16
 """Number of gains from the critical to the requested one, densest where the cycle is small."""
 
 
-def limit_cycle_from_hopf(drive: Drive, gains: WashoutGains) -> LimitCycle | None:
+def limit_cycle_from_hopf(drive: Drive, gains: ContinuousControl) -> LimitCycle | None:
     """Return the limit cycle that starts at the critical linear gain, with continuous control.
 
     It is a cycle of eq. 19, stable or not. It branches off the equilibrium at the critical linear
@@ -30,14 +31,15 @@ def limit_cycle_from_hopf(drive: Drive, gains: WashoutGains) -> LimitCycle | Non
     ----------
     drive : Drive
         Drive in SI units.
-    gains : WashoutGains
-        Controller in SI units, at whose linear gain the cycle is requested.
+    gains : ContinuousControl
+        Continuous control in SI units: `WashoutGains`, at whose linear gain the cycle is requested.
 
     Returns
     -------
     LimitCycle or None
-        Limit cycle in SI units. None if there is no critical gain, if the gain is on the other side
-        of it, and where the cycle is lost on the way: where it ends or folds back.
+        Limit cycle in SI units. None if there is no critical gain (see `critical_gains`), if the
+        gain is on the other side of it, and where the cycle is lost on the way: where it ends or
+        folds back.
 
     Examples
     --------
@@ -53,15 +55,15 @@ def limit_cycle_from_hopf(drive: Drive, gains: WashoutGains) -> LimitCycle | Non
     >>> round(cycle.measures.amplitude, 4), cycle.stable
     (0.1154, True)
     """
-    critical = critical_gains(drive, gains)
-    if critical is None:
+    own, critical = covered_gains(gains), critical_gains(drive, gains)
+    if own is None or critical is None:
         return None
     found: list[FloatArray] = []
     cycle = None
     for step in range(1, _STEPS + 1):
         part = (step / _STEPS) ** 2  # the amplitude grows with the root of the distance
-        linear = critical.linear + part * (gains.linear - critical.linear)
-        at_gain = replace(gains, linear=linear)
+        linear = critical.linear + part * (own.linear - critical.linear)
+        at_gain = replace(own, linear=linear)
         guess = (
             2.0 * found[-1] - found[-2]
             if len(found) > 1

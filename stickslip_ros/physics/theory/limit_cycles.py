@@ -6,7 +6,7 @@ the slide turns upward: X' = 0 and X'' > 0. Internal values are dimensionless (s
 durations; arguments and results are in SI units.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import isclose, sqrt
 from typing import Any, Self
@@ -16,7 +16,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.measures.cycle_measures import EQUILIBRIUM_SPEED, CycleMeter, Measures
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED, UNBOUNDED_SPEED
 from stickslip_ros.physics.motion.variational import SensitiveMotion, TooStiffError
@@ -55,14 +55,19 @@ class LimitCycle:
 
     position: float
     """Displacement at the turning point, m."""
-    filter_state: float | None
-    """State W of the washout filter at the turning point, m; None in the open loop."""
+    control_state: tuple[float, ...]
+    """States of the control at the turning point, times the unit of displacement, N/k."""
     period: float
     """Period, s."""
     multipliers: tuple[complex, ...]
     """Floquet multipliers without the trivial one, the largest first; the last is 0 with stick."""
     measures: Measures
     """Measures of one cycle."""
+
+    @property
+    def filter_state(self) -> float | None:
+        """The state of control that has one, such as W of eq. 17, m; None for any other."""
+        return self.control_state[0] if len(self.control_state) == 1 else None
 
     @property
     def stable(self) -> bool:
@@ -75,8 +80,8 @@ def shoot(
     position: float,
     period: float,
     *,
-    gains: WashoutGains | None = None,
-    filter_state: float = 0.0,
+    gains: ContinuousControl | None = None,
+    filter_state: float | Sequence[float] = 0.0,
 ) -> LimitCycle | None:
     """Return the limit cycle near a guess, by Newton's method.
 
@@ -91,10 +96,11 @@ def shoot(
         Guess of the displacement at an upward turning point, m.
     period : float
         Guess of the period, s.
-    gains : WashoutGains, optional
-        Continuous controller of eq. 19 in SI units. By default the loop is open.
-    filter_state : float, optional
-        Guess of the filter state W at the turning point, m; with `gains` only.
+    gains : ContinuousControl, optional
+        Continuous control in SI units, such as that of eq. 19. By default the loop is open.
+    filter_state : float or sequence of float, optional
+        Guess of the states of the control at the turning point, times N/k: in m for W of eq. 17.
+        One number applies to all of them. It is used with `gains` only.
 
     Returns
     -------
@@ -134,7 +140,7 @@ def limit_cycle_of_run(
     position: float,
     velocity: float = 0.0,
     *,
-    gains: WashoutGains | None = None,
+    gains: ContinuousControl | None = None,
     turns: int = 200,
 ) -> LimitCycle | None:
     """Return the limit cycle that a motion leads to.
@@ -149,8 +155,8 @@ def limit_cycle_of_run(
         Displacement of the slide at the start, m.
     velocity : float, optional
         Velocity of the slide at the start, m/s.
-    gains : WashoutGains, optional
-        Continuous controller of eq. 19 in SI units, its filter at rest at the start. By default the
+    gains : ContinuousControl, optional
+        Continuous control in SI units, such as that of eq. 19, at rest at the start. By default the
         loop is open.
     turns : int, optional
         Largest number of upward turns to run.
@@ -421,7 +427,7 @@ class _Shot:
         distance = float(motion.rate[SPEED])
         # Closer than this the state is treated as the equilibrium.
         smallest = 1e-6 * abs(drive.belt_speed) / drive.speed_scale
-        if distance < smallest or not 0.0 < period < longest_return(drive):
+        if distance < smallest or not 0.0 < period < longest_return(drive, motion.control):
             return None
         motion.advance(period)
         if motion.unbounded:
@@ -493,7 +499,7 @@ def _cycle(motion: SensitiveMotion, shot: _Shot) -> LimitCycle | None:
         return None
     return LimitCycle(
         position=float(start[0]) * drive.length_scale,
-        filter_state=None if motion.control is None else float(start[-1]) * drive.length_scale,
+        control_state=tuple((motion.control_state_of(start) * drive.length_scale).tolist()),
         period=period,
         multipliers=shot.multipliers(),
         measures=replace(measures, steady=True, trend=None),

@@ -2,10 +2,10 @@
 
 heyoka differentiates the equations of the `DriveSystem`, for any smooth friction law. Everything is
 dimensionless (see `Drive`). The n states are X, Y, the memory of the law and, with continuous
-control, the filter state W.
+control, its states, such as W of eq. 17. The actuator has no part in it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import copysign
 
@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
+from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SLIP
 from stickslip_ros.physics.model.plain_drive import drive_system
@@ -52,7 +53,7 @@ class Expansion:
         return bool(np.all(hurwitz_determinants(self.jacobian) > 0.0))
 
 
-def expand(drive: Drive, gains: WashoutGains | None = None) -> Expansion | None:
+def expand(drive: Drive, gains: ContinuousControl | None = None) -> Expansion | None:
     """Return the expansion of the equations of motion at the equilibrium.
 
     It covers every friction law, static or with a memory, at constant belt speed and normal force.
@@ -61,8 +62,8 @@ def expand(drive: Drive, gains: WashoutGains | None = None) -> Expansion | None:
     ----------
     drive : Drive
         Drive in SI units.
-    gains : WashoutGains, optional
-        Continuous controller of eq. 19 in SI units. By default the loop is open.
+    gains : ContinuousControl, optional
+        Continuous control in SI units, such as that of eq. 19. By default the loop is open.
 
     Returns
     -------
@@ -110,7 +111,7 @@ def expand(drive: Drive, gains: WashoutGains | None = None) -> Expansion | None:
     )
 
 
-def jacobians(drive: Drive, gains: WashoutGains | None, belt_speeds: FloatArray) -> FloatArray:
+def jacobians(drive: Drive, gains: ContinuousControl | None, belt_speeds: FloatArray) -> FloatArray:
     """Return A, shape (m, n, n), at m dimensionless belt speeds of one sign."""
     _, (first, *_) = _at_equilibrium(drive, gains, belt_speeds)
     return np.moveaxis(first[:, : len(first)], -1, 0)
@@ -157,10 +158,10 @@ def _hurwitz_minors(jacobian: FloatArray) -> FloatArray:
 
 
 def _at_equilibrium(
-    drive: Drive, gains: WashoutGains | None, belt_speeds: FloatArray
+    drive: Drive, gains: ContinuousControl | None, belt_speeds: FloatArray
 ) -> tuple[FloatArray, list[FloatArray]]:
     """Return the equilibria at m belt speeds of one sign, (n, m), and the derivatives there."""
-    system = drive_system(drive, gains)
+    system = drive_system(replace(drive, actuator=IDEAL_ACTUATOR), gains)
     values = np.zeros((len(system.index), len(belt_speeds)))
     for name, value in system.constants.items():
         values[system.index[name]] = value

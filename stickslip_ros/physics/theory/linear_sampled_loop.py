@@ -1,25 +1,30 @@
-"""The loop of the nodes, linear near its equilibrium: sampled, held, washed out and delayed.
+"""The loop of the nodes, linear near its equilibrium: sampled, held, controlled and delayed.
 
-It is exactly the loop of `SampledLoop` and `Washout`: between samples the force is constant, so
+It is exactly the loop of `SampledLoop` and `Controller`: between samples the force is constant, so
 that the matrix exponential gives the motion from one sample to the next.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import accumulate, pairwise
-from math import frexp, inf, isfinite, log, pi
-from typing import Any, NamedTuple, Self
+from math import frexp, inf, log
+from typing import Any, Protocol, Self
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.deprecated_names import Renamed
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.sampled_loop import whole_and_rest
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.control import LinearFeedback, WashoutGains
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.theory.gain_intervals import (
+    GainBoundary,
+    GainInterval,
+    feedback_family,
+    nearest_to_zero,
+)
 from stickslip_ros.physics.theory.linear import expand
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, STATIC, require
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, IMMEDIATE, STATIC, require
 
 LONGEST_DELAY = 300
 """Largest delay, in whole periods, for which the matrix is built; its order grows with it."""
@@ -27,25 +32,16 @@ LONGEST_DELAY = 300
 SETTLED = 0.01
 """Share of its first size that a deviation has at the 1 % settling time."""
 
-_ROUNDING = 1e-14
-"""Relative error of a multiplier."""
-
-_SLIDE, _FILTER = slice(0, 2), 2
-"""Indices of X, Y and of the filter's z = d w in the state; the forces under way follow."""
+_SLIDE = slice(0, 2)
+"""Indices of X and Y in the state; the states of the law follow, then the forces under way."""
 
 
-class GainInterval(NamedTuple):
-    """Interval of linear gains in which the loop is stable, N s/m."""
+class SampledControl(Protocol):
+    """A sampled control law that may be linear near the equilibrium, such as a `ControlLaw`."""
 
-    low: float
-    """Lower end, N s/m."""
-    high: float
-    """Upper end, N s/m."""
-
-    @property
-    def critical(self) -> float:
-        """End nearest to zero, N s/m; the upper end if zero is inside."""
-        return self.low if self.low >= 0.0 else self.high
+    def linear_feedback(self, period: float) -> LinearFeedback | None:
+        """Return the law near the equilibrium for a sample period (s), or None if not linear."""
+        ...
 
 
 def why_no_linear_loop(drive: Drive, rate: float, force_delay: float) -> str | None:
@@ -62,11 +58,11 @@ def why_no_linear_loop(drive: Drive, rate: float, force_delay: float) -> str | N
 
 @dataclass(frozen=True)
 class LinearSampledLoop:
-    """Drive at its equilibrium under a sampled washout controller, linearised; for any gains.
+    """Drive at its equilibrium under sampled control, linearised; for any linear control law.
 
-    With the period T, v_n = y_n - z_n and q = 1 - exp(-d T) the controller is z_(n+1) = z_n + q v_n
-    and force n = k1 v_n, which acts from n T + delay to (n + 1) T + delay. The state is X, Y, z and
-    the forces under way, the newest first.
+    With the period T, force n = C z_n + D (x_n, y_n) of the law (see `LinearFeedback`) acts from
+    n T + delay to (n + 1) T + delay. The state is X, Y, the states z of the law, and the forces
+    under way, the newest first.
 
     Examples
     --------
@@ -117,38 +113,47 @@ class LinearSampledLoop:
         Raises
         ------
         InvalidInputError
-            If the friction law has a memory, or belt or load follow a course.
+            If the friction law has a memory, belt or load follow a course, or the actuator has
+            states.
         """
-        require("the theory of the sampled loop", drive, AUTONOMOUS, STATIC)
+        require("the theory of the sampled loop", drive, AUTONOMOUS, STATIC, IMMEDIATE)
         expansion = expand(drive)
         if expansion is None or why_no_linear_loop(drive, rate, force_delay):
             return None
         return cls(drive, rate, force_delay, expansion.jacobian)
 
-    def transition_matrix(self, gains: WashoutGains) -> FloatArray:
+    def transition_matrix(self, gains: SampledControl) -> FloatArray:
         """Return the matrix from the state at one sample to the state at the next.
 
         Parameters
         ----------
-        gains : WashoutGains
-            Controller in SI units; its cubic gain is not used.
+        gains : ControlLaw or WashoutGains
+            Control law in SI units, of which only the linear part is used.
 
         Returns
         -------
         ndarray
-            Matrix for the dimensionless state, shape (n, n); n is 3 plus the number of periods of
-            the delay, rounded up.
-        """
-        scaled = gains.scaled(self.drive)
-        return self._transitions(np.float64(scaled.corner_frequency), np.float64(scaled.linear))
+            Matrix for the dimensionless state, shape (n, n); n is 2 plus the number of states of
+            the law plus the number of periods of the delay, rounded up.
 
-    def spectral_radius(self, gains: WashoutGains) -> float:
+        Raises
+        ------
+        InvalidInputError
+            If the law is not linear near the equilibrium.
+        """
+        feedback = gains.linear_feedback(1.0 / self.rate)
+        if feedback is None:
+            name = getattr(gains, "name", type(gains).__name__)
+            raise InvalidInputError(f"the theory of the sampled loop: {not_linear(name)}")
+        return self._transitions(feedback)
+
+    def spectral_radius(self, gains: SampledControl) -> float:
         """Return the factor by which a small deviation grows per sample, in the long run.
 
         Parameters
         ----------
-        gains : WashoutGains
-            Controller in SI units; its cubic gain is not used.
+        gains : ControlLaw or WashoutGains
+            Control law in SI units, linear near the equilibrium.
 
         Returns
         -------
@@ -157,13 +162,13 @@ class LinearSampledLoop:
         """
         return float(_spectral_radius(self.transition_matrix(gains)))
 
-    def decay_rate(self, gains: WashoutGains) -> float:
+    def decay_rate(self, gains: SampledControl) -> float:
         """Return the rate at which a small deviation decays.
 
         Parameters
         ----------
-        gains : WashoutGains
-            Controller in SI units; its cubic gain is not used.
+        gains : ControlLaw or WashoutGains
+            Control law in SI units, linear near the equilibrium.
 
         Returns
         -------
@@ -194,13 +199,13 @@ class LinearSampledLoop:
         with np.errstate(divide="ignore"):
             return -np.log(radii) * self.rate
 
-    def settling_time(self, gains: WashoutGains) -> float | None:
+    def settling_time(self, gains: SampledControl) -> float | None:
         """Return the 1 % settling time of a small deviation.
 
         Parameters
         ----------
-        gains : WashoutGains
-            Controller in SI units; its cubic gain is not used.
+        gains : ControlLaw or WashoutGains
+            Control law in SI units, linear near the equilibrium.
 
         Returns
         -------
@@ -210,14 +215,7 @@ class LinearSampledLoop:
         return settling_time(self.decay_rate(gains))
 
     def stable_linear_gains(self, corner_frequency: float) -> list[GainInterval]:
-        """Return all linear gains with which the loop is stable.
-
-        By D-decomposition (Neimark): a multiplier e^(j theta) on the unit circle requires
-        k1 = 1/G(e^(j theta)), which is a gain where it is real. These gains bound intervals in each
-        of which the number of multipliers outside the circle is constant; where Im(1/G) rises with
-        theta, the number increases with the gain. In the intervals where it is smallest it is zero,
-        or no gain is stable. Beyond the last of these gains no gain is stable: G has more poles
-        than zeros, so that a multiplier grows with the gain.
+        """Return all linear gains of eq. 18 with which the loop is stable.
 
         Parameters
         ----------
@@ -229,29 +227,12 @@ class LinearSampledLoop:
         list of GainInterval
             Stable intervals in ascending order; empty if no gain is stable.
         """
-        boundary = _Boundary(self, corner_frequency / self.drive.angular_frequency)
-        crossings = sorted(boundary.crossings())
-        unit = self.drive.normal_force / self.drive.speed_scale
-        outside = accumulate(number for _, number in crossings)
-        counted = [
-            (number, GainInterval(low * unit, high * unit))
-            for number, ((low, _), (high, _)) in zip(outside, pairwise(crossings), strict=False)
-            if low < high
-        ]
-        if not counted:
-            return []
-        fewest = min(number for number, _ in counted)
-        intervals = [interval for number, interval in counted if number == fewest]
-        nearest = min(intervals, key=_distance)
-        # Near an end the loop is slow; at a high rate also far from zero.
-        low, high = nearest
-        tried = (0.0, 2.0 * nearest.critical, (low + high) / 2.0)
-        radius = min(
-            self.spectral_radius(WashoutGains(corner_frequency, gain, 0.0))
-            for gain in tried
-            if low < gain < high
+        scaled = corner_frequency / self.drive.angular_frequency
+        boundary = GainBoundary(self.jacobian, self.held, self.delay[0], self.period, scaled)
+        return boundary.stable_intervals(
+            self.drive.normal_force / self.drive.speed_scale,
+            lambda gain: self.spectral_radius(WashoutGains(corner_frequency, gain, 0.0)),
         )
-        return intervals if radius < 1.0 - _ROUNDING else []
 
     def critical_linear_gain(self, corner_frequency: float) -> float | None:
         """Return the linear gain that the loop needs, or that it allows, to be stable.
@@ -270,7 +251,7 @@ class LinearSampledLoop:
             Critical linear gain, N s/m; None if no gain stabilises the loop.
         """
         intervals = self.stable_linear_gains(corner_frequency)
-        return min(intervals, key=_distance).critical if intervals else None
+        return nearest_to_zero(intervals).critical if intervals else None
 
     def coarsened(self) -> Self:
         """Return a similar loop at a rate at which even a long delay is few periods, for searches.
@@ -278,17 +259,17 @@ class LinearSampledLoop:
         To hold the force also delays it, by half a period on average; the sum is kept. A loop of
         small order is returned as it is.
         """
-        if self.order <= 24:  # searching many gains is quick
+        if self.under_way <= 21:  # searching many gains is quick
             return self
         rate = min(self.rate, max(20.0 / self.force_delay, 5.0 * self.drive.angular_frequency))
         mean_delay = self.force_delay + 0.5 / self.rate
         return replace(self, rate=rate, force_delay=mean_delay - 0.5 / rate)
 
     @property
-    def order(self) -> int:
-        """Number n of components of the state."""
+    def under_way(self) -> int:
+        """Number of forces that are under way at a sample."""
         whole, rest = self.delay
-        return 3 + whole + (rest > 0.0)
+        return whole + (rest > 0.0)
 
     @cached_property
     def period(self) -> float:
@@ -321,115 +302,43 @@ class LinearSampledLoop:
         return transition[:2, :2], transition[:2, 2]
 
     def _radii(self, corner_frequency: float, linear_gains: FloatArray) -> FloatArray:
-        scaled = WashoutGains(corner_frequency, linear_gains, 0.0).scaled(self.drive)
-        corners = np.full(len(linear_gains), scaled.corner_frequency)
-        return _spectral_radius(self._transitions(corners, scaled.linear))
+        family = feedback_family(corner_frequency, linear_gains, 1.0 / self.rate)
+        return _spectral_radius(self._transitions(family))
 
-    def _transitions(self, corner_frequency: Any, linear_gain: Any) -> FloatArray:
-        """Return the transition matrices for dimensionless arrays of one shape, (..., n, n)."""
+    def _transitions(self, feedback: LinearFeedback) -> FloatArray:
+        """Return the transition matrix, or those of laws that are stacked, (..., n, n).
+
+        The unit of the law's states is that of the speed: no eigenvalue depends on it.
+        """
         whole, split = self.delay
-        under_way = self.order - 3
+        under_way, drive = self.under_way, self.drive
         slide, starting, ending = self.held
-        matrix = np.zeros((*corner_frequency.shape, 3 + under_way, 3 + under_way))
-        forces = np.zeros((*corner_frequency.shape, 1 + under_way, 3 + under_way))
-        forces[..., 0, 1] = linear_gain
-        forces[..., 0, _FILTER] = -linear_gain
-        forces[..., 1:, 3:] = np.eye(under_way)
+        stacked, states = feedback.output.shape[:-1], feedback.output.shape[-1]
+        own, first = slice(2, 2 + states), 2 + states
+        matrix = np.zeros((*stacked, first + under_way, first + under_way))
+        forces = np.zeros((*stacked, 1 + under_way, first + under_way))
+        units = np.array([drive.length_scale, drive.speed_scale])
+        forces[..., 0, _SLIDE] = feedback.direct * units / drive.normal_force
+        forces[..., 0, own] = feedback.output * drive.speed_scale / drive.normal_force
+        forces[..., 1:, first:] = np.eye(under_way)
         matrix[..., _SLIDE, _SLIDE] = slide
         matrix[..., _SLIDE, :] += starting[:, None] * forces[..., whole, None, :]
         if split > 0.0:
             matrix[..., _SLIDE, :] += ending[:, None] * forces[..., whole + 1, None, :]
-        step = -np.expm1(-corner_frequency * self.period)
-        matrix[..., _FILTER, 1] = step
-        matrix[..., _FILTER, _FILTER] = 1.0 - step
-        matrix[..., 3:, :] = forces[..., :-1, :]
+        matrix[..., own, _SLIDE] = feedback.input * (units / drive.speed_scale)
+        matrix[..., own, own] = feedback.state
+        matrix[..., first:, :] = forces[..., :-1, :]
         return matrix
+
+
+def not_linear(law: str) -> str:
+    """Return a clause that says that the control law of this name has no linear form."""
+    return f"the control law {law} is not linear near the equilibrium"
 
 
 def settling_time(decay_rate: float) -> float | None:
     """Return the time (s) in which a deviation with this decay rate (1/s) falls to a hundredth."""
     return -log(SETTLED) / decay_rate if decay_rate > 0.0 else None
-
-
-class _Boundary:
-    """1/G(e^(j theta)), the gains that put a multiplier there; dimensionless.
-
-    From the force to v, with l = e^(j theta) and the whole periods m of the delay,
-    G = (l - 1)^2 (b l + c) / (l^(m+1) (l - e^(-d T)) (l - e^(s1 T)) (l - e^(s2 T))),
-    s1 and s2 being the eigenvalues of the open loop. One factor l - 1 is the filter's; the other
-    one shows that a constant force does not move the slide permanently. b and c are the force that
-    starts during a period, and the one that ends in it. In this form nothing cancels at high rates.
-    """
-
-    def __init__(self, loop: LinearSampledLoop, corner_frequency: float) -> None:
-        slide, starting, ending = loop.held
-        self._whole = loop.delay[0]
-        self._period = loop.period
-        values = np.linalg.eigvals(loop.jacobian).astype(np.complex128)
-        self._poles = np.array([-corner_frequency, *values]) * loop.period
-        self._starting = float(starting[1])
-        self._ending = float(slide[0, 0] * ending[1] - slide[1, 0] * ending[0])
-
-    def gain(self, theta: Any) -> Any:
-        """Return 1/G, an array of the shape of theta."""
-        forward = np.exp(1j * theta)
-        # The form of l - e^s that does not overflow on either side.
-        differences = np.prod(
-            [
-                np.exp(pole) * np.expm1(1j * theta - pole)
-                if pole.real > 0.0
-                else -forward * np.expm1(pole - 1j * theta)
-                for pole in self._poles
-            ],
-            axis=0,
-        )
-        zeros = np.expm1(1j * theta) ** 2 * (self._starting * forward + self._ending)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return forward ** (self._whole + 1) * differences / zeros
-
-    def crossings(self) -> Iterator[tuple[float, int]]:
-        """Yield the real gains, and how many multipliers leave the circle there as it rises."""
-        theta = self._angles()
-        imaginary = self.gain(theta).imag
-        theta, imaginary = theta[imaginary != 0.0], imaginary[imaginary != 0.0]
-        rows = np.flatnonzero(np.sign(imaginary[:-1]) * np.sign(imaginary[1:]) < 0.0)
-        low, high, rising = theta[rows], theta[rows + 1], np.sign(imaginary[rows + 1])
-        for _ in range(60):
-            middle = (low + high) / 2.0
-            above = self.gain(middle).imag * rising > 0.0
-            low, high = np.where(above, low, middle), np.where(above, middle, high)
-        gains = self.gain(low)
-        # An undamped drive's own multipliers are on the circle, which is a gain of zero.
-        unsure = np.abs(self.gain(low + _ROUNDING * self._period) - gains)
-        gains = np.where(np.abs(gains) > unsure, gains.real, 0.0)
-        for gain, number in zip(gains.tolist(), rising.tolist(), strict=True):
-            yield gain, 2 * int(number)
-        # One real multiplier at -1. By symmetry 1/G is real there; the sum is exact.
-        poles = np.exp(self._poles)
-        difference = self._ending - self._starting
-        if difference != 0.0:
-            gain = float(np.prod(-1.0 - poles).real) / (4.0 * difference)
-            if isfinite(gain):
-                yield gain * (-1.0) ** (self._whole + 1), -int(np.sign(imaginary[-1]))
-
-    def _angles(self) -> FloatArray:
-        """Return angles above 0 and below pi between which the phase of each factor changes little.
-
-        The phase of a factor l - e^s changes near the angle of e^s, fast if it is near the circle.
-        """
-        steps = 16 * (self._whole + 2)
-        parts: list[Any] = [np.arange(1, steps) * (pi / steps), self._near(0.0, self._period)]
-        for pole in self._poles:
-            parts.append(self._near(abs(float(np.angle(np.exp(1j * pole.imag)))), abs(pole.real)))
-        if self._ending > 0.0 and self._starting > 0.0:
-            parts.append(self._near(pi, abs(log(self._ending / self._starting))))
-        theta = np.sort(np.concatenate(parts))
-        return theta[(theta > 0.0) & (theta < pi)]
-
-    @staticmethod
-    def _near(angle: float, width: float) -> FloatArray:
-        distances: Any = np.geomspace(1e-3 * max(width, 1e-12), pi, 200)
-        return np.concatenate([angle - distances, angle + distances])
 
 
 def _exponential(matrix: FloatArray) -> FloatArray:
@@ -450,8 +359,3 @@ def _exponential(matrix: FloatArray) -> FloatArray:
 
 def _spectral_radius(matrices: FloatArray) -> Any:
     return np.abs(np.linalg.eigvals(matrices)).max(axis=-1)
-
-
-def _distance(interval: GainInterval) -> float:
-    """Return how far the interval is from zero."""
-    return max(interval.low, -interval.high, 0.0)

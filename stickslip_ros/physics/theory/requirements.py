@@ -73,6 +73,11 @@ def _asymmetry(drive: Drive) -> str | None:
     return f"the friction law {law.name} differs between forward and backward slip"
 
 
+def _actuator(drive: Drive) -> str | None:
+    states = ", ".join(drive.actuator.states)
+    return f"the actuator has states ({states})" if states else None
+
+
 AUTONOMOUS = Requirement("a constant belt speed and a constant normal force", _courses)
 """Belt speed and load are constant."""
 
@@ -81,3 +86,6 @@ STATIC = Requirement("a friction law without memory", _memory)
 
 SYMMETRIC = Requirement("friction that is the same in both directions", _asymmetry)
 """The coefficient is an odd function of the relative speed."""
+
+IMMEDIATE = Requirement("an actuator without states", _actuator)
+"""The actuator exerts a held force from its arrival on."""

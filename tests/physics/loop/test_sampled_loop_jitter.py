@@ -7,10 +7,11 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.loop.simulation import simulate_sampled
-from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.physics.drives import FEED_DRIVE, PAPER
 
@@ -200,7 +201,7 @@ def controlled(delay: float, jitter: float, seed: int = 0) -> Measures:
         force_jitter=jitter,
         force_jitter_seed=seed,
     )
-    law = Washout(WashoutParameters(20.0, -3000.0, 0.0, start_after=0.5))
+    law = Controller(Washout(20.0, -3000.0, 0.0, start_after=0.5))
     return simulate_sampled(loop, motion, law, 5.0, CycleMeter(20))
 
 

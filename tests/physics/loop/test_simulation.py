@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.loop.simulation import simulate_continuous, simulate_sampled
-from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
+from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.motion import Motion, RecordedMotion
@@ -17,11 +18,11 @@ from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
 
 SECOND = 10**9
 Simulate = Callable[..., tuple[Measures, Motion]]
-PAPER_GAINS = WashoutParameters(corner_frequency=2.0, linear_gain=-1.0, cubic_gain=-1.0)
+PAPER_GAINS = Washout(corner_frequency=2.0, linear_gain=-1.0, cubic_gain=-1.0)
 
 
 def sampled(
-    washout: WashoutParameters | None,
+    washout: Washout | None,
     duration: float,
     rate: float = 100.0,
     drive: Drive = PAPER,
@@ -29,12 +30,12 @@ def sampled(
 ) -> tuple[Measures, Motion]:
     motion = RecordedMotion(drive, position, 0.0)
     loop = SampledLoop(motion, rate, SECOND)
-    controller = Washout(washout) if washout is not None else None
+    controller = Controller(washout) if washout is not None else None
     return simulate_sampled(loop, motion, controller, duration, CycleMeter(20)), motion
 
 
 def continuous(
-    washout: WashoutParameters | None,
+    washout: Washout | None,
     duration: float,
     drive: Drive = PAPER,
     position: float = 0.0,
@@ -75,7 +76,7 @@ def test_the_critical_gain_of_the_continuous_loop(
     corner_frequency: float, linear_gain: float, rests: bool
 ) -> None:
     """By Routh and Hurwitz it is -0.935 at d = 2 and -0.148 at d = 0.2."""
-    washout = WashoutParameters(corner_frequency, linear_gain, cubic_gain=0.0)
+    washout = Washout(corner_frequency, linear_gain, cubic_gain=0.0)
     # Next to the equilibrium, so that it grows if it does.
     measures, motion = continuous(washout, 2000.0, position=0.2584 + 0.01)
     swing = abs(motion.position - 0.2584) + abs(motion.velocity)
@@ -124,7 +125,7 @@ def test_the_filter_runs_before_the_controller_comes_on() -> None:
 
 def test_si_units_give_the_paper_in_other_units() -> None:
     """The feed drive has scales of 100 rad/s, 0.1 m/s and 1000 N."""
-    washout = WashoutParameters(200.0, linear_gain=-1e4, cubic_gain=-1e6)
+    washout = Washout(200.0, linear_gain=-1e4, cubic_gain=-1e6)
     _, unit = continuous(PAPER_GAINS, 20.0)
     _, si = continuous(washout, 0.2, drive=FEED_DRIVE)
     assert si.position == pytest.approx(unit.position * 1e-3, rel=1e-9)
@@ -134,7 +135,7 @@ def test_si_units_give_the_paper_in_other_units() -> None:
 
 
 def test_the_feed_drive_comes_to_rest_once_its_controller_is_on() -> None:
-    washout = WashoutParameters(20.0, linear_gain=-3000.0, cubic_gain=0.0, start_after=5.0)
+    washout = Washout(20.0, linear_gain=-3000.0, cubic_gain=0.0, start_after=5.0)
     measures, _ = sampled(washout, 5.0, rate=1000.0, drive=FEED_DRIVE)
     assert measures.regime is Regime.STICK_SLIP
     measures, motion = sampled(washout, 10.0, rate=1000.0, drive=FEED_DRIVE)
@@ -167,7 +168,9 @@ def test_progress_rises_to_one(simulate: Simulate) -> None:
     motion = RecordedMotion(PAPER, 0.0, 0.0, control)
     if simulate is sampled:
         loop = SampledLoop(motion, 100.0, SECOND)
-        simulate_sampled(loop, motion, Washout(PAPER_GAINS), 300.0, CycleMeter(20), shares.append)
+        simulate_sampled(
+            loop, motion, Controller(PAPER_GAINS), 300.0, CycleMeter(20), shares.append
+        )
     else:
         simulate_continuous(motion, PAPER_GAINS, 300.0, CycleMeter(20), shares.append)
     assert len(shares) > 3

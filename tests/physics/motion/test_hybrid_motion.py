@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.constants import Scales, scaled
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.course import NO_COURSE, Course
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import DriveSystem
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import (
     Coulomb,
     Exponential,

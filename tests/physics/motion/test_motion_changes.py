@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Exponential
 from stickslip_ros.physics.motion.motion import Motion
 from tests.physics.drives import FEED_DRIVE, PAPER

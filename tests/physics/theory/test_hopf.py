@@ -9,8 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear, Stribeck
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.closed_forms import CubicLoop

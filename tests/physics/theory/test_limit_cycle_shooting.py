@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from stickslip_ros.physics.loop.simulation import simulate_continuous
-from stickslip_ros.physics.loop.washout import WashoutParameters
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Regime
+from stickslip_ros.physics.model.control import Washout, WashoutGains
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.physics.motion.variational import SensitiveMotion
@@ -229,7 +228,7 @@ def test_the_cycle_under_washout_control_is_what_a_long_run_leaves() -> None:
     assert cycle is not None
     assert cycle.stable
     motion = RecordedMotion(PAPER, 0.0, 0.0, control=GAINS)
-    run = simulate_continuous(motion, WashoutParameters(2.0, -0.5, 0.0), 1200.0, CycleMeter(10))
+    run = simulate_continuous(motion, Washout(2.0, -0.5, 0.0), 1200.0, CycleMeter(10))
     assert cycle.period == pytest.approx(run.period, rel=1e-10)
     assert cycle.measures.amplitude == pytest.approx(run.amplitude, rel=1e-10)
     assert cycle.measures.midpoint == pytest.approx(run.midpoint, rel=1e-10)

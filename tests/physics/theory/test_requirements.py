@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.critical_gains import critical_gains
@@ -20,7 +20,7 @@ from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from tests.physics.drives import PAPER
-from tests.physics.parts import Dahl, OneSided, Swing
+from tests.physics.parts import Dahl, Lag, OneSided, Swing
 
 GAINS = WashoutGains(2.0, -1.0, -1.0)
 
@@ -31,7 +31,10 @@ ONE_WAY = replace(PAPER, friction=OneSided())
 LOADED = replace(PAPER, load=SWING)
 CARRIED = replace(PAPER, belt=SWING, load=SWING)
 
+LAGGING = replace(PAPER, actuator=Lag())
+
 SENTENCES = {
+    "actuator": (LAGGING, "the actuator has states (force)"),
     "memory": (REMEMBERS, "the friction law dahl has a memory (z)"),
     "one way": (ONE_WAY, "the friction law one_sided differs between forward and backward slip"),
     "load": (LOADED, "the drive has a course of its load"),
@@ -63,6 +66,7 @@ REFUSED = [
     *((*each, lack) for each in WITHOUT_MEMORY for lack in ("memory", "load")),
     *((*each, lack) for each in SYMMETRIC for lack in ("memory", "one way", "load")),
     ("the closed form", CubicLoop.from_drive, "load"),
+    (*WITHOUT_MEMORY[-1], "actuator"),
 ]
 
 
@@ -92,3 +96,16 @@ def test_the_equilibrium_of_a_law_with_a_memory(gains: WashoutGains | None) -> N
 def test_what_covers_every_law_takes_them_all(theory: Theory) -> None:
     for drive in (PAPER, REMEMBERS, ONE_WAY):
         theory(drive)
+
+
+def test_an_actuator_has_no_part_in_theory_without_sampling() -> None:
+    for gains in (None, GAINS):
+        lagging, ideal = expand(LAGGING, gains), expand(PAPER, gains)
+        assert lagging is not None
+        assert ideal is not None
+        assert lagging.jacobian.tolist() == ideal.jacobian.tolist()
+        assert hopf_points(LAGGING, gains) == hopf_points(PAPER, gains)
+        assert shoot(LAGGING, -0.1, 6.4, gains=gains) == shoot(PAPER, -0.1, 6.4, gains=gains)
+        lagging, ideal = (limit_cycle_of_run(drive, 0.0, gains=gains) for drive in (LAGGING, PAPER))
+        assert lagging == ideal
+    assert limit_cycles(LAGGING) == limit_cycles(PAPER)

@@ -8,10 +8,11 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.loop.controller import Controller, answer
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
+from stickslip_ros.physics.model.control import ControlLaw, VelocityFeedback, Washout, WashoutGains
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.equations import WashoutGains
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
@@ -23,6 +24,7 @@ from stickslip_ros.physics.theory.linear_sampled_loop import (
 )
 from tests.examples import examples
 from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.physics.parts import Switching, TwoStates
 
 
 def loop_of(drive: Drive, rate: float, force_delay: float = 0.0) -> LinearSampledLoop:
@@ -32,24 +34,32 @@ def loop_of(drive: Drive, rate: float, force_delay: float = 0.0) -> LinearSample
 
 
 def simulated(
-    loop: LinearSampledLoop, gains: WashoutGains, samples: int, start: float = 1e-7
+    loop: LinearSampledLoop,
+    gains: WashoutGains | ControlLaw,
+    samples: int,
+    start: float = 1e-7,
+    rest: float | None = None,
+    state: tuple[float, ...] | None = None,
 ) -> np.ndarray:
-    """Dimensionless deviations (X, Y) at the samples of the loop that runs, from (start, 0)."""
+    """Dimensionless deviations (X, Y) at the samples of the loop that runs, from (start, 0).
+
+    `rest` is the equilibrium (m), and `state` that of the law at the first sample.
+    """
     drive, rate, force_delay = loop.drive, loop.rate, loop.force_delay
     expansion = expand(drive)
     assert expansion is not None
-    rest = expansion.equilibrium[0] * drive.length_scale
+    rest = expansion.equilibrium[0] * drive.length_scale if rest is None else rest
     motion = Motion(drive, rest + start * drive.length_scale, 0.0)
     running = SampledLoop(motion, rate, LOCKSTEP_START, force_delay=force_delay)
-    law = Washout(WashoutParameters(gains.corner_frequency, gains.linear, gains.cubic))
+    if isinstance(gains, WashoutGains):
+        gains = Washout(gains.corner_frequency, gains.linear, gains.cubic)
+    controller = Controller(gains, state=state)
     rows = []
     for _ in range(samples):
         sample = running.sample
         x, y = (sample.position - rest) / drive.length_scale, sample.velocity / drive.speed_scale
         rows.append((x, y))
-        force = law.answer(sample.stamp, sample.velocity)
-        assert force is not None
-        running.offer(sample.stamp, force)
+        answer(running, controller)
         running.advance()
     return np.array(rows)
 
@@ -230,11 +240,11 @@ def test_a_delay_of_whole_periods_hardly_differs_from_almost_as_much(
     gains = WashoutGains(corner_frequency, gain, 0.0)
     whole = round(periods)
     exact = loop_of(PAPER, rate, whole / rate)
-    assert exact.order == 3 + whole
+    assert exact.under_way == whole
     for further in (-1e-7, 1e-7):
         if whole + further > 0.0:
             near = loop_of(PAPER, rate, (whole + further) / rate)
-            assert near.order == 3 + whole + (further > 0.0)
+            assert near.under_way == whole + (further > 0.0)
             radius = exact.spectral_radius(gains)
             assert near.spectral_radius(gains) == pytest.approx(radius, abs=1e-3)
 
@@ -289,7 +299,7 @@ def test_a_map_has_the_decay_rate_of_each_pair() -> None:
 def test_a_coarser_loop_decays_nearly_alike(force_delay: float) -> None:
     loop = loop_of(PAPER, 100.0, force_delay)
     coarse = loop.coarsened()
-    assert coarse.order < 30 < loop.order
+    assert coarse.under_way < 27 < loop.under_way
     for linear in (-0.5, -0.2, 0.2):
         gains = WashoutGains(0.3, linear, 0.0)
         assert coarse.decay_rate(gains) == pytest.approx(loop.decay_rate(gains), abs=0.02)
@@ -311,3 +321,62 @@ def test_the_longest_delay_and_the_highest_rate() -> None:
     cubic = CubicLoop.from_drive(PAPER)
     assert cubic is not None
     assert critical == pytest.approx(cubic.critical_linear_gain(2.0), rel=1e-6)
+
+
+@pytest.mark.parametrize("force_delay", [0.0, 0.03, 0.1, 0.25])
+@pytest.mark.parametrize(
+    ("drive", "law"),
+    [
+        (PAPER, VelocityFeedback(velocity_gain=-0.4)),
+        (replace(PAPER, friction=Coulomb(0.4)), VelocityFeedback(-0.3, position_gain=0.2)),
+        (replace(PAPER, friction=Coulomb(0.4)), TwoStates()),
+        (FEED_DRIVE, VelocityFeedback(velocity_gain=-3000.0)),
+    ],
+    ids=["velocity", "position", "two states", "feed drive"],
+)
+def test_any_linear_law_in_the_loop_that_runs(
+    drive: Drive, law: ControlLaw, force_delay: float
+) -> None:
+    rate = 10.0 * drive.angular_frequency
+    loop = loop_of(drive, rate, force_delay / drive.angular_frequency)
+    matrix = loop.transition_matrix(law)
+    feedback = law.linear_feedback(1.0 / rate)
+    assert feedback is not None
+    states = len(feedback.output)
+    assert len(matrix) == 2 + states + loop.under_way
+    # The law holds its force at the equilibrium; before the first sample there is none.
+    settled = np.linalg.solve(np.eye(states) - feedback.state, feedback.input[:, 0])
+    stiffness = drive.stiffness - float(feedback.output @ settled + feedback.direct[0])
+    rest = drive.stiffness * drive.equilibrium_position / stiffness
+    held = (drive.stiffness - stiffness) * rest / drive.normal_force
+    found = simulated(loop, law, 200, 1e-7, rest, tuple((settled * rest).tolist()))
+    state = np.zeros(len(matrix))
+    state[0] = 1e-7
+    state[2 + states :] = -held
+    expected = []
+    for _ in found:
+        expected.append(state[:2])
+        state = matrix @ state
+    assert np.abs(expected).max() < 0.4  # the slide does not overtake the belt
+    assert found == pytest.approx(np.array(expected), abs=2e-6 * np.abs(expected).max())
+
+
+def test_velocity_feedback_that_is_sampled_fast_is_damping() -> None:
+    law = VelocityFeedback(velocity_gain=-0.2)
+    sampled, damped = loop_of(PAPER, 1e5), replace(PAPER, damping=PAPER.damping + 0.2)
+    expansion = expand(damped)
+    assert expansion is not None
+    decay_rate = -expansion.eigenvalues[0].real
+    assert sampled.decay_rate(law) == pytest.approx(decay_rate, rel=1e-4)
+    assert sampled.settling_time(law) == pytest.approx(log(100.0) / decay_rate, rel=1e-4)
+
+
+def test_a_law_and_its_gains_make_the_same_loop() -> None:
+    loop, gains = loop_of(PAPER, 10.0, 0.25), WashoutGains(0.5, -0.1, -1.0)
+    law = Washout(0.5, -0.1, -1.0)
+    assert np.array_equal(loop.transition_matrix(gains), loop.transition_matrix(law))
+
+
+def test_a_law_that_is_not_linear_is_refused_by_name() -> None:
+    with pytest.raises(InvalidInputError, match="the control law switching is not linear"):
+        loop_of(PAPER, 10.0).spectral_radius(Switching())

@@ -171,7 +171,10 @@ class ControlLaw(ABC):
     name: ClassVar[str]
     """Name in parameters, options and names of nodes."""
     follows_reference: ClassVar[bool] = False
-    """Whether the law uses a reference; then its controller has the parameters `reference.*`."""
+    """Whether the law uses a reference: its controller has the parameters `reference.*`.
+
+    A law that does not follow a reference receives none.
+    """
     state_units: ClassVar[Mapping[str, str | None]] = {}
     """Unit of each state, by name."""
 

@@ -287,7 +287,8 @@ class Washout(ControlLaw):
         """
         low_passed, held = state
         velocity = sample.velocity
-        low_passed -= expm1(-self.corner_frequency * elapsed) * (held - low_passed)
+        if elapsed > 0.0:
+            low_passed -= expm1(-self.corner_frequency * elapsed) * (held - low_passed)
         return self.gains.force(velocity - low_passed), (low_passed, velocity)
 
     def linear_feedback(self, period: float) -> LinearFeedback:

@@ -1,4 +1,4 @@
-"""The friction laws of other packages: found by entry point, or refused with the reason."""
+"""The laws of other packages: found by entry point, or refused with the reason."""
 
 import importlib
 import importlib.util
@@ -6,35 +6,55 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.control import CONTROL_LAWS
 from stickslip_ros.physics.model.friction import LAWS, Linear
 from stickslip_ros.scenarios import parameters
-from stickslip_ros.scenarios.friction_laws import REFUSED_LAWS, add_laws_of_other_packages
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.scenarios.foreign_laws import (
+    CONTROLLERS,
+    FRICTION_LAWS,
+    LawFamily,
+    add_laws_of_other_packages,
+)
 from stickslip_ros.scenarios.parameter_field import parameters_of
-from tests.scenarios.foreign_laws import FALLING, write_package
+from stickslip_ros.scenarios.parameters import ControllerParameters
+from tests.scenarios.foreign_laws import BRAKE, FALLING, write_package
 
 Install = Callable[..., None]
+
+OWN_ENTRY = {
+    FRICTION_LAWS.group: {"falling": "foreign:Falling"},
+    CONTROLLERS.group: {"brake": "foreign:Brake"},
+}
 
 
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
     """Write the module `foreign` and its entry points, and look for laws."""
-    laws, refused, modules = dict(LAWS), dict(REFUSED_LAWS), set(sys.modules)
+    families: tuple[LawFamily[Any], ...] = (FRICTION_LAWS, CONTROLLERS)
+    known_before: list[tuple[dict[str, Any], dict[str, Any]]] = [
+        (known, dict(known)) for each in families for known in (each.laws, each.refused)
+    ]
+    modules = set(sys.modules)
     monkeypatch.syspath_prepend(tmp_path)
 
-    def write_and_find(text: str = FALLING, **entry_points: str) -> None:
-        entries = entry_points or {"falling": "foreign:Falling"}
-        write_package(tmp_path, "foreign-laws", {"foreign": text}, entries)
+    def write_and_find(
+        text: str = FALLING, family: LawFamily[Any] = FRICTION_LAWS, **entry_points: str
+    ) -> None:
+        entries = entry_points or OWN_ENTRY[family.group]
+        write_package(tmp_path, "foreign-laws", {"foreign": text}, entries, family.group)
         importlib.invalidate_caches()
         add_laws_of_other_packages()
 
     yield write_and_find
-    for known, before in ((LAWS, laws), (REFUSED_LAWS, refused)):
+    for known, original in known_before:
         known.clear()
-        known.update(before)  # type: ignore[arg-type]
+        known.update(original)
     for name in set(sys.modules) - modules:
         del sys.modules[name]
 
@@ -54,9 +74,9 @@ def test_a_law_of_another_package_is_found(install: Install) -> None:
     install()
     assert LAWS["falling"].constants() == ("static", "fall")
     assert list(LAWS)[-1] == "falling"
-    assert REFUSED_LAWS == {}
+    assert FRICTION_LAWS.refused == {}
     add_laws_of_other_packages()  # the same law again is no other law
-    assert REFUSED_LAWS == {}
+    assert FRICTION_LAWS.refused == {}
 
 
 def test_its_constants_are_parameters(install: Install) -> None:
@@ -91,7 +111,7 @@ def test_a_constant_of_several_laws_names_them_all(install: Install) -> None:
         .replace(', "s/m", at_least=0.0)', ', "s/m")')
         .replace("self.fall", "self.viscous")
     )
-    assert REFUSED_LAWS == {}
+    assert FRICTION_LAWS.refused == {}
     known = {each.name: each for each in parameters_of(parameters_anew().PlantParameters)}
     assert known["friction.kinetic"].meaning == "Kinetic coefficient mu_k (exponential, falling)."
 
@@ -165,7 +185,7 @@ def test_a_law_that_does_not_fit_is_refused(
     install(FALLING.replace(old, new))
     assert laws == LAWS
     whole = f"foreign:Falling of package foreign-laws {reason}"
-    assert REFUSED_LAWS["falling"].startswith(whole)
+    assert FRICTION_LAWS.refused["falling"].startswith(whole)
     plant = parameters_anew().PlantParameters  # the others can be used
     assert plant().friction.law == "stribeck"
     with pytest.raises(InvalidInputError) as refused:
@@ -190,7 +210,7 @@ def test_an_entry_point_that_does_not_fit_is_refused(
     laws = dict(LAWS)
     install(**{name: place})
     assert laws == LAWS
-    assert f"{place} of package foreign-laws {reason}" in REFUSED_LAWS[name]
+    assert f"{place} of package foreign-laws {reason}" in FRICTION_LAWS.refused[name]
 
 
 def test_of_two_packages_with_one_name_the_first_by_place_has_it(
@@ -199,6 +219,62 @@ def test_of_two_packages_with_one_name_the_first_by_place_has_it(
     write_package(tmp_path, "other", {"elsewhere": FALLING}, {"falling": "elsewhere:Falling"})
     install()
     assert LAWS["falling"].__module__ == "elsewhere"
-    assert REFUSED_LAWS["falling"] == (
+    assert FRICTION_LAWS.refused["falling"] == (
         "foreign:Falling of package foreign-laws has the name of another law, elsewhere.Falling"
     )
+
+
+def test_the_control_law_of_another_package_has_a_node_with_parameters(install: Install) -> None:
+    install(BRAKE, CONTROLLERS)
+    assert CONTROLLERS.refused == {}
+    assert list(CONTROL_LAWS)[-1] == "brake"
+    model = parameters_anew().NODE_PARAMETERS["brake_controller"]
+    known = {parameter.name: parameter for parameter in parameters_of(model)}
+    assert list(known)[-3:] == ["strength", "force_limit", "start_after"]
+    strength = known["strength"]
+    assert (strength.unit, strength.default, strength.bounds) == ("N s/m", 1.0, "at least 0")
+    assert known["law"].choices == ("brake",)
+    parameters = model.validated({"strength": 3, "force_limit": 0.5}, "test")
+    assert parameters.node == "brake_controller"
+    brake: Any = CONTROL_LAWS["brake"]
+    assert parameters.as_law() == brake(strength=3.0, force_limit=0.5)
+    with pytest.raises(InvalidInputError, match=r"test: strength = 2000000.0 must not exceed 1e6"):
+        model.validated({"strength": 2e6}, "test")
+
+
+def test_control_laws_share_names_of_constants(install: Install) -> None:
+    install(BRAKE.replace("strength", "linear_gain").replace("N s/m", "kg/s"), CONTROLLERS)
+    assert CONTROLLERS.refused == {}
+
+
+STRENGTH = '    strength: Any = constant(1.0, "Force per velocity", "N s/m", at_least=0.0)'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ("(ControlLaw)", "(object)", "is no class derived from ControlLaw"),
+        ("def respond", "def reply", "does not define respond"),
+        ("constant(1.0", "constant(-1.0", "has the default -1.0 for its constant strength: must"),
+        *(
+            (
+                STRENGTH,
+                f'{STRENGTH}\n    {name}: Any = constant(1.0, "Gain.")',
+                f"has a constant {name}: the name cannot be that of a parameter",
+            )
+            for name in sorted({*dir(ControllerParameters), *ControllerParameters.model_fields})
+            if not name.startswith("_")
+        ),
+    ],
+)
+def test_a_control_law_that_does_not_fit_is_refused(
+    install: Install, old: str, new: str, reason: str
+) -> None:
+    assert old in BRAKE
+    install(BRAKE.replace(old, new), CONTROLLERS)
+    assert "brake" not in CONTROL_LAWS
+    whole = f"foreign:Brake of package foreign-laws {reason}"
+    assert CONTROLLERS.refused["brake"].startswith(whole)
+    with pytest.raises(InvalidInputError) as refused:
+        load_scenario("paper", controller="brake")
+    assert str(refused.value).startswith(f"control law brake is refused: {whole}")

@@ -8,15 +8,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from stickslip_ros.physics.loop.washout import Washout, WashoutParameters
+from stickslip_ros.physics.loop.controller import Controller
+from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.samples import Sample
 
 SECOND = 10**9
-UNIT_GAIN = WashoutParameters(corner_frequency=2.0, linear_gain=1.0, cubic_gain=0.0)
+UNIT_GAIN = Washout(corner_frequency=2.0, linear_gain=1.0, cubic_gain=0.0)
 """Its force is the filter's output."""
 
 measurements = st.lists(
     st.tuples(st.integers(1, 2 * SECOND), st.floats(-2.0, 2.0)), min_size=1, max_size=20
 )
+
+
+def at(stamp: int, velocity: float) -> Sample:
+    return Sample(stamp, 0.0, velocity, 0.0, 0.0, 0.0)
 
 
 def filtered(corner_frequency: float, steps: Sequence[tuple[int, float]]) -> list[float]:
@@ -39,67 +45,70 @@ def filtered(corner_frequency: float, steps: Sequence[tuple[int, float]]) -> lis
 def test_the_filter_is_exact_for_held_measurements(
     corner_frequency: float, steps: list[tuple[int, float]]
 ) -> None:
-    washout = Washout(replace(UNIT_GAIN, corner_frequency=corner_frequency))
+    washout = Controller(replace(UNIT_GAIN, corner_frequency=corner_frequency))
     stamp = 0
     answers = []
     for step, speed in steps:
         stamp += step
-        answers.append(washout.answer(stamp, speed))
+        answers.append(washout.answer(at(stamp, speed)))
     assert answers == pytest.approx(filtered(corner_frequency, steps), rel=1e-9, abs=1e-11)
 
 
 @given(st.integers(1, 10**18), st.floats(-2.0, 2.0))
 def test_the_first_output_is_zero(stamp: int, speed: float) -> None:
-    assert Washout(UNIT_GAIN).answer(stamp, speed) == 0.0
+    assert Controller(UNIT_GAIN).answer(at(stamp, speed)) == 0.0
 
 
 def test_the_force_is_linear_plus_cubic() -> None:
-    washout = Washout(WashoutParameters(2.0, linear_gain=-3.0, cubic_gain=-5.0))
-    washout.answer(SECOND, 0.0)
+    washout = Controller(Washout(2.0, linear_gain=-3.0, cubic_gain=-5.0))
+    washout.answer(at(SECOND, 0.0))
     # A step of 0.4, half a second later: the output is 0.4 at once.
-    assert washout.answer(SECOND * 3 // 2, 0.4) == pytest.approx(-3.0 * 0.4 - 5.0 * 0.4**3)
+    assert washout.answer(at(SECOND * 3 // 2, 0.4)) == pytest.approx(-3.0 * 0.4 - 5.0 * 0.4**3)
     # And has fallen by exp(-2 0.25) another quarter of a second later.
     output = 0.4 * exp(-0.5)
     force = -3.0 * output - 5.0 * output**3
-    assert washout.answer(SECOND * 7 // 4, 0.4) == pytest.approx(force, rel=1e-14)
+    assert washout.answer(at(SECOND * 7 // 4, 0.4)) == pytest.approx(force, rel=1e-14)
 
 
 def test_no_force_remains_at_a_constant_speed() -> None:
-    washout = Washout(UNIT_GAIN)
-    washout.answer(SECOND, 0.0)
-    forces = [washout.answer(SECOND + number * 10**8, 0.7) for number in range(1, 201)]
+    washout = Controller(UNIT_GAIN)
+    washout.answer(at(SECOND, 0.0))
+    forces = [washout.answer(at(SECOND + number * 10**8, 0.7)) for number in range(1, 201)]
     assert forces == pytest.approx([0.7 * exp(-0.2 * number) for number in range(200)], abs=1e-15)
     assert abs(forces[-1]) < 1e-15
 
 
 def test_changing_the_corner_frequency_does_not_jump() -> None:
-    washout = Washout(UNIT_GAIN)
-    washout.answer(SECOND, 0.0)
-    before = washout.answer(2 * SECOND, 0.7)
-    washout.parameters = replace(UNIT_GAIN, corner_frequency=50.0)
-    assert washout.answer(2 * SECOND + 1, 0.7) == pytest.approx(before, rel=1e-7)
+    washout = Controller(UNIT_GAIN)
+    washout.answer(at(SECOND, 0.0))
+    before = washout.answer(at(2 * SECOND, 0.7))
+    washout.law = replace(UNIT_GAIN, corner_frequency=50.0)
+    assert washout.answer(at(2 * SECOND + 1, 0.7)) == pytest.approx(before, rel=1e-7)
     # From then on it decays with the new one.
-    later = washout.answer(2 * SECOND + 1 + SECOND // 10, 0.7)
+    later = washout.answer(at(2 * SECOND + 1 + SECOND // 10, 0.7))
     assert later == pytest.approx(0.7 * exp(-50.0 * 0.1), rel=1e-6)
 
 
 @pytest.mark.parametrize("speed", [0.5, -0.5])
 def test_the_force_is_limited_either_way(speed: float) -> None:
-    washout = Washout(replace(UNIT_GAIN, force_limit=0.3))
-    washout.answer(SECOND, 0.0)
-    assert washout.answer(SECOND + 1, speed) == np.copysign(0.3, speed)
-    washout.parameters = replace(UNIT_GAIN, force_limit=inf)
-    assert washout.answer(SECOND + 2, speed) == pytest.approx(speed)
-    washout.parameters = replace(UNIT_GAIN, force_limit=0.0)
-    assert washout.answer(SECOND + 3, speed) == 0.0
+    washout = Controller(replace(UNIT_GAIN, force_limit=0.3))
+    washout.answer(at(SECOND, 0.0))
+    assert washout.answer(at(SECOND + 1, speed)) == np.copysign(0.3, speed)
+    washout.law = replace(UNIT_GAIN, force_limit=inf)
+    assert washout.answer(at(SECOND + 2, speed)) == pytest.approx(speed)
+    washout.law = replace(UNIT_GAIN, force_limit=0.0)
+    assert washout.answer(at(SECOND + 3, speed)) == 0.0
 
 
 def test_before_start_after_there_is_no_force_while_the_filter_runs() -> None:
-    waiting = Washout(replace(UNIT_GAIN, start_after=0.5))
-    acting = Washout(UNIT_GAIN)
+    waiting = Controller(replace(UNIT_GAIN, start_after=0.5))
+    acting = Controller(UNIT_GAIN)
     speeds = np.sin(np.arange(11.0))
     forces = [
-        (waiting.answer(SECOND + n * 10**8, speed), acting.answer(SECOND + n * 10**8, speed))
+        (
+            waiting.answer(at(SECOND + n * 10**8, speed)),
+            acting.answer(at(SECOND + n * 10**8, speed)),
+        )
         for n, speed in enumerate(speeds)
     ]
     assert [force for force, _ in forces[:5]] == [0.0] * 5
@@ -109,66 +118,66 @@ def test_before_start_after_there_is_no_force_while_the_filter_runs() -> None:
 
 @pytest.mark.parametrize("start_after", [0.1, 0.3, 0.7, 5.0, 1.1])
 def test_it_acts_on_the_sample_at_start_after(start_after: float) -> None:
-    washout = Washout(replace(UNIT_GAIN, start_after=start_after))
-    washout.answer(SECOND, 0.0)
+    washout = Controller(replace(UNIT_GAIN, start_after=start_after))
+    washout.answer(at(SECOND, 0.0))
     due = SECOND + round(start_after * SECOND)
-    assert washout.answer(due - 1, 0.1) == 0.0
-    assert washout.answer(due, 1.0) != 0.0
+    assert washout.answer(at(due - 1, 0.1)) == 0.0
+    assert washout.answer(at(due, 1.0)) != 0.0
 
 
 @given(measurements)
 def test_a_stamp_is_answered_once(steps: list[tuple[int, float]]) -> None:
-    once, again = Washout(UNIT_GAIN), Washout(UNIT_GAIN)
+    once, again = Controller(UNIT_GAIN), Controller(UNIT_GAIN)
     stamp = 0
     for step, speed in steps:
         stamp += step
-        assert once.answer(stamp, speed) == again.answer(stamp, speed)
-        assert again.answer(stamp, speed + 1.0) is None
+        assert once.answer(at(stamp, speed)) == again.answer(at(stamp, speed))
+        assert again.answer(at(stamp, speed + 1.0)) is None
 
 
 def test_it_restarts_where_time_goes_back_to_the_beginning() -> None:
-    washout = Washout(replace(UNIT_GAIN, start_after=0.5))
-    fresh = Washout(replace(UNIT_GAIN, start_after=0.5))
+    washout = Controller(replace(UNIT_GAIN, start_after=0.5))
+    fresh = Controller(replace(UNIT_GAIN, start_after=0.5))
     for stamp, speed in [(5 * SECOND, 0.1), (6 * SECOND, 0.9)]:
-        washout.answer(stamp, speed)
+        washout.answer(at(stamp, speed))
     for stamp, speed in [(2 * SECOND, 0.3), (2 * SECOND + 10**8, 0.5), (3 * SECOND, -0.4)]:
-        assert washout.answer(stamp, speed) == fresh.answer(stamp, speed)
+        assert washout.answer(at(stamp, speed)) == fresh.answer(at(stamp, speed))
 
 
 @given(measurements, st.integers(-5 * SECOND, 50 * SECOND), st.integers(0, 20))
 def test_one_measurement_that_is_not_later_leaves_the_filter_alone(
     steps: list[tuple[int, float]], older: int, place: int
 ) -> None:
-    undisturbed, disturbed = Washout(UNIT_GAIN), Washout(UNIT_GAIN)
+    undisturbed, disturbed = Controller(UNIT_GAIN), Controller(UNIT_GAIN)
     stamp = SECOND
     for number, (step, speed) in enumerate(steps):
         stamp += step
-        assert disturbed.answer(stamp, speed) == undisturbed.answer(stamp, speed)
+        assert disturbed.answer(at(stamp, speed)) == undisturbed.answer(at(stamp, speed))
         if number == place:
             first = stamp if number == 0 else SECOND + steps[0][0]
-            answer = disturbed.answer(min(older, stamp), 3.0)
+            answer = disturbed.answer(at(min(older, stamp), 3.0))
             assert answer == (0.0 if min(older, stamp) <= first and older < stamp else None)
 
 
 def test_measurements_that_come_twice_leave_the_filter_alone() -> None:
-    once, twice = Washout(UNIT_GAIN), Washout(UNIT_GAIN)
+    once, twice = Controller(UNIT_GAIN), Controller(UNIT_GAIN)
     speeds = np.sin(np.arange(20.0))
-    expected = [once.answer(SECOND + n, speed) for n, speed in enumerate(speeds)]
+    expected = [once.answer(at(SECOND + n, speed)) for n, speed in enumerate(speeds)]
     for n, speed in enumerate(speeds):
-        assert twice.answer(SECOND + n, speed) == expected[n]
+        assert twice.answer(at(SECOND + n, speed)) == expected[n]
         if n >= 2:
-            assert twice.answer(SECOND + n - 1, speeds[n - 1]) is None
-            assert twice.answer(SECOND + n, speed) is None
+            assert twice.answer(at(SECOND + n - 1, speeds[n - 1])) is None
+            assert twice.answer(at(SECOND + n, speed)) is None
 
 
 def test_it_follows_time_that_has_gone_back_into_the_run() -> None:
-    washout, fresh = Washout(UNIT_GAIN), Washout(UNIT_GAIN)
+    washout, fresh = Controller(UNIT_GAIN), Controller(UNIT_GAIN)
     for stamp, speed in [(SECOND, 0.1), (6 * SECOND, 0.9)]:
-        washout.answer(stamp, speed)
-    assert washout.answer(2 * SECOND, 0.3) is None
-    fresh.answer(2 * SECOND, 0.3)
+        washout.answer(at(stamp, speed))
+    assert washout.answer(at(2 * SECOND, 0.3)) is None
+    fresh.answer(at(2 * SECOND, 0.3))
     for stamp, speed in [(2 * SECOND + 10**8, 0.5), (3 * SECOND, -0.4), (9 * SECOND, 0.2)]:
-        assert washout.answer(stamp, speed) == fresh.answer(stamp, speed)
+        assert washout.answer(at(stamp, speed)) == fresh.answer(at(stamp, speed))
 
 
 @given(
@@ -180,7 +189,7 @@ def test_it_follows_time_that_has_gone_back_into_the_run() -> None:
 def test_no_stamp_and_no_speed_leaves_it_with_a_filter_that_is_not_finite(
     steps: list[tuple[int, float]], corner_frequency: float
 ) -> None:
-    washout = Washout(WashoutParameters(corner_frequency, -1.0, 0.0))
+    washout = Controller(Washout(corner_frequency, -1.0, 0.0))
     for stamp, speed in steps:
-        force = washout.answer(stamp, speed)
+        force = washout.answer(at(stamp, speed))
         assert force is None or isfinite(force)

@@ -1,0 +1,235 @@
+"""The controller node of any law, and references, on the real middleware."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import ClassVar
+
+import pytest
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState
+
+from stickslip_ros.bags.reader import Recording
+from stickslip_ros.messages.codec import pack_joint_state, pack_reference, unpack_wrench
+from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
+from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.base.ros_topics import qos_profile
+from stickslip_ros.nodes.controller import ControllerNode
+from stickslip_ros.nodes.plant import PlantNode
+from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
+from stickslip_ros.physics.model.constants import constant
+from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
+from stickslip_ros.samples import Reference, Sample
+from stickslip_ros.scenarios.parameters import (
+    CONTROLLER_PARAMETERS,
+    NODE_PARAMETERS,
+    controller_model,
+)
+from tests.nodes.graph import Graph
+
+SECOND = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class Servo(ControlLaw):
+    """A spring to the reference, and a damper."""
+
+    name: ClassVar[str] = "servo"
+    follows_reference: ClassVar[bool] = True
+    stiffness: float = constant(10.0, "Stiffness.", "N/m")
+    damping: float = constant(1.0, "Damping.", "N s/m")
+
+    def respond(
+        self, state: tuple[float, ...], elapsed: float, sample: Sample, reference: Reference
+    ) -> tuple[float, tuple[float, ...]]:
+        """Return the force."""
+        ahead = (reference.velocity or 0.0) - sample.velocity
+        return self.stiffness * (
+            (reference.position or 0.0) - sample.position
+        ) + self.damping * ahead, state
+
+
+@pytest.fixture
+def servo() -> Iterator[partial[ControllerNode]]:
+    """The node of a law that follows a reference."""
+    node = "servo_controller"
+    CONTROL_LAWS[Servo.name] = Servo
+    CONTROLLER_PARAMETERS[Servo.name] = NODE_PARAMETERS[node] = controller_model(Servo)
+    try:
+        yield partial(ControllerNode, Servo.name)
+    finally:
+        for known in (CONTROL_LAWS, CONTROLLER_PARAMETERS):
+            del known[Servo.name]
+        del NODE_PARAMETERS[node]
+
+
+class Loop:
+    """Sends joint states to a controller and hears its forces and its reference."""
+
+    def __init__(self, graph: Graph, node: partial[ControllerNode], **parameters: object) -> None:
+        self.graph = graph
+        self.forces = graph.listen(CONTROL_FORCE, raw=True)
+        self.references = graph.listen(REFERENCE, raw=True)
+        self.controller = graph.add(node, **parameters)
+        self.states, self.given = (
+            graph.observer.create_publisher(JointState, f"/test/{topic.name}", qos_profile(topic))
+            for topic in (JOINT_STATES, REFERENCE)
+        )
+        graph.wait_until(
+            lambda: self.controller.active and self.states.get_subscription_count() == 1,
+            "controller listens",
+        )
+
+    def force(self, stamp: int, position: float = 0.0, velocity: float = 0.0) -> float:
+        """Send a state and return the force of the answer."""
+        heard = len(self.forces)
+        self.states.publish(pack_joint_state(stamp, (position, 0.0), (velocity, 0.0), (0.0, 0.0)))
+        self.graph.wait_until(lambda: len(self.forces) > heard, f"answer to {stamp}")
+        answered, force = unpack_wrench(self.forces[-1])
+        assert answered == stamp
+        return force
+
+
+def test_a_law_has_a_node_of_its_name_and_its_constants_as_parameters(graph: Graph) -> None:
+    loop = Loop(graph, partial(ControllerNode, "velocity_feedback"), velocity_gain=-3.0)
+    assert loop.controller.get_fully_qualified_name() == "/test/velocity_feedback_controller"
+    assert loop.controller.get_parameter("law").value == "velocity_feedback"
+    assert loop.force(SECOND, position=5.0, velocity=0.5) == -1.5
+    (result,) = loop.controller.set_parameters([Parameter("position_gain", value=2)])
+    assert result.successful
+    assert loop.force(2 * SECOND, position=5.0, velocity=0.5) == 8.5
+    (result,) = loop.controller.set_parameters([Parameter("law", value="washout")])
+    assert not result.successful
+    assert "law = 'washout'" in result.reason
+
+
+def test_a_position_that_is_not_finite_is_dropped(graph: Graph) -> None:
+    loop = Loop(graph, partial(ControllerNode, "velocity_feedback"))
+    nowhere = pack_joint_state(SECOND, (float("inf"), 0.0), (0.0, 0.0), (0.0, 0.0))
+    loop.states.publish(nowhere)
+    graph.wait_until(lambda: "position inf" in loop.controller.diagnose()[1], "it is dropped")
+    assert loop.force(2 * SECOND, velocity=1.0) == -1.0
+
+
+def test_a_reference_from_a_topic_holds_until_the_next(
+    graph: Graph, servo: partial[ControllerNode]
+) -> None:
+    loop = Loop(graph, servo, **{"reference.kind": "topic"})
+    graph.wait_until(lambda: loop.given.get_subscription_count() == 2, "it listens")
+    assert loop.force(SECOND, position=0.1) == -1.0
+    for number, (given, force) in enumerate(
+        [(Reference(0.3), 2.0), (Reference(0.3, 5.0), 7.0), (Reference(None, 5.0), 4.0)]
+    ):
+        loop.references.clear()
+        loop.given.publish(pack_reference(0, given))
+        graph.wait_until(lambda: len(loop.references) == 1, "the reference arrives")
+        stamp = (2 + number) * SECOND
+        graph.wait_until(
+            lambda given=given: loop.controller._given == given, "the controller has it"
+        )
+        assert loop.force(stamp, position=0.1) == pytest.approx(force)
+    loop.given.publish(pack_reference(0, Reference(float("inf"))))
+    graph.wait_until(lambda: "position inf" in loop.controller.diagnose()[1], "it is dropped")
+    assert loop.force(9 * SECOND, position=0.1) == pytest.approx(4.0)
+
+
+def test_a_course_of_its_own_is_published_with_each_answer(
+    graph: Graph, servo: partial[ControllerNode]
+) -> None:
+    course = {"kind": "ramp", "amplitude": 0.4, "duration": 4.0, "start": 1.0}
+    loop = Loop(graph, servo, **{f"reference.{name}": value for name, value in course.items()})
+    forces = [loop.force((1 + n) * SECOND) for n in range(3)]
+    assert forces == pytest.approx([0.0, 0.1, 1.1])
+    graph.wait_until(lambda: len(loop.references) == 3, "references are heard")
+    expected = ReferenceCourse(ReferenceKind.RAMP, 0.4, 1.0, 4.0)
+    for number, data in enumerate(loop.references):
+        assert data == pack_reference((1 + number) * SECOND, expected(number))
+
+
+def test_the_analyzer_records_references_and_the_parameters_of_the_controller(
+    graph: Graph, servo: partial[ControllerNode], tmp_path: Path
+) -> None:
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    course = {"reference.kind": "sine", "reference.amplitude": 0.2, "reference.frequency": 2.0}
+    graph.add(servo, wait_for=["analyzer"], stiffness=7.0, **course)
+    plant = graph.add(PlantNode, wait_for=["analyzer", "servo_controller"], duration=2.0)
+    graph.wait_until(lambda: plant.active, "plant active")
+    graph.wait_until(lambda: not plant.active, "plant pauses")
+    graph.wait_until(
+        lambda: not any(not call.pursue() for call in analyzer._parameter_calls.values()),
+        "parameters are known",
+    )
+    graph.deactivate("analyzer")
+    with Recording(tmp_path / "bag") as recording:
+        states, forces, references = (
+            recording.joint_states,
+            recording.control_forces,
+            recording.references,
+        )
+        kept = recording.metadata("stickslip_ros/servo_controller")
+    assert json.loads(kept["stiffness"]) == 7.0
+    assert json.loads(kept["law"]) == "servo"
+    answered = states.stamp[: len(forces)]
+    assert references.stamp.tolist() == answered.tolist() == forces.stamp.tolist()
+    law, motion = Servo(stiffness=7.0), ReferenceCourse(ReferenceKind.SINE, 0.2, frequency=2.0)
+    for n in (0, 1, 57, len(forces) - 1):
+        wanted = motion((int(states.stamp[n]) - SECOND) * 1e-9)
+        assert (references.position[n], references.velocity[n]) == wanted[:2]
+        sample = Sample(0, states.position[n], states.velocity[n], 0.0, 0.0, 0.0)
+        assert forces.force[n] == law.respond((), 0.0, sample, wanted)[0]
+
+
+@pytest.mark.parametrize("stamp", [0, 1_700_000_000 * SECOND, 5 * SECOND])
+def test_a_reference_of_any_clock_is_recorded_within_the_run(
+    graph: Graph, tmp_path: Path, stamp: int
+) -> None:
+    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+    publishers = [
+        graph.observer.create_publisher(JointState, f"/test/{topic.name}", qos_profile(topic))
+        for topic in (JOINT_STATES, REFERENCE)
+    ]
+    graph.wait_until(lambda: analyzer.active, "analyzer active")
+    graph.wait_until(
+        lambda: all(each.get_subscription_count() == 1 for each in publishers), "it listens"
+    )
+    states, references = publishers
+    states.publish(pack_joint_state(4 * SECOND, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)))
+    graph.wait_until(lambda: analyzer.diagnose()[2]["samples"] == 1, "the sample is recorded")
+    references.publish(pack_reference(stamp, Reference(0.5, -1.0)))
+    graph.wait_until(lambda: "reference" in analyzer._published, "the reference is recorded")
+    graph.run_for(0.2)
+    graph.deactivate("analyzer")
+    with Recording(tmp_path / "bag") as recording:
+        ((_, logged, _),) = recording.messages("/test/reference")
+        assert recording.references.position.tolist() == [0.5]
+        assert recording.references.velocity.tolist() == [-1.0]
+    assert logged == (stamp if stamp == 5 * SECOND else 4 * SECOND)
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    ("parameters", "reason"),
+    [
+        (["law:=washuot"], "unknown control law washuot; did you mean washout?"),
+        (
+            ["law:=velocity_feedback", "corner_frequency:=3.0"],
+            "velocity_feedback_controller: unknown parameter corner_frequency",
+        ),
+        (["law:=velocity_feedback", "velocity_gain:=a"], "velocity_gain = 'a' is refused"),
+    ],
+)
+def test_a_law_or_parameter_that_does_not_exist_is_refused(
+    parameters: list[str], reason: str, process_environment: dict[str, str]
+) -> None:
+    given = [word for parameter in parameters for word in ("-p", parameter)]
+    command = [sys.executable, "-m", "stickslip_ros.nodes.controller", "--ros-args", *given]
+    done = subprocess.run(
+        command, env=process_environment, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 2
+    assert reason in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,211 @@
+"""Properties of every control law that ships."""
+
+import pickle
+from dataclasses import replace
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.loop.controller import Controller
+from stickslip_ros.physics.loop.sampled_loop import SampledLoop
+from stickslip_ros.physics.loop.simulation import simulate_continuous, simulate_sampled
+from stickslip_ros.physics.measures import CycleMeter
+from stickslip_ros.physics.model.constants import constants_of
+from stickslip_ros.physics.model.control import (
+    CONTROL_LAWS,
+    NO_REFERENCE,
+    ControlLaw,
+    VelocityFeedback,
+    Washout,
+    WashoutGains,
+)
+from stickslip_ros.physics.motion import Motion, RecordedMotion
+from stickslip_ros.samples import Sample
+from tests.physics.drives import FEED_DRIVE, PAPER
+
+LAWS: list[ControlLaw] = [Washout(20.0, -3000.0, -1e4), VelocityFeedback(-500.0, 2e4)]
+laws = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
+REST = (2.584e-4, 0.0)
+
+
+def at(position: float, velocity: float, stamp: int = 0) -> Sample:
+    return Sample(stamp, position, velocity, 0.0, 0.0, 0.0)
+
+
+def test_all_laws_are_tested() -> None:
+    assert [law.name for law in LAWS] == list(CONTROL_LAWS)
+
+
+@laws
+def test_its_constants_are_described_and_the_common_ones_come_last(law: ControlLaw) -> None:
+    names = law.constants()
+    assert names[-2:] == ["force_limit", "start_after"]
+    for name in names:
+        described = constants_of(type(law))[name]
+        assert described.meaning.endswith(".")
+        assert isinstance(getattr(law, name), float)
+    assert (law.force_limit, law.start_after) == (inf, 0.0)
+
+
+@laws
+def test_it_answers_with_finite_numbers_and_keeps_the_size_of_its_state(law: ControlLaw) -> None:
+    state = law.initial_state(at(*REST), NO_REFERENCE)
+    for elapsed, position, velocity in ((0.0, *REST), (1e-3, 0.1, -2.0), (1e9, -5.0, 3.0)):
+        force, following = law.respond(state, elapsed, at(position, velocity), NO_REFERENCE)
+        assert isfinite(force)
+        assert len(following) == len(state) == len(law.state_units or state)
+        assert all(map(isfinite, following))
+        state = following
+
+
+@laws
+@given(st.floats(1e-5, 0.5))
+def test_its_linear_form_is_that_of_its_answers(law: ControlLaw, period: float) -> None:
+    """From sample to sample, forces and states are those of finite differences."""
+    linear = law.linear_feedback(period)
+    assert linear is not None
+    order = len(linear.state)
+    assert linear.state.shape == (order, order)
+    assert linear.input.shape == (order, 2)
+    assert (linear.output.shape, linear.direct.shape) == ((order,), (2,))
+    rng = np.random.default_rng(1)
+    moves: FloatArray = rng.normal(size=(6, 2)) * [1e-4, 0.01]
+
+    def forces(size: float) -> FloatArray:
+        state = law.initial_state(at(*REST), NO_REFERENCE)
+        found: list[float] = []
+        for number, (x, y) in enumerate(size * moves):
+            elapsed = period if number > 0 else 0.0
+            sample = at(REST[0] + x, REST[1] + y)
+            force, state = law.respond(state, elapsed, sample, NO_REFERENCE)
+            found.append(force)
+        return np.array(found)
+
+    size = 1e-4
+    differences = (forces(size) - forces(-size)) / (2.0 * size)
+    z = np.zeros(order)
+    expected: list[float] = []
+    for move in moves:
+        expected.append(float(linear.output @ z + linear.direct @ move))
+        z = linear.state @ z + linear.input @ move
+    np.testing.assert_allclose(differences, expected, rtol=1e-6, atol=1e-6)
+
+
+@laws
+@pytest.mark.parametrize("drive", [PAPER, FEED_DRIVE], ids=["paper", "feed_drive"])
+def test_its_equations_are_the_same_in_other_units(law: ControlLaw, drive: Any) -> None:
+    control = law.continuous
+    assert control is not None
+    scaled = control.scaled(drive)
+    x, y = 0.3 * drive.length_scale, -0.7 * drive.speed_scale
+    own = [0.2 * drive.length_scale] * len(control.states)
+    unit = [0.2] * len(control.states)
+    force = control.control_force(x, y, own) / drive.normal_force
+    assert scaled.control_force(0.3, -0.7, unit) == pytest.approx(force, rel=1e-12)
+    rates = [rate / drive.speed_scale for rate in control.state_rates(x, y, own)]
+    assert list(scaled.state_rates(0.3, -0.7, unit)) == pytest.approx(rates, rel=1e-12)
+    rest = [each / drive.length_scale for each in control.rest(x, y)]
+    assert list(scaled.rest(0.3, -0.7)) == pytest.approx(rest, rel=1e-12)
+
+
+@laws
+def test_at_rest_its_states_stay(law: ControlLaw) -> None:
+    control = law.continuous
+    assert control is not None
+    rest = control.rest(*REST)
+    assert list(control.state_rates(*REST, rest)) == [0.0] * len(control.states)
+
+
+@laws
+def test_silenced_it_has_the_same_states_and_no_force(law: ControlLaw) -> None:
+    control = law.continuous
+    assert control is not None
+    silent = control.silenced()
+    own = [0.1] * len(control.states)
+    assert silent.control_force(0.3, 0.2, own) == 0.0
+    assert list(silent.state_rates(0.3, 0.2, own)) == list(control.state_rates(0.3, 0.2, own))
+
+
+@laws
+def test_its_bound_is_no_less_than_the_energy_that_it_gives(law: ControlLaw) -> None:
+    """For a slide that swings about the equilibrium."""
+    control = law.continuous
+    assert control is not None
+    phase = np.linspace(0.0, 2.0 * np.pi, 4001)[:-1]
+    omega = 90.0
+    own: FloatArray = np.zeros(len(control.states))
+    for size in (0.01, 0.1):
+        speed, position = size * np.cos(phase), size / omega * np.sin(phase)
+        states: list[FloatArray] = []
+        if own.size:  # w' = y - d w, periodic
+            d = law.corner_frequency  # type: ignore[attr-defined]
+            response = size / (d + 1j * omega)
+            states = [np.real(response * np.exp(1j * phase))]
+        given_energy = np.mean(control.control_force(position, speed, states) * speed)
+        allowed = np.mean(control.bound(speed) * speed)
+        assert given_energy <= allowed + 1e-12 * abs(allowed)
+
+
+@laws
+def test_the_faster_it_is_sampled_the_nearer_it_is_to_its_equations(law: ControlLaw) -> None:
+    def run(rate: float | None) -> Motion:
+        control = law.continuous if rate is None else None
+        motion = RecordedMotion(FEED_DRIVE, 0.0, 0.0, control)
+        if rate is None:
+            simulate_continuous(motion, law, 0.2, CycleMeter(20))
+        else:
+            loop = SampledLoop(motion, rate, 10**9)
+            simulate_sampled(loop, motion, Controller(law), 0.2, CycleMeter(20))
+        return motion
+
+    exact = run(None)
+    errors = [
+        abs(motion.position - exact.position) * 100.0 + abs(motion.velocity - exact.velocity)
+        for motion in map(run, (5e3, 2e4))
+    ]
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+
+
+@laws
+def test_its_state_goes_from_the_motion_to_the_controller_and_back(law: ControlLaw) -> None:
+    """The state of the equations, in the units of the sampled law."""
+    motion = Motion(FEED_DRIVE, 1e-4, -0.05, law.continuous)
+    motion.advance(0.013)
+    state = motion.control_state
+    force = motion.applied_force
+    controller = Controller(law, state=(*state, 0.0)[: len(law.state_units)] if state else None)
+    sample = at(motion.position, motion.velocity)
+    assert controller.answer(sample) == pytest.approx(force, rel=1e-9)
+    motion.advance(0.01)
+    motion.control_state = state
+    assert motion.control_state == pytest.approx(state, rel=1e-15)
+
+
+@laws
+def test_a_change_of_drive_or_constants_keeps_its_state(law: ControlLaw) -> None:
+    motion = Motion(FEED_DRIVE, 1e-4, -0.05, law.continuous)
+    motion.advance(0.013)
+    state, place = motion.control_state, (motion.position, motion.velocity)
+    for drive in (replace(FEED_DRIVE, mass=30.0), replace(FEED_DRIVE, normal_force=400.0)):
+        motion.drive = drive
+        assert motion.control_state == pytest.approx(state, rel=1e-14)
+    control = law.continuous
+    assert control is not None
+    motion.control = control.silenced()
+    assert motion.control_state == pytest.approx(state, rel=1e-14)
+    assert (motion.position, motion.velocity) == pytest.approx(place, rel=1e-14)
+    assert motion.applied_force == 0.0
+    motion.control = WashoutGains(50.0, -1.0, 0.0) if motion.control_state else control
+    assert motion.control_state == pytest.approx(state, rel=1e-14)
+
+
+@laws
+def test_it_goes_to_another_process(law: ControlLaw) -> None:
+    law = replace(law, force_limit=10.0)
+    assert pickle.loads(pickle.dumps(law)) == law
+    assert law.refusal() is None

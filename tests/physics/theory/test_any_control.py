@@ -1,0 +1,161 @@
+"""Theory under continuous control of any kind: feedback of the state, and laws with states."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.model.control import StateFeedback
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.motion.variational import SensitiveMotion
+from stickslip_ros.physics.theory.critical_gains import critical_gains
+from stickslip_ros.physics.theory.cycle_bounds import least_cycle
+from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
+from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
+from stickslip_ros.physics.theory.limit_cycles import (
+    LimitCycle,
+    limit_cycle_of_run,
+    limit_cycles,
+    shoot,
+)
+from stickslip_ros.physics.theory.linear import expand, jacobians
+from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.physics.parts import TwoLags
+
+GAINS = [
+    (PAPER, StateFeedback(0.0, -0.1)),
+    (PAPER, StateFeedback(0.0, -0.5)),
+    (PAPER, StateFeedback(0.0, 0.3)),
+    (PAPER, StateFeedback(-0.7, -0.1)),
+    (PAPER, StateFeedback(0.97, 0.002)),
+    (FEED_DRIVE, StateFeedback(-3e5, -1000.0)),
+    (replace(FEED_DRIVE, belt_speed=-0.02), StateFeedback(4e5, -500.0)),
+]
+feedback = pytest.mark.parametrize(("drive", "gains"), GAINS)
+
+
+def altered(drive: Drive, gains: StateFeedback) -> Drive:
+    """The drive whose spring and damper do what the feedback does."""
+    return replace(
+        drive,
+        stiffness=drive.stiffness - gains.position_gain,
+        damping=drive.damping - gains.velocity_gain,
+    )
+
+
+def in_si(drive: Drive, points: list[HopfPoint]) -> np.ndarray:
+    return np.array(
+        [
+            (
+                point.belt_speed,
+                point.angular_frequency,
+                point.crossing_speed,
+                point.first_lyapunov_coefficient * drive.angular_frequency / drive.speed_scale**2,
+            )
+            for point in points
+        ]
+    )
+
+
+@feedback
+def test_feedback_of_the_state_is_a_spring_and_a_damper(drive: Drive, gains: StateFeedback) -> None:
+    other = altered(drive, gains)
+    found, expected = expand(drive, gains), expand(other)
+    assert found is not None
+    assert expected is not None
+    position = found.equilibrium[0] * drive.length_scale
+    assert position == pytest.approx(other.equilibrium_position, rel=1e-13)
+    assert found.eigenvalues * drive.angular_frequency == pytest.approx(
+        expected.eigenvalues * other.angular_frequency, rel=1e-10
+    )
+    assert found.stable == expected.stable
+    speeds = np.array([0.1, 0.4, 0.7]) * drive.speed_scale
+    mine, theirs = (
+        np.linalg.eigvals(jacobians(each, control, speeds / each.speed_scale)).sum(axis=-1).real
+        * each.angular_frequency
+        for each, control in ((drive, gains), (other, None))
+    )
+    assert mine == pytest.approx(theirs, rel=1e-10)
+
+
+@feedback
+def test_its_hopf_points_are_those_of_that_drive(drive: Drive, gains: StateFeedback) -> None:
+    other = altered(drive, gains)
+    found, expected = in_si(drive, hopf_points(drive, gains)), in_si(other, hopf_points(other))
+    assert found == pytest.approx(expected, rel=1e-8)
+
+
+@feedback
+def test_its_limit_cycle_is_that_of_that_drive(drive: Drive, gains: StateFeedback) -> None:
+    other = altered(drive, gains)
+    found = limit_cycle_of_run(drive, 0.0, gains=gains)
+    expected = next((cycle for cycle in limit_cycles(other) if cycle.stable), None)
+    assert (found is None) == (expected is None)
+    if found is None or expected is None:
+        return
+    assert found.control_state == ()
+    assert found.filter_state is None
+    assert found.period == pytest.approx(expected.period, rel=1e-9)
+    assert found.position == pytest.approx(expected.position, rel=1e-8)
+    assert found.measures.amplitude == pytest.approx(expected.measures.amplitude, rel=1e-9)
+    assert found.measures.regime is expected.measures.regime
+    assert found.multipliers == pytest.approx(expected.multipliers, abs=1e-8)
+
+
+def test_of_all_these_loops_some_vibrate_and_some_do_not() -> None:
+    vibrating = [limit_cycle_of_run(drive, 0.0, gains=gains) for drive, gains in GAINS]
+    regimes = {cycle.measures.regime for cycle in vibrating if cycle is not None}
+    assert Regime.STICK_SLIP in regimes
+    assert None in vibrating
+
+
+def test_enough_velocity_feedback_leaves_no_cycle() -> None:
+    assert least_cycle(PAPER, StateFeedback(0.0, -0.1)) == least_cycle(
+        altered(PAPER, StateFeedback(0.0, -0.1))
+    )
+    assert least_cycle(PAPER, StateFeedback(0.0, -3.0)) is None
+
+
+def test_the_theory_of_gains_is_of_no_other_control() -> None:
+    assert critical_gains(PAPER, StateFeedback(0.0, -0.1)) is None
+    assert limit_cycle_from_hopf(PAPER, StateFeedback(0.0, -0.1)) is None
+
+
+LAGS = TwoLags(1.5, -0.1, -0.05)
+
+
+def cycle_with_lags() -> LimitCycle:
+    cycle = limit_cycle_of_run(PAPER, 0.0, gains=LAGS)
+    assert cycle is not None
+    return cycle
+
+
+def test_a_cycle_with_two_states_closes() -> None:
+    cycle = cycle_with_lags()
+    assert len(cycle.control_state) == 2
+    assert cycle.filter_state is None
+    assert len(cycle.multipliers) == 3
+    motion = SensitiveMotion(PAPER, LAGS)
+    start = motion.state_at(cycle.position, cycle.control_state)
+    assert start[2:].tolist() == list(cycle.control_state)
+    motion.start(start)
+    motion.advance(cycle.period)
+    assert motion.state == pytest.approx(start, abs=1e-11)
+
+
+def test_a_guess_of_two_states_leads_to_it() -> None:
+    cycle = cycle_with_lags()
+    guess = [1.02 * state for state in cycle.control_state]
+    found = shoot(PAPER, 1.02 * cycle.position, cycle.period, gains=LAGS, filter_state=guess)
+    assert found is not None
+    assert found.period == pytest.approx(cycle.period, rel=1e-10)
+    assert found.control_state == pytest.approx(cycle.control_state, rel=1e-9)
+
+
+def test_fast_lags_are_velocity_feedback() -> None:
+    fast, plain = TwoLags(1e4, -0.04, -0.06), StateFeedback(0.0, -0.1)
+    found, expected = expand(PAPER, fast), expand(PAPER, plain)
+    assert found is not None
+    assert expected is not None
+    assert found.eigenvalues[:2] == pytest.approx(expected.eigenvalues, abs=1e-4)
