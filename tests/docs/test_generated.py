@@ -66,6 +66,7 @@ def documented_keys() -> dict[str, set[str]]:
     rows = page.split("| node | key | |")[1].split("\n\n")[0].splitlines()[2:]
     for row in rows:
         nodes, keys, *_ = (cell.strip() for cell in row.strip("|").split(" | "))
+        nodes = nodes.replace("NAME_controller", "washout_controller")
         for node in found if nodes == "all" else nodes.split(", "):
             found[node] |= set(re.findall(r"`(.*?)`", keys))
     return found
