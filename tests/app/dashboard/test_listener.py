@@ -72,8 +72,9 @@ def run_loop(graph: Graph, observer: ListenerNode, **plant: object) -> None:
     graph.add(PlantNode, **{"pace": "realtime", "belt_speed": 0.2, **plant})
     graph.wait_until(
         lambda: (
-            all(health.state == "active" for health in observer.health.values())
-            and all(observer.parameters.values())
+            len(observer.health) == 3
+            and all(health.state == "active" for health in observer.health.values())
+            and all(observer.parameters[node] for node in observer.health)
         ),
         "the observer knows all nodes",
     )
