@@ -1,5 +1,7 @@
 """The ROS node of the dashboard: data received from a loop, and requests to it."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -15,6 +17,7 @@ from stickslip_ros.messages.topics import (
     STICK_FRACTION,
 )
 from stickslip_ros.nodes.analyzer import AnalyzerNode
+from stickslip_ros.nodes.controller import ControllerNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.samples import ForceColumns, SampleColumns
@@ -69,8 +72,9 @@ def run_loop(graph: Graph, observer: ListenerNode, **plant: object) -> None:
     graph.add(PlantNode, **{"pace": "realtime", "belt_speed": 0.2, **plant})
     graph.wait_until(
         lambda: (
-            all(health.state == "active" for health in observer.health.values())
-            and all(observer.parameters.values())
+            len(observer.health) == 3
+            and all(health.state == "active" for health in observer.health.values())
+            and all(observer.parameters[node] for node in observer.health)
         ),
         "the observer knows all nodes",
     )
@@ -122,6 +126,17 @@ def test_the_controller_is_switched_off_and_on(graph: Graph, observer: ListenerN
     assert [what for _, what in observer.events if "inactive" in what] == [
         "washout_controller inactive"
     ]
+
+
+def test_the_controller_is_the_one_that_is_heard(graph: Graph, observer: ListenerNode) -> None:
+    assert observer.controller == "washout_controller"
+    assert set(observer.health) == {"analyzer", "plant"}
+    node = graph.add(partial(ControllerNode, "velocity_feedback"), velocity_gain=-0.25)
+    graph.wait_until(lambda: observer.law == "velocity_feedback", "the controller")
+    assert observer.controller == node.get_name() == "velocity_feedback_controller"
+    graph.wait_until(lambda: observer.parameters[observer.controller], "its parameters")
+    assert observer.parameters[observer.controller]["velocity_gain"] == -0.25
+    assert set(observer.health) == {"analyzer", "plant", "velocity_feedback_controller"}
 
 
 def test_reset_puts_the_motion_back(graph: Graph, observer: ListenerNode, shown: Shown) -> None:
