@@ -21,9 +21,7 @@ PUBLISHED = (
     "docs/**/*.png",
     "docs/**/*.svg",
     "docs/site.css",
-    "examples/**/*.md",
     "examples/**/*.py",
-    "examples/**/*.toml",
     "examples/**/*.ipynb",
     "examples/**/*.png",
 )

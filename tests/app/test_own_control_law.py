@@ -50,7 +50,7 @@ def with_package(process_environment: dict[str, str], tmp_path: Path) -> Run:
 def test_it_suppresses_the_vibration_in_simulate(with_package: Run) -> None:
     arguments = ("simulate", "feed_drive", "--controller", "relay_brake", "--duration", "5")
     braked = with_package(*arguments, "--json")
-    assert (braked.returncode, braked.stderr) == (0, "")
+    assert braked.returncode == 0, braked.stderr
     assert json.loads(braked.stdout)["regime"] == "equilibrium"
     off = "relay_brake_controller.braking_force=0.0"
     free = json.loads(with_package(*arguments, "-p", off, "--json").stdout)
@@ -73,5 +73,5 @@ def test_continuous_control_is_refused_by_name(with_package: Run) -> None:
         "simulate", "feed_drive", "--controller", "relay_brake", "--continuous-control"
     )
     assert done.returncode == 2
-    assert "relay_brake" in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+    refusal = done.stderr.splitlines()[-1]
+    assert "--continuous-control: the control law relay_brake is defined for samples" in refusal
