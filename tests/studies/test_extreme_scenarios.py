@@ -39,8 +39,8 @@ def simulated(plant: dict[str, Any], controller: dict[str, Any], continuous: boo
         scenario: Scenario = replace(
             PAPER,
             plant=type(PAPER.plant).validated(PAPER.plant.flat() | plant, "plant"),
-            washout_controller=type(PAPER.washout_controller).validated(
-                PAPER.washout_controller.flat() | controller, "controller"
+            controller=type(PAPER.controller).validated(
+                PAPER.controller.flat() | controller, "controller"
             ),
         )
         duration = min(
@@ -55,7 +55,7 @@ def simulated(plant: dict[str, Any], controller: dict[str, Any], continuous: boo
 
 arguments = {
     "plant": extremes("plant"),
-    "controller": extremes("washout_controller"),
+    "controller": extremes(PAPER.controller.node),
     "continuous": st.booleans(),
 }
 

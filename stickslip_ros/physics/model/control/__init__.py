@@ -8,7 +8,7 @@ from stickslip_ros.samples import NO_REFERENCE, Reference
 CONTROL_LAWS: dict[str, type[ControlLaw]] = {law.name: law for law in (Washout, VelocityFeedback)}
 """Every control law by its name; the first is the default.
 
-`stickslip_ros.scenarios.control_laws` adds those of other packages, found by their entry points.
+`stickslip_ros.scenarios.foreign_laws` adds those of other packages, found by their entry points.
 """
 
 __all__ = [
