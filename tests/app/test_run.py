@@ -98,7 +98,7 @@ def test_a_node_that_dies_is_named_and_the_bag_closed(
     process = start_stickslip("run", "feed_drive", "--bag", "bag")
     wait_for_samples(process, tmp_path / "bag")
     for child in children(process.pid):
-        if b"stickslip_ros.nodes.washout_controller" in command(child):
+        if b"stickslip_ros.nodes.controller" in command(child):
             os.kill(child, signal.SIGKILL)
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 1

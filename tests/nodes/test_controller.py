@@ -160,7 +160,10 @@ def test_the_analyzer_records_references_and_the_parameters_of_the_controller(
     graph.wait_until(lambda: plant.active, "plant active")
     graph.wait_until(lambda: not plant.active, "plant pauses")
     graph.wait_until(
-        lambda: not any(not call.pursue() for call in analyzer._parameter_calls.values()),
+        lambda: (
+            "servo_controller" in analyzer._parameter_calls
+            and all(call.pursue() for call in analyzer._parameter_calls.values())
+        ),
         "parameters are known",
     )
     graph.deactivate("analyzer")
