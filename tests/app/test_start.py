@@ -85,9 +85,7 @@ def test_a_short_command_loads_what_it_computes_with(
     assert loaded(MAIN, *arguments) - {"rich"} == needed
 
 
-@pytest.mark.parametrize(
-    "module", ["nodes.analyzer", "nodes.controller", "running.bringup"]
-)
+@pytest.mark.parametrize("module", ["nodes.analyzer", "nodes.controller", "running.bringup"])
 def test_what_has_no_motion_loads_no_integrator(module: str) -> None:
     assert loaded(f"import stickslip_ros.{module}") & {"heyoka", "matplotlib", "scipy"} == set()
 
