@@ -21,13 +21,17 @@ Start = Callable[..., subprocess.Popen[str]]
 RUN = ("run", "feed_drive", "--bag", "bag", "-p", "analyzer.flush_period=0.2")
 
 
+_MODULES = {"analyzer": "analyzer", "washout_controller": "controller", "plant": "plant"}
+"""Module of each node of a run."""
+
+
 def nodes_of(process: subprocess.Popen[str]) -> dict[str, int]:
     """Return the process of each node of a run."""
     return {
         node: child
         for child in children(process.pid)
-        for node in ("analyzer", "washout_controller", "plant")
-        if f"stickslip_ros.nodes.{node}".encode() in command(child)
+        for node, module in _MODULES.items()
+        if f"stickslip_ros.nodes.{module}".encode() in command(child)
     }
 
 

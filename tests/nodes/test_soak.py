@@ -28,7 +28,7 @@ def test_a_run_in_real_time_lasts(tmp_path: Path) -> None:
     hidden = 1 + missing + outcome.unexplained_steps
     assert 0 <= run["late_forces"] - outcome.late_forces <= hidden
     assert outcome.unexplained_steps < 0.01 * run["samples"]
-    assert set(outcome.memory) == {"main", "plant", "washout_controller", "analyzer"}
+    assert set(outcome.memory) == {"main", "plant", "controller", "analyzer"}
     for process, sizes in outcome.memory.items():
         room = GROWTH + MESSAGE * outcome.furthest_behind
         assert max(sizes) - sizes[0] < room, process
