@@ -16,13 +16,13 @@ from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.model.actuator import Actuator
+from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
 from stickslip_ros.physics.model.constants import Constant, constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
-from stickslip_ros.physics.model.sensor import Sensor
+from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, add_laws_of_other_packages
 from stickslip_ros.scenarios.pace import Pace
 from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field
@@ -274,11 +274,13 @@ class PlantParameters(NodeParameters):
 
     def as_actuator(self) -> Actuator:
         """Return the actuator."""
-        return Actuator(**dict(getattr(self, "actuator", ())))
+        own: ParameterGroup | None = getattr(self, "actuator", None)
+        return IDEAL_ACTUATOR if own is None else Actuator(**dict(own))
 
     def as_sensor(self) -> Sensor:
         """Return the sensor."""
-        return Sensor(**dict(getattr(self, "sensor", ())))
+        own: ParameterGroup | None = getattr(self, "sensor", None)
+        return EXACT_SENSOR if own is None else Sensor(**dict(own))
 
     def drive_names(self) -> list[str]:
         """Return the flat names of the drive's parameters, with those of its friction law."""

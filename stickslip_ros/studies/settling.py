@@ -83,10 +83,11 @@ class ControlledDrive:
             )
         disturbed = plant.disturbance.kind != "none"
         sampled = not continuous and (law is not None or disturbed)
-        check_reference(scenario)
-        reference = scenario.controller.as_reference()
-        follows = law is not None and law.follows_reference
-        return cls(drive, law, plant if sampled else None, reference if follows else no_reference)
+        reference: ReferenceSource = no_reference
+        if law is not None and law.follows_reference:
+            check_reference(scenario)
+            reference = scenario.controller.as_reference()
+        return cls(drive, law, plant if sampled else None, reference)
 
 
 def check_reference(scenario: Scenario) -> None:

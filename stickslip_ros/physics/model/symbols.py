@@ -12,6 +12,8 @@ _Part = TypeVar("_Part")
 
 def numbers(part: Any, prefix: str) -> dict[str, float]:
     """Return the constants of a part by name; those of a table one by one."""
+    if not _fields(type(part)):
+        return {}
     return {
         name: number
         for field, value in _values(part).items()
@@ -33,6 +35,8 @@ def structure(part: Any) -> Any:
     if not is_dataclass(part):
         return part
     kind = type(part)
+    if not _fields(kind):
+        return kind
     found: list[Any] = [kind]
     for name, whole in _fields(kind):
         value = getattr(part, name)
