@@ -97,7 +97,7 @@ def test_bad_files_are_refused(tmp_path: Path, content: str, reason: str) -> Non
     path = tmp_path / "course.csv"
     path.write_text(content)
     message = refusal("paper", "plant.belt.kind=table", f"plant.belt.file={path}")
-    assert f"belt.file = '{path}'" in message
+    assert "belt.file = '" in message
     assert reason in message
 
 
@@ -159,7 +159,8 @@ def test_a_table_that_lifts_the_slide_is_refused(tmp_path: Path) -> None:
     (tmp_path / "course.csv").write_text("0,0\n1,-1.25\n")
     file = tmp_path / "course.csv"
     message = refusal("paper", "plant.load.kind=table", f"plant.load.file={file}")
-    assert f"load.file = '{file}' is refused: must leave a normal force" in message
+    assert "load.file = '" in message
+    assert " is refused: must leave a normal force" in message
 
 
 def test_when_they_can_be_changed() -> None:

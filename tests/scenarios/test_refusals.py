@@ -118,7 +118,13 @@ WHOLE = "must be a whole number"
         # Choices.
         ("plant", "pace", "fast", "'fast'", "must be one of realtime, lockstep"),
         ("plant", "friction.law", "dry", "'dry'", "one of stribeck, coulomb, linear, exponential"),
-        ("plant", "disturbance.kind", "on", "True", "must be one of none, step, impulse, ramp, sine"),
+        (
+            "plant",
+            "disturbance.kind",
+            "on",
+            "True",
+            "must be one of none, step, impulse, ramp, sine",
+        ),
         ("analyzer", "compression", "zip", "'zip'", "must be one of lz4, zstd, none"),
         # Not finite.
         ("plant", "mass", ".nan", "nan", f"{POSITIVE} kg"),

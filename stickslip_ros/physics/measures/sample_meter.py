@@ -117,9 +117,7 @@ class SampleMeter:
             )
         if self._last is not None:
             breakpoints = breakpoints[1:]  # the first sample was fed with the previous block
-        cycles = self._meter.feed(
-            breakpoints, float(samples.belt_velocity[-1]), self._fastest_belt
-        )
+        cycles = self._meter.feed(breakpoints, float(samples.belt_velocity[-1]), self._fastest_belt)
         if self._observer is not None:
             observed = (stamp - self.origin) / NANOSECONDS
             # Rounding may put a breakpoint after the last sample.

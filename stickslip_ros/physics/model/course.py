@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
 from typing import Any, ClassVar, Self
 
@@ -49,12 +50,12 @@ class Course(ABC):
         """
         return self
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest value at any time; infinite by default, where they are not known."""
         return -inf, inf
 
-    @property
+    @cached_property
     def steepest(self) -> float:
         """Largest absolute derivative by time; infinite by default, where it is not known."""
         return inf
@@ -209,12 +210,12 @@ class NoCourse(Course):
         """
         return 0.0
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[float, float]:
         """Zero and zero."""
         return 0.0, 0.0
 
-    @property
+    @cached_property
     def steepest(self) -> float:
         """Zero."""
         return 0.0

@@ -181,8 +181,8 @@ class DriveSystem(HybridSystem):
         normal = equations.normal_force(drive, time, switches.load)
         reaction = equations.reaction(drive, x, y, force)
         courses = [
-            *_guards(drive.belt.margins(time, switches.belt), kind.turn_belt),
-            *_guards(drive.load.margins(time, switches.load), kind.turn_load),
+            *_guards(_bounded(drive.belt.margins(time, switches.belt)), kind.turn_belt),
+            *_guards(_bounded(drive.load.margins(time, switches.load)), kind.turn_load),
         ]
         if self._may_lift:
             courses.append(Guard(normal + _LIFT_ROUNDING, kind.lift))
@@ -312,32 +312,35 @@ class DriveSystem(HybridSystem):
 
         A corner that is due at the instant, to the rounding of the time, has passed.
         """
-        drive = self.drive
         for _ in range(_MOST_AT_ONCE):
-            own, time = self._by_part(mode.switches), instant.time
-            due = _TIME_ROUNDING * time
-            parts = [
-                (self.turn_belt, drive.belt.margins(time, own.belt), due),
-                (self.turn_load, drive.load.margins(time, own.load), due),
-            ]
-            if mode.flow == SLIP:
-                speed = instant.state[SPEED] - self.belt_speed(mode, time)
-                sign, memory = mode.switches[0], self._memory(instant)
-                law = drive.friction.margins(speed, sign, memory, own.law)
-                parts.append((self.switch_friction, law, -_HYSTERESIS / 2.0))
-            passed = [
-                partial(enter, margin=number)
-                for enter, margins, threshold in parts
-                for number, margin in enumerate(margins)
-                if margin <= threshold
-            ]
-            if not passed:
+            enter = self._due(mode, instant)
+            if enter is None:
                 return mode
-            mode = passed[0](mode, instant)
+            mode = enter(mode, instant)
         raise RunError(
-            f"the friction law {drive.friction.name}, or a course of belt or load, changes its "
-            f"mode more than {_MOST_AT_ONCE} times at one instant"
+            f"the friction law {self.drive.friction.name}, or a course of belt or load, changes "
+            f"its mode more than {_MOST_AT_ONCE} times at one instant"
         )
+
+    def _due(self, mode: Mode, instant: Instant) -> Callable[[Mode, Instant], Mode] | None:
+        """Return what enters the next mode of a part whose margin is below zero, or None."""
+        drive, own, time = self.drive, self._by_part(mode.switches), instant.time
+        for enter, margins in (
+            (self.turn_belt, drive.belt.margins(time, own.belt)),
+            (self.turn_load, drive.load.margins(time, own.load)),
+        ):
+            for number, margin in enumerate(margins):
+                if margin <= _TIME_ROUNDING * time:
+                    return partial(enter, margin=number)
+        if mode.flow == SLIP and own.law:
+            speed = instant.state[SPEED] - self.belt_speed(mode, time)
+            memory = self._memory(instant)
+            for number, margin in enumerate(
+                drive.friction.margins(speed, mode.switches[0], memory, own.law)
+            ):
+                if margin <= -_HYSTERESIS / 2.0:
+                    return partial(self.switch_friction, margin=number)
+        return None
 
     def is_unbounded(self, instant: Instant) -> bool:
         """Return whether the slide is faster than `UNBOUNDED_SPEED`."""
@@ -507,6 +510,11 @@ def _guards(margins: Sequence[Any], leads: Callable[..., Mode]) -> list[Guard]:
         Guard(margin + _HYSTERESIS, partial(leads, margin=number))
         for number, margin in enumerate(margins)
     ]
+
+
+def _bounded(margins: Sequence[Any]) -> list[Any]:
+    """Return margins of at most one, the same near zero: heyoka's error is relative to them."""
+    return [margin / (1.0 + margin) for margin in margins]
 
 
 def _by_time(drive: Drive, time: Any, switches: Sequence[Any], zero: Any) -> Any:

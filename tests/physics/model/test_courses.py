@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from math import cos, inf, nan, pi, sin
 from typing import Any
 
@@ -99,7 +100,7 @@ def test_the_integral_is_exact(course: PiecewiseCourse, start: float, length: fl
     places = sorted({start, end, *(c for c in corners(course) if start < c < end)})
     expected = sum(
         quad(defined(course), a + 1e-13, b - 1e-13, epsabs=1e-12, limit=200)[0]
-        for a, b in zip(places, places[1:], strict=False)
+        for a, b in pairwise(places)
     )
     assert course.integral(start, end) == pytest.approx(expected, abs=1e-10)
 

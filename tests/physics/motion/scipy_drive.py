@@ -89,9 +89,7 @@ class ScipyDrive:
     def _at(self, time: float) -> None:
         """Use the pieces after a corner."""
         _, self._normal, _ = self.normal.pieces[bisect_right(self.normal.starts, time) - 1]
-        _, self._belt, self._belt_rate = self.belt.pieces[
-            bisect_right(self.belt.starts, time) - 1
-        ]
+        _, self._belt, self._belt_rate = self.belt.pieces[bisect_right(self.belt.starts, time) - 1]
 
     def _held(self, time: float, position: float) -> float:
         """Return h = m v_b' + c v_b + k x."""

@@ -1,6 +1,7 @@
 """Belts and loads that change with time, against another integrator and closed forms."""
 
 from dataclasses import replace
+from itertools import pairwise
 from math import cos, exp, inf, pi, sin
 from typing import Any
 
@@ -47,7 +48,7 @@ def pieces(course: Any, base: float) -> Piecewise:
 
     if isinstance(course, Table):
         points = list(zip(course.times, course.values, strict=True))
-        lines = [(a[0], *line(*a, *b)) for a, b in zip(points, points[1:], strict=False)]
+        lines = [(a[0], *line(*a, *b)) for a, b in pairwise(points)]
         return Piecewise(
             [(-inf, *level(course.values[0])), *lines, (points[-1][0], *level(points[-1][1]))]
         )
@@ -320,3 +321,16 @@ def test_a_fast_belt_with_a_narrow_exponential() -> None:
 
 def test_every_kind_is_tested() -> None:
     assert {"none", *KINDS} == set(COURSES)
+
+
+def test_a_far_corner_costs_no_accuracy() -> None:
+    """The margin of a corner does not count in the tolerance of the integration."""
+    near = replace(PAPER, belt=Step(0.1, start=500.0))
+    far = replace(PAPER, belt=Step(0.1, start=1e9))
+    found: list[tuple[float, float]] = []
+    for drive in (PAPER, near, far):
+        motion = Motion(drive, 0.1, 0.0)
+        motion.advance(60.0)
+        found.append((motion.position, motion.velocity))
+    assert found[1] == pytest.approx(found[0], abs=1e-12)
+    assert found[2] == pytest.approx(found[0], abs=1e-12)
