@@ -213,13 +213,13 @@ class PiecewiseCourse(Course):
     @cached_property
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest value; see `Course.bounds`."""
-        values = [value for piece in self._pieces for value in self._extremes(piece)]
+        values = [value for piece in self._used for value in self._extremes(piece)]
         return min(values), max(values)
 
     @cached_property
     def steepest(self) -> float:
         """Largest absolute rate; see `Course.steepest`."""
-        return max(abs(piece.slope) + abs(piece.swing) * piece.rate for piece in self._pieces)
+        return max(abs(piece.slope) + abs(piece.swing) * piece.rate for piece in self._used)
 
     def _extremes(self, piece: Piece) -> list[float]:
         """Return the values at the start of a piece, and at the turns and the end of a sine."""
@@ -235,13 +235,18 @@ class PiecewiseCourse(Course):
     @cached_property
     def _pieces(self) -> Sequence[Piece]:
         found: list[Piece] = []
-        now = 0.0
+        now = -inf
         for piece in self.pieces():
             if piece.end > now:
                 found.append(piece)
                 now = piece.end
         last = found.pop()
         return [*found, last._replace(end=0.0, last=1.0)]
+
+    @property
+    def _used(self) -> Sequence[Piece]:
+        """The pieces that do not end before the motion starts."""
+        return [piece for piece in self._pieces if piece.last or piece.end > 0.0]
 
     @cached_property
     def _ends(self) -> Sequence[float]:

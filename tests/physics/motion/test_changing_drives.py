@@ -162,7 +162,8 @@ def error(drive: Drive, position: float, velocity: float, periods: float = PERIO
         motion.advance(time - now)
         now = time
         found.append((motion.position, motion.velocity))
-    scale = np.abs(expected).max(axis=0)
+    least = 1e-3 * np.array([drive.length_scale, drive.speed_scale])  # of a slide that rests
+    scale = np.maximum(np.abs(expected).max(axis=0), least)
     return float((np.abs(np.array(found) - expected) / scale).max())
 
 
@@ -334,3 +335,35 @@ def test_a_far_corner_costs_no_accuracy() -> None:
         found.append((motion.position, motion.velocity))
     assert found[1] == pytest.approx(found[0], abs=1e-12)
     assert found[2] == pytest.approx(found[0], abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_energy_is_the_work_of_friction_and_damping(seed: int) -> None:
+    """The works of a moving belt and of a changing load are in that of the friction force."""
+    belt, load = KINDS[seed + 2], KINDS[-1 - seed]
+    drive, position, velocity = random_drive(seed, belt, load)
+    duration = 5.0 * drive.natural_period
+    recorded, motion = (kind(drive, position, velocity) for kind in (RecordedMotion, Motion))
+    recorded.advance(duration)
+    corners = [start for part in (drive.belt, drive.load) for start in pieces(part, 0.0).starts]
+    steps = np.linspace(0.0, duration, 200)
+    times = np.unique([*recorded.take_breakpoints().time, *corners, *steps])
+    times = times[(times >= 0.0) & (times <= duration)]
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+
+    def energy() -> float:
+        kinetic = drive.mass * motion.velocity**2
+        return 0.5 * (kinetic + drive.stiffness * motion.position**2)
+
+    before, work, now = energy(), 0.0, 0.0
+    for start, end in pairwise(times.tolist()):
+        half = 0.5 * (end - start)
+        for node, weight in zip(nodes.tolist(), weights.tolist(), strict=True):
+            time = start + half * (1.0 + node)
+            motion.advance(time - now)
+            now = time
+            force = motion.friction_force - drive.damping * motion.velocity
+            work += half * weight * force * motion.velocity
+    motion.advance(duration - now)
+    scale = drive.normal_force * drive.length_scale
+    assert (energy() - before) / scale == pytest.approx(work / scale, abs=1e-9)
