@@ -226,6 +226,8 @@ def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
         values[name] = draw(st.sampled_from(choices) if choices else strategies[kind])
     if "friction.static" in values or "friction.minimum" in values or "friction.kinetic" in values:
         values |= {"friction.static": 1e6}  # the largest of the coefficients
+    for part in ("belt", "load", "disturbance"):
+        values.pop(f"{part}.kind", None)  # it makes demands on the others
     if values.keys() & {"mass", "stiffness", "rate"}:
         values |= {"rate": 1e3}  # above all natural frequencies
     return values
