@@ -24,7 +24,7 @@ from stickslip_ros.physics.model.constants import Constant, constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.course import NO_COURSE, Course
 from stickslip_ros.physics.model.courses import COURSES, CourseKind, Table
-from stickslip_ros.physics.model.disturbance import Disturbance
+from stickslip_ros.physics.model.disturbance import NO_TABLE, Disturbance
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
 from stickslip_ros.physics.model.sensor import Sensor
@@ -190,7 +190,7 @@ class CourseParameters(ParameterGroup):
     @cached_property
     def table(self) -> Table:
         """The points of the file as it was when the parameters were made."""
-        return _table(self.part, self.file) if self._is_table else Table()
+        return _table(self.part, self.file) if self._is_table else NO_TABLE
 
 
 class LoadParameters(CourseParameters):

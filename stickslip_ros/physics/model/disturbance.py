@@ -6,9 +6,11 @@ from math import isfinite, pi, sin
 
 from stickslip_ros.physics.model.courses import CourseKind, PiecewiseCourse, Ramp, Table, Trapezoid
 
-
 DisturbanceKind = CourseKind
 """Shape of a disturbance force over time."""
+
+NO_TABLE = Table()
+"""The points of the other kinds."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class Disturbance:
     """Duration of a step or a sine, s; of a ramp, the time of its rise."""
     frequency: float = 1.0
     """Frequency of the sine, and one over the time of a rise of the trapezoid, Hz."""
-    table: Table = Table()
+    table: Table = NO_TABLE
     """Points of a table, N."""
 
     def refusal(self) -> str | None:

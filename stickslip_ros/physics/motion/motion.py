@@ -103,7 +103,7 @@ class Motion(HybridMotion):
         self._origin, self._lost = self._time, 0.0
         if not self._system.autonomous:
             self._set_clock()
-            self._set_state(self._instant.state.tolist())
+            self._set_state(list(self._instant.state))
 
     @property
     def course_time(self) -> float:
