@@ -1,5 +1,6 @@
 """Scenarios: ROS parameter files, loaded by name or path, with overrides."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -149,7 +150,7 @@ class Scenario:
         by_node: dict[str, dict[str, Any]] = {}
         for target, value in values.items():
             node, _, parameter = target.partition(".")
-            by_node.setdefault(node, {})[parameter] = value
+            by_node.setdefault(node, {})[parameter] = _absolute(parameter, value)
         return self._replaced(
             {
                 node: NODE_PARAMETERS[node].validated({**self._values_of(node), **new}, node)
@@ -179,7 +180,7 @@ class Scenario:
         texts: dict[str, str] = {}
         for override in overrides:
             node, parameter, value = parse_override(override)
-            by_node.setdefault(node, {})[parameter] = value
+            by_node.setdefault(node, {})[parameter] = _absolute(parameter, value)
             texts[node] = f"{texts.get(node, '')} {override:.80}"
         changed = self._replaced(
             {
@@ -363,13 +364,15 @@ def load_scenario(
     sources: dict[str, str] = {}
     other_sections: list[str] = []
 
-    def set_value(source: str, node: str, name: str, value: Any) -> None:
-        values[node][name] = value
+    def set_value(source: str, folder: Path, node: str, name: str, value: Any) -> None:
+        values[node][name] = _absolute(name, value, folder)
         sources[f"{node}.{name}"] = source
 
     for file in files[::-1]:
         source = FILE if file is files[0] else BASE
-        other_sections = file.apply(partial(set_value, source), namespace, other_nodes=other_nodes)
+        other_sections = file.apply(
+            partial(set_value, source, file.path.parent), namespace, other_nodes=other_nodes
+        )
     models: dict[str, Any] = {
         node: NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
         for node, parameters in values.items()
@@ -392,6 +395,13 @@ def load_scenario(
         bases=tuple(file.path for file in files[1:]),
     )
     return scenario.overridden(overrides) if overrides else scenario
+
+
+def _absolute(name: str, value: Any, folder: Path = Path()) -> Any:
+    """Return the value of a parameter; the path of a file, relative to `folder`, as absolute."""
+    if name.rpartition(".")[2] != "file" or not isinstance(value, str) or not value:
+        return value
+    return os.path.abspath(folder / value)
 
 
 def known_law(name: str) -> str:

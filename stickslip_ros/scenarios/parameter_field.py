@@ -23,13 +23,17 @@ class Fixed(StrEnum):
     NEVER = ""
     ACTIVE = "active"
     CONFIGURED = "configured"
+    RUNNING = "running"
 
     @property
     def changes(self) -> str:
         """When the parameter can be changed, in words."""
-        return {"": "at any time", "active": "while inactive", "configured": "before configured"}[
-            self
-        ]
+        return {
+            "": "at any time",
+            "active": "while inactive",
+            "configured": "before configured",
+            "running": "at the start of the node",
+        }[self]
 
 
 def field(

@@ -7,22 +7,28 @@ models. The nested field `friction.static` is the ROS parameter of that name.
 import re
 from collections.abc import Callable
 from dataclasses import fields
+from functools import cached_property, lru_cache
 from math import ceil, inf, isinf, pi, sqrt
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, create_model, model_validator
 
 from stickslip_ros.deprecated_names import Renamed
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
 from stickslip_ros.physics.model.constants import Constant, constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
-from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
+from stickslip_ros.physics.model.course import NO_COURSE, Course
+from stickslip_ros.physics.model.courses import COURSES, CourseKind, Table
+from stickslip_ros.physics.model.disturbance import NO_TABLE, Disturbance
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
+from stickslip_ros.scenarios.curve_file import read_pairs
 from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, add_laws_of_other_packages
 from stickslip_ros.scenarios.pace import Pace
 from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field
@@ -123,23 +129,117 @@ class Initial(ParameterGroup):
     velocity: float = field(0.0, "Initial velocity of the slide.", "m/s")
 
 
-class DisturbanceParameters(ParameterGroup):
+class CourseParameters(ParameterGroup):
+    """Course over the time since the first sample."""
+
+    part: ClassVar[str]
+    """Name of the group in the parameters."""
+
+    kind: CourseKind = field(
+        CourseKind.NONE,
+        "Time course: none, step, impulse (one sample long), ramp, sine, trapezoid or table.",
+        choices=CourseKind,
+        strict=False,
+        fixed=Fixed.ACTIVE,
+    )
+    amplitude: float = field(0.0, "Amplitude of the course.")
+    start: float = field(0.0, "Simulated time at which the course starts.", "s", ge=0.0, le=1e9)
+    duration: float = field(
+        inf,
+        "Duration of the course; of a ramp, the time of its rise.",
+        "s",
+        ge=0.0,
+        allow_inf_nan=True,
+    )
+    frequency: float = field(
+        1.0,
+        "Frequency of the sine; one over the time of each rise and fall of the trapezoid.",
+        "Hz",
+        ge=SMALLEST,
+        le=1e9,
+    )
+    file: str = field(
+        "",
+        "CSV file of the table: time (s) and value on each line, with straight lines between.",
+        fixed=Fixed.RUNNING,
+    )
+
+    @model_validator(mode="after")
+    def _course_is_possible(self) -> Self:
+        """Refuse constants that do not make a course, under their names as parameters."""
+        refusal = self.as_course(1.0).refusal()
+        if refusal is not None:
+            name = f"{self.part}.file = {shown(self.file)}: " if self._is_table else f"{self.part}."
+            raise ValueError(f"{name}{refusal}")
+        return self
+
+    @property
+    def _is_table(self) -> bool:
+        return self.kind is CourseKind.TABLE
+
+    def as_course(self, period: float) -> Course:
+        """Return the course in SI units; `period` is the sample period, s."""
+        if self.kind is CourseKind.NONE:
+            return NO_COURSE
+        if self._is_table:
+            return self.table
+        course = COURSES[self.kind]
+        values = {name: getattr(self, name) for name in constants_of(course)}
+        return course(**values).sampled(period)
+
+    @cached_property
+    def table(self) -> Table:
+        """The points of the file as it was when the parameters were made."""
+        return _table(self.part, self.file) if self._is_table else NO_TABLE
+
+
+class LoadParameters(CourseParameters):
+    """Course that is added to the normal force."""
+
+    part: ClassVar[str] = "load"
+    amplitude: float = field(0.0, "Amplitude of the change of the normal force.", "N")
+
+
+class BeltParameters(CourseParameters):
+    """Course that is added to the belt speed."""
+
+    part: ClassVar[str] = "belt"
+    amplitude: float = field(0.0, "Amplitude of the change of the belt speed.", "m/s")
+
+
+class DisturbanceParameters(CourseParameters):
     """Disturbance force on the slide that is part of the scenario."""
 
-    kind: DisturbanceKind = field(
-        DisturbanceKind.NONE,
-        "Time course: none, step, impulse (one sample long) or sine.",
-        choices=DisturbanceKind,
+    part: ClassVar[str] = "disturbance"
+    kind: CourseKind = field(
+        CourseKind.NONE,
+        "Time course: none, step, impulse (one sample long), ramp, sine, trapezoid or table.",
+        choices=CourseKind,
         strict=False,
     )
     amplitude: float = field(0.0, "Amplitude of the disturbance.", "N")
-    start: float = field(
-        0.0, "Simulated time at which the disturbance starts.", "s", ge=0.0, le=1e9
-    )
-    duration: float = field(
-        float("inf"), "Duration of the disturbance.", "s", ge=0.0, allow_inf_nan=True
-    )
-    frequency: float = field(1.0, "Frequency of the sine.", "Hz", ge=SMALLEST, le=1e9)
+
+
+def _table(part: str, file: str) -> Table:
+    """Return the table of a file; raises ValueError with a sentence on the parameter."""
+    name = f"{part}.file = {shown(file)} is refused:"
+    if not file:
+        raise ValueError(f"{name} must be the path of a CSV file for a table")
+    try:
+        about = Path(file).stat()
+        return _table_as_of(file, about.st_mtime_ns, about.st_size)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is no path"
+        raise ValueError(f"{name} the file cannot be read: {reason}") from None
+    except InvalidInputError as error:
+        raise ValueError(f"{name} {error}") from None
+
+
+@lru_cache(maxsize=64)
+def _table_as_of(file: str, changed: int, size: int) -> Table:
+    """Return the table of a file that was last changed then; studies ask for it many times."""
+    times, values = zip(*read_pairs(file), strict=True)
+    return Table(times, values)
 
 
 class NodeParameters(ParameterGroup):
@@ -234,6 +334,8 @@ class PlantParameters(NodeParameters):
         allow_inf_nan=True,
     )
     publish_clock: bool = field(False, "Publish simulated time on /clock.", fixed=Fixed.CONFIGURED)
+    load: LoadParameters = LoadParameters()
+    belt: BeltParameters = BeltParameters()
     disturbance: DisturbanceParameters = DisturbanceParameters()
     if constants_of(Sensor):
         sensor: SensorParameters = SensorParameters()
@@ -261,6 +363,19 @@ class PlantParameters(NodeParameters):
             )
         return self
 
+    @model_validator(mode="after")
+    def _slide_stays_on_the_belt(self) -> Self:
+        """Refuse a load that would lift the slide off the belt."""
+        lowest, _ = self.load.as_course(1.0 / self.rate).bounds
+        if self.normal_force + lowest < 0.0:
+            load = "file" if self.load.kind is CourseKind.TABLE else "amplitude"
+            raise ValueError(
+                f"load.{load} = {shown(getattr(self.load, load))} is refused: must leave a normal "
+                f"force of at least 0 N, with normal_force = {self.normal_force} N and a load down "
+                f"to {lowest} N"
+            )
+        return self
+
     @property
     def last_sample(self) -> int | None:
         """Number of the sample at which the plant pauses; None without `duration`."""
@@ -270,7 +385,14 @@ class PlantParameters(NodeParameters):
     def as_drive(self) -> Drive:
         """Return the drive."""
         values = {name: getattr(self, name) for name in _OF_DRIVE}
-        return Drive(**values, friction=self.friction.as_law(), actuator=self.as_actuator())
+        period = 1.0 / self.rate
+        return Drive(
+            **values,
+            friction=self.friction.as_law(),
+            belt=self.belt.as_course(period),
+            load=self.load.as_course(period),
+            actuator=self.as_actuator(),
+        )
 
     def as_actuator(self) -> Actuator:
         """Return the actuator."""
@@ -289,7 +411,15 @@ class PlantParameters(NodeParameters):
 
     def as_disturbance(self) -> Disturbance:
         """Return the disturbance of the scenario."""
-        return Disturbance(**dict(self.disturbance))
+        given = self.disturbance
+        return Disturbance(
+            given.kind,
+            given.amplitude,
+            given.start,
+            given.duration,
+            given.frequency,
+            given.table,
+        )
 
     def as_loop(
         self,

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.friction import LAWS
 from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters, PlantParameters
@@ -46,6 +47,19 @@ UNITS: dict[str, dict[str, str | None]] = {
         "disturbance.start": "s",
         "disturbance.duration": "s",
         "disturbance.frequency": "Hz",
+        "disturbance.file": None,
+        "load.kind": None,
+        "load.amplitude": "N",
+        "load.start": "s",
+        "load.duration": "s",
+        "load.frequency": "Hz",
+        "load.file": None,
+        "belt.kind": None,
+        "belt.amplitude": "m/s",
+        "belt.start": "s",
+        "belt.duration": "s",
+        "belt.frequency": "Hz",
+        "belt.file": None,
     },
     "washout_controller": {
         "corner_frequency": "rad/s",
@@ -74,6 +88,8 @@ DEFAULTS: dict[str, dict[str, Any]] = {
         "flow_window": 1000,
         "publish_clock": False,
         "disturbance.kind": "none",
+        "load.kind": "none",
+        "belt.kind": "none",
     },
     "washout_controller": {"force_limit": float("inf")},
     "velocity_feedback_controller": {"force_limit": float("inf"), "position_gain": 0.0},
@@ -168,7 +184,8 @@ def test_a_law_gets_the_constants_of_its_formula() -> None:
 def test_the_disturbance_of_a_plant() -> None:
     values = {"kind": "sine", "amplitude": 3.0, "start": 1.0, "duration": 2.0, "frequency": 4.0}
     flat = {f"disturbance.{name}": value for name, value in values.items()}
-    assert vars(PlantParameters.validated(flat, "test").as_disturbance()) == values
+    found = PlantParameters.validated(flat, "test").as_disturbance()
+    assert found == Disturbance(DisturbanceKind.SINE, 3.0, 1.0, 2.0, 4.0)
 
 
 @pytest.mark.parametrize(
@@ -209,6 +226,8 @@ def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
         values[name] = draw(st.sampled_from(choices) if choices else strategies[kind])
     if "friction.static" in values or "friction.minimum" in values or "friction.kinetic" in values:
         values |= {"friction.static": 1e6}  # the largest of the coefficients
+    for part in ("belt", "load", "disturbance"):
+        values.pop(f"{part}.kind", None)  # it makes demands on the others
     if values.keys() & {"mass", "stiffness", "rate"}:
         values |= {"rate": 1e3}  # above all natural frequencies
     return values

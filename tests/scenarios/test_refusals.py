@@ -118,7 +118,13 @@ WHOLE = "must be a whole number"
         # Choices.
         ("plant", "pace", "fast", "'fast'", "must be one of realtime, lockstep"),
         ("plant", "friction.law", "dry", "'dry'", "one of stribeck, coulomb, linear, exponential"),
-        ("plant", "disturbance.kind", "on", "True", "must be one of none, step, impulse, sine"),
+        (
+            "plant",
+            "disturbance.kind",
+            "on",
+            "True",
+            "must be one of none, step, impulse, ramp, sine",
+        ),
         ("analyzer", "compression", "zip", "'zip'", "must be one of lz4, zstd, none"),
         # Not finite.
         ("plant", "mass", ".nan", "nan", f"{POSITIVE} kg"),
@@ -201,8 +207,8 @@ def test_values_that_do_not_go_together(
         ("{friction: {statik: 0.4}}", "friction.statik", "0.4", "did you mean friction.static?"),
         ("{friction: 0.4}", "friction", "0.4", "did you mean friction."),
         ("{mass: {kg: 1}}", "mass.kg", "1", "did you mean mass?"),
-        ("{linear_gain: -1.0}", "linear_gain", "-1.0", "known are autostart, belt_speed,"),
-        ("{1: a}", "1", "'a'", "known are autostart, belt_speed,"),
+        ("{linear_gain: -1.0}", "linear_gain", "-1.0", "known are autostart, belt.amplitude,"),
+        ("{1: a}", "1", "'a'", "known are autostart, belt.amplitude,"),
     ],
 )
 def test_a_parameter_that_is_not_known(

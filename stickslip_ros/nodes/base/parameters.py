@@ -142,7 +142,12 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
     def _check_fixed(self, values: Mapping[str, Any], source: str) -> None:
         """Refuse changes of parameters that are fixed in the present state."""
         present = self.parameters.flat()
-        states = {Fixed.NEVER: False, Fixed.ACTIVE: self.active, Fixed.CONFIGURED: self.configured}
+        states = {
+            Fixed.NEVER: False,
+            Fixed.ACTIVE: self.active,
+            Fixed.CONFIGURED: self.configured,
+            Fixed.RUNNING: True,
+        }
         for name, value in values.items():
             fixed = self._known[name].fixed
             if states[fixed] and value != present[name]:

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
-from math import cos, isfinite, pi, sin
+from functools import cached_property
 
+from stickslip_ros.physics.model.courses import PiecewiseCourse, Ramp, Sine, Step, Trapezoid
 from stickslip_ros.samples import NO_REFERENCE, Reference
 
 
@@ -48,15 +49,7 @@ class ReferenceCourse:
 
     def refusal(self) -> str | None:
         """Return why the constants do not make a course, or None."""
-        edges = self.kind in (ReferenceKind.RAMP, ReferenceKind.TRAPEZOID)
-        if edges and not (isfinite(self.duration) and self.duration > 0.0):
-            return f"duration = {self.duration} s: must be above 0 and finite for a {self.kind}"
-        if self.kind is ReferenceKind.TRAPEZOID and self.duration * self.frequency < 2.0:
-            return (
-                f"duration = {self.duration} s: must be at least 2/frequency = "
-                f"{2.0 / self.frequency:g} s for a trapezoid"
-            )
-        return None
+        return None if self._course is None else self._course.refusal()
 
     def __call__(self, time: float) -> Reference:
         """Return the reference at a time.
@@ -72,27 +65,22 @@ class ReferenceCourse:
             Displacement, velocity and acceleration; at a corner, those after it. A jump has no
             velocity.
         """
-        kind, amplitude = self.kind, self.amplitude
-        if kind in (ReferenceKind.NONE, ReferenceKind.TOPIC):
+        course = self._course
+        if course is None:
             return NO_REFERENCE
-        since = time - self.start
-        if since < 0.0:
-            return Reference(0.0, 0.0, 0.0)
-        if kind is ReferenceKind.RAMP:
-            if since >= self.duration:
-                return Reference(amplitude, 0.0, 0.0)
-            speed = amplitude / self.duration
-            return Reference(speed * since, speed, 0.0)
-        if since >= self.duration:
-            return Reference(0.0, 0.0, 0.0)
-        if kind is ReferenceKind.SINE:
-            omega = 2.0 * pi * self.frequency
-            swing = amplitude * sin(omega * since)
-            return Reference(swing, amplitude * omega * cos(omega * since), -swing * omega**2)
-        if kind is ReferenceKind.TRAPEZOID:
-            left, speed = self.duration - since, amplitude * self.frequency
-            if since * self.frequency < 1.0:
-                return Reference(speed * since, speed, 0.0)
-            if left * self.frequency <= 1.0:
-                return Reference(speed * left, -speed, 0.0)
-        return Reference(amplitude, 0.0, 0.0)
+        return Reference(course.at(time), *course.rates(time))
+
+    @cached_property
+    def _course(self) -> PiecewiseCourse | None:
+        amplitude, start, duration = self.amplitude, self.start, self.duration
+        match self.kind:
+            case ReferenceKind.STEP:
+                return Step(amplitude, start, duration)
+            case ReferenceKind.RAMP:
+                return Ramp(amplitude, start, duration)
+            case ReferenceKind.SINE:
+                return Sine(amplitude, start, duration, self.frequency)
+            case ReferenceKind.TRAPEZOID:
+                return Trapezoid(amplitude, start, duration, self.frequency)
+            case ReferenceKind.NONE | ReferenceKind.TOPIC:
+                return None

@@ -12,6 +12,7 @@ from math import floor, isfinite
 from random import Random
 from typing import TYPE_CHECKING
 
+from stickslip_ros.physics.model.course import NO_COURSE
 from stickslip_ros.physics.model.disturbance import Disturbance
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
@@ -56,7 +57,8 @@ class SampledLoop:
     Parameters
     ----------
     motion : Motion
-        Motion to sample and to drive; sample 0 is its present state.
+        Motion to sample and to drive; sample 0 is its present state, and the courses of belt and
+        load start with it.
     rate : float
         Samples per second, Hz.
     start : int
@@ -162,6 +164,7 @@ class SampledLoop:
         self._limiter = motion.drive.actuator.limiter
         self._sensor = sensor
         self._measure = sensor.start(self.period)
+        motion.restart_courses()
         self.sample_number = 0
         """Number of the present sample."""
         self.true_sample = self._take_sample(0.0)
@@ -281,9 +284,11 @@ class SampledLoop:
             now = self._deliver()
         motion.set_forces(self._acting, self.disturbance)
         self._advance((1.0 - now) * period)
-        last = self.sample
-        belt_position = last.belt_position + last.belt_velocity * period
-        self.sample_number += 1
+        drive, number = motion.drive, self.sample_number
+        belt_position = self.sample.belt_position + drive.belt_speed * period
+        if drive.belt is not NO_COURSE:
+            belt_position += drive.belt.integral(number * period, (number + 1) * period)
+        self.sample_number = number + 1
         sample = self.true_sample = self._take_sample(belt_position)
         if self._measure is not None:
             sample = self._measured(sample)
@@ -354,7 +359,7 @@ class SampledLoop:
             motion.velocity,
             friction_force,
             belt_position,
-            motion.drive.belt_speed,
+            motion.belt_speed,
         )
 
     def _stand_in(self) -> tuple[int, float]:

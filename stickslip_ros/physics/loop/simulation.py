@@ -9,6 +9,7 @@ from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver, RunObserver
 from stickslip_ros.physics.model.control import ControlLaw
+from stickslip_ros.physics.model.course import NO_COURSE
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.progress import Progress
 
@@ -17,10 +18,12 @@ def measure_block(
     motion: RecordedMotion, meter: CycleMeter, observer: MotionObserver | None
 ) -> None:
     """Feed a meter, and an observer, with what `motion` has recorded since the last call."""
-    breakpoints, belt_speed = motion.take_breakpoints(), motion.drive.belt_speed
-    cycles = meter.feed(breakpoints, belt_speed)
+    breakpoints, drive = motion.take_breakpoints(), motion.drive
+    cycles = meter.feed(breakpoints, motion.belt_speed, drive.fastest_belt)
     if observer is not None:
-        belt_velocity = np.full(len(breakpoints), belt_speed)
+        belt_velocity = np.full(len(breakpoints), drive.belt_speed)
+        if drive.belt is not NO_COURSE:
+            belt_velocity += [drive.belt.at(t) for t in motion.course_times(breakpoints.time)]
         observer.take_motion(MeasuredMotion(breakpoints, belt_velocity, cycles, meter.ends))
 
 

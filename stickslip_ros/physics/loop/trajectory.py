@@ -83,14 +83,15 @@ class TrajectoryRecorder:
         number = self._number
         if number - self._now * self._rate > _ROUNDING:
             return
-        speed = motion.belt_speed
+        drive = motion.drive
+        travel = drive.belt.integral(0.0, number / self._rate)
         sample = Sample(
             0,
             motion.position,
             motion.velocity,
             motion.friction_force,
-            speed * number / self._rate,
-            speed,
+            drive.belt_speed * number / self._rate + travel,
+            motion.belt_speed,
         )
         self.take(sample, motion.applied_force)
 

@@ -247,7 +247,7 @@ class CycleMeter:
     def __init__(self, window: int) -> None:
         self._cycles: deque[Cycle] = deque(maxlen=window)
         self._amplitudes: deque[float] = deque(maxlen=max(window, LEAST_CYCLES))
-        self._belt_speed = 0.0
+        self._belt_speed = self._fastest_belt = 0.0
         self._fastest = 0.0
         self._unbounded = False
         self.ends: list[float] = []
@@ -263,11 +263,13 @@ class CycleMeter:
         self._recent: list[_Stretch] = []
         self._sticking_since: float | None = None
 
-    def report_run_away(self) -> None:
-        """Report that the motion is unbounded."""
-        self._unbounded = True
+    def report_run_away(self, unbounded: bool = True) -> None:
+        """Report that the motion is unbounded, or take that back."""
+        self._unbounded = unbounded
 
-    def feed(self, breakpoints: Breakpoints, belt_speed: float) -> list[Cycle]:
+    def feed(
+        self, breakpoints: Breakpoints, belt_speed: float, fastest_belt: float | None = None
+    ) -> list[Cycle]:
         """Add the breakpoints that follow.
 
         Parameters
@@ -275,7 +277,10 @@ class CycleMeter:
         breakpoints : Breakpoints
             Breakpoints that continue the motion, in SI units.
         belt_speed : float
-            Belt speed, m/s.
+            Belt speed at the last of them, m/s.
+        fastest_belt : float, optional
+            Largest absolute belt speed of the motion, m/s, the scale of its speeds. By default the
+            belt speed is constant.
 
         Returns
         -------
@@ -286,6 +291,7 @@ class CycleMeter:
         if len(breakpoints) == 0:
             return []
         self._belt_speed = belt_speed
+        self._fastest_belt = abs(belt_speed) if fastest_belt is None else fastest_belt
         first = len(self._last)
         breakpoints = self._last.followed_by(breakpoints)
         if self._open is None:
@@ -353,13 +359,15 @@ class CycleMeter:
 
     @property
     def _equilibrium_speed(self) -> float:
-        return EQUILIBRIUM_SPEED * abs(self._belt_speed)
+        if self._belt_speed == 0.0:
+            return 0.0
+        return EQUILIBRIUM_SPEED * self._fastest_belt
 
     def _upward_crossings(self, breakpoints: Breakpoints) -> list[int]:
         """Return the breakpoints at which the velocity changes from negative to positive."""
         speed = np.abs(breakpoints.velocity)
         self._fastest = max(self._fastest, float(speed.max()))
-        moving = np.flatnonzero(speed > _NOISE * max(self._fastest, abs(self._belt_speed)))
+        moving = np.flatnonzero(speed > _NOISE * max(self._fastest, self._fastest_belt))
         if len(moving) == 0:
             return []
         directions = np.concatenate([[self._direction], np.sign(breakpoints.velocity[moving])])

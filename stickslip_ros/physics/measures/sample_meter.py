@@ -53,6 +53,9 @@ class SampleMeter:
         self._meter = CycleMeter(window)
         self._last: SampleColumns | None = None
         self._elapsed = 0
+        self._fastest_belt = 0.0
+        # Highest speed above the limit at its sample: a belt that starts to move is slow at first.
+        self._unbounded_speed = 0.0
 
     def feed(self, samples: SampleColumns) -> list[Cycle]:
         """Add the samples that follow; return the cycles completed by them.
@@ -95,6 +98,8 @@ class SampleMeter:
 
     def measures(self) -> Measures:
         """Return the means over the last whole cycles."""
+        limit = UNBOUNDED_BELT_SPEEDS * self._fastest_belt
+        self._meter.report_run_away(self._unbounded_speed > limit)
         return self._meter.measures()
 
     def _feed_segment(self, samples: SampleColumns, jittered: bool) -> list[Cycle]:
@@ -112,7 +117,7 @@ class SampleMeter:
             )
         if self._last is not None:
             breakpoints = breakpoints[1:]  # the first sample was fed with the previous block
-        cycles = self._meter.feed(breakpoints, float(samples.belt_velocity[-1]))
+        cycles = self._meter.feed(breakpoints, float(samples.belt_velocity[-1]), self._fastest_belt)
         if self._observer is not None:
             observed = (stamp - self.origin) / NANOSECONDS
             # Rounding may put a breakpoint after the last sample.
@@ -131,6 +136,9 @@ class SampleMeter:
 
     def _look_for_unbounded(self, samples: SampleColumns) -> None:
         belt_speed = np.abs(samples.belt_velocity)
-        fast = np.abs(samples.velocity) > UNBOUNDED_BELT_SPEEDS * belt_speed
-        if fast.any() and belt_speed.all():
-            self._meter.report_run_away()
+        np.maximum.accumulate(np.maximum(belt_speed, self._fastest_belt), out=belt_speed)
+        self._fastest_belt = float(belt_speed[-1])
+        speed = np.abs(samples.velocity)
+        fast = (speed > UNBOUNDED_BELT_SPEEDS * belt_speed) & (belt_speed > 0.0)
+        if fast.any():
+            self._unbounded_speed = max(self._unbounded_speed, float(speed[fast].max()))

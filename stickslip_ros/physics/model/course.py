@@ -3,7 +3,11 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from functools import cached_property
+from math import inf
+from typing import Any, ClassVar, Self
+
+import numpy as np
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,86 @@ class Course(ABC):
 
     switches: ClassVar[Sequence[str]] = ()
     """Names of the values that are constant between two corners."""
+
+    @property
+    def equations(self) -> "Course":
+        """Course that has the same `value` and `margins`, from the switches alone if possible.
+
+        Courses with the same equations share their compiled flows. By default it is the course.
+        """
+        return self
+
+    @cached_property
+    def bounds(self) -> tuple[float, float]:
+        """Lowest and highest value at any time; infinite by default, where they are not known."""
+        return -inf, inf
+
+    @cached_property
+    def steepest(self) -> float:
+        """Largest absolute derivative by time; infinite by default, where it is not known."""
+        return inf
+
+    def refusal(self) -> str | None:
+        """Return why constants do not fit together, or None.
+
+        Returns
+        -------
+        str or None
+            Start of a sentence, "name = value: must be ..."; None if nothing is wrong.
+        """
+        return None
+
+    def sampled(self, period: float) -> Self:
+        """Return the course for a sample period.
+
+        Parameters
+        ----------
+        period : float
+            Sample period, s.
+
+        Returns
+        -------
+        Course
+            The course itself, unless it counts in samples.
+        """
+        return self
+
+    def at(self, time: float) -> float:
+        """Return the value at a time.
+
+        Parameters
+        ----------
+        time : float
+            Time from the start of the motion, s.
+
+        Returns
+        -------
+        float
+            Value; at a corner that after it.
+        """
+        return float(self.value(time, self.switches_at(time)))
+
+    def integral(self, start: float, end: float) -> float:
+        """Return the integral over an interval.
+
+        By default a quadrature that is exact to rounding where the course is smooth over it.
+
+        Parameters
+        ----------
+        start : float
+            Start of the interval, s.
+        end : float
+            End of the interval, s; not before its start.
+
+        Returns
+        -------
+        float
+            Integral, in the unit of the value times s.
+        """
+        nodes, weights = np.polynomial.legendre.leggauss(20)
+        half = 0.5 * (end - start)
+        values = [self.at(time) for time in (start + half * (1.0 + nodes)).tolist()]
+        return half * float(np.dot(weights, values))
 
     @abstractmethod
     def value(self, time: Any, switches: Sequence[Any]) -> Any:
@@ -118,6 +202,33 @@ class NoCourse(Course):
             Time from the start of the motion, s.
         switches : sequence of float or expression
             Values of `switches`; none.
+
+        Returns
+        -------
+        float
+            0.
+        """
+        return 0.0
+
+    @cached_property
+    def bounds(self) -> tuple[float, float]:
+        """Zero and zero."""
+        return 0.0, 0.0
+
+    @cached_property
+    def steepest(self) -> float:
+        """Zero."""
+        return 0.0
+
+    def integral(self, start: float, end: float) -> float:
+        """Return 0; see `Course.integral`.
+
+        Parameters
+        ----------
+        start : float
+            Start of the interval, s.
+        end : float
+            End of the interval, s.
 
         Returns
         -------

@@ -2,20 +2,34 @@
 
 from abc import abstractmethod
 from bisect import bisect_right
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from functools import cached_property
-from math import cos, pi
+from itertools import pairwise
+from math import cos, inf, isfinite, pi
 from math import sin as float_sin
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
-from stickslip_ros.physics.model.constants import constants_of
-from stickslip_ros.physics.model.course import Course
+from stickslip_ros.physics.model.constants import constant
+from stickslip_ros.physics.model.course import Course, NoCourse
 from stickslip_ros.physics.model.functions import sin
 
 
+class CourseKind(StrEnum):
+    """Shape of a course over time."""
+
+    NONE = "none"
+    STEP = "step"
+    IMPULSE = "impulse"
+    RAMP = "ramp"
+    SINE = "sine"
+    TRAPEZOID = "trapezoid"
+    TABLE = "table"
+
+
 class Piece(NamedTuple):
-    """Part of a course: offset + slope (t - origin) + swing sin(2 pi f (t - origin)), up to end."""
+    """Part of a course: offset + slope (t - origin) + swing sin(rate (t - origin)), up to end."""
 
     origin: float
     """Time that the piece counts from, s."""
@@ -25,24 +39,61 @@ class Piece(NamedTuple):
     """Rate of the straight line, per second."""
     swing: float
     """Amplitude of the sine."""
+    rate: float
+    """Angular frequency of the sine, rad/s."""
     end: float
-    """Time at which the next piece starts, s."""
+    """Time at which the next piece starts, s; infinite after the last corner."""
     last: float = 0.0
     """1 for the piece after which there is none, otherwise 0."""
+
+
+@dataclass(frozen=True)
+class _Lines(Course):
+    """The equations of all courses of straight lines: they share their compiled flows."""
+
+    switches: ClassVar[Sequence[str]] = Piece._fields
+
+    def value(self, time: Any, switches: Sequence[Any]) -> Any:
+        origin, offset, slope, *_ = switches
+        return offset + slope * (time - origin)
+
+    def margins(self, time: Any, switches: Sequence[Any]) -> Sequence[Any]:
+        *_, end, last = switches
+        return (last + (1.0 - last) * (end - time),)
+
+
+@dataclass(frozen=True)
+class _LinesAndSines(_Lines):
+    """The equations of courses with sines."""
+
+    def value(self, time: Any, switches: Sequence[Any]) -> Any:
+        origin, _, _, swing, rate, _, _ = switches
+        return super().value(time, switches) + swing * sin(rate * (time - origin))
+
+
+_LINES, _LINES_AND_SINES = _Lines(), _LinesAndSines()
 
 
 @dataclass(frozen=True)
 class PiecewiseCourse(Course):
     """Course of pieces that are a straight line and a sine each."""
 
+    name: ClassVar[str]
+    """Name of the course in the parameters."""
     switches: ClassVar[Sequence[str]] = Piece._fields
-
-    frequency: ClassVar[float] = 0.0
-    """Frequency of the sine, Hz; a constant of courses that have one."""
 
     @abstractmethod
     def pieces(self) -> Sequence[Piece]:
-        """Return the pieces in the order of time; the first one starts with the motion."""
+        """Return the pieces in the order of time.
+
+        The first one starts before the motion or with it, the last one ends at infinity. Pieces of
+        no length are ignored.
+        """
+
+    @property
+    def equations(self) -> Course:
+        """The equations that all courses of straight lines share; see `Course.equations`."""
+        return _LINES
 
     def value(self, time: Any, switches: Sequence[Any]) -> Any:
         """Return the value; see `Course.value`.
@@ -59,12 +110,7 @@ class PiecewiseCourse(Course):
         float, complex or expression
             Value.
         """
-        origin, offset, slope, swing, _, _ = switches
-        since = time - origin
-        line = offset + slope * since
-        if "frequency" not in constants_of(type(self)):
-            return line
-        return line + swing * sin(2.0 * pi * self.frequency * since)
+        return self.equations.value(time, switches)
 
     def margins(self, time: Any, switches: Sequence[Any]) -> Sequence[Any]:
         """Return the time to the next corner; see `Course.margins`.
@@ -81,8 +127,7 @@ class PiecewiseCourse(Course):
         sequence of float or expression
             One margin, s.
         """
-        *_, end, last = switches
-        return (last + (1.0 - last) * (end - time),)
+        return self.equations.margins(time, switches)
 
     def switches_at(self, time: float) -> Sequence[float]:
         """Return the piece at a time; see `Course.switches_at`.
@@ -116,41 +161,304 @@ class PiecewiseCourse(Course):
         """
         return self.switches_at(Piece(*switches).end)
 
-    def at(self, time: float) -> float:
-        """Return the value at a time (s); after a jump at a corner."""
-        return float(self.value(time, self.switches_at(time)))
-
     def rates(self, time: float) -> tuple[float, float]:
-        """Return first and second derivative at a time (s); after a corner, without its jump."""
-        piece = Piece(*self.switches_at(time))
-        omega = 2.0 * pi * self.frequency
-        since = omega * (time - piece.origin)
-        return (
-            piece.slope + piece.swing * omega * cos(since),
-            -piece.swing * omega * omega * float_sin(since),
-        )
+        """Return first and second derivative by time.
+
+        Parameters
+        ----------
+        time : float
+            Time from the start of the motion, s.
+
+        Returns
+        -------
+        tuple of float
+            Derivatives, per second and per second squared; at a corner those after it. A jump has
+            none.
+        """
+        origin, _, slope, swing, rate, _, _ = self.switches_at(time)
+        if not swing:
+            return slope, 0.0
+        turn = rate * (time - origin)
+        return slope + swing * rate * cos(turn), -swing * rate * rate * float_sin(turn)
 
     def integral(self, start: float, end: float) -> float:
-        """Return the integral from a time to a later one (s), exactly."""
+        """Return the integral over an interval, exactly.
+
+        Parameters
+        ----------
+        start : float
+            Start of the interval, s.
+        end : float
+            End of the interval, s; not before its start.
+
+        Returns
+        -------
+        float
+            Integral.
+        """
         total, now = 0.0, start
         while now < end:
             piece = Piece(*self.switches_at(now))
             until = end if piece.last else min(end, piece.end)
-            total += self._antiderivative(piece, until) - self._antiderivative(piece, now)
+            length, middle = until - now, 0.5 * (now + until) - piece.origin
+            total += length * (piece.offset + piece.slope * middle)
+            if piece.swing:
+                half = 0.5 * piece.rate
+                total += (
+                    piece.swing / half * float_sin(piece.rate * middle) * float_sin(half * length)
+                )
             now = until
         return total
 
-    def _antiderivative(self, piece: Piece, time: float) -> float:
-        since, omega = time - piece.origin, 2.0 * pi * self.frequency
-        swing = piece.swing / omega * (1.0 - cos(omega * since)) if piece.swing else 0.0
-        return since * (piece.offset + 0.5 * piece.slope * since) + swing
+    @cached_property
+    def bounds(self) -> tuple[float, float]:
+        """Lowest and highest value; see `Course.bounds`."""
+        values = [value for piece in self._used for value in self._extremes(piece)]
+        return min(values), max(values)
+
+    @cached_property
+    def steepest(self) -> float:
+        """Largest absolute rate; see `Course.steepest`."""
+        return max(abs(piece.slope) + abs(piece.swing) * piece.rate for piece in self._used)
+
+    def _extremes(self, piece: Piece) -> list[float]:
+        """Return the values at the start of a piece, and at the turns and the end of a sine."""
+        start = max(piece.origin, 0.0)
+        times = [start]
+        if piece.swing:
+            quarter = 0.5 * pi / piece.rate
+            times += [piece.origin + turns * quarter for turns in (1.0, 3.0)]
+            times.append(piece.end)
+        ends = inf if piece.last else piece.end
+        return [self.value(time, piece) for time in times if start <= time <= ends]
 
     @cached_property
     def _pieces(self) -> Sequence[Piece]:
-        *pieces, last = self.pieces()
-        pieces = [piece for piece in pieces if piece.end > 0.0]
-        return [*pieces, last._replace(end=pieces[-1].end if pieces else 0.0, last=1.0)]
+        found: list[Piece] = []
+        now = -inf
+        for piece in self.pieces():
+            if piece.end > now:
+                found.append(piece)
+                now = piece.end
+        last = found.pop()
+        return [*found, last._replace(end=0.0, last=1.0)]
+
+    @property
+    def _used(self) -> Sequence[Piece]:
+        """The pieces that do not end before the motion starts."""
+        return [piece for piece in self._pieces if piece.last or piece.end > 0.0]
 
     @cached_property
     def _ends(self) -> Sequence[float]:
         return [piece.end for piece in self._pieces[:-1]]
+
+
+def _held(value: float, end: float) -> Piece:
+    return Piece(0.0, value, 0.0, 0.0, 0.0, end)
+
+
+def _line(start: float, before: float, end: float, after: float) -> Piece:
+    slope = (after - before) / (end - start) if end > start else 0.0
+    return Piece(start, before, slope, 0.0, 0.0, end)
+
+
+@dataclass(frozen=True)
+class Step(PiecewiseCourse):
+    """Has its amplitude while it lasts, and is zero before and after.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.model.courses import Step
+    >>> step = Step(amplitude=2.0, start=1.0, duration=3.0)
+    >>> [step.at(time) for time in (0.5, 1.0, 3.9, 4.0)]
+    [0.0, 2.0, 2.0, 0.0]
+    """
+
+    name: ClassVar[str] = "step"
+    amplitude: float = constant(0.0, "Value while it lasts.", "value")
+    start: float = constant(0.0, "Time of the step.", "s", at_least=0.0)
+    duration: float = constant(inf, "Time that it lasts.", "s", at_least=0.0)
+
+    def pieces(self) -> Sequence[Piece]:
+        """Return zero, the amplitude and zero."""
+        end = self.start + self.duration
+        return [_held(0.0, self.start), _held(self.amplitude, end), _held(0.0, inf)]
+
+
+@dataclass(frozen=True)
+class Impulse(Step):
+    """Step that lasts for one sample."""
+
+    name: ClassVar[str] = "impulse"
+
+    def sampled(self, period: float) -> Self:
+        """Return the impulse with the duration of one sample.
+
+        Parameters
+        ----------
+        period : float
+            Sample period, s.
+
+        Returns
+        -------
+        Impulse
+            Impulse of this duration.
+        """
+        return replace(self, duration=period)
+
+
+@dataclass(frozen=True)
+class Ramp(PiecewiseCourse):
+    """Rises from zero to its amplitude in a straight line, and then stays.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.model.courses import Ramp
+    >>> ramp = Ramp(amplitude=0.04, start=1.0, duration=2.0)
+    >>> [ramp.at(time) for time in (0.5, 2.0, 3.0)]
+    [0.0, 0.02, 0.04]
+    """
+
+    name: ClassVar[str] = "ramp"
+    amplitude: float = constant(0.0, "Value at the end of the rise.", "value")
+    start: float = constant(0.0, "Start of the rise.", "s", at_least=0.0)
+    duration: float = constant(1.0, "Time of the rise.", "s", positive=True)
+
+    def pieces(self) -> Sequence[Piece]:
+        """Return zero, the rise and the amplitude."""
+        end = self.start + self.duration
+        rise = _line(self.start, 0.0, end, self.amplitude)
+        return [_held(0.0, self.start), rise, _held(self.amplitude, inf)]
+
+    def refusal(self) -> str | None:
+        """Return why the duration is refused, or None."""
+        return _refused_duration(self)
+
+
+@dataclass(frozen=True)
+class Sine(PiecewiseCourse):
+    """Sine that starts at zero, and is zero before and after it lasts.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.model.courses import Sine
+    >>> sine = Sine(amplitude=2.0, start=1.0, frequency=0.5)
+    >>> [round(sine.at(time), 9) for time in (0.5, 1.5, 2.0, 2.5)]
+    [0.0, 2.0, 0.0, -2.0]
+    """
+
+    name: ClassVar[str] = "sine"
+    amplitude: float = constant(0.0, "Amplitude.", "value")
+    start: float = constant(0.0, "Time of its first zero.", "s", at_least=0.0)
+    duration: float = constant(inf, "Time that it lasts.", "s", at_least=0.0)
+    frequency: float = constant(1.0, "Frequency.", "Hz", positive=True)
+
+    @property
+    def equations(self) -> Course:
+        """The equations with a sine; see `Course.equations`."""
+        return _LINES_AND_SINES
+
+    def pieces(self) -> Sequence[Piece]:
+        """Return zero, the sine and zero."""
+        end = self.start + self.duration
+        rate = 2.0 * pi * self.frequency
+        wave = Piece(self.start, 0.0, 0.0, self.amplitude, rate, end)
+        return [_held(0.0, self.start), wave, _held(0.0, inf)]
+
+
+@dataclass(frozen=True)
+class Trapezoid(PiecewiseCourse):
+    """Rises to its amplitude, holds it and falls to zero.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.model.courses import Trapezoid
+    >>> feed = Trapezoid(amplitude=0.04, duration=5.0, frequency=0.5)
+    >>> [feed.at(time) for time in (0.0, 1.0, 2.0, 4.0, 6.0)]
+    [0.0, 0.02, 0.04, 0.02, 0.0]
+    """
+
+    name: ClassVar[str] = "trapezoid"
+    amplitude: float = constant(0.0, "Value between rise and fall.", "value")
+    start: float = constant(0.0, "Start of the rise.", "s", at_least=0.0)
+    duration: float = constant(2.0, "Time from the start to the end of the fall.", "s",
+                               positive=True)  # fmt: skip
+    frequency: float = constant(
+        1.0, "One over the time of the rise, and of the fall.", "Hz", positive=True
+    )
+
+    def pieces(self) -> Sequence[Piece]:
+        """Return zero, the rise, the amplitude, the fall and zero."""
+        edge, end = 1.0 / self.frequency, self.start + self.duration
+        top, fall = self.start + edge, end - edge
+        return [
+            _held(0.0, self.start),
+            _line(self.start, 0.0, top, self.amplitude),
+            _held(self.amplitude, fall),
+            _line(fall, self.amplitude, end, 0.0),
+            _held(0.0, inf),
+        ]
+
+    def refusal(self) -> str | None:
+        """Return why the duration is refused, or None."""
+        refusal = _refused_duration(self)
+        if refusal is None and self.duration * self.frequency < 2.0:
+            least = 2.0 / self.frequency
+            return (
+                f"duration = {self.duration} s: must be at least 2/frequency = {least:g} s "
+                "for a trapezoid"
+            )
+        return refusal
+
+
+@dataclass(frozen=True)
+class Table(PiecewiseCourse):
+    """Straight lines between given points; the first and the last value are held outside.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.model.courses import Table
+    >>> table = Table(times=(1.0, 3.0), values=(0.0, 0.5))
+    >>> [table.at(time) for time in (0.0, 2.0, 9.0)]
+    [0.0, 0.25, 0.5]
+    """
+
+    name: ClassVar[str] = "table"
+    times: tuple[float, ...] = constant((0.0,), "Times of the points, increasing.", "s")
+    values: tuple[float, ...] = constant((0.0,), "Values at these times.", "value")
+
+    def pieces(self) -> Sequence[Piece]:
+        """Return the first value, the lines and the last value."""
+        points = list(zip(self.times, self.values, strict=True))
+        lines = [_line(*before, *after) for before, after in pairwise(points)]
+        return [_held(self.values[0], self.times[0]), *lines, _held(self.values[-1], inf)]
+
+    def refusal(self) -> str | None:
+        """Return why the points are refused, or None."""
+        if not self.times or len(self.times) != len(self.values):
+            return (
+                f"times and values have {len(self.times)} and {len(self.values)} numbers: must "
+                "have as many, at least one"
+            )
+        for number in (*self.times, *self.values):
+            if not isfinite(number):
+                return f"times and values = {number}: must be finite"
+        for before, after in pairwise(self.times):
+            if after <= before:
+                return f"time = {after} s after {before} s: the times must increase"
+        if not isfinite(self.steepest):
+            return "times and values rise too steeply: the slopes must be finite"
+        return None
+
+
+def _refused_duration(course: Ramp | Trapezoid) -> str | None:
+    if isfinite(course.duration) and course.duration > 0.0:
+        return None
+    return f"duration = {course.duration} s: must be above 0 and finite for a {course.name}"
+
+
+COURSES: Mapping[str, type[Course]] = {
+    CourseKind.NONE: NoCourse,
+    **{each.name: each for each in (Step, Impulse, Ramp, Sine, Trapezoid, Table)},
+}
+"""The courses by name."""

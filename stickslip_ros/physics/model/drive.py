@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import pi, sqrt
+from math import isfinite, pi, sqrt
 from typing import Self
 
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
@@ -65,6 +65,13 @@ class Drive:
     def natural_period(self) -> float:
         """Period of the undamped free vibration, s."""
         return 2.0 * pi / self.angular_frequency
+
+    @cached_property
+    def fastest_belt(self) -> float:
+        """Largest absolute speed of the belt, m/s; without its course where that has no bounds."""
+        low, high = self.belt.bounds
+        ends = [self.belt_speed + each for each in (low, high) if isfinite(each)]
+        return max(map(abs, ends), default=abs(self.belt_speed))
 
     @cached_property
     def length_scale(self) -> float:

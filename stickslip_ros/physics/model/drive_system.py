@@ -44,6 +44,11 @@ starts on one. It also keeps rounding from leading back.
 _SMALLEST_STEP = 2.0**-35
 """Speed below which a change of the belt speed at a corner, or a relative speed, is rounding."""
 
+_TIME_ROUNDING = 2.0**-49
+"""Share of the time by which rounding may put a corner after an instant that is meant to be it."""
+
+_LIFT_ROUNDING = 2.0**-40
+"""Normal force, in that of the drive, that is rounding where a load takes all of it away."""
 
 _MOST_AT_ONCE = 100
 """Number of changes of mode at one instant above which there is no end of them."""
@@ -115,20 +120,31 @@ class DriveSystem(HybridSystem):
         """The states of the controller, in a state."""
         self.actuator_states = slice(self.control_states.stop, len(self.states))
         """The states of the actuator, in a state."""
-        parts = (law, self.drive.belt, self.drive.load, self.drive.actuator, self.control)
-        self.structure = structure_number((type(self), self.states, *map(structure, parts)))
+        belt, load = self.drive.belt.equations, self.drive.load.equations
+        # Whether the normal force may fall below zero: then a guard ends the motion.
+        self._may_lift = 1.0 + self.drive.load.bounds[0] < -_LIFT_ROUNDING
+        parts = (law, belt, load, self.drive.actuator, self.control)
+        self.structure = structure_number(
+            (type(self), self.states, self._may_lift, *map(structure, parts))
+        )
         self._steady = isinstance(self.drive.belt, NoCourse)
+        self._frequency = drive.angular_frequency
         self.constants = {
             "damping": self.drive.damping,
             "belt_speed": self.drive.belt_speed,
             **numbers(law, "friction"),
-            **numbers(self.drive.belt, "belt"),
-            **numbers(self.drive.load, "load"),
+            **numbers(belt, "belt"),
+            **numbers(load, "load"),
             **numbers(self.drive.actuator, "actuator"),
             **(numbers(self.control, "control") if self.control is not None else {}),
         }
         self.sticks = law.sticks
         self.forward_limit, self.backward_limit = map(float, law.limits)
+        # Where a bound is not known, the course is taken to change less than the state does.
+        heaviest, steepest = 1.0 + self.drive.load.bounds[1], self.drive.belt.steepest
+        self._largest_friction = max(self.forward_limit, self.backward_limit)
+        self._largest_friction *= heaviest if heaviest < inf else 1.0
+        self._belt_acceleration = steepest if steepest < inf else 0.0
         self._characteristic_speed = law.characteristic_speed
         self.limits_steps = law.characteristic_speed != inf
 
@@ -165,9 +181,11 @@ class DriveSystem(HybridSystem):
         normal = equations.normal_force(drive, time, switches.load)
         reaction = equations.reaction(drive, x, y, force)
         courses = [
-            *_guards(drive.belt.margins(time, switches.belt), kind.turn_belt),
-            *_guards(drive.load.margins(time, switches.load), kind.turn_load),
+            *_guards(_bounded(drive.belt.margins(time, switches.belt)), kind.turn_belt),
+            *_guards(_bounded(drive.load.margins(time, switches.load)), kind.turn_load),
         ]
+        if self._may_lift:
+            courses.append(Guard(normal + _LIFT_ROUNDING, kind.lift))
         if name == STICK:
             forward, backward = law.limits
             belt_acceleration = _by_time(drive, time, switches.belt, 0.0 * y)
@@ -225,6 +243,13 @@ class DriveSystem(HybridSystem):
         """Slip forward where the reaction falls below its limit."""
         return self._slip(mode, 1.0, instant)
 
+    def lift(self, mode: Mode, instant: Instant) -> Mode:
+        """End the run: the slide lifts off the belt."""
+        raise RunError(
+            f"the normal force falls below 0 N at {instant.time / self._frequency:.6g} s: the load "
+            "must leave it at 0 N or more"
+        )
+
     def diverge(self, mode: Mode, instant: Instant) -> None:
         """End an unbounded motion."""
 
@@ -254,6 +279,7 @@ class DriveSystem(HybridSystem):
         """Enter the mode that follows at a corner, or a step, of the load's course."""
         own = self._by_part(mode.switches).load
         mode = with_switches(mode, self._ends[2], self.drive.load.switches_after(margin, own))
+        self._check_contact(mode, instant)
         return self._resting(mode, instant) if mode.flow == STICK else mode
 
     def settled(self, mode: Mode | None, instant: Instant) -> Mode:
@@ -264,6 +290,7 @@ class DriveSystem(HybridSystem):
                 return following
         if mode is None:
             mode = self._starting(instant)
+            self._check_contact(mode, instant)
         elif mode.flow == STICK and not self._steady:  # without the rounding of the integration
             instant.state[SPEED] = self.belt_speed(mode, instant.time)
         belt_speed = self.belt_speed(mode, instant.time)
@@ -276,33 +303,44 @@ class DriveSystem(HybridSystem):
         sign = 1.0 if relative_speed > 0.0 else -1.0
         return mode if mode.switches[0] == sign else self._slip(mode, sign, instant)
 
+    def _check_contact(self, mode: Mode, instant: Instant) -> None:
+        if self._may_lift and self.normal_force(mode, instant.time) < -_LIFT_ROUNDING:
+            self.lift(mode, instant)
+
     def past(self, mode: Mode, instant: Instant) -> Mode:
-        """Return the mode after the margins of law and courses that rounding has put below zero."""
-        drive = self.drive
+        """Return the mode after the margins of law and courses that rounding has put below zero.
+
+        A corner that is due at the instant, to the rounding of the time, has passed.
+        """
         for _ in range(_MOST_AT_ONCE):
-            own, time = self._by_part(mode.switches), instant.time
-            parts = [
-                (self.turn_belt, drive.belt.margins(time, own.belt)),
-                (self.turn_load, drive.load.margins(time, own.load)),
-            ]
-            if mode.flow == SLIP:
-                speed = instant.state[SPEED] - self.belt_speed(mode, time)
-                sign, memory = mode.switches[0], self._memory(instant)
-                law = drive.friction.margins(speed, sign, memory, own.law)
-                parts.append((self.switch_friction, law))
-            passed = [
-                partial(enter, margin=number)
-                for enter, margins in parts
-                for number, margin in enumerate(margins)
-                if margin <= -_HYSTERESIS / 2.0
-            ]
-            if not passed:
+            enter = self._due(mode, instant)
+            if enter is None:
                 return mode
-            mode = passed[0](mode, instant)
+            mode = enter(mode, instant)
         raise RunError(
-            f"the friction law {drive.friction.name}, or a course of belt or load, changes its "
-            f"mode more than {_MOST_AT_ONCE} times at one instant"
+            f"the friction law {self.drive.friction.name}, or a course of belt or load, changes "
+            f"its mode more than {_MOST_AT_ONCE} times at one instant"
         )
+
+    def _due(self, mode: Mode, instant: Instant) -> Callable[[Mode, Instant], Mode] | None:
+        """Return what enters the next mode of a part whose margin is below zero, or None."""
+        drive, own, time = self.drive, self._by_part(mode.switches), instant.time
+        for enter, margins in (
+            (self.turn_belt, drive.belt.margins(time, own.belt)),
+            (self.turn_load, drive.load.margins(time, own.load)),
+        ):
+            for number, margin in enumerate(margins):
+                if margin <= _TIME_ROUNDING * time:
+                    return partial(enter, margin=number)
+        if mode.flow == SLIP and own.law:
+            speed = instant.state[SPEED] - self.belt_speed(mode, time)
+            memory = self._memory(instant)
+            for number, margin in enumerate(
+                drive.friction.margins(speed, mode.switches[0], memory, own.law)
+            ):
+                if margin <= -_HYSTERESIS / 2.0:
+                    return partial(self.switch_friction, margin=number)
+        return None
 
     def is_unbounded(self, instant: Instant) -> bool:
         """Return whether the slide is faster than `UNBOUNDED_SPEED`."""
@@ -332,13 +370,14 @@ class DriveSystem(HybridSystem):
     def longest_step(self, instant: Instant) -> float:
         """Return a time in which the speed changes by the law's characteristic speed at most.
 
-        heyoka chooses a step from the series at its start. It would miss an exponential that is
-        negligible there and rises before the step ends.
+        The relative speed, that is: courses change normal force and belt speed. heyoka chooses a
+        step from the series at its start. It would miss an exponential that is negligible there and
+        rises before the step ends.
         """
         state = instant.state
         acceleration = (
             abs(self.reaction(instant)) + abs(state[POSITION]) + abs(state[SPEED])
-            + max(self.forward_limit, self.backward_limit)
+            + self._largest_friction + self._belt_acceleration
         )  # fmt: skip
         return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
 
@@ -412,8 +451,8 @@ class DriveSystem(HybridSystem):
             damping=constants["damping"],
             belt_speed=constants["belt_speed"],
             friction=with_symbols(drive.friction, "friction", constants),
-            belt=with_symbols(drive.belt, "belt", constants),
-            load=with_symbols(drive.load, "load", constants),
+            belt=with_symbols(drive.belt.equations, "belt", constants),
+            load=with_symbols(drive.load.equations, "load", constants),
             actuator=with_symbols(drive.actuator, "actuator", constants),
         )
         control = self.control
@@ -471,6 +510,11 @@ def _guards(margins: Sequence[Any], leads: Callable[..., Mode]) -> list[Guard]:
         Guard(margin + _HYSTERESIS, partial(leads, margin=number))
         for number, margin in enumerate(margins)
     ]
+
+
+def _bounded(margins: Sequence[Any]) -> list[Any]:
+    """Return margins of at most one, the same near zero: heyoka's error is relative to them."""
+    return [margin / (1.0 + margin) for margin in margins]
 
 
 def _by_time(drive: Drive, time: Any, switches: Sequence[Any], zero: Any) -> Any:

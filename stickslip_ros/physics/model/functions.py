@@ -1,5 +1,6 @@
 """Elementary functions of floats, complex numbers, arrays and heyoka expressions alike."""
 
+from math import sin as float_sin
 from typing import Any
 
 import numpy as np
@@ -20,4 +21,4 @@ def exp(x: Any) -> Any:
 
 def sin(x: Any) -> Any:
     """Return the sine of a float, an array or an expression."""
-    return _function("sin", x)
+    return float_sin(x) if isinstance(x, float) else _function("sin", x)

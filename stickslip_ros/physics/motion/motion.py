@@ -4,6 +4,7 @@ from array import array
 from collections.abc import Sequence
 from typing import ClassVar
 
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
@@ -72,6 +73,8 @@ class Motion(HybridMotion):
     ) -> None:
         self._drive, self._control = drive, control
         self._time = 0.0
+        # What the sum of the durations has lost by rounding, and the start of the courses.
+        self._lost = self._origin = 0.0
         system = drive_system(drive, control)
         state = system.initial_state(position / drive.length_scale, velocity / drive.speed_scale)
         super().__init__(system, state, self._first_detail)
@@ -79,7 +82,7 @@ class Motion(HybridMotion):
     def restart(self, position: float, velocity: float) -> None:
         """Set the state of the slide; forces and gains are kept, the controller is at rest.
 
-        An actuator with states gives no force.
+        An actuator with states gives no force. The courses of belt and load continue.
 
         Parameters
         ----------
@@ -90,7 +93,26 @@ class Motion(HybridMotion):
         """
         drive = self._drive
         x, y = position / drive.length_scale, velocity / drive.speed_scale
+        self._set_clock()
         self._set_state(self._system.initial_state(x, y))
+
+    def restart_courses(self) -> None:
+        """Start the courses of belt and load again, at their time zero; the slide moves on."""
+        if self.course_time == 0.0:
+            return
+        self._origin, self._lost = self._time, 0.0
+        if not self._system.autonomous:
+            self._set_clock()
+            self._set_state(list(self._instant.state))
+
+    @property
+    def course_time(self) -> float:
+        """Time of the courses of belt and load, s."""
+        return self._time - self._origin
+
+    def course_times(self, times: FloatArray) -> Sequence[float]:
+        """Return the times of the courses (s) at times of the motion (s), as of breakpoints."""
+        return (times - self._origin).tolist()
 
     @property
     def drive(self) -> Drive:
@@ -224,8 +246,9 @@ class Motion(HybridMotion):
         if self.unbounded:
             return
         frequency = self._drive.angular_frequency
-        if not self._system.autonomous:  # sums of the scaled durations would drift
-            self._instant.time = self._time * frequency
+        autonomous = self._system.autonomous
+        if not autonomous:
+            self._set_clock()
         try:
             self._advance(duration * frequency)
         except TooManyStepsError:
@@ -233,7 +256,20 @@ class Motion(HybridMotion):
                 "the motion is too stiff to be followed: it takes more than "
                 f"{STEPS_PER_UNIT} steps of integration for {1.0 / frequency:g} s"
             ) from None
+        if autonomous:
+            self._time += duration
+            return
+        before, duration = self._time, duration - self._lost
         self._time += duration
+        self._lost = (self._time - before) - duration
+        self._set_clock()
+        mode = self._system.past(self._mode, self._instant)
+        if mode is not self._mode:
+            self._enter(mode)
+
+    def _set_clock(self) -> None:
+        """Set the time of the courses: sums of the scaled durations would drift."""
+        self._instant.time = self.course_time * self._drive.angular_frequency
 
     def _change(self, drive: Drive, control: ContinuousControl | None) -> None:
         """Continue with another drive and controller, in the same state of all parts."""
@@ -263,7 +299,7 @@ class Motion(HybridMotion):
             ratio = old.normal_force / drive.normal_force
             state[system.actuator_states] = [each * ratio for each in lagging]
         self._use(system)
-        self._instant.time = self._time * drive.angular_frequency
+        self._set_clock()
         self._instant.inputs = [0.0] * len(system.inputs)
         self.set_forces(force, disturbance)
         self._set_state(state)

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from stickslip_ros.physics.model.courses import PiecewiseCourse, Ramp, Table, Trapezoid
 from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 
 PERIOD = 0.01
@@ -70,3 +71,24 @@ def test_a_sine_ends_after_its_duration() -> None:
         DisturbanceKind.SINE, amplitude=2.0, start=0.02, duration=0.02, frequency=12.5
     )
     assert forces(sine, 6) == pytest.approx([0.0, 0.0, 0.0, 2.0 * 0.5**0.5, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("disturbance", "course"),
+    [
+        (Disturbance(DisturbanceKind.RAMP, 2.0, 0.013, 0.05), Ramp(2.0, 0.013, 0.05)),
+        (
+            Disturbance(DisturbanceKind.TRAPEZOID, 2.0, 0.01, 0.1, 25.0),
+            Trapezoid(2.0, 0.01, 0.1, 25.0),
+        ),
+        (
+            Disturbance(DisturbanceKind.TABLE, table=Table((0.0, 0.1), (1.0, -1.0))),
+            Table((0.0, 0.1), (1.0, -1.0)),
+        ),
+    ],
+)
+def test_other_kinds_are_samples_of_their_course(
+    disturbance: Disturbance, course: PiecewiseCourse
+) -> None:
+    assert disturbance.refusal() is None
+    assert forces(disturbance, 20) == [course.at(number * PERIOD) for number in range(20)]
