@@ -99,7 +99,6 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._recorded = self.advertise(RECORDED)
         self._parameter_calls: dict[str, ServiceCall] = {}
         self._ask_for_parameters("plant")
-        self._controllers = 0
         self._to_measure: dict[Topic[Any], list[bytes]] = {
             JOINT_STATES: [],
             CONTROL_FORCE: [],
@@ -220,11 +219,10 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         self._parameter_calls[node] = parameters_call(self, node, names, partial(self._keep, node))
 
     def _look_for_controllers(self) -> None:
-        """Ask each controller of this package for its parameters, once it publishes forces."""
-        count = self._listening[CONTROL_FORCE].get_publisher_count()
-        if count == self._controllers:
-            return
-        self._controllers = count
+        """Ask each controller of this package for its parameters, once it publishes forces.
+
+        The middleware may name the node of a publisher later than it counts the publisher.
+        """
         own = self.get_namespace()
         for publisher in self.get_publishers_info_by_topic(CONTROL_FORCE.name):
             node = publisher.node_name

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from geometry_msgs.msg import WrenchStamped
 from rclpy.duration import Duration
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from sensor_msgs.msg import JointState
 
 from stickslip_ros.bags.reader import Recording
@@ -173,6 +174,34 @@ def test_a_message_without_a_proper_stamp_does_not_end_the_recording(
         recorded = [stamp for _, stamp, _ in recording.messages("/test/control_force")]
         assert recording.complete
     assert recorded == [5_000_000_000, 3_000_000_000]
+
+
+def test_a_controller_that_the_middleware_names_late_is_asked_for_its_parameters(
+    graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    named = AnalyzerNode.get_publishers_info_by_topic
+    looks = 0
+
+    def named_late(node: AnalyzerNode, topic: str) -> list[TopicEndpointInfo]:
+        nonlocal looks
+        publishers = named(node, topic)
+        looks += bool(publishers)
+        for publisher in publishers if looks < 3 else []:
+            publisher.node_name = "_NODE_NAME_UNKNOWN_"
+        return publishers
+
+    monkeypatch.setattr(AnalyzerNode, "get_publishers_info_by_topic", named_late)
+    graph.add(WashoutControllerNode)
+    graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
+
+    def kept() -> bool:
+        if not (tmp_path / "bag").is_dir():
+            return False
+        with Recording(tmp_path / "bag") as recording:
+            return recording.metadata("stickslip_ros/washout_controller") is not None
+
+    graph.wait_until(kept, "the parameters are in the bag")
+    assert looks >= 3
 
 
 def test_the_closed_loop_is_answered_without_loss(graph: Graph, tmp_path: Path) -> None:
