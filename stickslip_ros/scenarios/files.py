@@ -152,7 +152,9 @@ class Scenario:
             by_node.setdefault(node, {})[parameter] = value
         return self._replaced(
             {
-                node: NODE_PARAMETERS[node].validated({**self._values_of(node), **new}, node)
+                node: NODE_PARAMETERS[node].validated(
+                    {**self._values_of(node), **_absolute(node, new, Path())}, node
+                )
                 for node, new in by_node.items()
             }
         )
@@ -184,7 +186,8 @@ class Scenario:
         changed = self._replaced(
             {
                 node: NODE_PARAMETERS[node].validated(
-                    {**self._values_of(node), **new}, f"{self.path} with{texts[node]}, {node}"
+                    {**self._values_of(node), **_absolute(node, new, Path())},
+                    f"{self.path} with{texts[node]}, {node}",
                 )
                 for node, new in by_node.items()
             }
@@ -261,6 +264,7 @@ class Scenario:
             node, _, name = full_name.partition(".")
             value, known = self._flat[node][name], known_parameters(NODE_PARAMETERS[node])[name]
             text = f"{value:.10g}" if isinstance(value, float) else str(value)
+            text = known.unset if text == "nan" else text
             unit = "" if dimensionless else known.unit or ""
             note = "" if full_name in self.given else "default"
             rows.append([full_name, f"{text} {unit}".rstrip(), note])
@@ -363,13 +367,15 @@ def load_scenario(
     sources: dict[str, str] = {}
     other_sections: list[str] = []
 
-    def set_value(source: str, node: str, name: str, value: Any) -> None:
-        values[node][name] = value
+    def set_value(source: str, folder: Path, node: str, name: str, value: Any) -> None:
+        values[node][name] = _absolute(node, {name: value}, folder)[name]
         sources[f"{node}.{name}"] = source
 
     for file in files[::-1]:
         source = FILE if file is files[0] else BASE
-        other_sections = file.apply(partial(set_value, source), namespace, other_nodes=other_nodes)
+        other_sections = file.apply(
+            partial(set_value, source, file.path.parent), namespace, other_nodes=other_nodes
+        )
     models: dict[str, Any] = {
         node: NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
         for node, parameters in values.items()
@@ -392,6 +398,17 @@ def load_scenario(
         bases=tuple(file.path for file in files[1:]),
     )
     return scenario.overridden(overrides) if overrides else scenario
+
+
+def _absolute(node: str, values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return values of a node with absolute paths for those relative to a folder."""
+    known = known_parameters(NODE_PARAMETERS[node])
+    return {
+        name: str((folder / value).absolute())
+        if name in known and known[name].file and value and isinstance(value, str)
+        else value
+        for name, value in values.items()
+    }
 
 
 def known_law(name: str) -> str:

@@ -6,13 +6,14 @@ models. The nested field `friction.static` is the ROS parameter of that name.
 
 import re
 from collections.abc import Callable
-from dataclasses import fields
-from math import ceil, inf, isinf, pi, sqrt
+from dataclasses import fields, replace
+from math import ceil, inf, isinf, isnan, nan, pi, sqrt
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, create_model, model_validator
+from pydantic import AfterValidator, PrivateAttr, create_model, model_validator
 
 from stickslip_ros.deprecated_names import Renamed
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
@@ -21,11 +22,12 @@ from stickslip_ros.physics.model.constants import Constant, constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
+from stickslip_ros.physics.model.friction import LAWS, Directional, FrictionLaw, Table
 from stickslip_ros.physics.model.sensor import Sensor
+from stickslip_ros.scenarios.curve_file import Pairs, read_pairs
 from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, add_laws_of_other_packages
 from stickslip_ros.scenarios.pace import Pace
-from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field
+from stickslip_ros.scenarios.parameter_field import LARGEST, SMALLEST, Fixed, field
 from stickslip_ros.scenarios.validation import ParameterGroup, refused
 from stickslip_ros.text import shown
 
@@ -36,6 +38,8 @@ _SHORTEST = 1e-3
 """Shortest time-out or period of a node, s."""
 _OF_DRIVE = [each.name for each in fields(Drive) if each.type is float]
 """Parameters of the plant that the drive takes unchanged."""
+_AS_FORWARD = nan
+"""Value of a constant of backward slip that is the one of forward slip."""
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
 
@@ -48,20 +52,42 @@ def _known_law(name: str) -> str:
     raise ValueError(f"no law {name}")
 
 
-def _constants_of_laws() -> dict[str, Any]:
+def _constants_of_laws(*, reverse: bool = False) -> dict[str, Any]:
     """Return a field for each constant of the laws that is one number, by name."""
+    field_of = _reverse_field_of if reverse else _field_of
     laws: dict[str, list[str]] = {}
     constants: dict[str, Constant] = {}
     for law in LAWS.values():
         for name, constant in constants_of(law).items():
-            if isinstance(constant.default, tuple):
+            if isinstance(constant.default, tuple) or (constant.whole and reverse):
                 continue
             constants.setdefault(name, constant)
             laws.setdefault(name, []).append(law.name)
     return {
-        name: _field_of(constant, laws[name] if len(laws[name]) < len(LAWS) else [])
+        name: field_of(constant, laws[name] if len(laws[name]) < _LAWS_WITH_CONSTANTS else [])
         for name, constant in constants.items()
     }
+
+
+def _reverse_field_of(constant: Constant, laws: list[str]) -> Any:
+    """Return type and description of the parameter for a constant of backward slip."""
+    meaning = f"{constant.meaning.removesuffix('.')}, for v_r < 0."
+    _, described = _field_of(replace(constant, default=_AS_FORWARD, meaning=meaning), laws)
+    return Annotated[float, AfterValidator(_canonical)], described
+
+
+def _canonical(value: float) -> float:
+    """Return a number; of nan always the same object, so that groups of parameters compare."""
+    return _AS_FORWARD if isnan(value) else value
+
+
+def _curve(direction: str = "") -> Any:
+    return field(
+        "",
+        f"CSV file of relative speeds (m/s, from 0 on) and coefficients{direction} (table).",
+        fixed=Fixed.CONFIGURED,
+        file=True,
+    )
 
 
 def _group_of(part: type, fixed: Fixed) -> type[ParameterGroup]:
@@ -82,12 +108,26 @@ def _field_of(constant: Constant, laws: list[str] | None = None, fixed: Fixed = 
     if constant.whole:
         bounds = {bound: ceil(value) for bound, value in bounds.items()}
         return int, field(int(default), meaning, constant.unit, fixed=fixed, **bounds)
+    if isnan(default):
+        limits = {"ge": -LARGEST, "le": LARGEST} | bounds
+        return float, field(
+            default, meaning, constant.unit, unset="as forward", allow_inf_nan=True, **limits
+        )
     if isinf(default):
         bounds["allow_inf_nan"] = True
     return float, field(float(default), meaning, constant.unit, fixed=fixed, **bounds)
 
 
 add_laws_of_other_packages()
+_LAWS_WITH_CONSTANTS = sum(bool(constants_of(law)) for law in LAWS.values())
+
+
+class ReverseFriction(
+    create_model("_Reverse", __base__=ParameterGroup, **_constants_of_laws(reverse=True))
+):
+    """Coefficients of backward slip, v_r < 0, where they differ from those of forward slip."""
+
+    file: str = _curve(" for v_r < 0; empty: as forward")
 
 
 class _ChosenLaw(ParameterGroup):
@@ -95,25 +135,96 @@ class _ChosenLaw(ParameterGroup):
         "stribeck", "Friction law.", choices=LAWS
     )
 
+
+class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_laws())):
+    """Friction law and its coefficients; each law uses those of its formula."""
+
+    file: str = _curve()
+    reverse: ReverseFriction = ReverseFriction()
+
+    _law: FrictionLaw = PrivateAttr()
+
     @model_validator(mode="after")
     def _constants_fit_together(self) -> Self:
         """Refuse constants that the law refuses, under their names as parameters."""
-        law = self.as_law()
+        kind = LAWS[self.law]
+        if issubclass(kind, Table) and not self.file:
+            raise ValueError(
+                f"friction.file = {self.file!r} is refused: must be a CSV file of speeds and "
+                f"coefficients for law {self.law}"
+            )
+        law = kind(**self._constants(self, "friction"))
+        reverse = self._constants(self.reverse, "friction.reverse")
+        if reverse:
+            law = Directional(law, replace(law, **reverse))
         refusal = law.refusal()
         if refusal is not None:
-            names = "|".join(law.constants())
-            raise ValueError(re.sub(rf"\b({names}) = ", r"friction.\1 = ", refusal))
+
+            def parameter(match: re.Match[str]) -> str:
+                own = "reverse." if match[1] and match[2] in reverse else ""
+                return f"friction.{own}{match[2]} = "
+
+            names = "|".join(kind.constants())
+            raise ValueError(re.sub(rf"\b(reverse\.)?({names}) = ", parameter, refusal))
+        self._law = law
         return self
 
     def as_law(self) -> FrictionLaw:
         """Return the friction law in SI units."""
+        return self._law
+
+    def names(self) -> list[str]:
+        """Return the names of the parameters that make the law.
+
+        Constants of backward slip that are not given are none of them, and no constant at a default
+        that simplifies the equations.
+        """
         law = LAWS[self.law]
-        known = type(self).model_fields
-        return law(**{name: getattr(self, name) for name in law.constants() if name in known})
+        described = constants_of(law)
+        own = [
+            name
+            for name in law_parameters(law)
+            if not (
+                name in described
+                and described[name].simplifies
+                and getattr(self, name) == described[name].default
+            )
+        ]
+        return [*own, *(f"reverse.{name}" for name in self._given(self.reverse))]
+
+    def _given(self, group: "Friction | ReverseFriction") -> dict[str, Any]:
+        """Return the values of a group for the parameters of the law, by name."""
+        known = type(group).model_fields
+        values = {
+            name: getattr(group, name) for name in law_parameters(LAWS[self.law]) if name in known
+        }
+        return {name: value for name, value in values.items() if value not in ("", _AS_FORWARD)}
+
+    def _constants(self, group: "Friction | ReverseFriction", prefix: str) -> dict[str, Any]:
+        """Return the constants of the law that a group gives, those of a table from its file."""
+        values = self._given(group)
+        if "file" in values:
+            path = values.pop("file")
+            values["points"] = _points(path, f"{prefix}.file = {shown(path)} is refused")
+        return values
 
 
-class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_laws())):
-    """Friction law and its coefficients; each law uses those of its formula."""
+def law_parameters(law: type[FrictionLaw]) -> list[str]:
+    """Return the names of the parameters of a friction law, in the group `friction`."""
+    names = [name for name in law.constants() if name in Friction.model_fields]
+    return [*names, "file"] if issubclass(law, Table) else names
+
+
+def _points(path: str, lead: str) -> Pairs:
+    """Return the points of a table from its file; a refusal begins with `lead`."""
+    try:
+        points = read_pairs(path)
+    except InvalidInputError as error:
+        raise ValueError(f"{lead}: {error}") from None
+    refusal = Table(points).refusal()
+    if refusal is not None:
+        raise ValueError(f"{lead}: {refusal}")
+    return points
 
 
 class Initial(ParameterGroup):
@@ -282,8 +393,7 @@ class PlantParameters(NodeParameters):
 
     def drive_names(self) -> list[str]:
         """Return the flat names of the drive's parameters, with those of its friction law."""
-        constants = LAWS[self.friction.law].constants()
-        return [*_OF_DRIVE, "friction.law", *(f"friction.{name}" for name in constants)]
+        return [*_OF_DRIVE, "friction.law", *(f"friction.{name}" for name in self.friction.names())]
 
     def as_disturbance(self) -> Disturbance:
         """Return the disturbance of the scenario."""

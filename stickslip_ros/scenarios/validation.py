@@ -96,6 +96,8 @@ def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str
         if bounds:
             allowed = bounds if parameter.choices else f"{allowed} {bounds}"
         unit = f"{'' if bounds else ' in'} {parameter.unit}" if parameter.unit else ""
+        if parameter.unset:
+            unit += f", or nan ({parameter.unset})"
         text = ", not text" if isinstance(value, str) and parameter.kind is not str else ""
         complaints.append(f"{name} = {shown(value)} is refused: must be {allowed}{unit}{text}")
     return "; ".join(complaints)
@@ -104,8 +106,11 @@ def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str
 def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
     nested: dict[str, Any] = {}
     for name, value in values.items():
-        group, _, rest = name.rpartition(".")
-        (nested.setdefault(group, {}) if group else nested)[rest] = value
+        *groups, last = name.split(".")
+        group = nested
+        for each in groups:
+            group = group.setdefault(each, {})
+        group[last] = value
     return nested
 
 

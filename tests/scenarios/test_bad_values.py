@@ -25,7 +25,8 @@ def taken_or_refused(model: type[NodeParameters], name: str, value: Any) -> Any:
 
 
 def does_not_go_with_others(message: str) -> bool:
-    return "must not exceed" in message or "at least a thousandth" in message
+    clash = ("must not exceed", "at least a thousandth", "must be a CSV file")
+    return any(each in message for each in clash)
 
 
 def bits(value: Any) -> Any:

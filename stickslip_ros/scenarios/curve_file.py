@@ -1,0 +1,65 @@
+"""Reading a measured curve: a CSV file of pairs of numbers."""
+
+from pathlib import Path
+from stat import S_ISREG
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.scenarios.parameter_field import LARGEST
+from stickslip_ros.text import shown
+
+_LARGEST_FILE = 1_000_000
+"""Largest size of a file, bytes."""
+
+Pairs = tuple[tuple[float, float], ...]
+
+
+def read_pairs(path: str) -> Pairs:
+    """Return the pairs of numbers in a CSV file, one on each line.
+
+    Empty lines and lines that start with # are skipped, and so is a first line of names. Raises
+    InvalidInputError with the reason, which does not name the file.
+    """
+    lines = [
+        (number, line)
+        for number, line in enumerate(_text(Path(path)).splitlines(), start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if lines and not any(_number(cell) is not None for cell in lines[0][1].split(",")):
+        del lines[0]
+    if not lines:
+        raise InvalidInputError("the file has no numbers: must have two on each line")
+    return tuple(_pair(number, line) for number, line in lines)
+
+
+def _text(path: Path) -> str:
+    try:
+        about = path.stat()
+        if not S_ISREG(about.st_mode):
+            raise InvalidInputError("must be a regular file")
+        if about.st_size > _LARGEST_FILE:
+            raise InvalidInputError(
+                f"the file has {about.st_size} bytes: must have at most {_LARGEST_FILE}"
+            )
+        with path.open("rb") as file:
+            return file.read(_LARGEST_FILE).decode("utf-8-sig")
+    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a path with a null character
+        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        raise InvalidInputError(f"the file cannot be read: {reason}") from None
+
+
+def _pair(number: int, line: str) -> tuple[float, float]:
+    values = [_number(cell) for cell in line.split(",")]
+    if len(values) != 2 or values[0] is None or values[1] is None:
+        raise InvalidInputError(
+            f"line {number} is {shown(line.strip())}: must be two numbers with a comma between"
+        )
+    return values[0], values[1]
+
+
+def _number(cell: str) -> float | None:
+    """Return a number that no product or power in the physics overflows, or None."""
+    try:
+        value = float(cell)
+    except ValueError:
+        return None
+    return value if abs(value) <= LARGEST else None
