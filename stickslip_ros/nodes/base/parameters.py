@@ -109,6 +109,7 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
         values = {n: self._as_meant(n, p.value) for n, p in given.items() if n not in _OWNED_BY_ROS}
         source = self.get_fully_qualified_name()
         try:
+            self._check_files(values, source)
             changed = self._model.validated(self.parameters.flat() | values, source)
             self._check_fixed(values, source)
         except InvalidInputError as error:
@@ -138,6 +139,16 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
             )
         super().set_parameters(self._as_ros(validated.flat()))
         return validated
+
+    def _check_files(self, values: Mapping[str, Any], source: str) -> None:
+        """Refuse another file: a request from the network must not make the node read one."""
+        present = self.parameters.flat()
+        for name, value in values.items():
+            if name in self._known and self._known[name].file and value != present[name]:
+                raise InvalidInputError(
+                    f"{source}: {name} = {shown(value)} is refused: must be given where the node "
+                    f"is started, and is {shown(present[name])}"
+                )
 
     def _check_fixed(self, values: Mapping[str, Any], source: str) -> None:
         """Refuse changes of parameters that are fixed in the present state."""

@@ -146,6 +146,7 @@ def test_a_refusal_names_constants_with_their_values(
         (Stribeck(static=0.4, minimum=0.5), "minimum = 0.5 must not exceed static = 0.4"),
         (Exponential(static=0.1, kinetic=0.25), "kinetic = 0.25 must not exceed static = 0.1"),
         (Exponential(static=0.25, kinetic=0.25), None),
+        (Exponential(exponent=1e3), "exponent = 1000.0 must not exceed 100"),
         (Coulomb(static=0.0), None),
     ],
 )

@@ -7,6 +7,8 @@ from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
 from stickslip_ros.physics.model.functions import exp, power
 
+_LARGEST_EXPONENT = 100
+
 
 @dataclass(frozen=True)
 class Exponential(FrictionLaw):
@@ -63,11 +65,13 @@ class Exponential(FrictionLaw):
         return -sign * (self.kinetic + drop * decay + self.viscous * speed)
 
     def refusal(self) -> str | None:
-        """Refuse a kinetic coefficient above the static one; see `FrictionLaw.refusal`.
+        """Refuse a kinetic coefficient above the static one, and a drop that is nearly a step.
 
         Returns
         -------
         str or None
-            Sentence with both values.
+            Sentence with the values; see `FrictionLaw.refusal`.
         """
+        if self.exponent > _LARGEST_EXPONENT:
+            return f"exponent = {self.exponent} must not exceed {_LARGEST_EXPONENT}"
         return self.above_static("kinetic")
