@@ -21,9 +21,7 @@ LAW = Table(((0.0, 0.4), (0.1, 0.3), (0.3, 0.32), (0.5, 0.25)))
 @st.composite
 def tables(draw: st.DrawFn) -> Table:
     steps = draw(st.lists(st.floats(1e-3, 1.0), min_size=0, max_size=8))
-    values = draw(
-        st.lists(st.floats(0.0, 1.0), min_size=len(steps) + 1, max_size=len(steps) + 1)
-    )
+    values = draw(st.lists(st.floats(0.0, 1.0), min_size=len(steps) + 1, max_size=len(steps) + 1))
     speeds = np.cumsum([0.0, *steps]).tolist()
     return Table(tuple(zip(speeds, values, strict=True)))
 
@@ -31,9 +29,7 @@ def tables(draw: st.DrawFn) -> Table:
 def tabulated(law: FrictionLaw, last: float, count: int) -> Table:
     """Return a table of a law's own values."""
     speeds = np.linspace(0.0, last, count)
-    return Table(
-        tuple((float(v), -float(law.coefficient(float(v), 1.0))) for v in speeds)
-    )
+    return Table(tuple((float(v), -float(law.coefficient(float(v), 1.0))) for v in speeds))
 
 
 @given(tables())
@@ -127,9 +123,7 @@ def test_points_that_make_no_table_are_refused(points: Any, refusal: str) -> Non
     assert Table(points).refusal() == refusal
 
 
-@pytest.mark.parametrize(
-    "law", [Stribeck(0.4, 0.25, 0.5), Exponential(0.4, 0.25, 0.3, 0.02, 2.0)]
-)
+@pytest.mark.parametrize("law", [Stribeck(0.4, 0.25, 0.5), Exponential(0.4, 0.25, 0.3, 0.02, 2.0)])
 def test_the_table_of_a_law_moves_as_the_law(law: FrictionLaw) -> None:
     """The error falls with the square of the spacing, or faster."""
     errors: list[float] = []

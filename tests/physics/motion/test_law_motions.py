@@ -55,8 +55,9 @@ def exponential(exponent: float) -> Callable[[Random, float], Made]:
         static, kinetic = draw.uniform(0.4, 0.6), draw.uniform(0.1, 0.3)
         speed, viscous = draw.uniform(0.1, 0.5) * unit, draw.uniform(0.0, 0.2) / unit
         law = Exponential(static, kinetic, speed, viscous, exponent)
-        return law, lambda w: (
-            kinetic + (static - kinetic) * exp(-((w / speed) ** exponent)) + viscous * w
+        return (
+            law,
+            lambda w: kinetic + (static - kinetic) * exp(-((w / speed) ** exponent)) + viscous * w,
         )
 
     return made
