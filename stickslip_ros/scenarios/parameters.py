@@ -10,7 +10,7 @@ from dataclasses import fields, replace
 from math import ceil, inf, isinf, isnan, nan, pi, sqrt
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, PrivateAttr, create_model, model_validator
+from pydantic import AfterValidator, PrivateAttr, create_model, field_validator, model_validator
 
 from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import InvalidInputError
@@ -72,13 +72,7 @@ def _constants_of_laws(*, reverse: bool = False) -> dict[str, Any]:
 def _reverse_field_of(constant: Constant, laws: list[str]) -> Any:
     """Return type and description of the parameter for a constant of backward slip."""
     meaning = f"{constant.meaning.removesuffix('.')}, for v_r < 0."
-    _, described = _field_of(replace(constant, default=_AS_FORWARD, meaning=meaning), laws)
-    return Annotated[float, AfterValidator(_canonical)], described
-
-
-def _canonical(value: float) -> float:
-    """Return a number; of nan always the same object, so that groups of parameters compare."""
-    return _AS_FORWARD if isnan(value) else value
+    return _field_of(replace(constant, default=_AS_FORWARD, meaning=meaning), laws)
 
 
 def _curve(direction: str = "") -> Any:
@@ -128,6 +122,12 @@ class ReverseFriction(
     """Coefficients of backward slip, v_r < 0, where they differ from those of forward slip."""
 
     file: str = _curve(" for v_r < 0; empty: as forward")
+
+    @field_validator("*")
+    @classmethod
+    def _one_nan(cls, value: Any) -> Any:
+        """Return the same object for every nan, so that groups of parameters compare."""
+        return _AS_FORWARD if value != value else value  # noqa: PLR0124
 
 
 class _ChosenLaw(ParameterGroup):

@@ -40,14 +40,12 @@ def structure(part: Any) -> Any:
     found: list[Any] = [kind]
     for name, constant in _fields(kind):
         value = getattr(part, name)
-        if constant is not None and constant.stays(value):
-            found.append(value)
+        if constant is not None and (constant.whole or constant.simplifies):
+            found.append(value if constant.stays(value) else None)
         elif isinstance(value, tuple):
             found.append(len(value) if constant is not None else None)
         elif not isinstance(value, int | float):
             found.append(structure(value))
-        elif constant is not None and constant.simplifies:
-            found.append(None)
     return tuple(found)
 
 
@@ -61,7 +59,8 @@ def _values(part: Any) -> dict[str, Any]:
     for name, constant in _fields(type(part)):
         value = getattr(part, name)
         if isinstance(value, int | float):
-            if constant is None or not constant.stays(value):
+            special = constant is not None and (constant.whole or constant.simplifies)
+            if not (special and constant.stays(value)):
                 found[name] = value
         elif isinstance(value, tuple):
             if constant is not None:

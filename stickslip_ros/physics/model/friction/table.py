@@ -60,7 +60,9 @@ class Table(FrictionLaw):
         """
         speed = np.asarray(relative_speed * sign)
         piece = np.maximum(np.searchsorted(self._speeds, speed, side="right") - 1, 0)
-        return self.friction(relative_speed, sign, (), tuple(self._pieces[piece].T))
+        return self.friction(
+            relative_speed, sign, (), tuple(np.moveaxis(self._pieces[piece], -1, 0))
+        )
 
     def friction(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
