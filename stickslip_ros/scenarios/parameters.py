@@ -127,7 +127,7 @@ class ReverseFriction(
     @classmethod
     def _one_nan(cls, value: Any) -> Any:
         """Return the same object for every nan, so that groups of parameters compare."""
-        return _AS_FORWARD if value != value else value  # noqa: PLR0124
+        return _AS_FORWARD if value != value else value
 
 
 class _ChosenLaw(ParameterGroup):

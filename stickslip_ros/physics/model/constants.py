@@ -46,7 +46,18 @@ class Constant:
     """Whether whole values stay numbers in the equations, such as an exponent of 1."""
 
     def stays(self, value: Any) -> bool:
-        """Return whether a value stays a number in the symbolic equations."""
+        """Return whether a value stays a number in the symbolic equations.
+
+        Parameters
+        ----------
+        value : float or expression
+            Value of the constant.
+
+        Returns
+        -------
+        bool
+            True for a whole number that makes or simplifies the equations.
+        """
         number = isinstance(value, int | float)
         return self.whole or (self.simplifies and number and float(value).is_integer())
 
