@@ -117,7 +117,8 @@ class Reference:
             until = min(end, now + 1e-3 / self.drive.angular_frequency) if y == belt else end
             solution = self._slip(sign, now, until, x, y, events=y != belt)
             rows = (times >= now) & (times <= solution.t[-1])
-            found[rows] = solution.sol(times[rows]).T
+            if rows.any():
+                found[rows] = solution.sol(times[rows]).T
             now, (x, y) = float(solution.t[-1]), solution.y[:, -1].tolist()
             if solution.status == 1:
                 y = belt
