@@ -201,8 +201,8 @@ def test_a_slide_breaks_loose_at_the_limit_of_its_direction() -> None:
 
 
 MEMORIES: Sequence[tuple[FrictionLaw, Any]] = [
-    (Dahl(0.4, 20.0), Dahl(0.3, 15.0)),
-    (Iwan(0.4, 5.0), Iwan(0.3, 4.0)),
+    (Dahl(0.4, 20.0), Dahl(0.3, 20.0)),
+    (Iwan(0.4, 5.0), Iwan(0.3, 5.0)),
 ]
 
 
