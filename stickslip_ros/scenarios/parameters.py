@@ -10,7 +10,14 @@ from dataclasses import fields, replace
 from math import ceil, inf, isinf, isnan, nan, pi, sqrt
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, PrivateAttr, create_model, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    PrivateAttr,
+    ValidatorFunctionWrapHandler,
+    create_model,
+    field_validator,
+    model_validator,
+)
 
 from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import InvalidInputError
@@ -123,11 +130,11 @@ class ReverseFriction(
 
     file: str = _curve(" for v_r < 0; empty: as forward")
 
-    @field_validator("*")
+    @field_validator("*", mode="wrap")
     @classmethod
-    def _one_nan(cls, value: Any) -> Any:
-        """Return the same object for every nan, so that groups of parameters compare."""
-        return _AS_FORWARD if value != value else value
+    def _as_forward(cls, value: Any, handler: ValidatorFunctionWrapHandler) -> Any:
+        """Take nan, which no bounds allow, as one object: groups of parameters then compare."""
+        return _AS_FORWARD if isinstance(value, float) and isnan(value) else handler(value)
 
 
 class _ChosenLaw(ParameterGroup):
@@ -211,8 +218,9 @@ class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_l
 
 def law_parameters(law: type[FrictionLaw]) -> list[str]:
     """Return the names of the parameters of a friction law, in the group `friction`."""
-    names = [name for name in law.constants() if name in Friction.model_fields]
-    return [*names, "file"] if issubclass(law, Table) else names
+    if issubclass(law, Table):
+        return ["file"]
+    return [name for name in law.constants() if name in Friction.model_fields]
 
 
 def _points(path: str, lead: str) -> Pairs:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Exponential, FrictionLaw, Stribeck, Table
+from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.physics.theory.hopf import hopf_points
 from tests.physics.drives import PAPER
@@ -160,8 +161,13 @@ def test_the_hopf_speed_of_a_table_of_that_law() -> None:
 
 
 def test_a_table_is_compiled_once_for_every_table() -> None:
-    motion = Motion(replace(PAPER, friction=LAW), 0.0, 0.0)
-    motion.advance(5.0)
-    motion.drive = replace(PAPER, friction=Table(((0.0, 0.4),)))
-    motion.advance(5.0)
-    assert not motion.unbounded
+    """And each has its own limit of sticking."""
+    structures = {drive_system(replace(PAPER, friction=law)).structure for law in TWO}
+    assert len(structures) == 1
+    for law in TWO:
+        motion = Motion(replace(PAPER, friction=law), 0.0, 0.4)
+        motion.advance(law.static / 0.4)
+        assert motion.position == pytest.approx(law.static - 0.02 * 0.4, rel=0.05)
+
+
+TWO = [Table(((0.0, 0.4), (0.5, 0.3))), Table(((0.0, 0.8), (0.1, 0.5), (0.5, 0.3)))]

@@ -33,15 +33,15 @@ class Table(FrictionLaw):
     switches: ClassVar[Sequence[str]] = (
         "lower", "upper", "first", "last", "c0", "c1", "c2", "c3",
     )  # fmt: skip
-    static: ClassVar[Any]  # type: ignore[misc]
-
     points: tuple[tuple[float, float], ...] = field(default=((0.0, 0.4), (0.5, 0.25)))
     """Speeds |v_r| (m/s), the first of which is 0, each with its coefficient."""
+    static: Any = field(default=0.0, kw_only=True)
+    """Static coefficient: that of the first point, whatever is given."""
 
-    @property
-    def static(self) -> Any:
-        """Static coefficient: that of the first point."""
-        return self.points[0][1]
+    def __post_init__(self) -> None:
+        if isinstance(self.static, int | float):  # otherwise it is a symbol
+            first = self.points[0][1] if self.points else 0.0
+            object.__setattr__(self, "static", first)
 
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
         """Return mu(v_r); see `FrictionLaw.coefficient`.
