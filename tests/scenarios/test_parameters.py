@@ -215,8 +215,12 @@ def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
     for name in sorted(draw(st.sets(st.sampled_from(sorted(parameters))))):
         kind, choices = parameters[name].kind, parameters[name].choices
         values[name] = draw(st.sampled_from(choices) if choices else strategies[kind])
-    if "friction.static" in values or "friction.minimum" in values or "friction.kinetic" in values:
-        values |= {"friction.static": 1e6}  # the largest of the coefficients
+    if any(name.endswith((".static", ".minimum", ".kinetic")) for name in values):
+        # The largest of the coefficients.
+        values |= {"friction.static": 1e6, "friction.reverse.static": 1e6}
+    assume(values.get("friction.law") != "table")  # it needs a file
+    for name in values.keys() & {"friction.exponent", "friction.reverse.exponent"}:
+        values[name] = 2.0
     if values.keys() & {"mass", "stiffness", "rate"}:
         values |= {"rate": 1e3}  # above all natural frequencies
     return values
