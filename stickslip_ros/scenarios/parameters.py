@@ -110,7 +110,7 @@ def _field_of(constant: Constant, laws: list[str] | None = None, fixed: Fixed = 
         bounds = {bound: ceil(value) for bound, value in bounds.items()}
         return int, field(int(default), meaning, constant.unit, fixed=fixed, **bounds)
     if isnan(default):
-        limits = {"ge": -LARGEST, "le": LARGEST} | bounds
+        limits: dict[str, Any] = {"ge": -LARGEST, "le": LARGEST} | bounds
         return float, field(
             default, meaning, constant.unit, unset="as forward", allow_inf_nan=True, **limits
         )
