@@ -136,6 +136,11 @@ class ReverseFriction(
         """Take nan, which no bounds allow, as one object: groups of parameters then compare."""
         return _AS_FORWARD if isinstance(value, float) and isnan(value) else handler(value)
 
+    def __setstate__(self, state: dict[Any, Any]) -> None:
+        super().__setstate__(state)
+        values = self.__dict__
+        values |= {name: _AS_FORWARD for name, value in values.items() if value != value}
+
 
 class _ChosenLaw(ParameterGroup):
     law: Annotated[str, AfterValidator(_known_law)] = field(

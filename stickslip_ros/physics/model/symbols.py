@@ -59,8 +59,8 @@ def _values(part: Any) -> dict[str, Any]:
     for name, constant in _fields(type(part)):
         value = getattr(part, name)
         if isinstance(value, int | float):
-            special = constant is not None and (constant.whole or constant.simplifies)
-            if not (special and constant.stays(value)):
+            plain = constant is None or not (constant.whole or constant.simplifies)
+            if plain or constant is None or not constant.stays(value):
                 found[name] = value
         elif isinstance(value, tuple):
             if constant is not None:

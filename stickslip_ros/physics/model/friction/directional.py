@@ -38,7 +38,7 @@ class Directional(FrictionLaw):
             object.__setattr__(self, shared, getattr(self.forward, shared))
 
     @property
-    def static(self) -> Any:
+    def static(self) -> Any:  # pyright: ignore[reportIncompatibleVariableOverride]
         """The larger static coefficient."""
         return max(self.limits)
 
