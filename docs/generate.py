@@ -48,14 +48,14 @@ def _parameter_row(parameter: Parameter) -> list[str]:
     if parameter.kind is bool:
         default = str(default).lower()
     elif parameter.kind is float:
-        default = "inf" if isinf(default) else repr(default)
+        default = "inf" if isinf(default) else parameter.text(default)
     allowed = parameter.bounds
     if not parameter.finite:
         allowed += ", or inf" if allowed else "inf"
     return [
         f"`{parameter.name}`",
         parameter.unit or "",
-        f"`{default}`" if default not in ("", []) else "empty",
+        f"`{default}`" if default not in ("", [], parameter.unset) else default or "empty",
         allowed,
         parameter.fixed.changes,
         parameter.meaning.removesuffix("."),

@@ -1,5 +1,6 @@
 """Format text for messages, tables and figures."""
 
+import re
 from collections.abc import Iterable
 from difflib import SequenceMatcher
 from typing import Any
@@ -49,7 +50,8 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str | None = None) 
 
     If none is close, return `otherwise`, by default all known names. Names are close if they have
     the same last part (plant.friction.static and plant.static), or if its words include those of
-    the unknown name (linear_gain and gain); otherwise, the most similar name is close.
+    the unknown name (linear_gain and gain); otherwise, the most similar name is close. Of two close
+    names the one that has all words of the other and more (friction.reverse.static) is omitted.
     """
     names, name = sorted(known), name[:_LONGEST]
     last = name.rpartition(".")[2]
@@ -59,6 +61,8 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str | None = None) 
         ratios = {each: _likeness(name, each) for each in names}
         best = max(ratios.values(), default=0.0)
         close = [each for each in names if ratios[each] == best >= _ALIKE]
+    parts = {each: set(re.split(r"[._]", each)) for each in close}
+    close = [each for each in close if not any(parts[other] < parts[each] for other in close)]
     if close:
         return f"did you mean {' or '.join(close[:_MOST])}?"
     return f"known are {', '.join(names)}" if otherwise is None else otherwise

@@ -22,6 +22,11 @@ def test_a_close_name_is_meant(name: str, meant: str) -> None:
     assert did_you_mean(name, KNOWN) == f"did you mean {meant}?"
 
 
+def test_a_name_with_all_words_of_another_is_not_meant() -> None:
+    assert did_you_mean("static", ["a.static", "a.reverse.static"]) == "did you mean a.static?"
+    assert did_you_mean("static", ["a_static", "a_reverse_static"]) == "did you mean a_static?"
+
+
 def test_several_may_be_meant() -> None:
     assert did_you_mean("stop", ["a.stop", "b.stop"]) == "did you mean a.stop or b.stop?"
 

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from collections.abc import Iterable
 from inspect import getdoc
 from itertools import chain, repeat
 from pathlib import Path
@@ -37,13 +38,16 @@ def run(arguments: argparse.Namespace) -> int:
         from stickslip_ros.physics.model.friction import LAWS
         from stickslip_ros.scenarios.files import shipped_scenarios
         from stickslip_ros.scenarios.foreign_laws import CONTROLLERS, FRICTION_LAWS
+        from stickslip_ros.scenarios.friction_parameters import law_parameters
         from stickslip_ros.scenarios.parameters import controller_node
     for kind, family in (("friction law", FRICTION_LAWS), ("control law", CONTROLLERS)):
         for name, reason in family.refused.items():
             print(printable(f"{kind} {name} is refused: {reason}"), file=sys.stderr)
     scenarios = [_scenario(name, path) for name, path in shipped_scenarios().items()]
-    friction_laws = [_law(law, "plant.friction") for law in LAWS.values()]
-    control_laws = [_law(law, controller_node(name)) for name, law in CONTROL_LAWS.items()]
+    friction_laws = [_law(law, "plant.friction", law_parameters(law)) for law in LAWS.values()]
+    control_laws = [
+        _law(law, controller_node(name), law.constants()) for name, law in CONTROL_LAWS.items()
+    ]
     if arguments.json:
         print_json(
             {
@@ -87,11 +91,13 @@ def _scenario(name: str, path: Path) -> dict[str, str]:
     return {"name": name, "description": leading_comment(path), "path": str(path)}
 
 
-def _law(law: "type[FrictionLaw | ControlLaw]", group: str) -> dict[str, Any]:
+def _law(
+    law: "type[FrictionLaw | ControlLaw]", group: str, parameters: Iterable[str]
+) -> dict[str, Any]:
     return {
         "name": law.name,
         "description": (getdoc(law) or "").partition("\n")[0],
-        "parameters": [f"{group}.{constant}" for constant in law.constants()],
+        "parameters": [f"{group}.{name}" for name in parameters],
     }
 
 

@@ -12,6 +12,7 @@ from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
     from stickslip_ros.scenarios.files import Scenario
+    from stickslip_ros.scenarios.parameter_field import Parameter
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,6 +31,8 @@ def run(arguments: argparse.Namespace) -> int:
     with interrupts_kept():
         from stickslip_ros.plots.units import Units
         from stickslip_ros.scenarios.files import load_scenario
+        from stickslip_ros.scenarios.parameter_field import known_parameters
+        from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
     load = partial(
         load_scenario,
         arguments.scenario,
@@ -58,8 +61,9 @@ def run(arguments: argparse.Namespace) -> int:
     for node, parameters in found.items():
         # Where the drive is dimensionless, so are the parameters of the loop.
         unit = str if node == "analyzer" else units.of_unit
+        known = known_parameters(NODE_PARAMETERS[node])
         rows = [
-            [name, _text(row["value"]), unit(row["unit"] or ""), row["source"]]
+            [name, _text(known[name], row["value"]), unit(row["unit"] or ""), row["source"]]
             for name, row in parameters.items()
         ]
         print()
@@ -88,7 +92,5 @@ def _parameters(scenario: "Scenario", node: str) -> dict[str, dict[str, Any]]:
     }
 
 
-def _text(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return repr(value) if isinstance(value, float) else str(value)
+def _text(parameter: "Parameter", value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else parameter.text(value)

@@ -269,8 +269,8 @@ class _Panels:
                     speeds = end - (end - start) * steps
                 axes.plot(speeds / scale, law.coefficient(speeds, sign), **look)
         if least <= 0.0 <= largest:
-            limit = float(law.static)
-            axes.plot([0.0, 0.0], [-limit, limit], **look)
+            forward, backward = map(float, law.limits)
+            axes.plot([0.0, 0.0], [-forward, backward], **look)
 
 
 def _draw_held(

@@ -1,5 +1,7 @@
 """Reading a measured curve: a CSV file of pairs of numbers."""
 
+from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from stat import S_ISREG
 
@@ -11,6 +13,33 @@ _LARGEST_FILE = 1_000_000
 """Largest size of a file, bytes."""
 
 Pairs = tuple[tuple[float, float], ...]
+
+
+def read_curve(name: str, path: str, refusal: Callable[[Pairs], str | None]) -> Pairs:
+    """Return the pairs of numbers in the file of a parameter; see `read_pairs`.
+
+    Raises ValueError, as a validator does, with a sentence that names the parameter: if the file
+    cannot be read, or if there is a `refusal` of its pairs.
+    """
+    try:
+        about = Path(path).stat()
+        # Studies ask for the same file for each of their cases.
+        return _checked(path, about.st_mtime_ns, about.st_size, refusal)
+    except InvalidInputError as error:
+        reason = str(error)
+    except (OSError, ValueError) as error:  # ValueError: a path with a null character
+        reason = f"the file cannot be read: {getattr(error, 'strerror', None) or error}"
+    raise ValueError(f"{name} = {shown(path)} is refused: {reason}")
+
+
+@lru_cache(maxsize=64)
+def _checked(path: str, changed: int, size: int, refusal: Callable[[Pairs], str | None]) -> Pairs:
+    """Return the pairs of a file that was last changed then."""
+    pairs = read_pairs(path)
+    why = refusal(pairs)
+    if why is not None:
+        raise InvalidInputError(why)
+    return pairs
 
 
 def read_pairs(path: str) -> Pairs:

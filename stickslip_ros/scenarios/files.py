@@ -1,6 +1,5 @@
 """Scenarios: ROS parameter files, loaded by name or path, with overrides."""
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -150,10 +149,12 @@ class Scenario:
         by_node: dict[str, dict[str, Any]] = {}
         for target, value in values.items():
             node, _, parameter = target.partition(".")
-            by_node.setdefault(node, {})[parameter] = _absolute(parameter, value)
+            by_node.setdefault(node, {})[parameter] = value
         return self._replaced(
             {
-                node: NODE_PARAMETERS[node].validated({**self._values_of(node), **new}, node)
+                node: NODE_PARAMETERS[node].validated(
+                    {**self._values_of(node), **_absolute(node, new, Path())}, node
+                )
                 for node, new in by_node.items()
             }
         )
@@ -180,12 +181,13 @@ class Scenario:
         texts: dict[str, str] = {}
         for override in overrides:
             node, parameter, value = parse_override(override)
-            by_node.setdefault(node, {})[parameter] = _absolute(parameter, value)
+            by_node.setdefault(node, {})[parameter] = value
             texts[node] = f"{texts.get(node, '')} {override:.80}"
         changed = self._replaced(
             {
                 node: NODE_PARAMETERS[node].validated(
-                    {**self._values_of(node), **new}, f"{self.path} with{texts[node]}, {node}"
+                    {**self._values_of(node), **_absolute(node, new, Path())},
+                    f"{self.path} with{texts[node]}, {node}",
                 )
                 for node, new in by_node.items()
             }
@@ -262,6 +264,7 @@ class Scenario:
             node, _, name = full_name.partition(".")
             value, known = self._flat[node][name], known_parameters(NODE_PARAMETERS[node])[name]
             text = f"{value:.10g}" if isinstance(value, float) else str(value)
+            text = known.unset if text == "nan" else text
             unit = "" if dimensionless else known.unit or ""
             note = "" if full_name in self.given else "default"
             rows.append([full_name, f"{text} {unit}".rstrip(), note])
@@ -365,7 +368,7 @@ def load_scenario(
     other_sections: list[str] = []
 
     def set_value(source: str, folder: Path, node: str, name: str, value: Any) -> None:
-        values[node][name] = _absolute(name, value, folder)
+        values[node][name] = _absolute(node, {name: value}, folder)[name]
         sources[f"{node}.{name}"] = source
 
     for file in files[::-1]:
@@ -397,11 +400,15 @@ def load_scenario(
     return scenario.overridden(overrides) if overrides else scenario
 
 
-def _absolute(name: str, value: Any, folder: Path = Path()) -> Any:
-    """Return the value of a parameter; the path of a file, relative to `folder`, as absolute."""
-    if name.rpartition(".")[2] != "file" or not isinstance(value, str) or not value:
-        return value
-    return os.path.abspath(folder / value)
+def _absolute(node: str, values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return values of a node with absolute paths for those relative to a folder."""
+    known = known_parameters(NODE_PARAMETERS[node])
+    return {
+        name: str((folder / value).absolute())
+        if name in known and known[name].file and value and isinstance(value, str)
+        else value
+        for name, value in values.items()
+    }
 
 
 def known_law(name: str) -> str:

@@ -117,7 +117,7 @@ FRICTION_LAWS = LawFamily(
     "stickslip_ros.friction_laws",
     FrictionLaw,
     LAWS,
-    reserved={"law", "as_law", *dir(ParameterGroup)},
+    reserved={"law", "as_law", "file", "reverse", *dir(ParameterGroup)},
     one_namespace=True,
 )
 CONTROLLERS = LawFamily(

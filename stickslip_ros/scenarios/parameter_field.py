@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
+from math import isnan
 from typing import Any
 
 from pydantic import BaseModel, Field
@@ -43,10 +44,18 @@ def field(
     *,
     fixed: Fixed = Fixed.NEVER,
     choices: Iterable[str] = (),
+    unset: str = "",
+    file: bool = False,
     **bounds: Any,
 ) -> Any:
-    """Describe a parameter."""
-    extra: Any = {"unit": unit, "fixed": fixed, "choices": tuple(choices)}
+    """Describe a parameter; `unset` and `file` as in `Parameter`."""
+    extra: Any = {
+        "unit": unit,
+        "fixed": fixed,
+        "choices": tuple(choices),
+        "unset": unset,
+        "file": file,
+    }
     if isinstance(default, float) and "allow_inf_nan" not in bounds:
         bounds = {"ge": -LARGEST, "le": LARGEST} | bounds
     return Field(default, description=meaning, json_schema_extra=extra, **bounds)
@@ -78,6 +87,14 @@ class Parameter:
     """Smallest value of a number, if it has one."""
     largest: float | None
     """Largest value of a number, if it has one."""
+    unset: str = ""
+    """Meaning of nan, in words; empty: nan is refused."""
+    file: bool = False
+    """Whether it is the path of a file, or empty."""
+
+    def text(self, value: Any) -> str:
+        """Return a value for a reader: nan as its meaning."""
+        return self.unset if self.unset and isnan(value) else str(value)
 
 
 def parameters_of(model: type[BaseModel], prefix: str = "") -> Iterator[Parameter]:
@@ -108,6 +125,7 @@ def _parameter(name: str, info: FieldInfo) -> Parameter:
         if hasattr(constraint, comparison)
     }
     told = {name: limit for name, limit in limits.items() if abs(limit) not in _UNTOLD}
+    unset = extra["unset"]
     return Parameter(
         name=name,
         kind=kind,
@@ -118,10 +136,14 @@ def _parameter(name: str, info: FieldInfo) -> Parameter:
         choices=choices,
         bounds=one_of or _in_words(told).replace(f"at least {SMALLEST:g}", "above 0"),
         limits=one_of or _in_words(limits),
-        finite=not any(getattr(each, "allow_inf_nan", False) for each in info.metadata),
-        range=(limits["ge"], limits["le"]) if told and len(limits) == 2 else None,
+        finite=bool(unset)
+        or not any(getattr(each, "allow_inf_nan", False) for each in info.metadata),
+        # nan is in no range.
+        range=(limits["ge"], limits["le"]) if told and len(limits) == 2 and not unset else None,
         least=limits.get("ge"),
         largest=limits.get("le"),
+        unset=unset,
+        file=extra["file"],
     )
 
 

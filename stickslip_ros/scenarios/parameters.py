@@ -7,32 +7,33 @@ models. The nested field `friction.static` is the ROS parameter of that name.
 import re
 from collections.abc import Callable
 from dataclasses import fields
-from functools import cached_property, lru_cache
-from math import ceil, inf, isinf, pi, sqrt
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from math import isinf, pi, sqrt
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, create_model, model_validator
+from pydantic import create_model, model_validator
 
 from stickslip_ros.deprecated_names import Renamed
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.controller import Controller
-from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
+from stickslip_ros.physics.loop.reference import ReferenceCourse
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
-from stickslip_ros.physics.model.constants import Constant, constants_of
+from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
-from stickslip_ros.physics.model.course import NO_COURSE, Course
-from stickslip_ros.physics.model.courses import COURSES, CourseKind, Table
-from stickslip_ros.physics.model.disturbance import NO_TABLE, Disturbance
+from stickslip_ros.physics.model.courses import CourseKind
+from stickslip_ros.physics.model.disturbance import Disturbance
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
-from stickslip_ros.scenarios.curve_file import read_pairs
-from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, add_laws_of_other_packages
+from stickslip_ros.scenarios.constant_field import field_of, group_of
+from stickslip_ros.scenarios.course_parameters import (
+    BeltParameters,
+    DisturbanceParameters,
+    LoadParameters,
+    ReferenceParameters,
+)
+from stickslip_ros.scenarios.friction_parameters import Friction
 from stickslip_ros.scenarios.pace import Pace
 from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field
-from stickslip_ros.scenarios.validation import ParameterGroup, refused
+from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import shown
 
 if TYPE_CHECKING:
@@ -46,200 +47,11 @@ _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
 
 
-def _known_law(name: str) -> str:
-    if name in LAWS:
-        return name
-    if name in FRICTION_LAWS.refused:
-        raise refused(FRICTION_LAWS.refused[name])
-    raise ValueError(f"no law {name}")
-
-
-def _constants_of_laws() -> dict[str, Any]:
-    """Return a field for each constant of the laws that is one number, by name."""
-    laws: dict[str, list[str]] = {}
-    constants: dict[str, Constant] = {}
-    for law in LAWS.values():
-        for name, constant in constants_of(law).items():
-            if isinstance(constant.default, tuple):
-                continue
-            constants.setdefault(name, constant)
-            laws.setdefault(name, []).append(law.name)
-    return {
-        name: _field_of(constant, laws[name] if len(laws[name]) < len(LAWS) else [])
-        for name, constant in constants.items()
-    }
-
-
-def _group_of(part: type, fixed: Fixed) -> type[ParameterGroup]:
-    """Return the parameters for the constants of a part of the plant."""
-    constants = constants_of(part).items()
-    described: dict[str, Any] = {name: _field_of(each, fixed=fixed) for name, each in constants}
-    return create_model(part.__name__, __base__=ParameterGroup, **described)
-
-
-def _field_of(constant: Constant, laws: list[str] | None = None, fixed: Fixed = Fixed.NEVER) -> Any:
-    """Return type and description of a parameter for a constant, for some `laws` only."""
-    meaning = constant.meaning
-    if laws:
-        meaning = f"{meaning.removesuffix('.')} ({', '.join(laws)})."
-    least = max(constant.at_least, SMALLEST if constant.positive else -inf)
-    bounds: dict[str, Any] = {} if least == -inf else {"ge": least}
-    default: Any = constant.default
-    if constant.whole:
-        bounds = {bound: ceil(value) for bound, value in bounds.items()}
-        return int, field(int(default), meaning, constant.unit, fixed=fixed, **bounds)
-    if isinf(default):
-        bounds["allow_inf_nan"] = True
-    return float, field(float(default), meaning, constant.unit, fixed=fixed, **bounds)
-
-
-add_laws_of_other_packages()
-
-
-class _ChosenLaw(ParameterGroup):
-    law: Annotated[str, AfterValidator(_known_law)] = field(
-        "stribeck", "Friction law.", choices=LAWS
-    )
-
-    @model_validator(mode="after")
-    def _constants_fit_together(self) -> Self:
-        """Refuse constants that the law refuses, under their names as parameters."""
-        law = self.as_law()
-        refusal = law.refusal()
-        if refusal is not None:
-            names = "|".join(law.constants())
-            raise ValueError(re.sub(rf"\b({names}) = ", r"friction.\1 = ", refusal))
-        return self
-
-    def as_law(self) -> FrictionLaw:
-        """Return the friction law in SI units."""
-        law = LAWS[self.law]
-        known = type(self).model_fields
-        return law(**{name: getattr(self, name) for name in law.constants() if name in known})
-
-
-class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_laws())):
-    """Friction law and its coefficients; each law uses those of its formula."""
-
-
 class Initial(ParameterGroup):
     """State of the slide at the first sample."""
 
     position: float = field(0.0, "Initial displacement of the slide.", "m")
     velocity: float = field(0.0, "Initial velocity of the slide.", "m/s")
-
-
-class CourseParameters(ParameterGroup):
-    """Course over the time since the first sample."""
-
-    part: ClassVar[str]
-    """Name of the group in the parameters."""
-
-    kind: CourseKind = field(
-        CourseKind.NONE,
-        "Time course: none, step, impulse (one sample long), ramp, sine, trapezoid or table.",
-        choices=CourseKind,
-        strict=False,
-        fixed=Fixed.ACTIVE,
-    )
-    amplitude: float = field(0.0, "Amplitude of the course.")
-    start: float = field(0.0, "Simulated time at which the course starts.", "s", ge=0.0, le=1e9)
-    duration: float = field(
-        inf,
-        "Duration of the course; of a ramp, the time of its rise.",
-        "s",
-        ge=0.0,
-        allow_inf_nan=True,
-    )
-    frequency: float = field(
-        1.0,
-        "Frequency of the sine; one over the time of each rise and fall of the trapezoid.",
-        "Hz",
-        ge=SMALLEST,
-        le=1e9,
-    )
-    file: str = field(
-        "",
-        "CSV file of the table: time (s) and value on each line, with straight lines between.",
-        fixed=Fixed.RUNNING,
-    )
-
-    @model_validator(mode="after")
-    def _course_is_possible(self) -> Self:
-        """Refuse constants that do not make a course, under their names as parameters."""
-        refusal = self.as_course(1.0).refusal()
-        if refusal is not None:
-            name = f"{self.part}.file = {shown(self.file)}: " if self._is_table else f"{self.part}."
-            raise ValueError(f"{name}{refusal}")
-        return self
-
-    @property
-    def _is_table(self) -> bool:
-        return self.kind is CourseKind.TABLE
-
-    def as_course(self, period: float) -> Course:
-        """Return the course in SI units; `period` is the sample period, s."""
-        if self.kind is CourseKind.NONE:
-            return NO_COURSE
-        if self._is_table:
-            return self.table
-        course = COURSES[self.kind]
-        values = {name: getattr(self, name) for name in constants_of(course)}
-        return course(**values).sampled(period)
-
-    @cached_property
-    def table(self) -> Table:
-        """The points of the file as it was when the parameters were made."""
-        return _table(self.part, self.file) if self._is_table else NO_TABLE
-
-
-class LoadParameters(CourseParameters):
-    """Course that is added to the normal force."""
-
-    part: ClassVar[str] = "load"
-    amplitude: float = field(0.0, "Amplitude of the change of the normal force.", "N")
-
-
-class BeltParameters(CourseParameters):
-    """Course that is added to the belt speed."""
-
-    part: ClassVar[str] = "belt"
-    amplitude: float = field(0.0, "Amplitude of the change of the belt speed.", "m/s")
-
-
-class DisturbanceParameters(CourseParameters):
-    """Disturbance force on the slide that is part of the scenario."""
-
-    part: ClassVar[str] = "disturbance"
-    kind: CourseKind = field(
-        CourseKind.NONE,
-        "Time course: none, step, impulse (one sample long), ramp, sine, trapezoid or table.",
-        choices=CourseKind,
-        strict=False,
-    )
-    amplitude: float = field(0.0, "Amplitude of the disturbance.", "N")
-
-
-def _table(part: str, file: str) -> Table:
-    """Return the table of a file; raises ValueError with a sentence on the parameter."""
-    name = f"{part}.file = {shown(file)} is refused:"
-    if not file:
-        raise ValueError(f"{name} must be the path of a CSV file for a table")
-    try:
-        about = Path(file).stat()
-        return _table_as_of(file, about.st_mtime_ns, about.st_size)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "it is no path"
-        raise ValueError(f"{name} the file cannot be read: {reason}") from None
-    except InvalidInputError as error:
-        raise ValueError(f"{name} {error}") from None
-
-
-@lru_cache(maxsize=64)
-def _table_as_of(file: str, changed: int, size: int) -> Table:
-    """Return the table of a file that was last changed then; studies ask for it many times."""
-    times, values = zip(*read_pairs(file), strict=True)
-    return Table(times, values)
 
 
 class NodeParameters(ParameterGroup):
@@ -264,11 +76,11 @@ class NodeParameters(ParameterGroup):
         return self
 
 
-class SensorParameters(_group_of(Sensor, Fixed.ACTIVE)):
+class SensorParameters(group_of(Sensor, Fixed.ACTIVE)):
     """Constants of the sensor."""
 
 
-class ActuatorParameters(_group_of(Actuator, Fixed.NEVER)):
+class ActuatorParameters(group_of(Actuator, Fixed.NEVER)):
     """Constants of the actuator."""
 
 
@@ -406,8 +218,7 @@ class PlantParameters(NodeParameters):
 
     def drive_names(self) -> list[str]:
         """Return the flat names of the drive's parameters, with those of its friction law."""
-        constants = LAWS[self.friction.law].constants()
-        return [*_OF_DRIVE, "friction.law", *(f"friction.{name}" for name in constants)]
+        return [*_OF_DRIVE, "friction.law", *(f"friction.{name}" for name in self.friction.names())]
 
     def as_disturbance(self) -> Disturbance:
         """Return the disturbance of the scenario."""
@@ -446,42 +257,6 @@ class PlantParameters(NodeParameters):
             overtaken=overtaken,
             advance=advance,
         )
-
-
-class ReferenceParameters(ParameterGroup):
-    """Reference that the controller follows."""
-
-    kind: ReferenceKind = field(
-        ReferenceKind.NONE,
-        "Source: none, the topic `reference`, or a time course (step, ramp, sine, trapezoid).",
-        choices=ReferenceKind,
-        strict=False,
-        fixed=Fixed.CONFIGURED,
-    )
-    amplitude: float = field(0.0, "Largest displacement of the course.", "m")
-    start: float = field(0.0, "Simulated time at which the course starts.", "s", ge=0.0, le=1e9)
-    duration: float = field(
-        float("inf"),
-        "Duration of the course; of a ramp, the time of its rise.",
-        "s",
-        ge=0.0,
-        allow_inf_nan=True,
-    )
-    frequency: float = field(
-        1.0,
-        "Frequency of the sine; one over the time of each rise and fall of the trapezoid.",
-        "Hz",
-        ge=SMALLEST,
-        le=1e9,
-    )
-
-    @model_validator(mode="after")
-    def _course_is_possible(self) -> Self:
-        """Refuse constants that do not make a course, under their names as parameters."""
-        refusal = ReferenceCourse(**dict(self)).refusal()
-        if refusal is not None:
-            raise ValueError(f"reference.{refusal}")
-        return self
 
 
 class ControllerParameters(NodeParameters):
@@ -540,7 +315,7 @@ def controller_model(law: type[ControlLaw]) -> type[ControllerParameters]:
     fields: dict[str, Any] = {"law": (Literal[law.name], own_law)}
     for name in law.constants():
         if not isinstance(described[name].default, tuple):
-            fields[name] = _field_of(described[name])
+            fields[name] = field_of(described[name])
     if law.follows_reference:
         fields["reference"] = ReferenceParameters, ReferenceParameters()
     title = "".join(word.capitalize() for word in law.name.split("_"))

@@ -63,15 +63,18 @@ def _parameters(parameters: list[Parameter]) -> dict[str, Any]:
     """Return the schemas of parameters by name, those of a group also nested."""
     schemas: dict[str, Any] = {}
     for parameter in parameters:
-        schema = _value(parameter)
-        group, _, name = parameter.name.rpartition(".")
-        if group:
-            nested = schemas.setdefault(
-                group, {"type": "object", "properties": {}, "additionalProperties": False}
-            )
-            nested["properties"][name] = schema
-        schemas[parameter.name] = schema
+        _add(schemas, parameter.name, _value(parameter))
     return schemas
+
+
+def _add(schemas: dict[str, Any], name: str, schema: Mapping[str, Any]) -> None:
+    """Add the schema of a parameter by its name, and nested in each of its groups."""
+    schemas[name] = schema
+    for dot in (place for place, letter in enumerate(name) if letter == "."):
+        group = schemas.setdefault(
+            name[:dot], {"type": "object", "properties": {}, "additionalProperties": False}
+        )
+        _add(group["properties"], name[dot + 1 :], schema)
 
 
 def _value(parameter: Parameter) -> dict[str, Any]:

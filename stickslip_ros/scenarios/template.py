@@ -51,6 +51,10 @@ def _explained(parameter: Parameter) -> str:
     allowed = parameter.bounds
     if not parameter.finite:
         allowed = f"{allowed}, or .inf" if allowed else "or .inf"
+    if parameter.unset:
+        allowed = (
+            f"{allowed}, or .nan: {parameter.unset}" if allowed else f".nan: {parameter.unset}"
+        )
     notes = ", ".join(filter(None, [parameter.unit, allowed]))
     return f"{parameter.meaning} [{notes}]" if notes else parameter.meaning
 

@@ -1,6 +1,6 @@
 """Validation of parameters: an error names the parameter, its value and what is allowed."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from enum import StrEnum
 from math import inf
 from typing import Any, Self, cast
@@ -47,7 +47,7 @@ class ParameterGroup(BaseModel):
             if name not in known:
                 raise InvalidInputError(
                     f"{source}: unknown parameter {name:.80} = {shown(value)}; "
-                    f"{did_you_mean(name, known)}"
+                    f"{did_you_mean(name, known, f'known are {_shortened(known)}')}"
                 )
         try:
             return cls.model_validate(_nested(values))
@@ -70,6 +70,12 @@ class ParameterGroup(BaseModel):
         """Return the values by flat name, as plain Python types."""
         values = flattened(self.model_dump(mode="python"))
         return {name: str(value) if isinstance(value, StrEnum) else value for name, value in values}
+
+
+def _shortened(names: Iterable[str]) -> str:
+    """Return names in order, those of a group as one."""
+    groups = {f"{name.partition('.')[0]}.*" if "." in name else name for name in names}
+    return ", ".join(sorted(groups))
 
 
 def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str, Any]) -> str:
@@ -96,6 +102,8 @@ def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str
         if bounds:
             allowed = bounds if parameter.choices else f"{allowed} {bounds}"
         unit = f"{'' if bounds else ' in'} {parameter.unit}" if parameter.unit else ""
+        if parameter.unset:
+            unit += f", or nan ({parameter.unset})"
         text = ", not text" if isinstance(value, str) and parameter.kind is not str else ""
         complaints.append(f"{name} = {shown(value)} is refused: must be {allowed}{unit}{text}")
     return "; ".join(complaints)
@@ -104,8 +112,11 @@ def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str
 def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
     nested: dict[str, Any] = {}
     for name, value in values.items():
-        group, _, rest = name.rpartition(".")
-        (nested.setdefault(group, {}) if group else nested)[rest] = value
+        *groups, last = name.split(".")
+        group = nested
+        for each in groups:
+            group = group.setdefault(each, {})
+        group[last] = value
     return nested
 
 

@@ -1,6 +1,6 @@
 """Random courses: a drive, its start, and forces that are each held for a while."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
@@ -8,7 +8,15 @@ from hypothesis import strategies as st
 
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
+from stickslip_ros.physics.model.friction import (
+    Coulomb,
+    Directional,
+    Exponential,
+    FrictionLaw,
+    Linear,
+    Stribeck,
+    Table,
+)
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 
 # Rounding grows without bound where a motion just misses sticking, or just does not. Examples
@@ -68,7 +76,8 @@ class Course:
         """Whether the slide is at the belt's speed with friction just able to hold it, or not."""
         drive = self.drive
         reaction = drive.stiffness * position + drive.damping * drive.belt_speed - force
-        excess = abs(reaction) / drive.normal_force - drive.friction.static
+        limits = drive.friction.limits
+        excess = abs(reaction) / drive.normal_force - limits[0 if reaction < 0.0 else 1]
         return velocity == drive.belt_speed and abs(excess) < GRAZING
 
     def _runs_away_or_grazes(self, breakpoints: Breakpoints, force: float) -> bool:
@@ -98,16 +107,29 @@ def friction_laws(draw: st.DrawFn) -> FrictionLaw:
     static = draw(st.floats(0.05, 1.0))
     lower = draw(st.floats(0.0, 1.0)) * static
     speed = draw(st.floats(0.2, 2.0))
-    return draw(
+    law = draw(
         st.sampled_from(
             [
                 Stribeck(static, lower, speed),
-                Coulomb(static),
+                Coulomb(static, draw(st.floats(0.0, 0.5))),
                 Linear(static, draw(st.floats(-1.0, 1.0))),
                 Exponential(static, lower, speed, draw(st.floats(-0.5, 1.0))),
+                Exponential(static, lower, speed, 0.1, draw(st.sampled_from([1.5, 2.0]))),
+                Table(((0.0, static), (speed, lower), (2.0 * speed, 0.5 * static))),
             ]
         )
     )
+    share = draw(st.none() | st.floats(0.5, 1.0))
+    return law if share is None else Directional(law, weaker(law, share))
+
+
+def weaker(law: FrictionLaw, share: float) -> FrictionLaw:
+    """Return a law with a share of its coefficients."""
+    if isinstance(law, Table):
+        return Table(tuple((speed, share * value) for speed, value in law.points))
+    names = ("static", "minimum", "kinetic", "slope", "viscous")
+    own = {name: share * getattr(law, name) for name in names if name in law.constants()}
+    return replace(law, **own)
 
 
 @st.composite

@@ -25,8 +25,12 @@ def taken_or_refused(model: type[NodeParameters], name: str, value: Any) -> Any:
 
 
 def does_not_go_with_others(message: str) -> bool:
-    allowed = ("must not exceed", "at least a thousandth", "must be above 0 and finite for a ",
-               "must be the path of a CSV file")  # fmt: skip
+    allowed = (
+        "must not exceed",
+        "at least a thousandth",
+        "must be above 0 and finite for a ",
+        "must be the path of a CSV file",
+    )
     return any(each in message for each in allowed)
 
 

@@ -10,10 +10,11 @@ from typing import Any
 
 import pytest
 
+from stickslip_ros import scenarios
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.control import CONTROL_LAWS
 from stickslip_ros.physics.model.friction import LAWS, Linear
-from stickslip_ros.scenarios import parameters
+from stickslip_ros.scenarios import friction_parameters, parameters
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.foreign_laws import (
     CONTROLLERS,
@@ -66,7 +67,11 @@ def parameters_anew() -> ModuleType:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
+    present = sys.modules.pop(friction_parameters.__name__)
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.modules[present.__name__] = scenarios.friction_parameters = present
     return module
 
 

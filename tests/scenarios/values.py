@@ -45,7 +45,8 @@ def bad_values(parameter: Parameter) -> list[Any]:
     kinds = {parameter.kind, int} if parameter.kind is float else {parameter.kind}
     bad = [value for value in OF_EVERY_TYPE if type(value) not in kinds - {list}]
     if parameter.kind is float:
-        bad += [nan, *(value for value in EXTREMES if not _allowed(parameter, value))]
+        bad += [] if parameter.unset else [nan]
+        bad += [*(value for value in EXTREMES if not _allowed(parameter, value))]
     elif parameter.kind is int:
         bad += [value for value in (-1, 2**63 - 1, -(2**63)) if not _allowed(parameter, value)]
     elif parameter.choices:

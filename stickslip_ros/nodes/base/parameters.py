@@ -109,8 +109,9 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
         values = {n: self._as_meant(n, p.value) for n, p in given.items() if n not in _OWNED_BY_ROS}
         source = self.get_fully_qualified_name()
         try:
-            changed = self._model.validated(self.parameters.flat() | values, source)
+            # First of all: a request from the network must not make the node read a file.
             self._check_fixed(values, source)
+            changed = self._model.validated(self.parameters.flat() | values, source)
         except InvalidInputError as error:
             return SetParametersResult(successful=False, reason=str(error))
         flat = changed.flat()
@@ -149,6 +150,8 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
             Fixed.RUNNING: True,
         }
         for name, value in values.items():
+            if name not in self._known:
+                continue
             fixed = self._known[name].fixed
             if states[fixed] and value != present[name]:
                 raise InvalidInputError(

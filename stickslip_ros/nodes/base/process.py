@@ -143,9 +143,11 @@ def spin(executor: Executor, until: Future) -> None:
 def _parameter_help(model: type[NodeParameters]) -> str:
     lines = ["parameters:"]
     for parameter in parameters_of(model):
-        unit = f" {parameter.unit}" if parameter.unit else ""
+        unit, default = f" {parameter.unit}" if parameter.unit else "", parameter.default
+        if parameter.unset:
+            default, unit = parameter.unset, f";{unit}" if unit else ""
         bounds = f"; {parameter.bounds}" if parameter.bounds else ""
         when = f"; set {parameter.fixed.changes}" if parameter.fixed else ""
-        lines.append(f"  {parameter.name}  (default {parameter.default}{unit}{bounds}{when})")
+        lines.append(f"  {parameter.name}  (default {default}{unit}{bounds}{when})")
         lines.append(f"      {parameter.meaning}")
     return "\n".join(lines)

@@ -42,6 +42,24 @@ class Constant:
     """Whether the value must be above zero."""
     whole: bool = False
     """Whether it is a whole number that makes the equations, such as a number of elements."""
+    simplifies: bool = False
+    """Whether whole values stay numbers in the equations, such as an exponent of 1."""
+
+    def stays(self, value: Any) -> bool:
+        """Return whether a value stays a number in the symbolic equations.
+
+        Parameters
+        ----------
+        value : float or expression
+            Value of the constant.
+
+        Returns
+        -------
+        bool
+            True for a whole number that makes or simplifies the equations.
+        """
+        number = isinstance(value, int | float)
+        return self.whole or (self.simplifies and number and float(value).is_integer())
 
 
 def constant(
@@ -52,6 +70,7 @@ def constant(
     at_least: float = -inf,
     positive: bool = False,
     whole: bool = False,
+    simplifies: bool = False,
 ) -> Any:
     """Describe a constant, as the default of a dataclass field.
 
@@ -71,6 +90,9 @@ def constant(
     whole : bool, optional
         Whether it is a whole number that makes the equations, such as a number of elements. It
         stays a number in the symbolic equations.
+    simplifies : bool, optional
+        Whether whole values simplify the equations, such as a factor of 0 or an exponent of 1 or 2.
+        They stay numbers in the symbolic equations.
 
     Returns
     -------
@@ -93,7 +115,7 @@ def constant(
     'N/m'
     """
     unit_powers(unit)
-    described = Constant("", default, meaning, unit, at_least, positive, whole)
+    described = Constant("", default, meaning, unit, at_least, positive, whole, simplifies)
     return field(default=default, metadata={_KEY: described})
 
 

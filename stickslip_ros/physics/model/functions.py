@@ -22,3 +22,10 @@ def exp(x: Any) -> Any:
 def sin(x: Any) -> Any:
     """Return the sine of a float, an array or an expression."""
     return float_sin(x) if isinstance(x, float) else _function("sin", x)
+
+
+def power(base: Any, exponent: Any) -> Any:
+    """Return a power of a float, an array or an expression; 0 for a number below zero."""
+    if isinstance(base, int | float | np.ndarray | np.generic):
+        return np.maximum(base, 0.0) ** exponent
+    return base**exponent

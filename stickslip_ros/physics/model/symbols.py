@@ -5,13 +5,13 @@ from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from typing import Any, TypeVar
 
-from stickslip_ros.physics.model.constants import constants_of
+from stickslip_ros.physics.model.constants import Constant, constants_of
 
 _Part = TypeVar("_Part")
 
 
 def numbers(part: Any, prefix: str) -> dict[str, float]:
-    """Return the constants of a part by name; those of a table one by one."""
+    """Return the constants of a part by name; those of a table or of a part of it one by one."""
     if not _fields(type(part)):
         return {}
     return {
@@ -25,7 +25,11 @@ def with_symbols(part: _Part, prefix: str, symbols: Mapping[str, Any]) -> _Part:
     """Return a part with the expressions of these names for its constants, see `numbers`."""
     changes: dict[str, Any] = {}
     for field, value in _values(part).items():
-        found = [symbols[name] for name in _items(f"{prefix}.{field}", value)]
+        own = f"{prefix}.{field}"
+        if is_dataclass(value):
+            changes[field] = with_symbols(value, own, symbols)
+            continue
+        found = [symbols[name] for name in _items(own, value)]
         changes[field] = tuple(found) if isinstance(value, tuple) else found[0]
     return replace(part, **changes)  # type: ignore[type-var]
 
@@ -38,38 +42,49 @@ def structure(part: Any) -> Any:
     if not _fields(kind):
         return kind
     found: list[Any] = [kind]
-    for name, whole in _fields(kind):
+    for name, constant in _fields(kind):
         value = getattr(part, name)
-        if isinstance(value, tuple) and not whole:
-            found.append(len(value))
-        elif whole or not isinstance(value, int | float):
+        if constant is not None and (constant.whole or constant.simplifies):
+            found.append(value if constant.stays(value) else None)
+        elif isinstance(value, tuple):
+            found.append(len(value) if constant is not None else None)
+        elif not isinstance(value, int | float):
             found.append(structure(value))
     return tuple(found)
 
 
 def _values(part: Any) -> dict[str, Any]:
-    """Return the fields of a part that are numbers, or tuples of them, by name.
+    """Return the fields of a part that its equations have as symbols, by name.
 
-    Whole numbers, such as the number of elements, are no constants of the equations.
+    These are numbers, tuples of them, and parts with such fields. Tuples without a description are
+    data from which switches are made.
     """
-    return {
-        name: value
-        for name, whole in _fields(type(part))
-        if not whole and isinstance(value := getattr(part, name), int | float | tuple)
-    }
+    found: dict[str, Any] = {}
+    for name, constant in _fields(type(part)):
+        value = getattr(part, name)
+        if isinstance(value, int | float):
+            plain = constant is None or not (constant.whole or constant.simplifies)
+            if plain or constant is None or not constant.stays(value):
+                found[name] = value
+        elif isinstance(value, tuple):
+            if constant is not None:
+                found[name] = value
+        elif is_dataclass(value):
+            found[name] = value
+    return found
 
 
 @cache
-def _fields(kind: type) -> tuple[tuple[str, bool], ...]:
-    """Return the names of the fields of a class, and whether each is a whole number."""
+def _fields(kind: type) -> tuple[tuple[str, Constant | None], ...]:
+    """Return the names of the fields of a class, each with its description if it has one."""
     constants = constants_of(kind)
-    return tuple(
-        (each.name, each.name in constants and constants[each.name].whole) for each in fields(kind)
-    )
+    return tuple((each.name, constants.get(each.name)) for each in fields(kind))
 
 
 def _items(name: str, value: Any) -> dict[str, float]:
-    """Return a number, or the items of a tuple, by name."""
+    """Return a number, or those of a tuple or of a part, by name."""
+    if is_dataclass(value):
+        return numbers(value, name)
     if not isinstance(value, tuple):
         return {name: float(value)}
     items: tuple[float, ...] = value

@@ -11,7 +11,7 @@ from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.theory.linear import Expansion, expand, hurwitz_determinants, jacobians
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, require
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SYMMETRIC, require
 from stickslip_ros.physics.theory.roots import zero_between
 
 _BELT_SPEEDS = np.geomspace(1e-6, 1e3, 4001)
@@ -23,7 +23,10 @@ class HopfPoint:
     """Belt speed at which a pair of eigenvalues crosses the imaginary axis."""
 
     belt_speed: float
-    """Belt speed, m/s, above zero; there is a mirrored point at the opposite speed."""
+    """Belt speed, m/s, above zero if friction is the same in both directions.
+
+    There is then a mirrored point at the opposite speed.
+    """
     angular_frequency: float
     """Imaginary part of the pair, rad/s: the frequency of the vibration that starts here."""
     crossing_speed: float
@@ -67,12 +70,13 @@ def hopf_points(drive: Drive, gains: ContinuousControl | None = None) -> list[Ho
     """Return the Hopf points over the belt speed.
 
     It covers every friction law, at constant belt speed and normal force. The search covers belt
-    speeds from 1e-6 to 1e3 N/sqrt(k m). It may miss two points closer than half a percent.
+    speeds from 1e-6 to 1e3 N/sqrt(k m). It may miss two points closer than half a percent. If
+    friction differs between the directions, the points are those of the direction of the belt.
 
     Parameters
     ----------
     drive : Drive
-        Drive in SI units; its belt speed is not used.
+        Drive in SI units; of its belt speed at most the sign is used.
     gains : ContinuousControl, optional
         Continuous control in SI units, such as that of eq. 19. By default the loop is open.
 
@@ -100,14 +104,16 @@ def hopf_points(drive: Drive, gains: ContinuousControl | None = None) -> list[Ho
     (0.488763, True)
     """
     require("the search for Hopf points", drive, AUTONOMOUS)
-    margins = _hopf_margins(drive, gains, _BELT_SPEEDS)
+    mirrored = SYMMETRIC.lack(drive) is None
+    belt_speeds = _BELT_SPEEDS if mirrored or drive.belt_speed >= 0.0 else -_BELT_SPEEDS
+    margins = _hopf_margins(drive, gains, belt_speeds)
     before = np.flatnonzero(np.sign(margins[:-1]) * np.sign(margins[1:]) < 0.0)
     points: list[HopfPoint] = []
     for row in before:
         speed = zero_between(
             lambda v: float(_hopf_margins(drive, gains, np.array([v]))[0]),
-            float(_BELT_SPEEDS[row]),
-            float(_BELT_SPEEDS[row + 1]),
+            float(belt_speeds[row]),
+            float(belt_speeds[row + 1]),
         )
         at_point = replace(drive, belt_speed=speed * drive.speed_scale)
         expansion = expand(at_point, gains)

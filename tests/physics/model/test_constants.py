@@ -41,7 +41,13 @@ def test_the_constants_of_a_part() -> None:
 
 
 def test_a_derived_part_has_the_constants_of_its_base_first() -> None:
-    assert list(constants_of(Exponential)) == ["static", "kinetic", "decay_speed", "viscous"]
+    assert list(constants_of(Exponential)) == [
+        "static",
+        "kinetic",
+        "decay_speed",
+        "viscous",
+        "exponent",
+    ]
 
 
 def test_the_default_of_a_constant_is_that_of_its_field() -> None:

@@ -1,7 +1,7 @@
 """The friction laws: properties of every law in `LAWS`, and values of those known here."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cache
 from math import exp, inf
 from typing import Any
@@ -20,12 +20,14 @@ from stickslip_ros.physics.model.friction import (
     FrictionLaw,
     Linear,
     Stribeck,
+    Table,
 )
 
 STRIBECK = Stribeck(static=0.4, minimum=0.25, minimum_speed=0.5)
 COULOMB = Coulomb(static=0.4)
 LINEAR = Linear(static=0.4, slope=0.9)
 EXPONENTIAL = Exponential(static=0.4, kinetic=0.25, decay_speed=0.5, viscous=0.1)
+GAUSSIAN = Exponential(static=0.4, kinetic=0.25, decay_speed=0.5, viscous=0.1, exponent=2.0)
 
 LARGEST = 10.0
 """Magnitude of random constants, in SI units."""
@@ -45,17 +47,30 @@ def values(constant: Constant) -> st.SearchStrategy[float]:
 def laws(draw: st.DrawFn, kind: type[FrictionLaw]) -> FrictionLaw:
     """Laws with constants that fit together, the defaults among them."""
     described = constants_of(kind).items()
-    law = kind(**{name: draw(values(constant)) for name, constant in described})
+    made: dict[str, Any] = {name: draw(values(constant)) for name, constant in described}
+    if issubclass(kind, Table):
+        made["points"] = draw(points())
+    law = kind(**made)
     assume(law.refusal() is None)
     return law
 
 
+@st.composite
+def points(draw: st.DrawFn) -> tuple[tuple[float, float], ...]:
+    """Points of a table."""
+    steps = draw(st.lists(st.floats(0.05, LARGEST), max_size=5))
+    speeds = np.cumsum([0.0, *steps]).tolist()
+    return tuple((speed, draw(st.floats(0.0, LARGEST))) for speed in speeds)
+
+
 @cache
 def compiled(kind: type[FrictionLaw]) -> Any:
-    """The coefficient as a function of speed, sign and constants, compiled from its symbols."""
-    speed, sign, *constants = heyoka.make_vars("speed", "sign", *kind.constants())
-    law = kind(**dict(zip(kind.constants(), constants, strict=True)))
-    return heyoka.cfunc([law.coefficient(speed, sign)], [speed, sign, *constants])
+    """Friction as a function of speed, sign, constants and switches, compiled from its symbols."""
+    names = tuple(constants_of(kind))
+    speed, sign, *others = heyoka.make_vars("speed", "sign", *names, *kind.switches)
+    constants, switches = others[: len(names)], others[len(names) :]
+    law = kind(**dict(zip(names, constants, strict=True)))
+    return heyoka.cfunc([law.friction(speed, sign, (), switches)], [speed, sign, *others])
 
 
 # The cubic has a = 3 (0.4 - 0.25) / (2 0.5) = 0.45 and b = (0.4 - 0.25) / (2 0.5^3) = 0.6.
@@ -72,6 +87,11 @@ def compiled(kind: type[FrictionLaw]) -> Any:
         (LINEAR, 0.3, -0.4 + 0.9 * 0.3),
         (EXPONENTIAL, -0.5, 0.25 + 0.15 * exp(-1.0) + 0.1 * 0.5),
         (EXPONENTIAL, 1.0, -(0.25 + 0.15 * exp(-2.0) + 0.1)),
+        (GAUSSIAN, 1.0, -(0.25 + 0.15 * exp(-4.0) + 0.1)),
+        (GAUSSIAN, -0.25, 0.25 + 0.15 * exp(-0.25) + 0.025),
+        (replace(GAUSSIAN, exponent=1.5), -2.0, 0.25 + 0.15 * exp(-8.0) + 0.2),
+        (Coulomb(0.4, 0.1), 2.0, -0.6),
+        (Coulomb(0.4, 0.1), -2.0, 0.6),
     ],
 )
 def test_coefficient(law: FrictionLaw, relative_speed: float, expected: float) -> None:
@@ -89,13 +109,14 @@ def test_stribeck_friction_is_smallest_at_the_minimum_speed(speed: float) -> Non
 def test_a_law_is_found_by_its_name_and_made_from_its_constants(kind: type[FrictionLaw]) -> None:
     law = kind()
     assert LAWS[law.name](**asdict(law)) == law
-    assert law.constants()[0] == "static"
+    assert law.constants()[0] == "static" or isinstance(law, Table)
 
 
 @every_law
 def test_every_constant_is_described(kind: type[FrictionLaw]) -> None:
     described = constants_of(kind)
-    assert tuple(described) == kind.constants()
+    data = ("static", "points") if issubclass(kind, Table) else ()
+    assert (*described, *data) == kind.constants()
     for constant in described.values():
         assert constant.meaning.endswith(".")
         assert constant.at_least <= constant.default < inf
@@ -125,6 +146,7 @@ def test_a_refusal_names_constants_with_their_values(
         (Stribeck(static=0.4, minimum=0.5), "minimum = 0.5 must not exceed static = 0.4"),
         (Exponential(static=0.1, kinetic=0.25), "kinetic = 0.25 must not exceed static = 0.1"),
         (Exponential(static=0.25, kinetic=0.25), None),
+        (Exponential(exponent=1e3), "exponent = 1000.0 must not exceed 100"),
         (Coulomb(static=0.0), None),
     ],
 )
@@ -192,8 +214,11 @@ def test_arrays_and_symbols_give_what_numbers_give(
         float(law.coefficient(float(speed), float(sign)))
         for speed, sign in zip(relative_speeds, directions, strict=True)
     ]
-    constants = [np.full(len(directions), value) for value in asdict(law).values()]
-    of_symbols = compiled(kind)(np.array([relative_speeds, directions, *constants]))[0]
+    constants = [np.full(len(directions), getattr(law, name)) for name in constants_of(kind)]
+    pieces = np.array(
+        [law.switches_at(*each, ()) for each in zip(relative_speeds, directions, strict=True)]
+    )
+    of_symbols = compiled(kind)(np.array([relative_speeds, directions, *constants, *pieces.T]))[0]
     close = {"rtol": 1e-14, "atol": 1e-14 * largest_term(law)}
     np.testing.assert_allclose(law.coefficient(relative_speeds, directions), one_by_one, **close)
     np.testing.assert_allclose(of_symbols, one_by_one, **close)
@@ -202,7 +227,8 @@ def test_arrays_and_symbols_give_what_numbers_give(
 def largest_term(law: FrictionLaw) -> float:
     """Size of what may cancel in a coefficient at speeds below 5 m/s."""
     of_speeds = law.coefficient(np.array([-5.0, -1.0, 1.0, 5.0]), np.array([-1.0, -1.0, 1.0, 1.0]))
-    return max(1.0, *np.abs(of_speeds).tolist(), *map(abs, asdict(law).values()))
+    constants = (abs(getattr(law, name)) for name in constants_of(type(law)))
+    return max(1.0, *np.abs(of_speeds).tolist(), *constants)
 
 
 @every_law

@@ -8,13 +8,28 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Exponential, Stribeck
+from stickslip_ros.physics.model.friction import (
+    Directional,
+    Exponential,
+    FrictionLaw,
+    Stribeck,
+    Table,
+)
 from tests.examples import examples
 from tests.physics.courses import Course, courses
 
 # Gauss-Legendre quadrature: eight nodes are exact to rounding for what changes by a factor of e, or
 # by a radian, from one end of a panel to the other.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+
+
+def finest_speed(law: FrictionLaw) -> float:
+    """Return the speed within which a law changes, for the quadrature."""
+    if isinstance(law, Directional):
+        return min(finest_speed(law.forward), finest_speed(law.reverse))
+    if isinstance(law, Table):  # the curvature jumps at its points
+        return float(np.diff([speed for speed, _ in law.points]).min()) / 50.0
+    return law.characteristic_speed
 
 
 class Works:
@@ -31,9 +46,9 @@ class Works:
     def add(self, duration: float, speeds: tuple[float, float]) -> None:
         """Go on for `duration` (s) while the motion is smooth and its speed between those two."""
         panels = max(1, int(np.ceil(duration * max(self._rate(speed) for speed in speeds))))
-        # The exponential law changes within its decay speed, however fast that is passed.
-        decay_speed = getattr(self.course.drive.friction, "decay_speed", np.inf)
-        panels = max(panels, int(np.ceil(4.0 * abs(speeds[1] - speeds[0]) / decay_speed)))
+        # A law changes within a certain speed, however fast that is passed.
+        finest = finest_speed(self.course.drive.friction)
+        panels = max(panels, int(np.ceil(4.0 * abs(speeds[1] - speeds[0]) / finest)))
         for _ in range(panels):
             self._add_panel(duration / panels)
 

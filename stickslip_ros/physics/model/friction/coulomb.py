@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
 
 
 @dataclass(frozen=True)
 class Coulomb(FrictionLaw):
-    """Coulomb law (Fig. 8 of the paper): mu = -mu_s s at any speed.
+    """Coulomb law (Fig. 8 of the paper), with viscous friction: mu = -s (mu_s + mu_v |v_r|).
 
     Examples
     --------
@@ -18,6 +19,8 @@ class Coulomb(FrictionLaw):
     """
 
     name: ClassVar[str] = "coulomb"
+
+    viscous: Any = constant(0.0, "Increase of the coefficient with speed.", "s/m", simplifies=True)
 
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
         """Return mu(v_r); see `FrictionLaw.coefficient`.
@@ -34,4 +37,4 @@ class Coulomb(FrictionLaw):
         float, array or expression
             Coefficient, dimensionless.
         """
-        return -self.static * sign + 0.0 * relative_speed
+        return -self.static * sign - self.viscous * relative_speed

@@ -5,15 +5,17 @@ from typing import Any, ClassVar
 
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
-from stickslip_ros.physics.model.functions import exp
+from stickslip_ros.physics.model.functions import exp, power
+
+_LARGEST_EXPONENT = 100
 
 
 @dataclass(frozen=True)
 class Exponential(FrictionLaw):
-    """Exponential Stribeck law: mu = -s [mu_k + (mu_s - mu_k) exp(-|v_r|/v_s) + mu_v |v_r|].
+    """Exponential Stribeck law: mu = -s [mu_k + (mu_s - mu_k) exp(-(|v_r|/v_s)^n) + mu_v |v_r|].
 
     It is not in the paper. It is the usual form elsewhere (Armstrong-Helouvry et al., Automatica
-    30, 1994, with exponent 1).
+    30, 1994). The exponent n is often 1 or 2.
 
     Examples
     --------
@@ -30,11 +32,14 @@ class Exponential(FrictionLaw):
         0.5, "Speed v_s of the decay from mu_s to mu_k.", "m/s", positive=True
     )
     viscous: Any = constant(0.0, "Increase of the coefficient with speed.", "s/m")
+    exponent: Any = constant(
+        1.0, "Exponent n of the decay from mu_s to mu_k.", at_least=1.0, simplifies=True
+    )
 
     @property
     def characteristic_speed(self) -> float:
-        """The decay speed v_s, m/s."""
-        return float(self.decay_speed)
+        """The decay speed divided by the exponent, v_s/n, m/s."""
+        return float(self.decay_speed / self.exponent)
 
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
         """Return mu(v_r); see `FrictionLaw.coefficient`.
@@ -53,15 +58,20 @@ class Exponential(FrictionLaw):
         """
         speed = relative_speed * sign
         drop = self.static - self.kinetic
-        decay = exp(-speed / self.decay_speed)
+        if isinstance(self.exponent, int | float) and self.exponent == 1.0:
+            decay = exp(-speed / self.decay_speed)
+        else:
+            decay = exp(-power(speed / self.decay_speed, self.exponent))
         return -sign * (self.kinetic + drop * decay + self.viscous * speed)
 
     def refusal(self) -> str | None:
-        """Refuse a kinetic coefficient above the static one; see `FrictionLaw.refusal`.
+        """Refuse a kinetic coefficient above the static one, and a drop that is nearly a step.
 
         Returns
         -------
         str or None
-            Sentence with both values.
+            Sentence with the values; see `FrictionLaw.refusal`.
         """
+        if self.exponent > _LARGEST_EXPONENT:
+            return f"exponent = {self.exponent} must not exceed {_LARGEST_EXPONENT}"
         return self.above_static("kinetic")

@@ -1,0 +1,225 @@
+"""A measured friction law, from a table."""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import isfinite, nextafter
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.friction.base import FrictionLaw
+
+
+@dataclass(frozen=True)
+class Table(FrictionLaw):
+    """Table of coefficients by |v_r|: exact at its points, and monotone wherever these are.
+
+    Between the points it is the cubic Hermite spline of Fritsch and Butland, SIAM J. Sci. Stat.
+    Comput. 5, 1984 (PCHIP), which is continuously differentiable. Beyond the last point it is
+    constant. The coefficient of the first point is the static one.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.model.friction import Table
+    >>> law = Table(points=((0.0, 0.4), (0.1, 0.3), (0.5, 0.25)))
+    >>> law.static, float(law.coefficient(-0.1, -1.0)), float(law.coefficient(2.0, 1.0))
+    (0.4, 0.3, -0.25)
+    """
+
+    name: ClassVar[str] = "table"
+    switches: ClassVar[Sequence[str]] = (
+        "lower", "upper", "first", "last", "c0", "c1", "c2", "c3",
+    )  # fmt: skip
+    points: tuple[tuple[float, float], ...] = field(default=((0.0, 0.4), (0.5, 0.25)))
+    """Speeds |v_r| (m/s), the first of which is 0, each with its coefficient."""
+    static: Any = field(default=0.0, kw_only=True)
+    """Static coefficient: that of the first point, whatever is given."""
+
+    def __post_init__(self) -> None:
+        if isinstance(self.static, int | float):  # otherwise it is a symbol
+            first = self.points[0][1] if self.points else 0.0
+            object.__setattr__(self, "static", first)
+
+    def coefficient(self, relative_speed: Any, sign: Any) -> Any:
+        """Return mu(v_r); see `FrictionLaw.coefficient`.
+
+        Parameters
+        ----------
+        relative_speed : float or array
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float or array
+            sgn(v_r), -1 or 1.
+
+        Returns
+        -------
+        float or array
+            Coefficient, dimensionless.
+        """
+        speed = np.asarray(relative_speed * sign)
+        piece = np.maximum(np.searchsorted(self._speeds, speed, side="right") - 1, 0)
+        return self.friction(
+            relative_speed, sign, (), tuple(np.moveaxis(self._pieces[piece], -1, 0))
+        )
+
+    def friction(
+        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
+    ) -> Any:
+        """Return the coefficient in a piece; see `FrictionLaw.friction`.
+
+        Parameters
+        ----------
+        relative_speed : float, array or expression
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float, array or expression
+            sgn(v_r), -1 or 1.
+        memory : sequence of float or expression
+            None.
+        switches : sequence of float or expression
+            Piece.
+
+        Returns
+        -------
+        float, array or expression
+            Coefficient, dimensionless.
+        """
+        lower, _, _, _, c0, c1, c2, c3 = switches
+        speed = relative_speed * sign - lower
+        return -sign * (c0 + speed * (c1 + speed * (c2 + speed * c3)))
+
+    def margins(
+        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
+    ) -> Sequence[Any]:
+        """Return the distances to the ends of a piece; see `FrictionLaw.margins`.
+
+        Parameters
+        ----------
+        relative_speed : float or expression
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float or expression
+            sgn(v_r), -1 or 1.
+        memory : sequence of float or expression
+            None.
+        switches : sequence of float or expression
+            Piece.
+
+        Returns
+        -------
+        sequence of float or expression
+            Distances to the lower and the upper end; 1 where there is none.
+        """
+        lower, upper, first, last, *_ = switches
+        speed = relative_speed * sign
+        return (
+            first + (1.0 - first) * (speed - lower),
+            last + (1.0 - last) * (upper - speed),
+        )
+
+    def switches_at(
+        self, relative_speed: float, sign: float, memory: Sequence[float]
+    ) -> Sequence[float]:
+        """Return the piece at a speed; see `FrictionLaw.switches_at`.
+
+        Parameters
+        ----------
+        relative_speed : float
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float
+            sgn(v_r), -1 or 1.
+        memory : sequence of float
+            None.
+
+        Returns
+        -------
+        sequence of float
+            Piece.
+        """
+        return self._piece(relative_speed * sign)
+
+    def switches_after(
+        self, margin: int, sign: float, switches: Sequence[float]
+    ) -> Sequence[float]:
+        """Return the piece below or above; see `FrictionLaw.switches_after`.
+
+        Parameters
+        ----------
+        margin : int
+            0 at the lower end, 1 at the upper end.
+        sign : float
+            sgn(v_r), -1 or 1.
+        switches : sequence of float
+            Piece so far.
+
+        Returns
+        -------
+        sequence of float
+            Piece that follows.
+        """
+        lower, upper, *_ = switches
+        return self._piece(upper) if margin else self._piece(nextafter(lower, 0.0))
+
+    def refusal(self) -> str | None:
+        """Refuse points that make no table; see `FrictionLaw.refusal`.
+
+        Returns
+        -------
+        str or None
+            Sentence with the number of the point and its values.
+        """
+        if not self.points:
+            return "the table has no points: must have at least one"
+        before = None
+        for number, (speed, coefficient) in enumerate(self.points, start=1):
+            place = f"point {number} of the table"
+            if not (isfinite(coefficient) and coefficient >= 0.0):
+                return f"{place}: coefficient = {coefficient} must be a finite number at least 0"
+            if before is None and speed != 0.0:
+                return f"{place}: speed = {speed} must be 0"
+            if before is not None and not (isfinite(speed) and speed > before):
+                return f"{place}: speed = {speed} must be finite and above the one before, {before}"
+            before = speed
+        return None
+
+    def scaled(self, speed: float, length: float = 1.0) -> Self:
+        """Return the same law in another unit of speed; see `FrictionLaw.scaled`.
+
+        Parameters
+        ----------
+        speed : float
+            New unit of speed, m/s.
+        length : float, optional
+            New unit of length, m; the law does not depend on it.
+
+        Returns
+        -------
+        Table
+            Law with scaled speeds.
+        """
+        return replace(self, points=tuple((each / speed, value) for each, value in self.points))
+
+    @cached_property
+    def _speeds(self) -> list[float]:
+        return [speed for speed, _ in self.points]
+
+    @cached_property
+    def _pieces(self) -> FloatArray:
+        """Switches of each piece, a row each."""
+        from scipy.interpolate import PchipInterpolator  # takes long to import
+
+        speeds, values = np.array(self.points, dtype=float).T
+        pieces = np.zeros((len(speeds), len(self.switches)))
+        pieces[:, 0] = speeds
+        pieces[:, 1] = [*speeds[1:], speeds[-1]]
+        pieces[0, 2] = pieces[-1, 3] = 1.0
+        pieces[-1, 4] = values[-1]
+        # One more point, so that the slope is 0 where the constant begins.
+        beyond = 2.0 * speeds[-1] or 1.0
+        cubics = PchipInterpolator([*speeds, beyond], [*values, values[-1]]).c
+        pieces[:-1, 4:] = cubics[::-1, :-1].T
+        return pieces
+
+    def _piece(self, speed: float) -> Sequence[float]:
+        number = max(bisect_right(self._speeds, speed) - 1, 0)
+        return tuple(self._pieces[number].tolist())

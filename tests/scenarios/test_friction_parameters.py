@@ -1,0 +1,269 @@
+"""Friction as parameters: constants by direction, and measured curves from files."""
+
+import json
+import os
+from math import isnan, nan
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.constants import constants_of
+from stickslip_ros.physics.model.friction import LAWS, Directional, Exponential, Stribeck, Table
+from stickslip_ros.scenarios.files import load_scenario, parameter_file
+from stickslip_ros.scenarios.parameter_field import Fixed, known_parameters
+from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.scenarios.schema import scenario_schema
+from stickslip_ros.scenarios.template import commented_file
+from tests.scenarios.files import refusal, scenario_file, section
+
+CURVE = "0,0.4\n0.1,0.3\n0.5,0.25\n"
+POINTS = ((0.0, 0.4), (0.1, 0.3), (0.5, 0.25))
+
+
+def plant(**values: Any) -> PlantParameters:
+    flat = {name.replace("__", "."): value for name, value in values.items()}
+    return PlantParameters.validated(flat, "test")
+
+
+@pytest.fixture
+def curve(tmp_path: Path) -> Path:
+    path = tmp_path / "curve.csv"
+    path.write_text(CURVE)
+    return path
+
+
+def test_every_constant_has_one_for_backward_slip() -> None:
+    known = known_parameters(PlantParameters)
+    for law in LAWS.values():
+        for constant in constants_of(law).values():
+            parameter = known[f"friction.reverse.{constant.name}"]
+            forward = known[f"friction.{constant.name}"]
+            assert parameter.unit == forward.unit
+            assert parameter.bounds == forward.bounds
+            assert isnan(parameter.default)
+            assert parameter.text(parameter.default) == "as forward"
+            assert parameter.finite
+            assert parameter.range is None
+            assert "for v_r < 0" in parameter.meaning
+
+
+def test_without_constants_for_backward_slip_the_law_is_the_same_in_both_directions() -> None:
+    assert plant().as_drive().friction == Stribeck(0.4, 0.25, 0.5)
+    assert plant(friction__reverse__static=nan).as_drive().friction == Stribeck(0.4, 0.25, 0.5)
+
+
+def test_a_constant_for_backward_slip_makes_a_law_of_two_directions() -> None:
+    law = plant(friction__reverse__static=0.3).as_drive().friction
+    assert law == Directional(Stribeck(0.4, 0.25, 0.5), Stribeck(0.3, 0.25, 0.5))
+
+
+def test_a_constant_of_another_law_makes_no_difference() -> None:
+    assert plant(friction__reverse__slope=0.3).as_drive().friction == Stribeck(0.4, 0.25, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (
+            {"friction__reverse__static": 0.2},
+            "test: friction.minimum = 0.25 must not exceed friction.reverse.static = 0.2",
+        ),
+        (
+            {"friction__reverse__minimum": 0.45},
+            "test: friction.reverse.minimum = 0.45 must not exceed friction.static = 0.4",
+        ),
+        (
+            {"friction__reverse__static": -0.2},
+            "test: friction.reverse.static = -0.2 is refused: must be a finite number at least 0, "
+            "or nan (as forward)",
+        ),
+        (
+            {"friction__reverse__static": float("inf")},
+            "test: friction.reverse.static = inf is refused: must be a finite number at least 0, "
+            "or nan (as forward)",
+        ),
+        (
+            {"friction__exponent": 0.5},
+            "test: friction.exponent = 0.5 is refused: must be a finite number at least 1",
+        ),
+    ],
+)
+def test_a_refusal_names_the_parameter(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(InvalidInputError) as caught:
+        plant(**values)
+    assert str(caught.value) == message
+
+
+def test_parameters_that_are_equal_compare_equal() -> None:
+    assert plant() == plant(friction__reverse__static=float("nan"))
+    assert load_scenario("paper") == load_scenario("paper")
+
+
+def test_the_names_of_a_drive_are_those_that_make_its_law() -> None:
+    assert "friction.reverse.static" not in plant().drive_names()
+    assert "friction.reverse.static" in plant(friction__reverse__static=0.3).drive_names()
+    exponential = plant(friction__law="exponential")
+    assert "friction.exponent" not in exponential.drive_names()
+    two = plant(friction__law="exponential", friction__exponent=2.0)
+    assert "friction.exponent" in two.drive_names()
+    assert two.as_drive().friction == Exponential(0.4, 0.25, 0.5, 0.0, 2.0)
+
+
+def test_a_scenario_shows_a_constant_of_backward_slip_where_it_is_given() -> None:
+    assert "reverse" not in repr(load_scenario("paper"))
+    shown = repr(load_scenario("paper", ["plant.friction.reverse.static=0.35"]))
+    assert "plant.friction.reverse.static" in shown
+
+
+def test_a_complete_file_gives_the_same_parameters(tmp_path: Path) -> None:
+    scenario = load_scenario("paper", ["plant.friction.reverse.static=0.35"])
+    commented = scenario_file(tmp_path, commented_file(scenario, "A copy."))
+    assert load_scenario(commented).plant == scenario.plant
+    plain = scenario_file(tmp_path, parameter_file(scenario.as_dict()))
+    assert load_scenario(plain).plant == scenario.plant
+
+
+def test_the_schema_has_nested_groups() -> None:
+    known = scenario_schema()["definitions"]["plant"]["properties"]["ros__parameters"]["properties"]
+    value = known["friction.reverse.static"]
+    assert value["minimum"] == 0.0
+    assert "default" not in value
+    assert known["friction"]["properties"]["reverse"]["properties"]["static"] == value
+    assert known["friction"]["properties"]["reverse.static"] == value
+    json.dumps(known, allow_nan=False)
+
+
+def test_the_law_of_a_file(curve: Path) -> None:
+    law = plant(friction__law="table", friction__file=str(curve)).as_drive().friction
+    assert law == Table(POINTS)
+
+
+def test_a_file_for_each_direction(curve: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.csv"
+    other.write_text("0,0.2\n")
+    made = plant(
+        friction__law="table", friction__file=str(curve), friction__reverse__file=str(other)
+    )
+    assert made.as_drive().friction == Directional(Table(POINTS), Table(((0.0, 0.2),)))
+    assert {"friction.file", "friction.reverse.file"} <= set(made.drive_names())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        CURVE,
+        CURVE.replace("\n", "\r\n"),
+        "\ufeff" + CURVE,
+        "# measured\nspeed,coefficient\n" + CURVE,
+        "\n" + CURVE.replace(",", " , ") + "\n\n",
+    ],
+)
+def test_what_a_file_may_look_like(curve: Path, text: str) -> None:
+    curve.write_bytes(text.encode())
+    assert plant(friction__law="table", friction__file=str(curve)).as_drive().friction == Table(
+        POINTS
+    )
+
+
+def test_a_file_is_relative_to_the_scenario_file(curve: Path, tmp_path: Path) -> None:
+    path = scenario_file(
+        tmp_path, section("/**/plant", "{friction: {law: table, file: curve.csv}}")
+    )
+    scenario = load_scenario(path)
+    assert scenario.plant.friction.file == str(curve)
+    assert scenario.plant.as_drive().friction == Table(POINTS)
+    assert load_scenario(path, ["plant.mass=2"]).plant.friction.file == str(curve)
+
+
+def test_a_file_of_a_base_is_relative_to_the_base(curve: Path, tmp_path: Path) -> None:
+    scenario_file(tmp_path, section("/**/plant", "{friction: {law: table, file: curve.csv}}"))
+    own = tmp_path / "own"
+    own.mkdir()
+    path = scenario_file(
+        own,
+        section("/**/plant", "{mass: 2.0}") + section("/**/scenario", "{base: ../scenario.yaml}"),
+    )
+    file = Path(load_scenario(path).plant.friction.file)
+    assert file.samefile(curve)
+    assert file.is_absolute()
+
+
+def test_a_file_of_an_override_is_relative_to_the_working_directory(
+    curve: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(curve.parent)
+    texts = ["plant.friction.law=table", "plant.friction.file=curve.csv"]
+    scenario = load_scenario("paper", texts)
+    assert scenario.plant.friction.file == str(curve)
+    changed = scenario.changed({"plant.friction.file": "curve.csv"})
+    assert changed.plant.friction.file == str(curve)
+
+
+def test_a_file_is_given_where_the_node_is_started() -> None:
+    known = known_parameters(PlantParameters)
+    for name in ("friction.file", "friction.reverse.file"):
+        assert known[name].fixed is Fixed.RUNNING
+        assert known[name].file
+
+
+def refused(path: Path) -> str:
+    name = f"plant.friction.file={path}"
+    return refusal("paper", "plant.friction.law=table", name)
+
+
+def test_a_table_needs_a_file() -> None:
+    message = refusal("paper", "plant.friction.law=table")
+    assert "friction.file = '' is refused: must be the path of a CSV file for law table" in message
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "the file has no numbers: must have two on each line"),
+        ("speed,coefficient\n", "the file has no numbers: must have two on each line"),
+        ("0,0.4\n0.1\n", "line 2 is '0.1': must be two numbers with a comma between"),
+        ("0,0.4\n0.1,x\n", "line 2 is '0.1,x': must be two numbers with a comma between"),
+        ("0,0.4,7\n", "line 1 is '0,0.4,7': must be two numbers with a comma between"),
+        ("0,0.4\n0.1,nan\n", "line 2 is '0.1,nan': must be two numbers with a comma between"),
+        ("0,0.4\n0.1,1e31\n", "line 2 is '0.1,1e31': must be two numbers with a comma between"),
+        ("0.1,0.4\n", "point 1 of the table: speed = 0.1 must be 0"),
+        (
+            "0,0.4\n0.2,0.3\n0.1,0.2\n",
+            "point 3 of the table: speed = 0.1 must be finite and above the one before, 0.2",
+        ),
+        (
+            "0,-0.4\n",
+            "point 1 of the table: coefficient = -0.4 must be a finite number at least 0",
+        ),
+    ],
+)
+def test_a_file_that_makes_no_table_is_refused(curve: Path, text: str, reason: str) -> None:
+    curve.write_text(text)
+    assert refused(curve).endswith(f"is refused: {reason}")
+
+
+def test_a_file_that_cannot_be_read_is_refused(curve: Path, tmp_path: Path) -> None:
+    assert refused(tmp_path / "none.csv").endswith(
+        "is refused: the file cannot be read: No such file or directory"
+    )
+    assert refused(tmp_path).endswith("is refused: must be a regular file")
+    assert refused(Path("/dev/zero")).endswith("is refused: must be a regular file")
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    assert refused(pipe).endswith("is refused: must be a regular file")
+    curve.write_bytes(b"\xff\xfe\x00")
+    assert refused(curve).endswith("is refused: the file cannot be read: it is not UTF-8 text")
+    curve.write_text("0,0.4\n" * 200_000)
+    assert refused(curve).endswith("bytes: must have at most 1000000")
+
+
+def test_a_bad_file_for_backward_slip_is_refused_by_its_name(curve: Path, tmp_path: Path) -> None:
+    message = refusal(
+        "paper",
+        "plant.friction.law=table",
+        f"plant.friction.file={curve}",
+        f"plant.friction.reverse.file={tmp_path / 'none.csv'}",
+    )
+    assert "friction.reverse.file = " in message
