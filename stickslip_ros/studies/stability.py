@@ -1,9 +1,9 @@
 """Stability of a scenario by theory, without a simulation of it."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import copysign, isclose
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -23,10 +23,18 @@ from stickslip_ros.physics.theory.linear_sampled_loop import (
     not_linear,
     why_no_linear_loop,
 )
+from stickslip_ros.physics.theory.requirements import (
+    AUTONOMOUS,
+    STATIC,
+    NotCoveredError,
+    require,
+)
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.text import quantity
+
+_Found = TypeVar("_Found")
 
 Section = dict[str, Any]
 Notes = dict[str, str]
@@ -42,9 +50,13 @@ _SAMPLED_LOOP = ("spectral_radius", "stable", "decay_rate", "settling_time", *_S
 
 
 def stability(scenario: Scenario) -> tuple[Section, Notes]:
-    """Return the theoretical quantities of the scenario, in SI units, and notes on them."""
+    """Return the theoretical quantities of the scenario, in SI units, and notes on them.
+
+    Raises InvalidInputError if belt or load follow a course, or if the friction law has a memory.
+    """
     plant = scenario.plant
     drive = plant.as_drive()
+    require("the theory of stability", drive, AUTONOMOUS, STATIC)
     law = scenario.control_law
     notes: Notes = {}
     expansion = expand(drive)
@@ -73,6 +85,15 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
     return found, notes
 
 
+def _covered(place: str, notes: Notes, otherwise: _Found, function: Callable[[], _Found]) -> _Found:
+    """Return what a function returns; note it, and return `otherwise`, if it refuses the drive."""
+    try:
+        return function()
+    except NotCoveredError as error:
+        notes[place] = str(error)
+        return otherwise
+
+
 def _places(found: Section) -> Iterator[tuple[str, Any]]:
     """Yield the quantities with their places; within sections as section.name."""
     for section, value in found.items():
@@ -94,13 +115,13 @@ def _eigenvalues(drive: Drive, expansion: Expansion | None) -> Section:
 
 
 def _open_loop(drive: Drive, expansion: Expansion | None, notes: Notes) -> Section:
-    points, cycles = hopf_points(drive), limit_cycles(drive)
+    place = "open_loop.limit_cycles"
+    points = hopf_points(drive)
+    cycles = _covered(place, notes, [], lambda: limit_cycles(drive))
     if not points:
         notes["open_loop.hopf_speeds"] = _why_no_hopf_speed(drive)
-    if not cycles:
-        notes["open_loop.limit_cycles"] = (
-            "no periodic motion was found, or the drive is too stiff to integrate"
-        )
+    if not cycles and place not in notes:
+        notes[place] = "no periodic motion was found, or the drive is too stiff to integrate"
     return {
         **_eigenvalues(drive, expansion),
         **_hopf_points(points),
@@ -129,7 +150,9 @@ def _hopf_points(points: list[HopfPoint]) -> Section:
 
 
 def _sticking(drive: Drive, notes: Notes) -> Section:
-    onset = sticking_onset(drive)
+    onset = _covered("sticking", notes, None, lambda: sticking_onset(drive))
+    if onset is None:
+        return dict.fromkeys(("onset_speed_approximate", "onset_speed", "speed_ranges"))
     if onset.no_approximate is not None:
         notes["sticking.onset_speed_approximate"] = onset.no_approximate
     if onset.no_exact is not None:
@@ -167,13 +190,22 @@ def _closed_loop(drive: Drive, law: ControlLaw | None, notes: Notes) -> Section:
         notes["closed_loop.hopf_speeds"] = (
             "with these gains no pair of eigenvalues crosses the imaginary axis at any belt speed"
         )
-    possible = limit_cycle_from_hopf(drive, control), limit_cycle_of_run(drive, 0.0, gains=control)
+    place = "closed_loop.limit_cycles"
+    possible = _covered(
+        place,
+        notes,
+        (),
+        lambda: (
+            limit_cycle_from_hopf(drive, control),
+            limit_cycle_of_run(drive, 0.0, gains=control),
+        ),
+    )
     cycles = [cycle for cycle in possible if cycle is not None]
     if len(cycles) > 1 and isclose(cycles[0].position, cycles[1].position, rel_tol=1e-6):
         cycles.pop()
-    if not cycles:
+    if not cycles and place not in notes:
         started = " or from the Hopf point at the critical linear gain" if gains_of(law) else ""
-        notes["closed_loop.limit_cycles"] = (
+        notes[place] = (
             f"none found from rest at zero displacement{started}; there is no search for others, "
             "and none in a very stiff loop"
         )

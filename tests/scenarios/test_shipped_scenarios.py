@@ -14,6 +14,16 @@ ROOT = Path(__file__).parents[2]
 CONFIG = ROOT / "config"
 
 STRIBECK = {"friction.law": "stribeck", "friction.static": 0.4, "friction.minimum": 0.25}
+SLIDE = STRIBECK | {
+    "mass": 100.0,
+    "stiffness": 1e6,
+    "damping": 200.0,
+    "normal_force": 1000.0,
+    "friction.minimum_speed": 0.05,
+    "rate": 1000.0,
+    "pace": "realtime",
+}
+WASHOUT = {"corner_frequency": 20.0, "linear_gain": -3000.0, "cubic_gain": 0.0}
 SHIPPED: dict[str, dict[str, dict[str, Any]]] = {
     "paper": {
         "plant": STRIBECK
@@ -35,23 +45,28 @@ SHIPPED: dict[str, dict[str, dict[str, Any]]] = {
         },
     },
     "feed_drive": {
-        "plant": STRIBECK
+        "plant": SLIDE | {"belt_speed": 0.04},
+        "washout_controller": WASHOUT | {"start_after": 5.0},
+    },
+    "feed_profile": {
+        "plant": SLIDE
         | {
-            "mass": 100.0,
-            "stiffness": 1e6,
-            "damping": 200.0,
-            "normal_force": 1000.0,
+            "belt_speed": 0.0,
+            "belt.kind": "table",
+            "belt.file": str(CONFIG / "feed_profile.csv"),
+            "duration": 13.0,
+        },
+        "washout_controller": WASHOUT | {"start_after": 4.0},
+    },
+    "vibrating_load": {
+        "plant": SLIDE
+        | {
             "belt_speed": 0.04,
-            "friction.minimum_speed": 0.05,
-            "rate": 1000.0,
-            "pace": "realtime",
+            "load.kind": "sine",
+            "load.amplitude": 300.0,
+            "load.frequency": 50.0,
         },
-        "washout_controller": {
-            "corner_frequency": 20.0,
-            "linear_gain": -3000.0,
-            "cubic_gain": 0.0,
-            "start_after": 5.0,
-        },
+        "washout_controller": WASHOUT | {"start_after": 5.0},
     },
 }
 

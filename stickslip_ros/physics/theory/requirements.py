@@ -10,6 +10,10 @@ from stickslip_ros.physics.model.course import NO_COURSE
 from stickslip_ros.physics.model.drive import Drive
 
 
+class NotCoveredError(InvalidInputError):
+    """A function of the theory does not cover a drive; the text names both."""
+
+
 @dataclass(frozen=True)
 class Requirement:
     """Property of a drive that some of the theory needs."""
@@ -34,7 +38,7 @@ def require(function: str, drive: Drive, *requirements: Requirement) -> None:
 
     Raises
     ------
-    InvalidInputError
+    NotCoveredError
         If it lacks one of them; the sentence names function and drive.
 
     Examples
@@ -48,7 +52,7 @@ def require(function: str, drive: Drive, *requirements: Requirement) -> None:
     for requirement in requirements:
         lack = requirement.lack(drive)
         if lack is not None:
-            raise InvalidInputError(f"{function} needs {requirement.need}: {lack}")
+            raise NotCoveredError(f"{function} needs {requirement.need}: {lack}")
 
 
 def _courses(drive: Drive) -> str | None:
