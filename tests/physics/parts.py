@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import pi
+from math import inf, pi
 from typing import Any, ClassVar
 
 import numpy as np
@@ -84,19 +84,14 @@ class Ramp(Course):
         slope = (time - self.start) / self.duration
         return self.height * (rising * slope + (1.0 - before - rising))
 
-    def margins(self, time: Any, switches: Sequence[Any]) -> Sequence[Any]:
-        before, rising = switches
-        after = 1.0 - before - rising
-        return (before * self.start + rising * (self.start + self.duration) - time
-                + after * (1.0 + time),)  # fmt: skip
-
     def switches_at(self, time: float) -> Sequence[float]:
         if time < self.start:
             return (1.0, 0.0)
         return (0.0, 1.0 if time < self.start + self.duration else 0.0)
 
-    def switches_after(self, margin: int, switches: Sequence[float]) -> Sequence[float]:
-        return (0.0, switches[0])
+    def corner(self, switches: Sequence[float]) -> float:
+        before, rising = switches
+        return self.start if before else self.start + self.duration if rising else inf
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,10 @@ from tests.scenarios.files import refusal, scenario_file, section
 
 
 def test_an_unknown_scenario() -> None:
-    assert "unknown scenario 'lathe'; the known names are feed_drive, paper; " in refusal("lathe")
+    assert (
+        "unknown scenario 'lathe'; the known names are feed_drive, feed_profile, paper, vibrating_load; "
+        in refusal("lathe")
+    )
     assert refusal("papre") == "unknown scenario 'papre'; did you mean paper?"
 
 

@@ -16,8 +16,8 @@ class Course(ABC):
 
     A course is a frozen dataclass of its constants, each described by `constant`; the unit of what
     it gives is called "value" there. Its equations accept floats, complex numbers and heyoka
-    expressions. A course with corners has `switches`, values that are constant between two corners.
-    A mode ends where one of `margins` falls to zero; `switches_after` then gives the next one.
+    expressions. A course with corners has `switches`, values that are constant between two corners,
+    and says in `corner` when the next one comes.
 
     Examples
     --------
@@ -44,7 +44,7 @@ class Course(ABC):
 
     @property
     def equations(self) -> "Course":
-        """Course that has the same `value` and `margins`, from the switches alone if possible.
+        """Course that has the same `value`, from the switches alone if possible.
 
         Courses with the same equations share their compiled flows. By default it is the course.
         """
@@ -139,23 +139,6 @@ class Course(ABC):
             Value, in the unit of what follows the course.
         """
 
-    def margins(self, time: Any, switches: Sequence[Any]) -> Sequence[Any]:
-        """Return what is above zero up to the next corner, and zero there.
-
-        Parameters
-        ----------
-        time : float or expression
-            Time from the start of the motion, s.
-        switches : sequence of float or expression
-            Values of `switches`.
-
-        Returns
-        -------
-        sequence of float or expression
-            Margins; as many in every mode, and a constant above zero where there is none.
-        """
-        return ()
-
     def switches_at(self, time: float) -> Sequence[float]:
         """Return the switches of the mode that starts at a time, or in which it lies.
 
@@ -171,22 +154,20 @@ class Course(ABC):
         """
         return ()
 
-    def switches_after(self, margin: int, switches: Sequence[float]) -> Sequence[float]:
-        """Return the switches after the corner where a margin has fallen to zero.
+    def corner(self, switches: Sequence[float]) -> float:
+        """Return the time of the next corner, where `switches_at` gives the next mode.
 
         Parameters
         ----------
-        margin : int
-            Index of the margin.
         switches : sequence of float
-            Values of `switches` so far.
+            Values of `switches`.
 
         Returns
         -------
-        sequence of float
-            Values of `switches` from then on.
+        float
+            Time from the start of the motion, s; infinite if no corner follows.
         """
-        return switches
+        return inf
 
 
 @dataclass(frozen=True)

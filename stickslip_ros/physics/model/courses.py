@@ -43,8 +43,6 @@ class Piece(NamedTuple):
     """Angular frequency of the sine, rad/s."""
     end: float
     """Time at which the next piece starts, s; infinite after the last corner."""
-    last: float = 0.0
-    """1 for the piece after which there is none, otherwise 0."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +52,8 @@ class _Lines(Course):
     switches: ClassVar[Sequence[str]] = Piece._fields
 
     def value(self, time: Any, switches: Sequence[Any]) -> Any:
-        origin, offset, slope, *_ = switches
+        origin, offset, slope, _, _, _ = switches
         return offset + slope * (time - origin)
-
-    def margins(self, time: Any, switches: Sequence[Any]) -> Sequence[Any]:
-        *_, end, last = switches
-        return (last + (1.0 - last) * (end - time),)
 
 
 @dataclass(frozen=True)
@@ -67,8 +61,9 @@ class _LinesAndSines(_Lines):
     """The equations of courses with sines."""
 
     def value(self, time: Any, switches: Sequence[Any]) -> Any:
-        origin, _, _, swing, rate, _, _ = switches
-        return super().value(time, switches) + swing * sin(rate * (time - origin))
+        origin, offset, slope, swing, rate, _ = switches
+        since = time - origin
+        return offset + slope * since + swing * sin(rate * since)
 
 
 _LINES, _LINES_AND_SINES = _Lines(), _LinesAndSines()
@@ -112,23 +107,6 @@ class PiecewiseCourse(Course):
         """
         return self.equations.value(time, switches)
 
-    def margins(self, time: Any, switches: Sequence[Any]) -> Sequence[Any]:
-        """Return the time to the next corner; see `Course.margins`.
-
-        Parameters
-        ----------
-        time : float or expression
-            Time from the start of the motion, s.
-        switches : sequence of float or expression
-            Piece.
-
-        Returns
-        -------
-        sequence of float or expression
-            One margin, s.
-        """
-        return self.equations.margins(time, switches)
-
     def switches_at(self, time: float) -> Sequence[float]:
         """Return the piece at a time; see `Course.switches_at`.
 
@@ -144,22 +122,20 @@ class PiecewiseCourse(Course):
         """
         return self._pieces[bisect_right(self._ends, time)]
 
-    def switches_after(self, margin: int, switches: Sequence[float]) -> Sequence[float]:
-        """Return the next piece; see `Course.switches_after`.
+    def corner(self, switches: Sequence[float]) -> float:
+        """Return the end of a piece; see `Course.corner`.
 
         Parameters
         ----------
-        margin : int
-            0.
         switches : sequence of float
-            Piece so far.
+            Piece.
 
         Returns
         -------
-        sequence of float
-            Piece that follows.
+        float
+            Time, s.
         """
-        return self.switches_at(Piece(*switches).end)
+        return switches[-1]
 
     def rates(self, time: float) -> tuple[float, float]:
         """Return first and second derivative by time.
@@ -175,7 +151,7 @@ class PiecewiseCourse(Course):
             Derivatives, per second and per second squared; at a corner those after it. A jump has
             none.
         """
-        origin, _, slope, swing, rate, _, _ = self.switches_at(time)
+        origin, _, slope, swing, rate, _ = self.switches_at(time)
         if not swing:
             return slope, 0.0
         turn = rate * (time - origin)
@@ -196,19 +172,18 @@ class PiecewiseCourse(Course):
         float
             Integral.
         """
-        total, now = 0.0, start
-        while now < end:
-            piece = Piece(*self.switches_at(now))
-            until = end if piece.last else min(end, piece.end)
-            length, middle = until - now, 0.5 * (now + until) - piece.origin
-            total += length * (piece.offset + piece.slope * middle)
-            if piece.swing:
-                half = 0.5 * piece.rate
-                total += (
-                    piece.swing / half * float_sin(piece.rate * middle) * float_sin(half * length)
-                )
-            now = until
-        return total
+        total = 0.0
+        while True:
+            origin, offset, slope, swing, rate, last = self.switches_at(start)
+            until = end if end <= last else last
+            length, middle = until - start, 0.5 * (start + until) - origin
+            total += length * (offset + slope * middle)
+            if swing:
+                half = 0.5 * rate
+                total += swing / half * float_sin(rate * middle) * float_sin(half * length)
+            if until == end:
+                return total
+            start = until
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
@@ -228,9 +203,9 @@ class PiecewiseCourse(Course):
         if piece.swing:
             quarter = 0.5 * pi / piece.rate
             times += [piece.origin + turns * quarter for turns in (1.0, 3.0)]
-            times.append(piece.end)
-        ends = inf if piece.last else piece.end
-        return [self.value(time, piece) for time in times if start <= time <= ends]
+            if piece.end < inf:
+                times.append(piece.end)
+        return [self.value(time, piece) for time in times if start <= time <= piece.end]
 
     @cached_property
     def _pieces(self) -> Sequence[Piece]:
@@ -240,13 +215,12 @@ class PiecewiseCourse(Course):
             if piece.end > now:
                 found.append(piece)
                 now = piece.end
-        last = found.pop()
-        return [*found, last._replace(end=0.0, last=1.0)]
+        return found
 
     @property
     def _used(self) -> Sequence[Piece]:
         """The pieces that do not end before the motion starts."""
-        return [piece for piece in self._pieces if piece.last or piece.end > 0.0]
+        return [piece for piece in self._pieces if piece.end > 0.0]
 
     @cached_property
     def _ends(self) -> Sequence[float]:

@@ -12,7 +12,7 @@ import heyoka as hy
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model import equations
 from stickslip_ros.physics.model.control import ContinuousControl
-from stickslip_ros.physics.model.course import NoCourse
+from stickslip_ros.physics.model.course import Course, NoCourse
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.hybrid import (
     Flow,
@@ -44,7 +44,7 @@ starts on one. It also keeps rounding from leading back.
 _SMALLEST_STEP = 2.0**-35
 """Speed below which a change of the belt speed at a corner, or a relative speed, is rounding."""
 
-_TIME_ROUNDING = 2.0**-49
+TIME_ROUNDING = 2.0**-49
 """Share of the time by which rounding may put a corner after an instant that is meant to be it."""
 
 _LIFT_ROUNDING = 2.0**-40
@@ -112,9 +112,11 @@ class DriveSystem(HybridSystem):
                 for name in names
             ),
         )
-        self.has_parts = len(self.switches) > 1
+        self.has_parts = len(law.switches) > 0
         # Where the switches of law, belt and load start, after the sign.
         self._ends = list(accumulate(map(len, parts[:2]), initial=1))
+        self._law = slice(1, self._ends[1])
+        self._belt, self._load = slice(*self._ends[1:]), slice(self._ends[2], None)
         first = MEMORY + len(law.states)
         self.control_states = slice(first, first + len(control_states))
         """The states of the controller, in a state."""
@@ -138,6 +140,7 @@ class DriveSystem(HybridSystem):
             **numbers(self.drive.actuator, "actuator"),
             **(numbers(self.control, "control") if self.control is not None else {}),
         }
+        self._friction = law.friction
         self.sticks = law.sticks
         self.forward_limit, self.backward_limit = map(float, law.limits)
         # Where a bound is not known, the course is taken to change less than the state does.
@@ -158,7 +161,7 @@ class DriveSystem(HybridSystem):
 
         In slip the guards are: the slide reaches the belt speed; the motion is unbounded. In stick:
         the reaction exceeds the limit against backward, and against forward slip. Then come those
-        of law, belt and load.
+        of the law, and that of a load that may lift the slide.
         """
         kind = type(self)
         state, _, inputs, all_switches, time = self.symbols
@@ -180,12 +183,9 @@ class DriveSystem(HybridSystem):
         belt_speed = equations.belt_speed(drive, time, switches.belt)
         normal = equations.normal_force(drive, time, switches.load)
         reaction = equations.reaction(drive, x, y, force)
-        courses = [
-            *_guards(_bounded(drive.belt.margins(time, switches.belt)), kind.turn_belt),
-            *_guards(_bounded(drive.load.margins(time, switches.load)), kind.turn_load),
-        ]
+        lifted: list[Guard] = []
         if self._may_lift:
-            courses.append(Guard(normal + _LIFT_ROUNDING, kind.lift))
+            lifted.append(Guard(normal + _LIFT_ROUNDING, kind.lift))
         if name == STICK:
             forward, backward = law.limits
             belt_acceleration = _by_time(drive, time, switches.belt, 0.0 * y)
@@ -195,7 +195,7 @@ class DriveSystem(HybridSystem):
                 guards=(
                     Guard(normal * backward - held, kind.release_backward),
                     Guard(normal * forward + held, kind.release_forward),
-                    *courses,
+                    *lifted,
                 ),
                 marks=self._marks_of_stick(y, belt_acceleration),
             )
@@ -216,7 +216,7 @@ class DriveSystem(HybridSystem):
                 # one, since heyoka's error is relative to the largest of states and events.
                 Guard(1.0 - sign * y / UNBOUNDED_SPEED, kind.diverge),
                 *_guards(margins, kind.switch_friction),
-                *courses,
+                *lifted,
             ),
             marks=(y, acceleration),
         )
@@ -260,37 +260,36 @@ class DriveSystem(HybridSystem):
             mode, 1, self.drive.friction.switches_after(margin, mode.switches[0], own)
         )
 
-    def turn_belt(self, mode: Mode, instant: Instant, *, margin: int) -> Mode:
-        """Enter the mode that follows at a corner, or a step, of the belt's course."""
-        before = self.belt_speed(mode, instant.time)
-        own = self._by_part(mode.switches).belt
-        mode = with_switches(mode, self._ends[1], self.drive.belt.switches_after(margin, own))
-        belt_speed = self.belt_speed(mode, instant.time)
+    def corner(self, mode: Mode) -> float:
+        """Return the time of the next corner of the courses."""
+        own = self._by_part(mode.switches)
+        return min(self.drive.belt.corner(own.belt), self.drive.load.corner(own.load))
+
+    def turn(self, mode: Mode, instant: Instant) -> Mode:
+        """Return the mode after the corners and steps of the courses up to an instant."""
+        time, own = instant.time, self._by_part(mode.switches)
+        before = self.belt_speed(mode, time)
+        belt = _after(self.drive.belt, own.belt, time)
+        load = _after(self.drive.load, own.load, time)
+        mode = with_switches(mode, self._ends[1], (*belt, *load))
+        self._check_contact(mode, instant)
+        belt_speed = self.belt_speed(mode, time)
         relative_speed = instant.state[SPEED] - belt_speed
         if abs(relative_speed) <= _SMALLEST_STEP:
             instant.state[SPEED] = belt_speed
-            return self._resting(mode, instant)  # the acceleration of the belt jumps
+            return self._resting(mode, instant)  # acceleration of the belt, or load, jumps
         sign = copysign(1.0, relative_speed)
         if sign == mode.switches[0] and abs(belt_speed - before) <= _SMALLEST_STEP:
             return mode
         return self._slip(mode, sign, instant)
 
-    def turn_load(self, mode: Mode, instant: Instant, *, margin: int) -> Mode:
-        """Enter the mode that follows at a corner, or a step, of the load's course."""
-        own = self._by_part(mode.switches).load
-        mode = with_switches(mode, self._ends[2], self.drive.load.switches_after(margin, own))
-        self._check_contact(mode, instant)
-        return self._resting(mode, instant) if mode.flow == STICK else mode
-
     def settled(self, mode: Mode | None, instant: Instant) -> Mode:
         """Return stick, or slip in the direction of the relative speed; see the class."""
-        if mode is not None and self.has_parts:
-            following = self.past(mode, instant)
-            if following is not mode:
-                return following
         if mode is None:
             mode = self._starting(instant)
             self._check_contact(mode, instant)
+        elif self.has_parts and (following := self.past(mode, instant)) is not mode:
+            return following
         elif mode.flow == STICK and not self._steady:  # without the rounding of the integration
             instant.state[SPEED] = self.belt_speed(mode, instant.time)
         belt_speed = self.belt_speed(mode, instant.time)
@@ -308,30 +307,20 @@ class DriveSystem(HybridSystem):
             self.lift(mode, instant)
 
     def past(self, mode: Mode, instant: Instant) -> Mode:
-        """Return the mode after the margins of law and courses that rounding has put below zero.
-
-        A corner that is due at the instant, to the rounding of the time, has passed.
-        """
+        """Return the mode after the margins of the law that rounding has put below zero."""
         for _ in range(_MOST_AT_ONCE):
             enter = self._due(mode, instant)
             if enter is None:
                 return mode
             mode = enter(mode, instant)
         raise RunError(
-            f"the friction law {self.drive.friction.name}, or a course of belt or load, changes "
-            f"its mode more than {_MOST_AT_ONCE} times at one instant"
+            f"the friction law {self.drive.friction.name} changes its mode more than "
+            f"{_MOST_AT_ONCE} times at one instant"
         )
 
     def _due(self, mode: Mode, instant: Instant) -> Callable[[Mode, Instant], Mode] | None:
-        """Return what enters the next mode of a part whose margin is below zero, or None."""
+        """Return what enters the next mode of the law if a margin is below zero, or None."""
         drive, own, time = self.drive, self._by_part(mode.switches), instant.time
-        for enter, margins in (
-            (self.turn_belt, drive.belt.margins(time, own.belt)),
-            (self.turn_load, drive.load.margins(time, own.load)),
-        ):
-            for number, margin in enumerate(margins):
-                if margin <= _TIME_ROUNDING * time:
-                    return partial(enter, margin=number)
         if mode.flow == SLIP and own.law:
             speed = instant.state[SPEED] - self.belt_speed(mode, time)
             memory = self._memory(instant)
@@ -400,11 +389,11 @@ class DriveSystem(HybridSystem):
 
     def belt_speed(self, mode: Mode, time: float) -> float:
         """Return the speed of the belt."""
-        return float(equations.belt_speed(self.drive, time, self._by_part(mode.switches).belt))
+        return float(equations.belt_speed(self._shared, time, mode.switches[self._belt]))
 
     def normal_force(self, mode: Mode, time: float) -> float:
         """Return the normal force."""
-        return float(equations.normal_force(self.drive, time, self._by_part(mode.switches).load))
+        return float(equations.normal_force(self._shared, time, mode.switches[self._load]))
 
     def control_force(self, instant: Instant) -> float:
         """Return the force on the slide: held, with the actuator, or continuous control."""
@@ -427,8 +416,8 @@ class DriveSystem(HybridSystem):
         if self._steady:
             return self.reaction(instant)
         tiny = 1e-30j  # imaginary, so that nothing cancels
-        switches = self._by_part(mode.switches).belt
-        speed: Any = equations.belt_speed(self.drive, instant.time + tiny, switches)
+        switches = mode.switches[self._belt]
+        speed: Any = equations.belt_speed(self._shared, instant.time + tiny, switches)
         return self.reaction(instant) + self.drive.mass * (speed.imag / tiny.imag)
 
     def friction_force(self, mode: Mode, instant: Instant) -> float:
@@ -436,12 +425,16 @@ class DriveSystem(HybridSystem):
         sign = mode.switches[0]
         if sign == 0.0:
             return self.held_force(mode, instant)
-        state = instant.state
-        belt_speed = self.belt_speed(mode, instant.time)
-        coefficient = self.drive.friction.friction(
-            state[SPEED] - belt_speed, sign, self._memory(instant), self._law_switches(mode)
-        )
+        relative_speed = instant.state[SPEED] - self.belt_speed(mode, instant.time)
+        memory = self._memory(instant)
+        coefficient = self._friction(relative_speed, sign, memory, mode.switches[self._law])
         return self.normal_force(mode, instant.time) * float(coefficient)
+
+    @cached_property
+    def _shared(self) -> Drive:
+        """The drive with the equations of its courses, which are quicker than the courses."""
+        drive = self.drive
+        return replace(drive, belt=drive.belt.equations, load=drive.load.equations)
 
     @cached_property
     def _symbolic(self) -> _SymbolicDrive:
@@ -462,9 +455,6 @@ class DriveSystem(HybridSystem):
 
     def _memory(self, instant: Instant) -> Sequence[float]:
         return () if self.sticks else instant.state[MEMORY : self.control_states.start].tolist()
-
-    def _law_switches(self, mode: Mode) -> Sequence[float]:
-        return mode.switches[1 : self._ends[1]]
 
     def _by_part(self, switches: Sequence[Any]) -> _Parts:
         first, belt, load = self._ends
@@ -512,9 +502,11 @@ def _guards(margins: Sequence[Any], leads: Callable[..., Mode]) -> list[Guard]:
     ]
 
 
-def _bounded(margins: Sequence[Any]) -> list[Any]:
-    """Return margins of at most one, the same near zero: heyoka's error is relative to them."""
-    return [margin / (1.0 + margin) for margin in margins]
+def _after(course: Course, switches: Sequence[float], time: float) -> Sequence[float]:
+    """Return the switches of a course after its corners up to a time, or within its rounding."""
+    while (corner := course.corner(switches)) <= time * (1.0 + TIME_ROUNDING):
+        switches = course.switches_at(corner)
+    return switches
 
 
 def _by_time(drive: Drive, time: Any, switches: Sequence[Any], zero: Any) -> Any:

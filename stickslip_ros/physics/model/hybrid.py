@@ -137,6 +137,14 @@ class HybridSystem(ABC):
         """Advance the state for `duration` or up to a guard; return the guard and the time."""
         raise NotImplementedError
 
+    def corner(self, mode: Mode) -> float:
+        """Return the time at which a mode ends whatever the state; infinite by default."""
+        return inf
+
+    def turn(self, mode: Mode, instant: Instant) -> Mode:
+        """Return the mode after the corners that an instant has reached."""
+        return mode
+
     has_parts = False
     """Whether several margins may fall to zero at one instant, see `past`."""
 

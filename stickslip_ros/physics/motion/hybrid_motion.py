@@ -1,6 +1,7 @@
 """Motion of a hybrid system: a state vector and a mode, integrated to machine precision."""
 
 from array import array
+from math import inf
 
 import heyoka as hy
 
@@ -59,7 +60,7 @@ class HybridMotion:
     def _use(self, system: HybridSystem) -> None:
         """Continue with a system that has the same states; its mode is found by `_set_state`."""
         self._system = system
-        self._clocked = not system.autonomous
+        self._clocked, self._corner = not system.autonomous, inf
         self._constants = array("d", system.constants.values())
         self._prepared_by_detail: dict[Detail, dict[str, _Prepared]] = {}
         self._prepared = self._prepared_by_detail.setdefault(self._detail, {})
@@ -79,6 +80,8 @@ class HybridMotion:
     def _enter(self, mode: Mode) -> None:
         """Continue in a mode."""
         self._mode = mode
+        if self._clocked:
+            self._corner = self._system.corner(mode)
         prepared = self._prepared.get(mode.flow) or self._prepare(mode)
         self._flow, self._leads = prepared
         flow = prepared[0]
@@ -120,7 +123,11 @@ class HybridMotion:
         epoch, now = instant.time, 0.0
         limits_steps, clocked, has_parts = system.limits_steps, self._clocked, system.has_parts
         while now < duration:
-            end = self._begin(now, duration) if watched else duration
+            end, corner = duration, self._corner - epoch
+            if corner < end:
+                end = corner
+            if watched:
+                end = self._begin(now, end)
             flow, guard = self._flow, None
             if flow is None:
                 guard, elapsed = system.closed_form(mode, instant, end - now)
@@ -154,8 +161,15 @@ class HybridMotion:
             if clocked:
                 instant.time = epoch + now
             if guard is None:
+                following = mode
+                if now >= corner:
+                    instant.time = self._corner
+                    following = system.turn(mode, instant)
                 if watched:
-                    self._pass(mode, None, mode, now)
+                    self._pass(mode, None, following, now)
+                if following is not mode:
+                    mode = following
+                    self._enter(mode)
                 continue
             following = None if guard == _DIVERGED else self._leads[guard](system, mode, instant)
             if has_parts and following is not None:

@@ -13,6 +13,7 @@ from stickslip_ros.physics.model.drive_system import (
     POSITION,
     SPEED,
     STICK,
+    TIME_ROUNDING,
     DriveSystem,
 )
 from stickslip_ros.physics.model.plain_drive import drive_system
@@ -246,9 +247,6 @@ class Motion(HybridMotion):
         if self.unbounded:
             return
         frequency = self._drive.angular_frequency
-        autonomous = self._system.autonomous
-        if not autonomous:
-            self._set_clock()
         try:
             self._advance(duration * frequency)
         except TooManyStepsError:
@@ -256,20 +254,19 @@ class Motion(HybridMotion):
                 "the motion is too stiff to be followed: it takes more than "
                 f"{STEPS_PER_UNIT} steps of integration for {1.0 / frequency:g} s"
             ) from None
-        if autonomous:
+        if not self._clocked:
             self._time += duration
             return
         before, duration = self._time, duration - self._lost
         self._time += duration
         self._lost = (self._time - before) - duration
         self._set_clock()
-        mode = self._system.past(self._mode, self._instant)
-        if mode is not self._mode:
-            self._enter(mode)
+        if self._instant.time * (1.0 + TIME_ROUNDING) >= self._corner:
+            self._enter(self._system.turn(self._mode, self._instant))
 
     def _set_clock(self) -> None:
         """Set the time of the courses: sums of the scaled durations would drift."""
-        self._instant.time = self.course_time * self._drive.angular_frequency
+        self._instant.time = (self._time - self._origin) * self._drive.angular_frequency
 
     def _change(self, drive: Drive, control: ContinuousControl | None) -> None:
         """Continue with another drive and controller, in the same state of all parts."""
