@@ -9,7 +9,8 @@ The error is the larger one of displacement and velocity after all 190 periods. 
 Taylor series of the same motion in decimal arithmetic with 40 digits.
 
 A tick is the work of the plant per sample: a new force, then a step of 1 or 10 ms. Peer: a bare
-heyoka integrator of the same slipping motion with the same two terminal events.
+heyoka integrator of the same slipping motion with the same two terminal events. The peer of a tick
+with a course is the tick of the same drive without it.
 """
 
 import time
@@ -22,6 +23,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from benchmarks.slices import Row, by_turns, compare_times, show
+from stickslip_ros.physics.model.course import Course
+from stickslip_ros.physics.model.courses import Ramp, Sine
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
 from stickslip_ros.physics.model.friction import Stribeck
@@ -36,14 +39,15 @@ PURE_SLIP_SPEED = 1.0
 
 PERIODS, SCIPY_PERIODS = 190, 19
 ROUNDS, MOTIONS, TICKS = 9, 20, 2000
+FORCES = [0.001 * (n % 2) for n in range(TICKS)]
 RTOL, ATOL = 1e-11, 1e-12
 
 State = tuple[float, float]
 
 
-def motion(belt_speed: float) -> Motion:
+def motion(belt_speed: float, **courses: Course) -> Motion:
     friction = Stribeck(STATIC, MINIMUM, MINIMUM_SPEED)
-    return Motion(Drive(1.0, DAMPING, 1.0, 1.0, belt_speed, friction), 0.0, 0.0)
+    return Motion(Drive(1.0, DAMPING, 1.0, 1.0, belt_speed, friction, **courses), 0.0, 0.0)
 
 
 def by_scipy(belt_speed: float, end: float) -> State:
@@ -182,30 +186,47 @@ def error(state: State, exact: State) -> float:
     return max(abs(a - b) for a, b in zip(state, exact, strict=True))
 
 
-def tick_row(step: float) -> Row:
-    ours, bare = motion(PURE_SLIP_SPEED), bare_integrator()
-    forces = [0.001 * (n % 2) for n in range(TICKS)]
+def ticks(moving: Motion, step: float) -> Callable[[], float]:
+    """Return a function that times a tick of a motion."""
 
-    def run_ours() -> None:
-        for force in forces:
-            ours.force = force
-            ours.advance(step)
+    def run() -> None:
+        for force in FORCES:
+            moving.force = force
+            moving.advance(step)
+
+    return timed(run, TICKS)
+
+
+def tick_row(step: float) -> Row:
+    bare = bare_integrator()
 
     def run_bare() -> None:
         now = float(bare.time)
-        for force in forces:
+        for force in FORCES:
             now += step
             bare.pars[0] = force
             bare.propagate_until(now)
 
-    times, bare_times = by_turns(3 * ROUNDS, timed(run_ours, TICKS), timed(run_bare, TICKS))
+    ours = ticks(motion(PURE_SLIP_SPEED), step)
+    times, bare_times = by_turns(3 * ROUNDS, ours, timed(run_bare, TICKS))
     return compare_times(f"tick of {1e3 * step:g} ms", times, "bare heyoka", bare_times)
+
+
+def course_row(name: str, **courses: Course) -> Row:
+    step = 1e-2
+    with_course, without = motion(PURE_SLIP_SPEED, **courses), motion(PURE_SLIP_SPEED)
+    times, plain = by_turns(3 * ROUNDS, ticks(with_course, step), ticks(without, step))
+    what = f"tick of {1e3 * step:g} ms, {name}"
+    return compare_times(what, times, "no course", plain, required=1.0 / 1.2)
 
 
 def measure() -> list[Row]:
     return [
         *(row for belt_speed in BELT_SPEEDS for row in motion_rows(belt_speed)),
         *(tick_row(step) for step in (1e-3, 1e-2)),
+        course_row("belt in a ramp", belt=Ramp(0.1, duration=1e4)),
+        course_row("belt in a sine", belt=Sine(0.02, frequency=0.3)),
+        course_row("load in a sine", load=Sine(0.1, frequency=0.3)),
     ]
 
 

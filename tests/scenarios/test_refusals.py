@@ -4,15 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.scenarios.files import load_scenario, shipped_scenarios
 from tests.scenarios.files import refusal, scenario_file, section
 
 
 def test_an_unknown_scenario() -> None:
-    assert (
-        "unknown scenario 'lathe'; the known names are feed_drive, feed_profile, paper, vibrating_load; "
-        in refusal("lathe")
-    )
+    known = ", ".join(sorted(shipped_scenarios()))
+    assert f"unknown scenario 'lathe'; the known names are {known}; " in refusal("lathe")
     assert refusal("papre") == "unknown scenario 'papre'; did you mean paper?"
 
 

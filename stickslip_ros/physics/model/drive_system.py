@@ -147,7 +147,9 @@ class DriveSystem(HybridSystem):
         heaviest, steepest = 1.0 + self.drive.load.bounds[1], self.drive.belt.steepest
         self._largest_friction = max(self.forward_limit, self.backward_limit)
         self._largest_friction *= heaviest if heaviest < inf else 1.0
-        self._belt_acceleration = steepest if steepest < inf else 0.0
+        self._steepest, self._belt_acceleration = steepest, steepest if steepest < inf else 0.0
+        # Time at which the speed of the belt was last asked for, and that speed.
+        self._seen_at = self._seen_belt_speed = inf
         self._characteristic_speed = law.characteristic_speed
         self.limits_steps = law.characteristic_speed != inf
 
@@ -274,6 +276,7 @@ class DriveSystem(HybridSystem):
         mode = with_switches(mode, self._ends[1], (*belt, *load))
         self._check_contact(mode, instant)
         belt_speed = self.belt_speed(mode, time)
+        self._seen_at, self._seen_belt_speed = time, belt_speed
         relative_speed = instant.state[SPEED] - belt_speed
         if abs(relative_speed) <= _SMALLEST_STEP:
             instant.state[SPEED] = belt_speed
@@ -285,15 +288,24 @@ class DriveSystem(HybridSystem):
 
     def settled(self, mode: Mode | None, instant: Instant) -> Mode:
         """Return stick, or slip in the direction of the relative speed; see the class."""
+        state, time = instant.state, instant.time
+        sticks = mode is not None and mode.flow == STICK
         if mode is None:
             mode = self._starting(instant)
             self._check_contact(mode, instant)
-        elif self.has_parts and (following := self.past(mode, instant)) is not mode:
-            return following
-        elif mode.flow == STICK and not self._steady:  # without the rounding of the integration
-            instant.state[SPEED] = self.belt_speed(mode, instant.time)
-        belt_speed = self.belt_speed(mode, instant.time)
-        relative_speed = instant.state[SPEED] - belt_speed
+        elif self.has_parts:
+            if (following := self.past(mode, instant)) is not mode:
+                return following
+        elif not sticks:
+            # The belt has changed its speed by so much at most.
+            change = self._steepest * (time - self._seen_at)
+            if mode.switches[0] * (state[SPEED] - self._seen_belt_speed) > change + _SMALLEST_STEP:
+                return mode
+        belt_speed = self.belt_speed(mode, time)
+        self._seen_at, self._seen_belt_speed = time, belt_speed
+        if sticks and not self._steady:  # without the rounding of the integration
+            state[SPEED] = belt_speed
+        relative_speed = state[SPEED] - belt_speed
         if relative_speed == 0.0:
             settled = self._resting(mode, instant)
             if settled is mode:

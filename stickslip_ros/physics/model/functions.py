@@ -25,7 +25,5 @@ def sin(x: Any) -> Any:
 
 
 def power(base: Any, exponent: Any) -> Any:
-    """Return a power of a float, an array or an expression; 0 for a number below zero."""
-    if isinstance(base, int | float | np.ndarray | np.generic):
-        return np.maximum(base, 0.0) ** exponent
+    """Return a power of a float, an array or an expression above zero."""
     return base**exponent

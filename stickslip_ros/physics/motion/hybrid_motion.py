@@ -158,8 +158,6 @@ class HybridMotion:
                         guard, now = _DIVERGED, taylor.time
                     else:
                         guard, now = -outcome - 1, taylor.time
-            if clocked:
-                instant.time = epoch + now
             if guard is None:
                 following = mode
                 if now >= corner:
@@ -171,6 +169,8 @@ class HybridMotion:
                     mode = following
                     self._enter(mode)
                 continue
+            if clocked:
+                instant.time = epoch + now
             following = None if guard == _DIVERGED else self._leads[guard](system, mode, instant)
             if has_parts and following is not None:
                 following = system.past(following, instant)

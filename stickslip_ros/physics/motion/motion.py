@@ -258,10 +258,10 @@ class Motion(HybridMotion):
             self._time += duration
             return
         before, duration = self._time, duration - self._lost
-        self._time += duration
-        self._lost = (self._time - before) - duration
-        self._set_clock()
-        if self._instant.time * (1.0 + TIME_ROUNDING) >= self._corner:
+        self._time = time = before + duration
+        self._lost = (time - before) - duration
+        self._instant.time = time = (time - self._origin) * frequency
+        if time + TIME_ROUNDING * time >= self._corner:
             self._enter(self._system.turn(self._mode, self._instant))
 
     def _set_clock(self) -> None:
