@@ -184,7 +184,9 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) ->
         transient += loading
     # The first and the last cycle are incomplete.
     cycles = max(course.cycles, LEAST_CYCLES) + 2
-    block = cycles * period
+    block, longest = cycles * period, cycles * (period + loading)
+    if not drive.has_spring:  # forces alone make its cycles
+        block = longest = case.duration
     controller = loop = None
     if case.sampled is not None:
         loop = case.sampled.as_loop(motion)
@@ -213,7 +215,6 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) ->
                 motion.advance(left)
                 motion.advance(transient)
         motion.recording = True
-        longest = cycles * (period + loading)
         done, step = 0.0, block
         while not motion.unbounded and done < longest and not (done and section.done):
             advance(step, section)
