@@ -207,7 +207,7 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) ->
 
     def observe() -> _Section:
         motion.recording = False
-        section = _Section(course.cycles)
+        section = _Section(course.cycles, once=not drive.has_spring)
         advance(transient, section)
         if motion.sticking and not controlled and loads:
             left = (release_position(drive) - motion.position) / drive.belt_speed
@@ -266,15 +266,19 @@ def _alike(before: Measures, after: Measures) -> bool:
 class _Section:
     """Measures a motion, keeps its Poincare section, and counts the measured cycles."""
 
-    def __init__(self, cycles: int) -> None:
+    def __init__(self, cycles: int, *, once: bool = False) -> None:
+        """Measure at least `cycles`; keep a turning point `once` if the slide sticks there."""
         self.meter = CycleMeter(cycles)
-        self._missing = max(cycles, LEAST_CYCLES)
+        self._missing, self._once = max(cycles, LEAST_CYCLES), once
         self._sections = [np.empty(0)]
 
     def take_motion(self, motion: MeasuredMotion) -> None:
         """Keep the turning points of the slide, as an observer."""
         breakpoints = motion.breakpoints
-        self._sections.append(breakpoints.position[breakpoints.velocity == 0.0])
+        turns = breakpoints.position[breakpoints.velocity == 0.0]
+        if self._once:
+            turns = turns[np.diff(turns, prepend=np.nan) != 0.0]
+        self._sections.append(turns)
         self._missing -= len(motion.cycles)
 
     @property

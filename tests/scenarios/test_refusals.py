@@ -4,12 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.scenarios.files import load_scenario, shipped_scenarios
 from tests.scenarios.files import refusal, scenario_file, section
 
 
 def test_an_unknown_scenario() -> None:
-    assert "unknown scenario 'lathe'; the known names are feed_drive, paper; " in refusal("lathe")
+    known = ", ".join(sorted(shipped_scenarios()))
+    assert f"unknown scenario 'lathe'; the known names are {known}; " in refusal("lathe")
     assert refusal("papre") == "unknown scenario 'papre'; did you mean paper?"
 
 
@@ -84,7 +85,7 @@ WHOLE = "must be a whole number"
         ("plant", "mass", "0", "0", f"{POSITIVE} kg"),
         ("plant", "mass", "-1.5", "-1.5", f"{POSITIVE} kg"),
         ("plant", "damping", "-1e-9", "-1e-09", f"{FINITE} at least 0 N s/m"),
-        ("plant", "stiffness", "0.0", "0.0", f"{POSITIVE} N/m"),
+        ("plant", "stiffness", "-1.0", "-1.0", f"{FINITE} at least 0 N/m"),
         ("plant", "normal_force", "-1", "-1", f"{POSITIVE} N"),
         ("plant", "friction.static", "-0.1", "-0.1", f"{FINITE} at least 0"),
         ("plant", "friction.minimum_speed", "0", "0", f"{POSITIVE} m/s"),
