@@ -47,8 +47,8 @@ class PositionServo(ControlLaw):
         return self.velocity_gain * (self.position_gain * lag - sample.velocity), state
 
 
-# Their fit: 95.1 kg, 203.5 N s/m, 20.4 N. A drive needs a spring: 1 N/m takes 0.1 N at most.
-AXIS = Drive(95.1, 203.5, 1.0, 1000.0, belt_speed=0.0, friction=Coulomb(static=0.0204))
+# Their fit: 95.1 kg, 203.5 N s/m, 20.4 N; no spring holds the axis.
+AXIS = Drive(95.1, 203.5, 0.0, 1000.0, belt_speed=0.0, friction=Coulomb(static=0.0204))
 COURSE = ReferenceCourse(ReferenceKind.TRAPEZOID, amplitude=0.1, start=0.1, duration=3.0)
 
 

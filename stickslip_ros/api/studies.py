@@ -378,15 +378,17 @@ def basin(
     [1.0]
     """
     chosen = as_scenario(scenario)
-    axes = list(default_axes(chosen, BASIN_COUNT))
+    axes: list[Axis] = []
     starts: list[tuple[str, str, Any]] = [
         ("position", POSITION, position),
         ("velocity", VELOCITY, velocity),
     ]
     for place, (name, parameter, given) in enumerate(starts):
-        if given is not None:
-            ends = sample is not None and isinstance(given, tuple) and len(given) == 2
-            axes[place] = _axis(name, parameter, (*given, 2) if ends else given)
+        if given is None:
+            axes.append(default_axes(chosen, BASIN_COUNT)[place])
+            continue
+        ends = sample is not None and isinstance(given, tuple) and len(given) == 2
+        axes.append(_axis(name, parameter, (*given, 2) if ends else given))
     plan = Grid(tuple(axes)) if sample is None else RandomSample(tuple(axes), sample, seed)
     course = _course(BASIN_COURSE, transient, cycles)
     study = basin_study(chosen, plan, course=course, continuous=continuous)

@@ -92,15 +92,16 @@ def _plan(arguments: argparse.Namespace, scenario: "Scenario") -> "Plan":
         raise InvalidInputError(f"--seed {arguments.seed}: is for a random --sample")
     if arguments.seed is not None and arguments.seed < 0:
         raise InvalidInputError(f"--seed {arguments.seed}: must be 0 or more")
-    axes = list(default_axes(scenario, BASIN_COUNT))
+    axes: list[Axis] = []
     for place, (option, parameter) in enumerate((("position", POSITION), ("velocity", VELOCITY))):
         text: str | None = getattr(arguments, option)
         if text is None:
+            axes.append(default_axes(scenario, BASIN_COUNT)[place])
             continue
         # Of a sample only the ends matter.
         number = f"{text}:2" if arguments.sample is not None and text.count(":") == 1 else text
         try:
-            axes[place] = Axis.parse(f"{parameter}={number}")
+            axes.append(Axis.parse(f"{parameter}={number}"))
         except InvalidInputError as error:
             reason = str(error).partition(": ")[2].replace("NODE.PARAMETER=", "")
             raise InvalidInputError(f"--{option}={text}: {reason}") from None

@@ -34,7 +34,7 @@ def study_figure(columns: Columns, basins: Basins, study: Study) -> Figure:
         labels=[_label(attractor, units) for attractor in basins.attractors],
         grid_shape=plan.shape if isinstance(plan, Grid) else None,
         belt_speed=drive.belt_speed,
-        equilibrium_position=drive.equilibrium_position,
+        equilibrium_position=drive.equilibrium_position if drive.has_spring else None,
         units=units,
         title=" ".join([scenario.name, *scenario.overrides]),
     )
@@ -50,7 +50,7 @@ def basin_figure(
     labels: Sequence[str],
     grid_shape: tuple[int, ...] | None,
     belt_speed: float,
-    equilibrium_position: float,
+    equilibrium_position: float | None,
     units: Units = SI,
     title: str = "",
 ) -> Figure:
@@ -59,7 +59,8 @@ def basin_figure(
     `position` (m) and `velocity` (m/s) are those of the starts, and `attractor` is the index of
     each one's attractor in `regimes` and `labels`; arrays of shape (n,). The starts are a row-major
     grid of `grid_shape`, or scattered if that is None. Lines mark the `belt_speed` (m/s) and a
-    circle the equilibrium at `equilibrium_position` (m). `title` names the computed study.
+    circle the equilibrium at `equilibrium_position` (m), if there is one. `title` names the
+    computed study.
     """
     figure = Figure(figsize=(7.5, 6.8))
     what = f"Motion that each of {len(attractor)} starts leads to"
@@ -85,11 +86,11 @@ def basin_figure(
     if grid_shape is not None:  # white below black is visible on any colour
         axes.axhline(belt_speed / speed, color="white", lw=3.0)
     axes.axhline(belt_speed / speed, color="black", lw=1.2, ls="--")
-    axes.plot(equilibrium_position / length, 0.0, "o", color="white", mec="black", mew=1.5, ms=8.0)
-    handles += [
-        Line2D([], [], color="black", lw=1.2, ls="--", label="belt speed"),
-        Line2D([], [], color="white", mec="black", mew=1.5, marker="o", ls="", label="equilibrium"),
-    ]
+    handles.append(Line2D([], [], color="black", lw=1.2, ls="--", label="belt speed"))
+    if equilibrium_position is not None:
+        circle: Any = {"color": "white", "mec": "black", "mew": 1.5, "marker": "o", "ls": ""}
+        axes.plot(equilibrium_position / length, 0.0, ms=8.0, **circle)
+        handles.append(Line2D([], [], label="equilibrium", **circle))
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
     figure.legend(handles=handles, loc="outside lower center", ncols=2)

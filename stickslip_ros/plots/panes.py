@@ -62,7 +62,8 @@ def measures_text(measures: Measures, units: Units) -> str:
 def end_duration(motion: DrawnMotion, measures: Measures, drive: Drive | None) -> float:
     """Return the duration of the enlarged end, s; a fixed share of the run without a period."""
     span = float(motion.time[-1] - motion.time[0]) if len(motion.time) else 0.0
-    period = measures.period or (drive.natural_period if drive is not None else 0.0)
+    natural = drive.natural_period if drive is not None and drive.has_spring else 0.0
+    period = measures.period or natural
     return min(LAST_CYCLES * period, span) or 0.05 * span
 
 

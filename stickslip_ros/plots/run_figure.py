@@ -97,7 +97,7 @@ def run_figure(
         Line2D([], [], **_FRICTION, label="friction force"),
         Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"),
     ]
-    if drive is not None:
+    if drive is not None and drive.has_spring:
         handles.insert(2, Line2D([], [], **_POINT | _REST, label="equilibrium"))
     if panels.holds:
         handles.append(Line2D([], [], **_HELD, label="no new force: last one"))
@@ -164,10 +164,11 @@ class _Panels:
     def _draw_motion(self, position: Axes, velocity: Axes, pane: Pane) -> None:
         rows, gap = pane.rows, self._history.gap
         length, speed = self._length[0], self._speed[0]
-        if self._drive is not None:
+        if self._drive is not None and self._drive.has_spring:
             # On a belt at rest any position within the static friction is an equilibrium.
             belt = np.where(rows.belt_velocity == 0.0, np.nan, rows.belt_velocity)
-            rest = self._drive.friction.at_rest(belt) * self._drive.length_scale
+            by_friction = self._drive.friction.at_rest(belt) * self._drive.length_scale
+            rest = by_friction + self._drive.bias_force / self._drive.stiffness
             draw_line(position, pane, (rows.time, rest), length, gap, **_REST)
         draw_line(position, pane, (rows.time, rows.position), length, gap, **_MOTION)
         draw_line(velocity, pane, (rows.time, rows.belt_velocity), speed, gap, **_BELT)
@@ -193,7 +194,7 @@ class _Panels:
             axes.plot(np.where(stuck, position, np.nan) / length, belt / speed, **_STICKS)
         belt_speed = float(self._last.belt_velocity[-1])
         axes.axhline(belt_speed / speed, **_BELT)
-        if self._drive is not None and belt_speed != 0.0:
+        if self._drive is not None and self._drive.has_spring and belt_speed != 0.0:
             axes.plot(self._drive.equilibrium_position / length, 0.0, zorder=3.0, **_POINT)
         axes.set_xlim(widened(*axes.get_xlim()))
         axes.set_ylim(widened(*axes.get_ylim()))

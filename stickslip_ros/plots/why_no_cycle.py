@@ -1,5 +1,6 @@
 """Why a motion has no measures."""
 
+from math import inf
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ def why_no_cycle(regime: str | None, duration: float, drive: "Drive | None") -> 
     if drive is None:
         return said
     period = drive.natural_period
-    if duration < 3.0 * period:
+    if duration < 3.0 * period < inf:
         return f"{said}: the natural period is {units.text(period, 's')}, so run it for longer"
     ratio = hopf_ratio(drive)
     if ratio is not None and not 1.0 / _FAR < ratio < _FAR:

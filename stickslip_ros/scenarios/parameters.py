@@ -43,6 +43,8 @@ _SHORTEST = 1e-3
 """Shortest time-out or period of a node, s."""
 _OF_DRIVE = [each.name for each in fields(Drive) if each.type is float]
 """Parameters of the plant that the drive takes unchanged."""
+_DEFAULTS = {each.name: each.default for each in fields(Drive)}
+"""Defaults of the drive; only constants that may be absent have one."""
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
 
@@ -89,11 +91,14 @@ class PlantParameters(NodeParameters):
 
     mass: float = field(1.0, "Mass of the slide.", "kg", ge=SMALLEST)
     damping: float = field(0.02, "Viscous damping of the transmission.", "N s/m", ge=0.0)
-    stiffness: float = field(1.0, "Stiffness of the transmission.", "N/m", ge=SMALLEST)
+    stiffness: float = field(
+        1.0, "Stiffness of the transmission; 0 for an axis that no spring holds.", "N/m", ge=0.0
+    )
     normal_force: float = field(
         1.0, "Force that presses the slide onto the belt.", "N", ge=SMALLEST
     )
     belt_speed: float = field(0.4, "Speed of the belt (feed speed), positive or negative.", "m/s")
+    bias_force: float = field(0.0, "Constant force on the slide, such as an offset.", "N")
     friction: Friction = Friction()
     initial: Initial = Initial()
     rate: float = field(100.0, "Samples per second.", "Hz", fixed=Fixed.ACTIVE, ge=1e-6, le=1e9)
@@ -153,6 +158,15 @@ class PlantParameters(NodeParameters):
         sensor: SensorParameters = SensorParameters()
     if constants_of(Actuator):
         actuator: ActuatorParameters = ActuatorParameters()
+
+    @model_validator(mode="after")
+    def _spring_is_none_or_some(self) -> Self:
+        """Refuse a stiffness so small that the scales of the drive overflow."""
+        if 0.0 < self.stiffness < SMALLEST:
+            raise ValueError(
+                f"stiffness = {self.stiffness} N/m is refused: must be 0 or at least {SMALLEST:g}"
+            )
+        return self
 
     @model_validator(mode="after")
     def _delay_is_bounded(self) -> Self:
@@ -217,8 +231,12 @@ class PlantParameters(NodeParameters):
         return EXACT_SENSOR if own is None else Sensor(**dict(own))
 
     def drive_names(self) -> list[str]:
-        """Return the flat names of the drive's parameters, with those of its friction law."""
-        return [*_OF_DRIVE, "friction.law", *(f"friction.{name}" for name in self.friction.names())]
+        """Return the flat names of the drive's parameters, with those of its friction law.
+
+        Those at a default of the drive are none of them.
+        """
+        own = [name for name in _OF_DRIVE if getattr(self, name) != _DEFAULTS.get(name)]
+        return [*own, "friction.law", *(f"friction.{name}" for name in self.friction.names())]
 
     def as_disturbance(self) -> Disturbance:
         """Return the disturbance of the scenario."""

@@ -216,6 +216,11 @@ def default_axes(scenario: Scenario, count: int) -> tuple[Axis, Axis]:
         Axes of `plant.initial.position` (m), centred on the equilibrium, and
         `plant.initial.velocity` (m/s), centred on zero.
 
+    Raises
+    ------
+    InvalidInputError
+        If the drive has no spring.
+
     Examples
     --------
     >>> from stickslip_ros.scenarios.files import load_scenario
@@ -223,6 +228,11 @@ def default_axes(scenario: Scenario, count: int) -> tuple[Axis, Axis]:
     [5, 5]
     """
     drive = scenario.plant.as_drive()
+    if not drive.has_spring:
+        raise InvalidInputError(
+            "plant.stiffness = 0 N/m: without a spring no range of starts follows from the drive, "
+            "so both position and velocity must be given"
+        )
     bent = max(drive.friction.limits) * drive.length_scale
     reach = 2.0 * max(abs(drive.belt_speed) / drive.angular_frequency, bent)
     middle, speed = drive.equilibrium_position, reach * drive.angular_frequency

@@ -1,12 +1,19 @@
 """Distance of a belt speed from the Hopf speed, which also reveals a wrong unit."""
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.hopf import hopf_points
 
 
 def hopf_ratio(drive: Drive) -> float | None:
-    """Return the belt speed over the nearest Hopf speed; None without one or at zero speed."""
-    speeds = [point.belt_speed for point in hopf_points(drive)]
+    """Return the belt speed over the nearest Hopf speed; None without one or at zero speed.
+
+    A drive that the theory does not cover has none.
+    """
+    try:
+        speeds = [point.belt_speed for point in hopf_points(drive)]
+    except InvalidInputError:
+        return None
     speed = abs(drive.belt_speed)
     if not speeds or speed == 0.0:
         return None

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -26,7 +27,7 @@ from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
-from stickslip_ros.studies.options import LONGEST, SettlingCourse
+from stickslip_ros.studies.options import DEFAULT_PERIODS, LONGEST, SettlingCourse
 
 CYCLES = (Regime.STICK_SLIP, Regime.PURE_SLIP)
 """Regimes of a limit cycle, which has an amplitude."""
@@ -63,6 +64,8 @@ class ControlledDrive:
     """Sampling of the loop; None: no sampling, and continuous control (eq. 19)."""
     reference: ReferenceSource = no_reference
     """Reference of the control law."""
+    duration: float = inf
+    """Duration of the scenario, s: the scale of time of a drive without a spring."""
 
     @classmethod
     def from_scenario(cls, scenario: Scenario, *, continuous: bool = False) -> "ControlledDrive":
@@ -76,7 +79,8 @@ class ControlledDrive:
         if continuous:
             check_continuous(scenario)
         drive = plant.as_drive()
-        if law is not None and law.start_after > LONGEST * drive.natural_period:
+        period = unit_period(drive, plant.duration)
+        if law is not None and law.start_after > LONGEST * period:
             raise InvalidInputError(
                 f"{scenario.controller.node}.start_after = {law.start_after:g} s: in a study it "
                 f"must be at most {LONGEST:g} natural periods"
@@ -87,7 +91,27 @@ class ControlledDrive:
         if law is not None and law.follows_reference:
             check_reference(scenario)
             reference = scenario.controller.as_reference()
-        return cls(drive, law, plant if sampled else None, reference)
+        return cls(drive, law, plant if sampled else None, reference, plant.duration)
+
+    @property
+    def period(self) -> float:
+        """Unit of the durations of a study, s; see `unit_period`."""
+        return unit_period(self.drive, self.duration)
+
+
+def unit_period(drive: Drive, duration: float) -> float:
+    """Return the natural period, s, or without a spring the duration (s) over `DEFAULT_PERIODS`.
+
+    Raises InvalidInputError if neither is finite.
+    """
+    if drive.has_spring:
+        return drive.natural_period
+    if not 0.0 < duration < inf:
+        raise InvalidInputError(
+            f"plant.duration = {duration:g} s is refused: must be finite and above 0 s with "
+            "plant.stiffness = 0 N/m, because a drive without a spring has no natural period"
+        )
+    return duration / DEFAULT_PERIODS
 
 
 def check_reference(scenario: Scenario) -> None:
@@ -146,20 +170,23 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) ->
 
     Raises RunError if the motion is too stiff to integrate.
     """
-    drive, law = case.drive, case.law
+    drive, law, period = case.drive, case.law, case.period
     control = law.continuous if law is not None and case.sampled is None else None
     motion = RecordedMotion(drive, start.position, start.velocity, control)
     motion.recording = False
     motion.take_breakpoints()  # the start is not part of what is measured
-    loading = 0.0 if drive.belt_speed == 0.0 else loading_time(drive)
-    transient = course.transient * drive.natural_period
+    loads = drive.belt_speed != 0.0 and drive.has_spring
+    loading = loading_time(drive) if loads else 0.0
+    transient = course.transient * period
     controlled = law is not None or case.sampled is not None
     if controlled:  # otherwise one step covers the stick phase on a slow belt
-        loading = min(loading, 50.0 * drive.natural_period)
+        loading = min(loading, 50.0 * period)
         transient += loading
     # The first and the last cycle are incomplete.
     cycles = max(course.cycles, LEAST_CYCLES) + 2
-    block = cycles * drive.natural_period
+    block, longest = cycles * period, cycles * (period + loading)
+    if not drive.has_spring:  # forces alone make its cycles
+        block = longest = case.duration
     controller = loop = None
     if case.sampled is not None:
         loop = case.sampled.as_loop(motion)
@@ -180,15 +207,14 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) ->
 
     def observe() -> _Section:
         motion.recording = False
-        section = _Section(course.cycles)
+        section = _Section(course.cycles, once=not drive.has_spring)
         advance(transient, section)
-        if motion.sticking and not controlled and drive.belt_speed != 0.0:
+        if motion.sticking and not controlled and loads:
             left = (release_position(drive) - motion.position) / drive.belt_speed
-            if left > drive.natural_period:  # the transient has only started
+            if left > period:  # the transient has only started
                 motion.advance(left)
                 motion.advance(transient)
         motion.recording = True
-        longest = cycles * (drive.natural_period + loading)
         done, step = 0.0, block
         while not motion.unbounded and done < longest and not (done and section.done):
             advance(step, section)
@@ -240,15 +266,19 @@ def _alike(before: Measures, after: Measures) -> bool:
 class _Section:
     """Measures a motion, keeps its Poincare section, and counts the measured cycles."""
 
-    def __init__(self, cycles: int) -> None:
+    def __init__(self, cycles: int, *, once: bool = False) -> None:
+        """Measure at least `cycles`; keep a turning point `once` if the slide sticks there."""
         self.meter = CycleMeter(cycles)
-        self._missing = max(cycles, LEAST_CYCLES)
+        self._missing, self._once = max(cycles, LEAST_CYCLES), once
         self._sections = [np.empty(0)]
 
     def take_motion(self, motion: MeasuredMotion) -> None:
         """Keep the turning points of the slide, as an observer."""
         breakpoints = motion.breakpoints
-        self._sections.append(breakpoints.position[breakpoints.velocity == 0.0])
+        turns = breakpoints.position[breakpoints.velocity == 0.0]
+        if self._once:
+            turns = turns[np.diff(turns, prepend=np.nan) != 0.0]
+        self._sections.append(turns)
         self._missing -= len(motion.cycles)
 
     @property

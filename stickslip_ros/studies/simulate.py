@@ -12,14 +12,17 @@ from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.options import DEFAULT_PERIODS
-from stickslip_ros.studies.settling import check_continuous, check_reference
+from stickslip_ros.studies.settling import check_continuous, check_reference, unit_period
 
 
 def default_duration(scenario: Scenario) -> float:
-    """Return the scenario's own duration, s, or without one `DEFAULT_PERIODS`."""
+    """Return the scenario's own duration, s, or without one `DEFAULT_PERIODS`.
+
+    Raises InvalidInputError if the scenario has neither a duration nor a spring.
+    """
     if isfinite(scenario.plant.duration):
         return scenario.plant.duration
-    return DEFAULT_PERIODS * scenario.plant.as_drive().natural_period
+    return DEFAULT_PERIODS * unit_period(scenario.plant.as_drive(), scenario.plant.duration)
 
 
 def simulate(

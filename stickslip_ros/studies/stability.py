@@ -75,7 +75,7 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
         shown = f"{reach:.4g}" if drive.is_dimensionless else quantity(reach, "m")
         reason = (
             "the belt is at rest, and friction holds the slide anywhere within mu_s N / k = "
-            f"{shown}"
+            f"{shown}" + (" of bias_force / k" if drive.bias_force else "")
         )
         for place, value in _places(found):
             if value is None and not {place, place.split(".")[0]} & notes.keys():
@@ -276,7 +276,8 @@ def _closed_forms(drive: Drive, law: ControlLaw | None) -> Section | None:
     gains = gains_of(law)
 
     forms: Section = {
-        "equilibrium_position": copysign(drive.length_scale, drive.belt_speed) * cubic.equilibrium,
+        "equilibrium_position": copysign(drive.length_scale, drive.belt_speed) * cubic.equilibrium
+        + drive.bias_force / drive.stiffness,
         "first_lyapunov_coefficient": cubic.first_lyapunov_coefficient,
         "hopf_speed": _scaled(cubic.hopf_speed, speed),
         "crossing_speed": _scaled(cubic.crossing_speed, drive.angular_frequency / speed),

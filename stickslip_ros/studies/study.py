@@ -113,7 +113,7 @@ class Study:
         periods = self.course.transient + self.course.cycles + 2
         if case.sampled is None:
             return periods * 2e-5
-        return periods * case.drive.natural_period * case.sampled.rate * 1e-5
+        return periods * case.period * case.sampled.rate * 1e-5
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything that the result depends on, ready for JSON."""

@@ -39,8 +39,7 @@ def test_the_axis_follows_its_reference(example: ModuleType) -> None:
     moving = (moved.time > 0.6) & (moved.time < 1.1)
     # At a constant speed v the velocity loop needs v and the friction force: a lag of both.
     drive, speed = example.AXIS, 0.1  # m/s
-    resistance = drive.damping * speed + 20.4 + drive.stiffness * moved.position[moving]
-    lag = (speed + resistance / (GTAU * KV)) / KP
+    lag = (speed + (drive.damping * speed + 20.4) / (GTAU * KV)) / KP
     assert error[moving] == pytest.approx(lag, rel=1e-3)
     assert abs(error[-1]) < 20.4 / (GTAU * KV * KP)  # friction holds it there
 

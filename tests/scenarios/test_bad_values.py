@@ -28,6 +28,7 @@ def does_not_go_with_others(message: str) -> bool:
     allowed = (
         "must not exceed",
         "at least a thousandth",
+        "must be 0 or at least",
         "must be above 0 and finite for a ",
         "must be the path of a CSV file",
     )

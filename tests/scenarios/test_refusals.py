@@ -85,7 +85,7 @@ WHOLE = "must be a whole number"
         ("plant", "mass", "0", "0", f"{POSITIVE} kg"),
         ("plant", "mass", "-1.5", "-1.5", f"{POSITIVE} kg"),
         ("plant", "damping", "-1e-9", "-1e-09", f"{FINITE} at least 0 N s/m"),
-        ("plant", "stiffness", "0.0", "0.0", f"{POSITIVE} N/m"),
+        ("plant", "stiffness", "-1.0", "-1.0", f"{FINITE} at least 0 N/m"),
         ("plant", "normal_force", "-1", "-1", f"{POSITIVE} N"),
         ("plant", "friction.static", "-0.1", "-0.1", f"{FINITE} at least 0"),
         ("plant", "friction.minimum_speed", "0", "0", f"{POSITIVE} m/s"),

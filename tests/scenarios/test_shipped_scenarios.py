@@ -68,6 +68,31 @@ SHIPPED: dict[str, dict[str, dict[str, Any]]] = {
         },
         "washout_controller": WASHOUT | {"start_after": 5.0},
     },
+    "axis": {
+        "plant": {
+            "friction.law": "coulomb",
+            "mass": 95.154,
+            "stiffness": 0.0,
+            "damping": 0.0,
+            "normal_force": 1000.0,
+            "belt_speed": 0.0,
+            "bias_force": 3.1648,
+            "friction.static": 0.020144,
+            "friction.viscous": 0.1667061,
+            "friction.reverse.static": 0.0206277,
+            "friction.reverse.viscous": 0.2404236,
+            "disturbance.kind": "sine",
+            "disturbance.amplitude": 60.0,
+            "rate": 1000.0,
+            "pace": "lockstep",
+            "duration": 10.0,
+        },
+        "velocity_feedback_controller": {
+            "position_gain": -1370728.4554,  # 243.45 V/(m/s) 160.18 1/s 35.15065 N/V
+            "velocity_gain": -8557.426,
+            "force_limit": 351.5065,  # 10 V
+        },
+    },
 }
 
 

@@ -46,8 +46,8 @@ class Frames:
 
     @property
     def period(self) -> float:
-        """Natural period, s, or the period of the last cycle if the drive is unknown."""
-        if self.drive is not None:
+        """Natural period, s, or the period of the last cycle if there is none, or it is unknown."""
+        if self.drive is not None and self.drive.has_spring:
             return self.drive.natural_period
         frequencies = list(self._listener.cycles[FREQUENCY])[-1:]
         return next((1.0 / f for f in frequencies if 1e-9 < f < 1e9), _UNKNOWN_PERIOD)
@@ -85,14 +85,16 @@ class Frames:
                 "dropped": _scaled(frame.dropped, 1.0, force),
                 "orbit": _scaled(frame.orbit, length, speed),
             }
-            at_rest = drive is not None and drive.belt_speed
+            in_equilibrium = drive is not None and drive.has_spring and drive.belt_speed
             body["motion"] = {
                 "end": frame.end,
                 "window": periods * period,
                 "labels": [label for _, label in axes],
                 "time_label": Units.for_drive(drive).label("time before now", "s"),
                 "counts": {name: len(line[0]) for name, line in lines.items()},
-                "equilibrium": drive.equilibrium_position / length if drive and at_rest else None,
+                "equilibrium": (
+                    drive.equilibrium_position / length if drive and in_equilibrium else None
+                ),
                 "belt_speed": float(frame.belt_velocity.y[-1]) / speed,
             }
         text = orjson.dumps(body)
@@ -112,7 +114,8 @@ def _axes(drive: Drive | None) -> list[tuple[float, str]]:
     if drive is not None:
         friction = float(max(drive.friction.limits)) * drive.normal_force
         speed = abs(drive.belt_speed) or drive.speed_scale
-        largest = (friction / drive.stiffness, speed, friction)
+        reach = friction / drive.stiffness if drive.has_spring else drive.length_scale
+        largest = (reach, speed, friction)
     units = Units.for_drive(drive)
     return [
         units.axis(*quantity, magnitude)

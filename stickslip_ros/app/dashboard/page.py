@@ -175,7 +175,9 @@ class _Page:
             label.set_text(units.text(values[-1] if values else None, unit, largest=largest))
         self._show_regime(listener.health["analyzer"])
         self._trouble.set_text(", ".join(self._missing()))
-        scales = (drive.normal_force, drive.natural_period) if drive is not None else None
+        scales = None
+        if drive is not None:
+            scales = drive.normal_force, drive.natural_period if drive.has_spring else 1.0
         if scales is not None and scales != self._tap_scales:
             self._tap_scales = scales
             for field, scale, label in (

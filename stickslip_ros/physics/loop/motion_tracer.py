@@ -1,6 +1,6 @@
 """The forces of a simulated motion, for an observer."""
 
-from math import ceil
+from math import ceil, inf
 
 import numpy as np
 
@@ -14,8 +14,9 @@ _STEPS_PER_PERIOD = 60
 class MotionTracer:
     """Advances a motion in short steps, and passes its forces and the motion to an observer."""
 
-    def __init__(self, motion: Motion, observer: RunObserver) -> None:
-        self._motion, self._observer = motion, observer
+    def __init__(self, motion: Motion, observer: RunObserver, longest_period: float = inf) -> None:
+        """Trace a motion; the steps are parts of its natural period, of at most this one (s)."""
+        self._motion, self._observer, self._longest_period = motion, observer, longest_period
         self._now = 0.0
         self._forces: list[tuple[float, float, float, float]] = []
         """Time (s) and force (N) from then on; time, and friction force (N) up to then."""
@@ -23,7 +24,8 @@ class MotionTracer:
     def advance(self, duration: float) -> None:
         """Advance the motion by `duration` (s), or until it is unbounded."""
         motion = self._motion
-        steps = max(1, ceil(duration / motion.drive.natural_period * _STEPS_PER_PERIOD))
+        period = min(motion.drive.natural_period, self._longest_period)
+        steps = max(1, ceil(duration / period * _STEPS_PER_PERIOD))
         for _ in range(steps):
             if motion.unbounded:
                 break

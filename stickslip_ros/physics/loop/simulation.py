@@ -129,7 +129,8 @@ def simulate_continuous(
     meter : CycleMeter
         Meter that receives the motion.
     progress : callable, optional
-        Called with the completed share, 0 to 1, every ten natural periods.
+        Called with the completed share, 0 to 1, every ten natural periods; without a spring twenty
+        times in all.
     observer : RunObserver, optional
         Receives motion and forces in blocks.
     recorder : TrajectoryRecorder, optional
@@ -162,13 +163,16 @@ def simulate_continuous(
     >>> simulate_continuous(motion, washout, 5.0, CycleMeter(20)).regime.value
     'equilibrium'
     """
-    tracer = None if observer is None else MotionTracer(motion, observer)
+    drive = motion.drive
+    # Without a spring as many blocks and steps as in 200 natural periods.
+    period = drive.natural_period if drive.has_spring else duration / 200.0
+    tracer = None if observer is None else MotionTracer(motion, observer, period)
     advance = motion.advance if tracer is None else tracer.advance
     if recorder is not None:
         advance = recorder.sampling(motion, advance)
     control = None if law is None else law.continuous
     free = duration if law is None else min(law.start_after, duration)
-    block = 10.0 * motion.drive.natural_period
+    block = 10.0 * period
     done = 0.0
     for length, acts in ((free, False), (duration - free, True)):
         if control is not None:

@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite, pi, sqrt
+from math import inf, isfinite, pi, sqrt
 from typing import Self
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
 from stickslip_ros.physics.model.constants import Scales, scaled
 from stickslip_ros.physics.model.course import NO_COURSE, Course
@@ -13,10 +14,11 @@ from stickslip_ros.physics.model.friction import FrictionLaw
 
 @dataclass(frozen=True)
 class Drive:
-    """Feed drive in SI units, eq. 1: m x'' + c x' + k x = N mu(x' - v_belt) + u.
+    """Feed drive in SI units, eq. 1: m x'' + c x' + k x = N mu(x' - v_belt) + u + bias.
 
     The scales make it dimensionless, eq. 2: X'' + 2 beta X' + X = mu(X' - v0) + U.
-    A drive with m = k = N = 1 is the dimensionless system itself.
+    A drive with m = k = N = 1 is the dimensionless system itself. Without a spring, k = 0, the term
+    X vanishes, and the unit of speed is 1 m/s.
 
     Examples
     --------
@@ -37,7 +39,7 @@ class Drive:
     damping: float
     """Viscous damping c, N s/m."""
     stiffness: float
-    """Stiffness k of the transmission, N/m."""
+    """Stiffness k of the transmission, N/m; 0 for an axis that no spring holds."""
     normal_force: float
     """Force N that presses the slide onto the belt, N."""
     belt_speed: float
@@ -50,10 +52,22 @@ class Drive:
     """Course added to the normal force, N."""
     actuator: Actuator = IDEAL_ACTUATOR
     """Actuator that exerts the control force."""
+    bias_force: float = 0.0
+    """Constant force on the slide, N, such as an offset of the drive or a weight."""
+
+    @property
+    def has_spring(self) -> bool:
+        """Whether the stiffness is above zero."""
+        return self.stiffness != 0.0
 
     @cached_property
     def angular_frequency(self) -> float:
-        """Natural angular frequency w0 = sqrt(k/m), rad/s; the scale of time is 1/w0."""
+        """Scale of rates, rad/s: the natural angular frequency w0 = sqrt(k/m).
+
+        Without a spring it is N/(m V) with the scale of speed V = 1 m/s.
+        """
+        if not self.has_spring:
+            return self.normal_force / self.mass
         return sqrt(self.stiffness / self.mass)
 
     @property
@@ -63,8 +77,8 @@ class Drive:
 
     @property
     def natural_period(self) -> float:
-        """Period of the undamped free vibration, s."""
-        return 2.0 * pi / self.angular_frequency
+        """Period of the undamped free vibration, s; infinite without a spring."""
+        return 2.0 * pi / self.angular_frequency if self.has_spring else inf
 
     @cached_property
     def fastest_belt(self) -> float:
@@ -75,12 +89,16 @@ class Drive:
 
     @cached_property
     def length_scale(self) -> float:
-        """Scale of length L = N/k, m."""
+        """Scale of length L = N/k, m; without a spring V/w0 = m V^2/N."""
+        if not self.has_spring:
+            return self.mass / self.normal_force
         return self.normal_force / self.stiffness
 
     @cached_property
     def speed_scale(self) -> float:
-        """Scale of speed V = w0 L, m/s."""
+        """Scale of speed V = w0 L, m/s; 1 m/s without a spring."""
+        if not self.has_spring:
+            return 1.0
         return self.angular_frequency * self.length_scale
 
     @cached_property
@@ -90,31 +108,43 @@ class Drive:
 
     @cached_property
     def dimensionless(self) -> Self:
-        """The same drive in these units, eq. 2: m = k = N = 1."""
+        """The same drive in these units, eq. 2: m = k = N = 1, or k = 0 without a spring."""
         if self.is_dimensionless:
             return self
         scales = self.scales
         return type(self)(
             mass=1.0,
             damping=self.damping_coefficient,
-            stiffness=1.0,
+            stiffness=1.0 if self.has_spring else 0.0,
             normal_force=1.0,
             belt_speed=self.belt_speed / self.speed_scale,
             friction=self.friction.scaled(self.speed_scale, self.length_scale),
             belt=scaled(self.belt, scales, "m/s"),
             load=scaled(self.load, scales, "N"),
             actuator=scaled(self.actuator, scales),
+            bias_force=self.bias_force / self.normal_force,
         )
 
     @property
     def equilibrium_position(self) -> float:
         """Displacement of the slide in equilibrium, m, eq. 6.
 
-        With the belt at rest it is one of many possible rest positions.
+        With the belt at rest it is one of many possible rest positions. Raises InvalidInputError
+        for a drive without a spring, which has none.
         """
-        return float(self.friction.at_rest(self.belt_speed)) * self.length_scale
+        if not self.has_spring:
+            raise InvalidInputError(
+                "stiffness = 0 N/m: without a spring the slide has no equilibrium position"
+            )
+        by_friction = float(self.friction.at_rest(self.belt_speed)) * self.length_scale
+        return by_friction + self.bias_force / self.stiffness
 
     @property
     def damping_coefficient(self) -> float:
-        """Dimensionless damping 2 beta = c / sqrt(k m), the coefficient of X'."""
+        """Dimensionless damping 2 beta = c / sqrt(k m), the coefficient of X'.
+
+        Without a spring it is c V/N.
+        """
+        if not self.has_spring:
+            return self.damping / self.normal_force
         return self.damping / sqrt(self.stiffness * self.mass)

@@ -126,14 +126,19 @@ class DriveSystem(HybridSystem):
         # Whether the normal force may fall below zero: then a guard ends the motion.
         self._may_lift = 1.0 + self.drive.load.bounds[0] < -_LIFT_ROUNDING
         parts = (law, belt, load, self.drive.actuator, self.control)
+        has_bias = self.drive.bias_force != 0.0
         self.structure = structure_number(
-            (type(self), self.states, self._may_lift, *map(structure, parts))
+            (
+                *(type(self), self.states, self._may_lift, drive.has_spring, has_bias),
+                *map(structure, parts),
+            )
         )
         self._steady = isinstance(self.drive.belt, NoCourse)
-        self._frequency = drive.angular_frequency
+        self._frequency, self._stiffness = drive.angular_frequency, self.drive.stiffness
         self.constants = {
             "damping": self.drive.damping,
             "belt_speed": self.drive.belt_speed,
+            **({"bias_force": self.drive.bias_force} if has_bias else {}),
             **numbers(law, "friction"),
             **numbers(belt, "belt"),
             **numbers(load, "load"),
@@ -359,7 +364,8 @@ class DriveSystem(HybridSystem):
             backward = sign < 0.0 or (sign == 0.0 and held > 0.0)
             limit = self.backward_limit if backward else self.forward_limit
             limit *= self.normal_force(mode, instant.time)
-            margin = 8.0 * ulp(abs(x) + abs(held) + abs(force) + limit)
+            # Without a spring no displacement changes the reaction.
+            margin = self._stiffness * 8.0 * ulp(abs(x) + abs(held) + abs(force) + limit)
             if sign == 0.0:
                 if abs(held) > limit - margin:
                     state[POSITION] = x - copysign(margin, held)
@@ -377,7 +383,7 @@ class DriveSystem(HybridSystem):
         """
         state = instant.state
         acceleration = (
-            abs(self.reaction(instant)) + abs(state[POSITION]) + abs(state[SPEED])
+            abs(self.reaction(instant)) + self._stiffness * abs(state[POSITION]) + abs(state[SPEED])
             + self._largest_friction + self._belt_acceleration
         )  # fmt: skip
         return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
@@ -419,7 +425,7 @@ class DriveSystem(HybridSystem):
         return inputs[0]
 
     def reaction(self, instant: Instant) -> float:
-        """Return h = X + 2 beta X' - U."""
+        """Return h = X + 2 beta X' - U - bias."""
         state, force = instant.state, self.control_force(instant)
         return equations.reaction(self.drive, state[POSITION], state[SPEED], force)
 
@@ -455,6 +461,7 @@ class DriveSystem(HybridSystem):
             drive,
             damping=constants["damping"],
             belt_speed=constants["belt_speed"],
+            bias_force=constants.get("bias_force", 0.0),
             friction=with_symbols(drive.friction, "friction", constants),
             belt=with_symbols(drive.belt.equations, "belt", constants),
             load=with_symbols(drive.load.equations, "load", constants),

@@ -14,8 +14,8 @@ __getattr__ = moved_from(__name__)
 
 
 def reaction(drive: Drive, position: Any, velocity: Any, force: Any) -> Any:
-    """Return h = k x + c x' - u: the friction force that keeps the slide from accelerating."""
-    return drive.stiffness * position + drive.damping * velocity - force
+    """Return h = k x + c x' - u - bias: friction of this force leaves the slide no acceleration."""
+    return drive.stiffness * position + drive.damping * velocity - force - drive.bias_force
 
 
 def acceleration(drive: Drive, friction_force: Any, reaction: Any) -> Any:

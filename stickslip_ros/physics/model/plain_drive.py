@@ -33,6 +33,8 @@ class PlainDriveSystem(DriveSystem):
         # The speed relative to the belt with which a slide starts to slip.
         self._least_speed = max(ulp(self._speed), ulp(1.0))
         self._coefficient = self.drive.friction.coefficient
+        # Whether the belt bends the spring; without one a held force never releases the slide.
+        self._loads = self._speed != 0.0 and self.drive.has_spring
 
     def belt_speed(self, mode: Mode, time: float) -> float:
         """Return the speed of the belt."""
@@ -43,7 +45,7 @@ class PlainDriveSystem(DriveSystem):
         return 1.0
 
     def reaction(self, instant: Instant) -> float:
-        """Return h = X + 2 beta X' - U."""
+        """Return h = X + 2 beta X' - U - bias."""
         state = instant.state
         force = instant.inputs[0] if self.control is None else self.control_force(instant)
         return self._reaction(state[POSITION], state[SPEED], force)
@@ -107,7 +109,8 @@ class PlainDriveSystem(DriveSystem):
         held = self._reaction(x, y, force)
         backward = sign < 0.0 or (sign == 0.0 and held > 0.0)
         limit = self.backward_limit if backward else self.forward_limit
-        margin = 8.0 * ulp(abs(x) + abs(held) + abs(force) + limit)
+        # Without a spring no displacement changes the reaction.
+        margin = self._stiffness * 8.0 * ulp(abs(x) + abs(held) + abs(force) + limit)
         if sign == 0.0:
             if abs(held) > limit - margin:
                 state[POSITION] = x - copysign(margin, held)
@@ -125,7 +128,7 @@ class PlainDriveSystem(DriveSystem):
     ) -> tuple[int | None, float]:
         """Move with the belt for `duration`, or until the reaction reaches its limit."""
         state, speed = instant.state, self._speed
-        if speed != 0.0:
+        if self._loads:
             limit = self.backward_limit if speed > 0.0 else -self.forward_limit
             limit -= self._reaction(0.0, speed, instant.inputs[0])
             time = (limit - state[POSITION]) / speed

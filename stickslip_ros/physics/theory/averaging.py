@@ -8,6 +8,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
+    SPRING,
     STATIC,
     SYMMETRIC,
     require,
@@ -27,9 +28,10 @@ def averaged_growth(drive: Drive, belt_speed: Any, amplitude: Any) -> FloatArray
     may be arrays. The trapezoidal rule is exact to rounding while A <= v0, where the slide does not
     overtake the belt, if the law's characteristic speed is not much below v0 / 10,000. A result
     that cannot be distinguished from rounding is zero. Raises InvalidInputError for a friction law
-    that has a memory or differs between the directions, and for a belt or load with a course.
+    that has a memory or differs between the directions, for a belt or load with a course, and
+    without a spring.
     """
-    require("averaging", drive, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("averaging", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
     law = drive.dimensionless.friction
     belt_speed, amplitude = np.asarray(belt_speed, float), np.asarray(amplitude, float)
     relative_speed = np.multiply.outer(amplitude, np.cos(_PHASES)) - belt_speed[..., np.newaxis]

@@ -12,7 +12,7 @@ from typing import Self
 from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Stribeck
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, require
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SPRING, require
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,9 @@ class CubicLoop:
         Raises
         ------
         InvalidInputError
-            If belt or load follow a course.
+            If belt or load follow a course, or the drive has no spring.
         """
-        require("the closed form", drive, AUTONOMOUS)
+        require("the closed form", drive, SPRING, AUTONOMOUS)
         law = drive.dimensionless.friction
         if not isinstance(law, Stribeck) or drive.belt_speed == 0.0:
             return None

@@ -8,7 +8,7 @@ from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.theory.gain_intervals import covered_gains
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, STATIC, require
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SPRING, STATIC, require
 
 _ROUNDING = 1e-9
 """Relative change of a determinant with the gain below which it is treated as zero."""
@@ -45,7 +45,7 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     Raises
     ------
     InvalidInputError
-        If the friction law has a memory, or belt or load follow a course.
+        If the friction law has a memory, belt or load follow a course, or the drive has no spring.
 
     Examples
     --------
@@ -61,7 +61,7 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     >>> round(critical.linear, 6), round(critical.cubic, 4)
     (-0.935296, 31.468)
     """
-    require("the critical gain", drive, AUTONOMOUS, STATIC)
+    require("the critical gain", drive, SPRING, AUTONOMOUS, STATIC)
     own = covered_gains(gains)
     linear = None if own is None else _critical_linear_gain(drive, own)
     if own is None or linear is None:

@@ -21,6 +21,7 @@ from stickslip_ros.physics.model.equations import acceleration, reaction
 from stickslip_ros.physics.motion.recorded_motion import RecordedMotion
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
+    SPRING,
     STATIC,
     SYMMETRIC,
     require,
@@ -33,8 +34,10 @@ _ROUNDING = 16.0 * float(np.finfo(float).eps)
 def release_position(drive: Drive) -> float:
     """Return the displacement (m) at which the belt releases the slide without control.
 
-    There friction is at its limit and the slide is not yet accelerated: k x + c v_belt = N mu_s.
+    There friction is at its limit and the slide is not yet accelerated:
+    k x + c v_belt - bias = N mu_s. Raises InvalidInputError without a spring.
     """
+    require("the release by the belt", drive, SPRING)
     forward, backward = drive.friction.limits
     limit = drive.normal_force * (backward if drive.belt_speed >= 0.0 else -forward)
     return (limit - reaction(drive, 0.0, drive.belt_speed, 0.0)) / drive.stiffness
@@ -60,7 +63,11 @@ def _static_stiffness(drive: Drive, control: ContinuousControl) -> float:
 
 
 def loading_time(drive: Drive) -> float:
-    """Return the time (s) in which the belt bends the spring from one limit to the other."""
+    """Return the time (s) in which the belt bends the spring from one limit to the other.
+
+    Raises InvalidInputError without a spring.
+    """
+    require("the loading by the belt", drive, SPRING)
     forward, backward = drive.friction.limits
     return (forward + backward) * drive.length_scale / abs(drive.belt_speed)
 
@@ -86,7 +93,7 @@ def least_cycle(drive: Drive, gains: ContinuousControl | None = None) -> float |
     gain balances the loss, so that there is no cycle up to `UNBOUNDED_SPEED`, unless energy is
     conserved. Raises InvalidInputError for a drive that it does not cover, see `requirements`.
     """
-    require("the energy of a cycle", drive, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("the energy of a cycle", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
     speed, force = _net_force(drive)
     if gains is not None:
         force = force + gains.scaled(drive).bound(speed)
@@ -104,7 +111,7 @@ def largest_cycle(drive: Drive) -> float | None:
     where D = d - 2 n - max(l, p) is at least sqrt(2) v0. The energy then changes by less than
     2 (p + n) v0^2 / D - 2 (u - n) (D - v0^2 / D). None if there is no such u.
     """
-    require("the energy of a cycle", drive, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("the energy of a cycle", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
     speed, force = _net_force(drive)
     belt_speed = abs(drive.belt_speed) / drive.speed_scale
     above, below = force[speed > belt_speed], force[speed <= 0.0]
@@ -118,8 +125,8 @@ def largest_cycle(drive: Drive) -> float | None:
 
 def _net_force(drive: Drive) -> tuple[FloatArray, FloatArray]:
     """Return speeds y on both sides of rest and of the belt speed, and g there."""
-    law = drive.dimensionless.friction
-    belt_speed = abs(drive.belt_speed) / drive.speed_scale
+    unit = drive.dimensionless
+    law, belt_speed = unit.friction, abs(drive.belt_speed) / drive.speed_scale
     least = 1e-6 * min(belt_speed, drive.friction.characteristic_speed / drive.speed_scale)
     distances = np.geomspace(least, UNBOUNDED_SPEED, 2048)
     relative_speed = np.concatenate(
@@ -129,7 +136,7 @@ def _net_force(drive: Drive) -> tuple[FloatArray, FloatArray]:
     speed = relative_speed + belt_speed
     friction: Any = law.coefficient(relative_speed, np.sign(relative_speed))
     at_rest = float(law.at_rest(belt_speed))
-    held = reaction(drive.dimensionless, at_rest, speed, 0.0)
-    force = acceleration(drive.dimensionless, friction, held)
+    held = reaction(unit, at_rest + unit.bias_force, speed, 0.0)
+    force = acceleration(unit, friction, held)
     terms = np.abs(friction) + abs(at_rest) + np.abs(held - at_rest)
     return speed, np.where(np.abs(force) < _ROUNDING * terms, 0.0, force)

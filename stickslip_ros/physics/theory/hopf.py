@@ -11,7 +11,7 @@ from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.theory.linear import Expansion, expand, hurwitz_determinants, jacobians
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SYMMETRIC, require
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SPRING, SYMMETRIC, require
 from stickslip_ros.physics.theory.roots import zero_between
 
 _BELT_SPEEDS = np.geomspace(1e-6, 1e3, 4001)
@@ -88,7 +88,7 @@ def hopf_points(drive: Drive, gains: ContinuousControl | None = None) -> list[Ho
     Raises
     ------
     InvalidInputError
-        If belt or load follow a course.
+        If belt or load follow a course, or the drive has no spring.
 
     Examples
     --------
@@ -103,7 +103,7 @@ def hopf_points(drive: Drive, gains: ContinuousControl | None = None) -> list[Ho
     >>> round(point.belt_speed, 6), point.supercritical
     (0.488763, True)
     """
-    require("the search for Hopf points", drive, AUTONOMOUS)
+    require("the search for Hopf points", drive, SPRING, AUTONOMOUS)
     mirrored = SYMMETRIC.lack(drive) is None
     belt_speeds = _BELT_SPEEDS if mirrored or drive.belt_speed >= 0.0 else -_BELT_SPEEDS
     margins = _hopf_margins(drive, gains, belt_speeds)

@@ -30,6 +30,7 @@ from stickslip_ros.physics.theory.cycle_bounds import (
 )
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
+    SPRING,
     STATIC,
     SYMMETRIC,
     require,
@@ -110,7 +111,7 @@ def shoot(
     Raises
     ------
     InvalidInputError
-        If belt or load follow a course.
+        If belt or load follow a course, or the drive has no spring.
 
     Examples
     --------
@@ -124,7 +125,7 @@ def shoot(
     >>> round(shoot(drive, position=-0.1, period=6.4).period, 6)
     6.392424
     """
-    require("shooting", drive, AUTONOMOUS)
+    require("shooting", drive, SPRING, AUTONOMOUS)
     if drive.belt_speed == 0.0:
         return None
     motion = SensitiveMotion(drive, gains)
@@ -170,10 +171,10 @@ def limit_cycle_of_run(
     Raises
     ------
     InvalidInputError
-        If the friction law has a memory or differs between the directions, or belt or load follow a
-        course.
+        If the friction law has a memory or differs between the directions, belt or load follow a
+        course, or the drive has no spring.
     """
-    require("the limit cycle of a run", drive, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("the limit cycle of a run", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
     if drive.belt_speed == 0.0 or least_cycle(drive, gains) is None:
         return None
     motion = SensitiveMotion(drive, gains)
@@ -206,8 +207,8 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
     Raises
     ------
     InvalidInputError
-        If the friction law has a memory or differs between the directions, or belt or load follow a
-        course.
+        If the friction law has a memory or differs between the directions, belt or load follow a
+        course, or the drive has no spring.
 
     Examples
     --------
@@ -222,7 +223,7 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
     >>> round(cycle.measures.amplitude, 6), cycle.stable
     (0.434086, True)
     """
-    require("the search for limit cycles", drive, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("the search for limit cycles", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
     if drive.belt_speed == 0.0 or least_cycle(drive) is None:
         return []
     returns = _ReturnMap(drive)

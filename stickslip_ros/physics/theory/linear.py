@@ -20,7 +20,7 @@ from stickslip_ros.physics.model.drive_system import SLIP
 from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion.derivatives import flow_tensors
 from stickslip_ros.physics.theory.equilibrium import equilibria
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, require
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SPRING, require
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def expand(drive: Drive, gains: ContinuousControl | None = None) -> Expansion | 
     Raises
     ------
     InvalidInputError
-        If belt or load follow a course.
+        If belt or load follow a course, or the drive has no spring.
     RunError
         If the equilibrium of a law with a memory is not found.
 
@@ -93,7 +93,7 @@ def expand(drive: Drive, gains: ContinuousControl | None = None) -> Expansion | 
     >>> round(float(expansion.eigenvalues[0].real), 6)
     0.071
     """
-    require("the expansion at the equilibrium", drive, AUTONOMOUS)
+    require("the expansion at the equilibrium", drive, SPRING, AUTONOMOUS)
     if drive.belt_speed == 0.0:
         return None
     states, (first, second, third) = _at_equilibrium(

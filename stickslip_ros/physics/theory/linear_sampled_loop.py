@@ -24,7 +24,13 @@ from stickslip_ros.physics.theory.gain_intervals import (
     nearest_to_zero,
 )
 from stickslip_ros.physics.theory.linear import expand
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, IMMEDIATE, STATIC, require
+from stickslip_ros.physics.theory.requirements import (
+    AUTONOMOUS,
+    IMMEDIATE,
+    SPRING,
+    STATIC,
+    require,
+)
 
 LONGEST_DELAY = 300
 """Largest delay, in whole periods, for which the matrix is built; its order grows with it."""
@@ -113,10 +119,10 @@ class LinearSampledLoop:
         Raises
         ------
         InvalidInputError
-            If the friction law has a memory, belt or load follow a course, or the actuator has
-            states.
+            If the friction law has a memory, belt or load follow a course, the actuator has
+            states, or the drive has no spring.
         """
-        require("the theory of the sampled loop", drive, AUTONOMOUS, STATIC, IMMEDIATE)
+        require("the theory of the sampled loop", drive, SPRING, AUTONOMOUS, STATIC, IMMEDIATE)
         expansion = expand(drive)
         if expansion is None or why_no_linear_loop(drive, rate, force_delay):
             return None

@@ -55,6 +55,10 @@ def require(function: str, drive: Drive, *requirements: Requirement) -> None:
             raise NotCoveredError(f"{function} needs {requirement.need}: {lack}")
 
 
+def _no_spring(drive: Drive) -> str | None:
+    return None if drive.has_spring else "the drive has stiffness = 0 N/m"
+
+
 def _courses(drive: Drive) -> str | None:
     moving = [f"its {name}" for name in ("belt", "load") if getattr(drive, name) != NO_COURSE]
     return f"the drive has a course of {' and '.join(moving)}" if moving else None
@@ -81,6 +85,9 @@ def _actuator(drive: Drive) -> str | None:
     states = ", ".join(drive.actuator.states)
     return f"the actuator has states ({states})" if states else None
 
+
+SPRING = Requirement("a spring", _no_spring)
+"""The stiffness is above zero: the drive has a natural frequency."""
 
 AUTONOMOUS = Requirement("a constant belt speed and a constant normal force", _courses)
 """Belt speed and load are constant."""

@@ -14,6 +14,7 @@ from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.cycle_bounds import follow, least_cycle, release_position
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
+    SPRING,
     STATIC,
     SYMMETRIC,
     require,
@@ -77,8 +78,8 @@ def sticking_onset(drive: Drive) -> StickingOnset:
     Raises
     ------
     InvalidInputError
-        If the friction law has a memory or differs between the directions, or belt or load follow a
-        course.
+        If the friction law has a memory or differs between the directions, belt or load follow a
+        course, or the drive has no spring.
     RunError
         If the motion is too stiff to follow.
 
@@ -95,7 +96,7 @@ def sticking_onset(drive: Drive) -> StickingOnset:
     >>> round(onset.approximate, 6), round(onset.exact, 6)
     (0.437163, 0.439472)
     """
-    require("the onset of sticking", drive, AUTONOMOUS, STATIC, SYMMETRIC)
+    require("the onset of sticking", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
     averaged = _averaged(drive)
     reference = averaged if isinstance(averaged, float) else abs(drive.belt_speed)
     speeds = ((reference or drive.speed_scale) * _FOLLOWED).tolist()

@@ -12,7 +12,13 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.critical_gains import critical_gains
-from stickslip_ros.physics.theory.cycle_bounds import largest_cycle, least_cycle
+from stickslip_ros.physics.theory.cycle_bounds import (
+    largest_cycle,
+    least_cycle,
+    loading_time,
+    longest_return,
+    release_position,
+)
 from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles, shoot
@@ -38,6 +44,7 @@ SENTENCES = {
     "memory": (REMEMBERS, "the friction law dahl has a memory (z)"),
     "one way": (ONE_WAY, "the friction law one_sided differs between forward and backward slip"),
     "load": (LOADED, "the drive has a course of its load"),
+    "spring": (replace(PAPER, stiffness=0.0), "needs a spring: the drive has stiffness = 0 N/m"),
     "belt and load": (CARRIED, "the drive has a course of its belt and its load"),
 }
 
@@ -67,6 +74,11 @@ REFUSED = [
     *((*each, lack) for each in SYMMETRIC for lack in ("memory", "one way", "load")),
     ("the closed form", CubicLoop.from_drive, "load"),
     (*WITHOUT_MEMORY[-1], "actuator"),
+    *((*each, "spring") for each in (*SMOOTH, *WITHOUT_MEMORY, *SYMMETRIC)),
+    ("the closed form", CubicLoop.from_drive, "spring"),
+    ("the release by the belt", release_position, "spring"),
+    ("the loading by the belt", loading_time, "spring"),
+    ("the loading by the belt", longest_return, "spring"),
 ]
 
 
@@ -109,3 +121,20 @@ def test_an_actuator_has_no_part_in_theory_without_sampling() -> None:
         lagging, ideal = (limit_cycle_of_run(drive, 0.0, gains=gains) for drive in (LAGGING, PAPER))
         assert lagging == ideal
     assert limit_cycles(LAGGING) == limit_cycles(PAPER)
+
+
+@pytest.mark.parametrize("gains", [None, GAINS])
+def test_a_bias_force_moves_the_equilibrium_and_nothing_else(gains: WashoutGains | None) -> None:
+    biased = replace(PAPER, bias_force=0.3)
+    moved, unmoved = expand(biased, gains), expand(PAPER, gains)
+    assert moved is not None
+    assert unmoved is not None
+    assert moved.equilibrium[0] == pytest.approx(unmoved.equilibrium[0] + 0.3, rel=1e-14)
+    assert moved.jacobian.tolist() == unmoved.jacobian.tolist()
+    assert hopf_points(biased, gains) == hopf_points(PAPER, gains)
+    (cycle,), (other,) = limit_cycles(biased), limit_cycles(PAPER)
+    assert cycle.position == pytest.approx(other.position + 0.3, rel=1e-12)
+    assert cycle.measures.amplitude == pytest.approx(other.measures.amplitude, rel=1e-12)
+    assert sticking_onset(biased).exact == pytest.approx(sticking_onset(PAPER).exact, rel=1e-12)
+    assert largest_cycle(biased) == pytest.approx(largest_cycle(PAPER), rel=1e-12)
+    assert least_cycle(biased) == pytest.approx(least_cycle(PAPER), rel=1e-12)
