@@ -341,7 +341,8 @@ class _Watch:
     A guard is zero, to rounding, where a phase starts on it: it counts once it has been positive.
     """
 
-    PARTS = 4
+    PARTS = np.array([0.25, 0.5, 0.75, 1.0])
+    FIRST_PARTS = np.array([*np.geomspace(1e-5, 0.1, 9), *PARTS])
     POSITIVE = 1e-11
 
     def __init__(
@@ -358,7 +359,9 @@ class _Watch:
             part = path if before is None or time >= path.t_old else before
             return self._guard(time, *part(time).tolist())
 
-        grid = np.linspace(path.t_old, path.t, self.PARTS + 1)[1:]
+        parts = self.FIRST_PARTS if before is None else self.PARTS
+        grid = path.t_old + (path.t - path.t_old) * parts
+        grid[-1] = path.t
         states = path(grid)
         for time, x, y in zip(grid.tolist(), *states.tolist(), strict=True):
             self._seen = [*self._seen[-2:], (time, self._guard(time, x, y))]
@@ -379,11 +382,12 @@ class _Watch:
         return end if height <= 0.0 else float(brentq(value, start, end, xtol=1e-300, rtol=1e-15))
 
     def _dip(self, value: Function) -> float | None:
-        """Return a zero before a minimum between the last three points."""
-        if len(self._seen) < 3:
+        """Return a zero before a minimum between the last three points, or after the first one."""
+        (first, high), *between, (last, after) = self._seen
+        low = min(high, *(height for _, height in between), after)
+        if low > 0.1 or low == after or (between and low == high):
             return None
-        (first, high), (_, low), (last, after) = self._seen
-        if not (high > low < after and low < 0.1):
-            return None
-        lowest = minimize_scalar(value, bounds=(first, last), method="bounded").x
+        lowest = minimize_scalar(
+            value, bounds=(first, last), method="bounded", options={"xatol": 1e-6 * (last - first)}
+        ).x
         return self._zero(value, first, lowest, high) if value(lowest) < 0.0 else None

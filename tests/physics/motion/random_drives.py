@@ -221,7 +221,7 @@ def random_drive(
         damping=float(draw.uniform(0.02, 0.2) * frequency * mass),
         stiffness=float(stiffness),
         normal_force=float(normal),
-        belt_speed=float(draw.choice([0.0, 0.1, 0.3, -0.2]) * speed),
+        belt_speed=float(draw.choice([0.0, 0.1, 0.2, 0.3, -0.1, -0.2]) * speed),
         friction=friction,
     )
     sample = plain.natural_period / SAMPLES
