@@ -55,7 +55,7 @@ def random_cases() -> Generator[Any]:
         yield pytest.param(law, kind, place, seed, marks=marks)
 
 
-@pytest.mark.parametrize(("law", "kind", "place", "seed"), random_cases())
+@pytest.mark.parametrize(("law", "kind", "place", "seed"), list(random_cases()))
 def test_motions_are_those_of_another_integrator(
     law: str, kind: str, place: str, seed: int
 ) -> None:
