@@ -109,12 +109,22 @@ class RandomCourse:
 NONE = RandomCourse("none", {})
 
 
-def random_course(kind: str, size: float, sample: float, draw: Random) -> RandomCourse:
-    """Return a course of a size; it begins and ends with samples, `sample` (s) apart."""
-    amplitude = float(draw.uniform(0.2, 0.9) * draw.choice([-1.0, 1.0])) * size
-    start = sample * int(draw.integers(0, 5 * SAMPLES))
-    duration = sample * int(draw.integers(SAMPLES, 12 * SAMPLES))
-    frequency = float(draw.uniform(0.1, 1.3)) / (SAMPLES * sample)
+def random_course(
+    kind: str, size: float, sample: float, draw: Random, *, held: bool = False
+) -> RandomCourse:
+    """Return a course of a size at most; `sample` is the time from sample to sample, s.
+
+    Every other one has its corners at samples, and all that are `held` between samples.
+    """
+    at_samples = bool(draw.uniform() < 0.5) or held
+
+    def time(least: float, most: float) -> float:
+        samples = float(draw.uniform(least, most))
+        return sample * (round(samples) if at_samples else samples)
+
+    share = float(draw.uniform(0.2, 0.9)) if draw.uniform() < 0.9 else 1.0
+    amplitude = float(draw.choice([-1.0, 1.0])) * share * size
+    start, duration = time(0.0, 5.0 * SAMPLES), time(SAMPLES, 12.0 * SAMPLES)
     numbers: dict[str, Any] = {"amplitude": amplitude, "start": start, "duration": duration}
     match kind:
         case "impulse":
@@ -122,12 +132,12 @@ def random_course(kind: str, size: float, sample: float, draw: Random) -> Random
         case "sine":
             if draw.uniform() < 0.5:
                 numbers["duration"] = inf
-            numbers["frequency"] = frequency
+            numbers["frequency"] = float(10.0 ** draw.uniform(-1.0, 0.5)) / (SAMPLES * sample)
         case "trapezoid":
-            edge = sample * int(draw.integers(2, 5 * SAMPLES))
+            edge = time(2.0, 5.0 * SAMPLES)
             numbers |= {"duration": duration + 2.0 * edge, "frequency": 1.0 / edge}
         case "table":
-            times = (sample * np.cumsum(draw.integers(SAMPLES // 3, 4 * SAMPLES, 6))).tolist()
+            times = np.cumsum([time(0.3 * SAMPLES, 4.0 * SAMPLES) for _ in range(6)]).tolist()
             numbers = {"times": times, "values": (amplitude * draw.uniform(-1, 1, 6)).tolist()}
         case _:
             pass
@@ -233,7 +243,7 @@ def random_drive(
         backward,
         random_course(belt, 0.4 * speed, sample, draw) if belt != "none" else NONE,
         random_course(load, normal, sample, draw) if load != "none" else NONE,
-        random_course(force, 0.5 * normal, sample, draw) if force != "none" else NONE,
+        random_course(force, 0.5 * normal, sample, draw, held=True) if force != "none" else NONE,
         float(draw.choice([0.0, draw.uniform(-1.0, 1.0)]) * length),
         float(velocity),
     )
