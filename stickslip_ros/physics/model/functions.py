@@ -5,6 +5,9 @@ from typing import Any
 
 import numpy as np
 
+_SMALLEST_SQUARE = 2.0**-100
+"""Square of the smallest base of a power in an expression, which is above zero."""
+
 
 def _function(name: str, x: Any) -> Any:
     if isinstance(x, int | float | complex | np.ndarray | np.generic):
@@ -25,5 +28,11 @@ def sin(x: Any) -> Any:
 
 
 def power(base: Any, exponent: Any) -> Any:
-    """Return a power of a float, an array or an expression above zero."""
-    return base**exponent
+    """Return a power of a float, an array or an expression; 0 for a number below zero.
+
+    The base of an expression may pass zero: it is kept away from there by less than its rounding,
+    since the series of a power at zero is not finite.
+    """
+    if isinstance(base, int | float | np.ndarray | np.generic):
+        return np.maximum(base, 0.0) ** exponent
+    return (base * base + _SMALLEST_SQUARE) ** (0.5 * exponent)

@@ -8,10 +8,6 @@ from stickslip_ros.physics.model.friction.base import FrictionLaw
 from stickslip_ros.physics.model.functions import exp, power
 
 _LARGEST_EXPONENT = 100
-_ROUNDING = 1e-15
-"""Share of the decay speed below which a power of the speed is rounded off: it has no Taylor series
-at zero, where the slide lands and starts.
-"""
 
 
 @dataclass(frozen=True)
@@ -65,8 +61,7 @@ class Exponential(FrictionLaw):
         if isinstance(self.exponent, int | float) and self.exponent == 1.0:
             decay = exp(-speed / self.decay_speed)
         else:
-            ratio = speed / self.decay_speed
-            decay = exp(-power(ratio * ratio + _ROUNDING**2, 0.5 * self.exponent))
+            decay = exp(-power(speed / self.decay_speed, self.exponent))
         return -sign * (self.kinetic + drop * decay + self.viscous * speed)
 
     def refusal(self) -> str | None:

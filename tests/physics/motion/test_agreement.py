@@ -1,0 +1,61 @@
+"""benchmarks/agreement.json: what `python -m benchmarks.agreement` has found."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks import agreement
+from benchmarks.agreement import Case, cases, compared, report, table
+from tests.physics.motion.random_drives import KINDS, LAWS, PLACES
+
+FOUND: dict[str, Any] = json.loads(
+    (Path(agreement.__file__).parent / "agreement.json").read_text(encoding="utf-8")
+)
+
+
+def test_thirty_drives_of_each_law_and_each_course_agree() -> None:
+    assert set(FOUND["by_law_and_kind"]) == {f"{law}, {kind}" for law in LAWS for kind in KINDS}
+    assert set(FOUND["by_place"]) == set(PLACES)
+    for row in [*FOUND["by_law_and_kind"].values(), *FOUND["by_place"].values()]:
+        assert row["drives"] >= 30
+        assert row["agree"] == row["compared"]
+        assert max(row["worst_error"], row["worst_event_error"]) < FOUND["required"] == 1e-7
+    assert FOUND["differing"] == []
+    uncompared = FOUND["all"]["drives"] - FOUND["all"]["compared"]
+    assert len(FOUND["reference_not_accurate"]) == uncompared < 0.01 * FOUND["all"]["drives"]
+
+
+def test_each_place_and_direction_has_its_share() -> None:
+    chosen = cases(agreement.DRIVES)
+    assert len(chosen) == FOUND["all"]["drives"]
+    for place in PLACES:
+        own = [case for case in chosen if case.place == place]
+        assert {(case.kind, case.law, case.seed % 2) for case in own} == {
+            (kind, law, odd) for kind in KINDS for law in LAWS for odd in (0, 1)
+        }
+
+
+@pytest.fixture(scope="module")
+def result() -> agreement.Result:
+    return compared(Case("stribeck", "step", "belt", 0))
+
+
+def test_a_drive_that_differs_is_listed(result: agreement.Result) -> None:
+    assert result.agrees
+    different = replace(result, error=2e-7)
+    found = report([result, different])
+    assert (found["all"]["drives"], found["all"]["agree"]) == (2, 1)
+    assert [each["error"] for each in found["differing"]] == [2e-7]
+    assert "differing: " in table(found)
+
+
+def test_a_reference_that_is_not_accurate_is_listed_and_does_not_count(
+    result: agreement.Result,
+) -> None:
+    found = report([result, replace(result, error=1.0, reference_error=1e-6)])
+    assert (found["all"]["drives"], found["all"]["compared"]) == (2, 1)
+    assert found["differing"] == []
+    assert len(found["reference_not_accurate"]) == 1
