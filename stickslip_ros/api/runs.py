@@ -116,8 +116,8 @@ def simulate(
     scenario : Scenario, str or Path
         The scenario, its name or its path.
     duration : float, optional
-        Simulated time, s. By default this is the scenario's own duration, or 200 natural periods; it
-        is needed for a drive without a spring and without a duration.
+        Simulated time, s. By default this is the scenario's own duration, or 200 natural periods.
+        It is needed for a drive without a spring and without a duration.
     continuous : bool
         Let the controller act without sampling, as in the paper's eq. 19. By default its force is
         held from sample to sample, as between the nodes.

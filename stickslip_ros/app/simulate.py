@@ -27,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration",
         type=seconds,
         metavar="S",
-        help=f"simulated time, s (default: the scenario's, else {DEFAULT_PERIODS:g} periods; needed "
-        "if it has neither a duration nor a spring)",
+        help=f"simulated time, s (default: the scenario's, else {DEFAULT_PERIODS:g} periods; "
+        "needed if it has neither a duration nor a spring)",
     )
     parser.add_argument(
         "--continuous-control",

@@ -301,7 +301,7 @@ class DriveSystem(HybridSystem):
         elif self.has_parts:
             if (following := self.past(mode, instant)) is not mode:
                 return following
-        elif not sticks:
+        elif not sticks and self._steepest < inf:
             # The belt has changed its speed by so much at most.
             change = self._steepest * (time - self._seen_at)
             if mode.switches[0] * (state[SPEED] - self._seen_belt_speed) > change + _SMALLEST_STEP:

@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
-_SMALLEST_SQUARE = 2.0**-100
-"""Square of the smallest base of a power in an expression, which is above zero."""
+_SMALLEST_SQUARE = 2.0**-80
+"""Square of the smallest base of a power in an expression: the step of an integration that starts
+there is not lost in the rounding of time.
+"""
 
 
 def _function(name: str, x: Any) -> Any:
@@ -30,8 +32,8 @@ def sin(x: Any) -> Any:
 def power(base: Any, exponent: Any) -> Any:
     """Return a power of a float, an array or an expression; 0 for a number below zero.
 
-    The base of an expression may pass zero: it is kept away from there by less than its rounding,
-    since the series of a power at zero is not finite.
+    The base of an expression may pass zero, where the series of a power is not finite: it is kept
+    1e-12 away from there.
     """
     if isinstance(base, int | float | np.ndarray | np.generic):
         return np.maximum(base, 0.0) ** exponent

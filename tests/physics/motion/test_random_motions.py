@@ -168,9 +168,19 @@ SUDDEN = Course(
     durations=(2.0, 2.0, 8.0),
 )
 
+# The power of the speed has no series at zero, where the slide turns.
+TURNING = Course(
+    drive=Drive(1.0, 0.0, 1.0, 1.0, 0.0, Exponential(1.0, 0.0, 1.0, 0.1, exponent=1.5)),
+    position=2.0,
+    velocity=1.0,
+    forces=(0.0,),
+    durations=(1.0,),
+)
+
 
 @given(courses(), cuts)
 @example(course=SUDDEN, cuts=[])
+@example(course=TURNING, cuts=[])
 @examples(quick=15, thorough=300)
 def test_cutting_into_steps_changes_nothing(course: Course, cuts: list[float]) -> None:
     check_cutting(course, cuts)
