@@ -51,7 +51,7 @@ class CourseParameters(ParameterGroup):
         file=True,
     )
 
-    _table: Table = PrivateAttr(NO_TABLE)
+    _table: Table = PrivateAttr(default_factory=lambda: NO_TABLE)
 
     @model_validator(mode="after")
     def _course_is_possible(self) -> Self:

@@ -284,11 +284,12 @@ class SampledLoop:
             now = self._deliver()
         motion.set_forces(self._acting, self.disturbance)
         self._advance((1.0 - now) * period)
-        drive, number = motion.drive, self.sample_number
+        drive = motion.drive
         belt_position = self.sample.belt_position + drive.belt_speed * period
         if drive.belt is not NO_COURSE:
+            number = self.sample_number
             belt_position += drive.belt.integral(number * period, (number + 1) * period)
-        self.sample_number = number + 1
+        self.sample_number += 1
         sample = self.true_sample = self._take_sample(belt_position)
         if self._measure is not None:
             sample = self._measured(sample)

@@ -216,7 +216,7 @@ class Motion(HybridMotion):
     @property
     def belt_speed(self) -> float:
         """Present speed of the belt, m/s."""
-        if self._system.autonomous:
+        if not self._clocked:
             return self._drive.belt_speed
         return self._system.belt_speed(self._mode, self._instant.time) * self._drive.speed_scale
 
