@@ -23,6 +23,7 @@ from stickslip_ros.scenarios.parameters import (
     controller_node,
 )
 from stickslip_ros.scenarios.sections import PARAMETERS_KEY, ScenarioFile, read_file
+from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.tables import TextTable
 from stickslip_ros.text import did_you_mean
 
@@ -152,9 +153,7 @@ class Scenario:
             by_node.setdefault(node, {})[parameter] = value
         return self._replaced(
             {
-                node: NODE_PARAMETERS[node].validated(
-                    {**self._values_of(node), **_absolute(node, new, Path())}, node
-                )
+                node: self._parameters_of(node).changed(_absolute(node, new, Path()), node)
                 for node, new in by_node.items()
             }
         )
@@ -185,9 +184,8 @@ class Scenario:
             texts[node] = f"{texts.get(node, '')} {override:.80}"
         changed = self._replaced(
             {
-                node: NODE_PARAMETERS[node].validated(
-                    {**self._values_of(node), **_absolute(node, new, Path())},
-                    f"{self.path} with{texts[node]}, {node}",
+                node: self._parameters_of(node).changed(
+                    _absolute(node, new, Path()), f"{self.path} with{texts[node]}, {node}"
                 )
                 for node, new in by_node.items()
             }
@@ -232,13 +230,13 @@ class Scenario:
             overrides=tuple(overrides),
         )
 
-    def _values_of(self, node: str) -> dict[str, Any]:
-        """Return the values of a node; raises InvalidInputError for a controller not in use."""
-        if node not in self._flat:
+    def _parameters_of(self, node: str) -> ParameterGroup:
+        """Return the parameters of a node; refuse those of a controller that is not in use."""
+        if node not in self.nodes:
             raise InvalidInputError(
                 f"{node}: is not the controller in use, which is {self.controller.node}"
             )
-        return self._flat[node]
+        return getattr(self, node)
 
     def _replaced(self, nodes: Mapping[str, Any]) -> Self:
         """Return the scenario with other parameters of some nodes."""

@@ -42,6 +42,27 @@ class ParameterGroup(BaseModel):
 
         Raises InvalidInputError that names `source`, parameter, value and what is allowed.
         """
+        return cls._validated(values, {}, source)
+
+    def changed(self, values: Mapping[str, Any], source: str) -> Self:
+        """Return the parameters with others given by flat name; see `validated`.
+
+        The groups in which nothing changes are not validated again.
+        """
+        names = {name.partition(".")[0] for name in values}
+        kept: dict[str, Any] = {}
+        given: dict[str, Any] = {}
+        for name, each in self:
+            if not isinstance(each, ParameterGroup):
+                given[name] = each
+            elif name in names:
+                given |= {f"{name}.{inner}": value for inner, value in each.flat().items()}
+            else:
+                kept[name] = each
+        return self._validated({**given, **values}, kept, source)
+
+    @classmethod
+    def _validated(cls, values: Mapping[str, Any], kept: Mapping[str, Any], source: str) -> Self:
         known = known_parameters(cls)
         for name, value in values.items():
             if name not in known:
@@ -50,7 +71,7 @@ class ParameterGroup(BaseModel):
                     f"{did_you_mean(name, known, f'known are {_shortened(known)}')}"
                 )
         try:
-            return cls.model_validate(_nested(values))
+            return cls.model_validate({**kept, **_nested(values)})
         except ValidationError as error:
             raise InvalidInputError(f"{source}: {_explain(cls, error, values)}") from None
 

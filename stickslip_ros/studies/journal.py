@@ -201,12 +201,11 @@ class Journal:
             found = {}
         if found.get("format") != _FORMAT:
             raise InvalidInputError(f"{self._path}: {_NO_JOURNAL}")
-        differing = [key for key in header if found.get(key) != header[key]]
-        if differing:
+        differences = ", ".join(_differences(found, header))
+        if differences:
             raise InvalidInputError(
-                f"{self._path}: belongs to another study, which differs in "
-                f"{', '.join(_differences(found, header, differing))}; finish that study, or "
-                "remove the file"
+                f"{self._path}: belongs to another study, which differs in {differences}; finish "
+                "that study, or remove the file"
             )
 
 
@@ -239,14 +238,11 @@ def _parsed(line: bytes) -> dict[str, Any]:
     return found
 
 
-def _differences(
-    found: Mapping[str, Any], expected: Mapping[str, Any], keys: Sequence[str]
-) -> Iterator[str]:
+def _differences(found: Mapping[str, Any], expected: Mapping[str, Any]) -> Iterator[str]:
     """Yield the entries in which the two differ, with both values."""
-    for key in keys:
-        one, other = found.get(key), expected[key]
+    for key, other in expected.items():
+        one = found.get(key)
         if isinstance(one, dict) and isinstance(other, dict):
-            inner = [name for name in other if one.get(name) != other[name]]
-            yield from (f"{key}.{text}" for text in _differences(one, other, inner))
-        else:
+            yield from (f"{key}.{text}" for text in _differences(one, other))
+        elif one != other and (one == one or other == other):  # nan is as good as nan
             yield f"{key} ({one!r:.60}, not {other!r:.60})"

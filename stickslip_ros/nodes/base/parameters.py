@@ -111,7 +111,7 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
         try:
             # First of all: a request from the network must not make the node read a file.
             self._check_fixed(values, source)
-            changed = self._model.validated(self.parameters.flat() | values, source)
+            changed = self.parameters.changed(values, source)
         except InvalidInputError as error:
             return SetParametersResult(successful=False, reason=str(error))
         flat = changed.flat()
