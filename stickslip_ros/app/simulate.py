@@ -1,23 +1,35 @@
 """`stickslip simulate`: the closed loop without ROS, measured on the motion itself."""
 
 import argparse
+from collections.abc import Generator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from stickslip_ros.app.arguments import (
     add_json,
     add_plot,
     add_scenario,
     check_figure,
+    check_new,
     made_of,
     naming,
     scenario_of,
     seconds,
     write_figure,
+    writing,
 )
 from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_figures, print_json, progress_bar
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.plots.why_no_cycle import why_no_cycle
 from stickslip_ros.studies.options import DEFAULT_PERIODS
+
+if TYPE_CHECKING:
+    from stickslip_ros.physics.loop.trajectory import SampleRecorder
+
+_ROUNDING = 1e-9
+"""Share of an interval by which it may differ from a whole number of sample periods."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,6 +47,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="let the controller act continuously, as in the paper's eq. 19 "
         "(default: the force is held from sample to sample, as between the nodes)",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE.csv",
+        help="write time, position, velocity, friction force, control force, position and velocity "
+        "of the belt at the samples (CSV, SI units); an existing file is refused",
+    )
+    parser.add_argument(
+        "--every",
+        type=seconds,
+        metavar="S",
+        help="time from row to row of --out, s: a multiple of the sample period (default: one)",
     )
     add_plot(parser, "motion, force, cycles and friction law")
     add_json(parser)
@@ -59,13 +84,17 @@ def run(arguments: argparse.Namespace) -> int:
     history = None if plot is None else RunHistory()
     units = Units.for_drive(scenario.plant.as_drive())
     shown = f"{duration:g} {units.of_unit('s')}".rstrip()
-    with progress_bar(f"simulating {shown}", 1.0) as progress:
+    with (
+        _recorder(arguments, scenario.plant.rate) as recorder,
+        progress_bar(f"simulating {shown}", 1.0) as progress,
+    ):
         measures = simulate(
             scenario,
             duration,
             continuous=arguments.continuous_control,
             progress=progress,
             observer=history,
+            recorder=recorder,
         )
     if plot is not None and history is not None:
         from stickslip_ros.plots.simulated_run import simulated_run_figure
@@ -79,3 +108,41 @@ def run(arguments: argparse.Namespace) -> int:
         if reason is not None:
             print(reason)
     return 0
+
+
+@contextmanager
+def _recorder(arguments: argparse.Namespace, rate: float) -> "Generator[SampleRecorder | None]":
+    """Provide what writes the file of --out, if it is given; `rate` is that of the samples, Hz."""
+    out: Path | None = arguments.out
+    if out is None:
+        if arguments.every is not None:
+            raise InvalidInputError(
+                f"--every {arguments.every:g}: needs --out FILE.csv, which is not given"
+            )
+        yield None
+        return
+    every = _samples(arguments.every, rate)
+    if out.suffix.lower() != ".csv":
+        raise InvalidInputError(f"--out {out}: must end in .csv")
+    check_new("--out", out)
+    from stickslip_ros.studies.trajectory_file import TrajectoryFile
+
+    new = out.with_name(f"{out.name}.new")
+    with ExitStack() as stack:
+        stack.enter_context(writing("--out", out))
+        stack.callback(new.unlink, missing_ok=True)
+        with new.open("x", encoding="utf-8", newline="") as stream:
+            yield TrajectoryFile(stream, rate, every)
+        new.replace(out)
+
+
+def _samples(interval: float | None, rate: float) -> int:
+    """Return the number of sample periods in an interval, s."""
+    if interval is None:
+        return 1
+    samples = round(interval * rate)
+    if samples < 1 or abs(interval * rate - samples) > _ROUNDING * samples:
+        raise InvalidInputError(
+            f"--every {interval:g}: must be a multiple of the sample period, {1.0 / rate:g} s"
+        )
+    return samples

@@ -5,7 +5,7 @@ from math import isfinite
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.motion_tracer import MotionTracer
 from stickslip_ros.physics.loop.simulation import simulate_continuous, simulate_sampled
-from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
+from stickslip_ros.physics.loop.trajectory import SampleRecorder
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import RunObserver
 from stickslip_ros.physics.motion import RecordedMotion
@@ -32,7 +32,7 @@ def simulate(
     continuous: bool = False,
     progress: Progress = lambda _: None,
     observer: RunObserver | None = None,
-    recorder: TrajectoryRecorder | None = None,
+    recorder: SampleRecorder | None = None,
 ) -> Measures:
     """Return the measures of the scenario's motion over `duration` (s).
 

@@ -1,5 +1,6 @@
 """`stickslip simulate`: the limit cycles of the paper's drive, from the command line."""
 
+import csv
 import json
 import re
 import subprocess
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import stickslip_ros as ss
 from tests.app.conftest import Run
 
 # belt speed: amplitude, speed amplitude, stick fraction, period, midpoint (damping 0.02).
@@ -112,6 +114,82 @@ def test_it_says_whether_the_motion_was_steady(
 ) -> None:
     found = json.loads(stickslip("simulate", *arguments, "--json").stdout)
     assert (found["regime"], found["steady"], found["trend"]) == (regime, steady, trend)
+
+
+def rows_of(path: Path) -> list[dict[str, float]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        return [
+            {name: float(value) for name, value in row.items()} for row in csv.DictReader(stream)
+        ]
+
+
+@pytest.mark.parametrize("flags", [(), ("--continuous-control",)])
+def test_the_file_has_the_trajectory_to_the_last_digit(
+    stickslip: Run, tmp_path: Path, flags: tuple[str, ...]
+) -> None:
+    call = ("simulate", "feed_profile", "--duration", "1.9", *flags, "--json")
+    done = stickslip(*call, "--out", "run.csv")
+    assert (done.returncode, done.stderr) == (0, "")
+    if not flags:  # continuous control acts in shorter steps
+        assert done.stdout == stickslip(*call).stdout
+    run = ss.simulate("feed_profile", duration=1.9, continuous=bool(flags))
+    columns = vars(run.trajectory)
+    rows = rows_of(tmp_path / "run.csv")
+    assert list(rows[0]) == [
+        "time", "position", "velocity", "friction_force", "control_force", "belt_position",
+        "belt_velocity",
+    ]  # fmt: skip
+    assert {name: [row[name] for row in rows] for name in rows[0]} == {
+        name: values.tolist() for name, values in columns.items()
+    }
+    assert rows[-1]["time"] == 1.9
+    assert rows[-1]["belt_velocity"] > 0.0
+    assert list(tmp_path.iterdir()) == [tmp_path / "run.csv"]
+
+
+def test_every_interval_of_the_file_is_a_row(stickslip: Run, tmp_path: Path) -> None:
+    call = ("simulate", "feed_drive", "--duration", "0.5", "--out")
+    assert stickslip(*call, "all.csv").returncode == 0
+    assert stickslip(*call, "some.csv", "--every", "0.007").returncode == 0
+    rows = rows_of(tmp_path / "some.csv")
+    assert rows == rows_of(tmp_path / "all.csv")[::7]
+    assert [row["time"] for row in rows[:3]] == [0.0, 0.007, 0.014]
+
+
+@pytest.mark.parametrize(
+    ("options", "refusal"),
+    [
+        (("--out", "run.txt"), "--out run.txt: must end in .csv"),
+        (("--out", "there.csv"), "--out there.csv: exists already; it is not overwritten"),
+        (("--out", "nowhere/run.csv"), "--out nowhere/run.csv: there is no directory nowhere"),
+        (("--every", "0.1"), "--every 0.1: needs --out FILE.csv, which is not given"),
+        (
+            ("--out", "run.csv", "--every", "0.0015"),
+            "--every 0.0015: must be a multiple of the sample period, 0.001 s",
+        ),
+        (
+            ("--out", "run.csv", "--every", "0"),
+            "--every 0: must be a multiple of the sample period, 0.001 s",
+        ),
+        (("--out", "run.csv", "--every", "inf"), "'inf' is not a time in seconds"),
+    ],
+)
+def test_a_file_that_cannot_be_is_refused_before_anything_runs(
+    stickslip: Run, tmp_path: Path, options: tuple[str, ...], refusal: str
+) -> None:
+    (tmp_path / "there.csv").touch()
+    done = stickslip("simulate", "feed_drive", "--duration", "1e9", *options)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert refusal in done.stderr
+    assert list(tmp_path.iterdir()) == [tmp_path / "there.csv"]
+
+
+def test_a_run_that_fails_leaves_no_file(stickslip: Run, tmp_path: Path) -> None:
+    stiff = ("-p", "plant.damping=1e9", "--continuous-control")
+    done = stickslip("simulate", "paper", *stiff, "--out", "run.csv")
+    assert done.returncode == 1
+    assert "too stiff" in done.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.process

@@ -5,7 +5,7 @@ import numpy as np
 from stickslip_ros.physics.loop.controller import Controller, answer
 from stickslip_ros.physics.loop.motion_tracer import MotionTracer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.loop.trajectory import TrajectoryRecorder
+from stickslip_ros.physics.loop.trajectory import SampleRecorder
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver, RunObserver
 from stickslip_ros.physics.model.control import ControlLaw
@@ -35,7 +35,7 @@ def simulate_sampled(
     meter: CycleMeter,
     progress: Progress = lambda _: None,
     observer: MotionObserver | None = None,
-    recorder: TrajectoryRecorder | None = None,
+    recorder: SampleRecorder | None = None,
 ) -> Measures:
     """Simulate the sampled loop and measure its motion.
 
@@ -55,7 +55,7 @@ def simulate_sampled(
         Called with the completed share, 0 to 1, every 1000 samples.
     observer : MotionObserver, optional
         Receives the motion in blocks.
-    recorder : TrajectoryRecorder, optional
+    recorder : SampleRecorder, optional
         Takes each sample with the control force that answers it.
 
     Returns
@@ -112,7 +112,7 @@ def simulate_continuous(
     meter: CycleMeter,
     progress: Progress = lambda _: None,
     observer: RunObserver | None = None,
-    recorder: TrajectoryRecorder | None = None,
+    recorder: SampleRecorder | None = None,
 ) -> Measures:
     """Simulate a motion with a control law acting without sampling (eq. 19), and measure it.
 
@@ -133,7 +133,7 @@ def simulate_continuous(
         times in all.
     observer : RunObserver, optional
         Receives motion and forces in blocks.
-    recorder : TrajectoryRecorder, optional
+    recorder : SampleRecorder, optional
         Takes samples at its rate.
 
     Returns

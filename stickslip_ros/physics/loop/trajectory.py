@@ -1,5 +1,6 @@
 """The trajectory of a simulated run: the motion and its forces at the samples."""
 
+from abc import ABC, abstractmethod
 from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -49,21 +50,29 @@ QUANTITIES = {
 """Label and unit of each column of a trajectory."""
 
 
-class TrajectoryRecorder:
-    """Keeps the samples of a run as they come."""
+class SampleRecorder(ABC):
+    """Receives the samples of a run as they come, and keeps each one or every nth."""
 
-    def __init__(self, rate: float) -> None:
-        """Keep samples that are taken `rate` (Hz) times per second."""
-        self._rate = rate
-        self._values = array("d")
+    def __init__(self, rate: float, every: int = 1) -> None:
+        """Keep one in `every` samples; they are taken `rate` (Hz) times per second."""
+        self._rate, self._every = rate, every
+        self._number = 0
+        """Number of the next sample."""
         self._now = 0.0
 
+    @abstractmethod
+    def keep(self, row: tuple[float, ...]) -> None:
+        """Keep the values of one sample, in the order of `QUANTITIES`."""
+
     def take(self, sample: Sample, control_force: float) -> None:
-        """Keep the next sample, and the control force (N) that answers it."""
-        _, position, velocity, friction_force, belt_position, belt_velocity = sample
-        self._values.extend(
-            (position, velocity, friction_force, control_force, belt_position, belt_velocity)
-        )
+        """Receive the next sample, and the control force (N) that answers it."""
+        number = self._number
+        if number % self._every == 0:
+            _, position, velocity, friction_force, *belt = sample
+            self.keep(
+                (number / self._rate, position, velocity, friction_force, control_force, *belt)
+            )
+        self._number = number + 1
 
     def sampling(self, motion: Motion, advance: Callable[[float], None]) -> Callable[[float], None]:
         """Return an `advance` (s) of a motion without sampled loop that stops to take samples."""
@@ -95,12 +104,19 @@ class TrajectoryRecorder:
         )
         self.take(sample, motion.applied_force)
 
+
+class TrajectoryRecorder(SampleRecorder):
+    """Keeps the samples of a run in memory."""
+
+    def __init__(self, rate: float, every: int = 1) -> None:
+        """Keep one in `every` samples; they are taken `rate` (Hz) times per second."""
+        super().__init__(rate, every)
+        self._values = array("d")
+
+    def keep(self, row: tuple[float, ...]) -> None:
+        """Keep the values of one sample."""
+        self._values.extend(row)
+
     def trajectory(self) -> Trajectory:
         """Return the samples so far."""
-        columns = np.array(self._values).reshape(-1, 6).T.copy()
-        return Trajectory(np.arange(columns.shape[1]) / self._rate, *columns)
-
-    @property
-    def _number(self) -> int:
-        """Number of the next sample."""
-        return len(self._values) // 6
+        return Trajectory(*np.array(self._values).reshape(-1, len(QUANTITIES)).T.copy())
