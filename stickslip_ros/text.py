@@ -45,6 +45,12 @@ def prefix_for(largest: float) -> tuple[float, str]:
     return next(((scale, p) for scale, p in _PREFIXES.items() if magnitude >= scale), (1.0, ""))
 
 
+def by_group(names: Iterable[str]) -> str:
+    """Return flat names in order, those of a group (friction.static) as one (friction.*)."""
+    groups = {f"{name.partition('.')[0]}.*" if "." in name else name for name in names}
+    return ", ".join(sorted(groups))
+
+
 def did_you_mean(name: str, known: Iterable[str], otherwise: str | None = None) -> str:
     """Return the end of a message about an unknown name: the known names that are close to it.
 

@@ -1,6 +1,6 @@
 """Validation of parameters: an error names the parameter, its value and what is allowed."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from math import inf
 from typing import Any, Self, cast
@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.parameter_field import LARGEST, SMALLEST, known_parameters
-from stickslip_ros.text import did_you_mean, shown
+from stickslip_ros.text import by_group, did_you_mean, shown
 
 _KIND_NAMES = {
     bool: "true or false",
@@ -68,7 +68,7 @@ class ParameterGroup(BaseModel):
             if name not in known:
                 raise InvalidInputError(
                     f"{source}: unknown parameter {name:.80} = {shown(value)}; "
-                    f"{did_you_mean(name, known, f'known are {_shortened(known)}')}"
+                    f"{did_you_mean(name, known, f'known are {by_group(known)}')}"
                 )
         try:
             return cls.model_validate({**kept, **_nested(values)})
@@ -91,12 +91,6 @@ class ParameterGroup(BaseModel):
         """Return the values by flat name, as plain Python types."""
         values = flattened(self.model_dump(mode="python"))
         return {name: str(value) if isinstance(value, StrEnum) else value for name, value in values}
-
-
-def _shortened(names: Iterable[str]) -> str:
-    """Return names in order, those of a group as one."""
-    groups = {f"{name.partition('.')[0]}.*" if "." in name else name for name in names}
-    return ", ".join(sorted(groups))
 
 
 def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str, Any]) -> str:

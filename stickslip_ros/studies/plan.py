@@ -14,7 +14,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.parameter_field import Parameter, known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.studies.options import Carry
-from stickslip_ros.text import did_you_mean
+from stickslip_ros.text import by_group, did_you_mean
 
 MOST_POINTS = 1_000_000_000
 """Largest number of points of a study, since its results must fit into a file."""
@@ -162,7 +162,8 @@ class Axis:
             )
         known = known_parameters(NODE_PARAMETERS[node])
         if name not in known:
-            every = f"numbers of {node} are {', '.join(sorted(_numbers(node)))}"
+            numbers = by_group(each.partition(".")[2] for each in _numbers(node))
+            every = f"numbers of {node} are {numbers}"
             raise InvalidInputError(
                 f"{self.parameter:.80}: unknown parameter; "
                 + did_you_mean(f"{node}.{name}", _numbers(node), every)

@@ -16,7 +16,10 @@ from tests.app.conftest import Run
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (("simulate", "nosuch"), ("unknown scenario 'nosuch'", "feed_drive, paper")),
+        (
+            ("simulate", "nosuch"),
+            ("unknown scenario 'nosuch'", "axis, feed_drive, feed_profile, paper"),
+        ),
         (("run", "./nosuch.yaml"), ("no scenario file ./nosuch.yaml",)),
         (("simulate", "feed_driv"), ("unknown scenario 'feed_driv'", "did you mean feed_drive?")),
         (("simulate", "papre.yaml"), ("no scenario file papre.yaml", "did you mean paper?")),

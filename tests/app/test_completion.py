@@ -73,7 +73,7 @@ def test_scenarios_and_scenario_files(complete: Complete) -> None:
     assert {"feed_drive", "paper", "mine.yaml", "bags"} <= set(proposed)
     assert "notes.txt" not in proposed
     assert complete("simulate", "pa") == ["paper"]
-    assert complete("new", "x.yaml", "--from", "fe") == ["feed_drive"]
+    assert complete("new", "x.yaml", "--from", "fe") == ["feed_drive", "feed_profile"]
 
 
 def test_files(complete: Complete) -> None:
@@ -82,7 +82,7 @@ def test_files(complete: Complete) -> None:
 
 
 def test_parameters_and_their_values(complete: Complete, shell: str) -> None:
-    assert complete("simulate", "paper", "-p", "plant.belt") == ["plant.belt_speed="]
+    assert complete("simulate", "paper", "-p", "plant.belt_") == ["plant.belt_speed="]
     assert complete("sweep", "paper", "--over", "plant.mas") == ["plant.mass="]
     assert complete("set", "washout_controller.lin") == ["washout_controller.linear_gain="]
     if shell == "bash":  # which splits words at "="

@@ -99,7 +99,13 @@ def test_ros_reads_a_new_file(
     given = {
         name: value for name, value in values.items() if name not in ("wait_for", "use_sim_time")
     }
-    assert read_by_ros(str(tmp_path / "mine.yaml")) == given
+    read = read_by_ros(str(tmp_path / "mine.yaml"))
+    assert {name for name in given if given[name] != given[name]} == {
+        name for name in read if read[name] != read[name]
+    }  # nan
+    numbers = {name: value for name, value in given.items() if value == value}
+    assert read.keys() == given.keys()
+    assert {name: read[name] for name in numbers} == numbers
 
 
 def test_new_begins_with_its_title_and_a_command(stickslip: Run, tmp_path: Path) -> None:

@@ -136,7 +136,11 @@ def test_good_values_are_taken_exactly_in_every_state(graph: Graph, name: str) -
                 assert (
                     bits(now)[parameter] == bits(start if reason else {parameter: value})[parameter]
                 )
-                refusals = ["must not exceed", "at least a thousandth", "must be a CSV file"]
+                refusals = [
+                    "must not exceed",
+                    "at least a thousandth",
+                    "must be the path of a CSV file",
+                ]
                 allowed = refusals if reason else [""]
                 if parameter not in settable and value != start[parameter]:
                     allowed += [f"{parameter} cannot be changed while the node is "]

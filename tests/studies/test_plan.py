@@ -60,7 +60,10 @@ FORM = "must be NODE.PARAMETER=A:B:COUNT, or A:B:COUNT:log"
         ("belt_speed=1:2:3", "must be a parameter of plant or washout_controller"),
         ("analyzer.window=1:2:3", "must be a parameter of plant or washout_controller"),
         ("=1:2:3", "must be a parameter of plant or washout_controller"),
-        ("plant=1:2:3", "unknown parameter; numbers of plant are plant.belt_speed, plant.damping"),
+        (
+            "plant=1:2:3",
+            r"unknown parameter; numbers of plant are belt\.\*, belt_speed, bias_force",
+        ),
         ("plant.speed=1:2:3", r"unknown parameter; did you mean plant\.belt_speed or "),
         (
             "washout_controller.gain=1:2:3",
