@@ -2,9 +2,8 @@
 
 With the Stribeck law of the paper the Hopf point is supercritical: the vibration starts and ends
 near the same speed. With the exponential law it is subcritical: rest is stable above the Hopf
-speed, and so is stick-slip, up to the fold of the limit cycles. Between the two speeds the motion
-depends on where the belt comes from. A small sine force near resonance replaces the disturbances of
-a real drive: without any, the slide would rest far beyond the Hopf point.
+speed, and so is stick-slip, up to the fold of the limit cycles. A small sine force near resonance
+replaces the disturbances of a real drive: without any, the slide would rest beyond the Hopf point.
 """
 
 import sys
@@ -37,11 +36,8 @@ folder.mkdir(parents=True, exist_ok=True)
 
 def amplitudes(trajectory: Trajectory, samples: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the belt speed and half the stroke in each stretch of so many samples."""
-    count = len(trajectory) // samples
-    position, speed = (
-        each[: count * samples].reshape(count, samples)
-        for each in (trajectory.position, trajectory.belt_velocity)
-    )
+    whole = trajectory[: len(trajectory) // samples * samples]
+    position, speed = (each.reshape(-1, samples) for each in (whole.position, whole.belt_velocity))
     return speed.mean(axis=1), np.ptp(position, axis=1) / 2.0
 
 

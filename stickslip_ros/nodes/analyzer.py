@@ -6,6 +6,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from itertools import islice
 from operator import attrgetter
@@ -15,7 +16,7 @@ from typing import Any, NamedTuple, TypeVar
 from std_msgs.msg import Float64
 
 from stickslip_ros.bags.recorder import QosProfile, Recorder, check_new_bag
-from stickslip_ros.errors import BagError, MessageError
+from stickslip_ros.errors import BagError, InvalidInputError, MessageError
 from stickslip_ros.messages.cdr import Refused
 from stickslip_ros.messages.codec import (
     joint_state_columns,
@@ -44,6 +45,7 @@ from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.base.service_call import ServiceCall, parameters_call
 from stickslip_ros.physics.measures.run_meter import RunMeter
+from stickslip_ros.scenarios.curve_file import CURVES, Pairs, read_pairs
 from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, AnalyzerParameters
 from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
@@ -127,7 +129,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             self.release(end)
         for call in self._parameter_calls.values():
             call.close()
-        self._keep("report", report)
+        self._keep("stickslip_ros/report", report)
         self._record(Recorder.close)
         self._recorder = None
         if self._bag_failure:  # then the report is in no bag
@@ -216,7 +218,9 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def _ask_for_parameters(self, node: str) -> None:
         """Ask a node for its parameters, to be kept in the bag."""
         names = list(known_parameters(NODE_PARAMETERS[node]))
-        self._parameter_calls[node] = parameters_call(self, node, names, partial(self._keep, node))
+        self._parameter_calls[node] = parameters_call(
+            self, node, names, partial(self._keep_parameters, node)
+        )
 
     def _look_for_controllers(self) -> None:
         """Ask each controller of this package for its parameters, once it publishes forces.
@@ -292,18 +296,29 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             raise
         self._bags_opened += 1
         self._recorder = recorder
-        self._keep("versions", versions())
-        self._keep("analyzer", self.parameters.flat())
+        self._keep("stickslip_ros/versions", versions())
+        self._keep("stickslip_ros/analyzer", self.parameters.flat())
 
     def _add_topic(self, recorder: Recorder, topic: Topic[Any]) -> None:
         name = self.resolve_topic_name(topic.name)
         qos = QosProfile(depth=topic.depth)
         self._channels[topic.name] = recorder.add_topic(name, topic.type_name, qos)
 
+    def _keep_parameters(self, node: str, values: Mapping[str, Any]) -> None:
+        """Put the parameters of a node into the bag, and the curves in the files that they name."""
+        self._keep(f"stickslip_ros/{node}", values)
+        known, curves = known_parameters(NODE_PARAMETERS[node]), dict[str, Pairs]()
+        for name, path in values.items():
+            if known[name].file and path and isinstance(path, str):
+                with suppress(InvalidInputError):  # the node may run on another machine
+                    curves[path] = read_pairs(path)
+        if curves:
+            self._keep(CURVES, curves)
+
     def _keep(self, name: str, values: Mapping[str, Any]) -> None:
         """Put a table of metadata into the bag: origin or results of the recording."""
         texts = {key: json.dumps(value) for key, value in values.items()}
-        self._record(lambda recorder: recorder.add_metadata(f"stickslip_ros/{name}", texts))
+        self._record(lambda recorder: recorder.add_metadata(name, texts))
 
     def _write(self, messages: Iterable[_Message]) -> None:
         def write(recorder: Recorder) -> None:

@@ -3,7 +3,7 @@
 from math import inf
 from typing import ClassVar, Self
 
-from pydantic import PrivateAttr, model_validator
+from pydantic import PrivateAttr, ValidationInfo, model_validator
 
 from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
 from stickslip_ros.physics.model.constants import constants_of
@@ -54,14 +54,14 @@ class CourseParameters(ParameterGroup):
     _table: Table = PrivateAttr(default_factory=lambda: NO_TABLE)
 
     @model_validator(mode="after")
-    def _course_is_possible(self) -> Self:
+    def _course_is_possible(self, info: ValidationInfo) -> Self:
         """Refuse constants that do not make a course, under their names as parameters."""
         if self.kind is CourseKind.TABLE:
             if not self.file:
                 raise ValueError(
                     f"{self.part}.file = '' is refused: must be the path of a CSV file for a table"
                 )
-            points = read_curve(f"{self.part}.file", self.file, _refusal)
+            points = read_curve(f"{self.part}.file", self.file, _refusal, info.context)
             self._table = _as_table(points)
             return self
         refusal = self.as_course(1.0).refusal()

@@ -1,9 +1,10 @@
 """Reading a measured curve: a CSV file of pairs of numbers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from stat import S_ISREG
+from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.parameter_field import LARGEST
@@ -14,14 +15,28 @@ _LARGEST_FILE = 1_000_000
 
 Pairs = tuple[tuple[float, float], ...]
 
+CURVES = "stickslip_ros/curves"
+"""Name of the table of a bag that has the pairs of each file, by its path."""
 
-def read_curve(name: str, path: str, refusal: Callable[[Pairs], str | None]) -> Pairs:
+
+def read_curve(
+    name: str,
+    path: str,
+    refusal: Callable[[Pairs], str | None],
+    known: Mapping[str, Pairs] | None = None,
+) -> Pairs:
     """Return the pairs of numbers in the file of a parameter; see `read_pairs`.
 
-    Raises ValueError, as a validator does, with a sentence that names the parameter: if the file
-    cannot be read, or if there is a `refusal` of its pairs.
+    A file whose pairs are `known`, by path, is not read. Raises ValueError, as a validator does,
+    with a sentence that names the parameter: if the file cannot be read, or if there is a `refusal`
+    of its pairs.
     """
     try:
+        if known is not None and path in known:
+            why = refusal(known[path])
+            if why is not None:
+                raise InvalidInputError(why)
+            return known[path]
         about = Path(path).stat()
         # Studies ask for the same file for each of their cases.
         return _checked(path, about.st_mtime_ns, about.st_size, refusal)
@@ -58,6 +73,17 @@ def read_pairs(path: str) -> Pairs:
     if not lines:
         raise InvalidInputError("the file has no numbers: must have two on each line")
     return tuple(_pair(number, line) for number, line in lines)
+
+
+def as_pairs(values: Any) -> Pairs:
+    """Return pairs that JSON holds as lists; raises ValueError if they are anything else."""
+    try:
+        pairs = tuple((float(first), float(second)) for first, second in values)
+    except (TypeError, OverflowError) as error:
+        raise ValueError(str(error)) from None
+    if not all(abs(value) <= LARGEST for pair in pairs for value in pair):
+        raise ValueError("a number is too large")
+    return pairs
 
 
 def _text(path: Path) -> str:

@@ -1,6 +1,7 @@
 """The parameters of the friction of the plant: its law and the constants of each law."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from math import isnan, nan
 from typing import Annotated, Any, Self
@@ -8,6 +9,7 @@ from typing import Annotated, Any, Self
 from pydantic import (
     AfterValidator,
     PrivateAttr,
+    ValidationInfo,
     ValidatorFunctionWrapHandler,
     create_model,
     field_validator,
@@ -105,7 +107,7 @@ class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_l
     _law: FrictionLaw = PrivateAttr()
 
     @model_validator(mode="after")
-    def _constants_fit_together(self) -> Self:
+    def _constants_fit_together(self, info: ValidationInfo) -> Self:
         """Refuse constants that the law refuses, under their names as parameters."""
         kind = LAWS[self.law]
         if issubclass(kind, Table) and not self.file:
@@ -113,8 +115,8 @@ class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_l
                 f"friction.file = {shown(self.file)} is refused: must be the path of a CSV file "
                 f"for law {self.law}"
             )
-        law = kind(**self._constants(self, "friction"))
-        reverse = self._constants(self.reverse, "friction.reverse")
+        law = kind(**self._constants(self, "friction", info.context))
+        reverse = self._constants(self.reverse, "friction.reverse", info.context)
         if reverse:
             law = Directional(law, replace(law, **reverse))
         refusal = law.refusal()
@@ -160,12 +162,17 @@ class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_l
         }
         return {name: value for name, value in values.items() if value not in ("", _AS_FORWARD)}
 
-    def _constants(self, group: "Friction | ReverseFriction", prefix: str) -> dict[str, Any]:
+    def _constants(
+        self,
+        group: "Friction | ReverseFriction",
+        prefix: str,
+        curves: Mapping[str, Pairs] | None,
+    ) -> dict[str, Any]:
         """Return the constants of the law that a group gives, those of a table from its file."""
         values = self._given(group)
         if "file" in values:
             path = values.pop("file")
-            values["points"] = read_curve(f"{prefix}.file", path, _refusal)
+            values["points"] = read_curve(f"{prefix}.file", path, _refusal, curves)
         return values
 
 

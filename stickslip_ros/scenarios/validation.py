@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import PydanticCustomError
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.scenarios.curve_file import Pairs
 from stickslip_ros.scenarios.parameter_field import LARGEST, SMALLEST, known_parameters
 from stickslip_ros.text import by_group, did_you_mean, shown
 
@@ -37,12 +38,15 @@ class ParameterGroup(BaseModel):
     )
 
     @classmethod
-    def validated(cls, values: Mapping[str, Any], source: str) -> Self:
+    def validated(
+        cls, values: Mapping[str, Any], source: str, curves: Mapping[str, Pairs] | None = None
+    ) -> Self:
         """Return the parameters given by flat name, the others at their defaults.
 
-        Raises InvalidInputError that names `source`, parameter, value and what is allowed.
+        Files whose `curves` are given by path are not read. Raises InvalidInputError that names
+        `source`, parameter, value and what is allowed.
         """
-        return cls._validated(values, {}, source)
+        return cls._validated(values, {}, source, curves)
 
     def changed(self, values: Mapping[str, Any], source: str) -> Self:
         """Return the parameters with others given by flat name; see `validated`.
@@ -62,7 +66,13 @@ class ParameterGroup(BaseModel):
         return self._validated({**given, **values}, kept, source)
 
     @classmethod
-    def _validated(cls, values: Mapping[str, Any], kept: Mapping[str, Any], source: str) -> Self:
+    def _validated(
+        cls,
+        values: Mapping[str, Any],
+        kept: Mapping[str, Any],
+        source: str,
+        curves: Mapping[str, Pairs] | None = None,
+    ) -> Self:
         known = known_parameters(cls)
         for name, value in values.items():
             if name not in known:
@@ -71,7 +81,7 @@ class ParameterGroup(BaseModel):
                     f"{did_you_mean(name, known, f'known are {by_group(known)}')}"
                 )
         try:
-            return cls.model_validate({**kept, **_nested(values)})
+            return cls.model_validate({**kept, **_nested(values)}, context=curves)
         except ValidationError as error:
             raise InvalidInputError(f"{source}: {_explain(cls, error, values)}") from None
 

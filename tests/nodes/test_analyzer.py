@@ -14,6 +14,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from sensor_msgs.msg import JointState
 
 from stickslip_ros.bags.reader import Recording
+from stickslip_ros.bags.recorder import Recorder
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.messages.codec import joint_state_columns, pack_joint_state, pack_wrench
 from stickslip_ros.messages.topics import (
@@ -29,6 +30,7 @@ from stickslip_ros.nodes.base.managed import ERROR
 from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
+from stickslip_ros.studies.recorded_drive import recorded_drive
 from tests.nodes.graph import PATIENCE, Graph
 
 _FIGURES = r"stick_slip: amplitude \d+\.?\d* mm, frequency \d+\.?\d* mHz, stick fraction 0\.\d{1,3}"
@@ -67,6 +69,44 @@ def test_it_records_the_bytes_it_hears_and_measures_them(graph: Graph, tmp_path:
     assert fractions[-1].data == pytest.approx(0.285506954, abs=2e-3)
     assert plant is not None
     assert json.loads(plant["belt_speed"]) == 0.2
+
+
+def test_it_keeps_the_curves_in_files_that_parameters_name(graph: Graph, tmp_path: Path) -> None:
+    files = {
+        "forward": "0,0.4\n0.5,0.25\n",
+        "reverse": "0,0.42\n0.5,0.24\n",
+        "belt": "0,0\n9,0.05\n",
+    }
+    paths = {name: str(tmp_path / f"{name}.csv") for name in files}
+    for name, text in files.items():
+        Path(paths[name]).write_text(text)
+    run_to_the_end(
+        graph, tmp_path / "bag", expects_control=False, duration=60.0,
+        **{
+            "friction.law": "table", "friction.file": paths["forward"],
+            "friction.reverse.file": paths["reverse"],
+            "belt.kind": "table", "belt.file": paths["belt"],
+        },
+    )  # fmt: skip
+    with_files = recorded_drive(tmp_path / "bag")
+    assert with_files is not None
+    for path in paths.values():
+        Path(path).unlink()
+    without = recorded_drive(tmp_path / "bag")
+    assert without == with_files
+    assert float(without.friction.coefficient(-0.5, -1.0)) == 0.24
+    assert without.belt.at(4.5) == pytest.approx(0.025, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "curve", ['[[0, 0.4], [0.5, "x"]]', "3", "[[0, 1e999], [1, 1]]", "[[1]]", "["]
+)
+def test_a_curve_in_a_bag_that_is_none_makes_no_drive(tmp_path: Path, curve: str) -> None:
+    parameters = {"friction.law": '"table"', "friction.file": '"/none.csv"'}
+    with Recorder(tmp_path / "bag") as recorder:
+        recorder.add_metadata("stickslip_ros/plant", parameters)
+        recorder.add_metadata("stickslip_ros/curves", {"/none.csv": curve})
+    assert recorded_drive(tmp_path / "bag") is None
 
 
 def test_it_logs_rounded_figures_and_no_line_that_reads_as_the_one_before(

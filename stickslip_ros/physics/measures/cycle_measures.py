@@ -264,7 +264,13 @@ class CycleMeter:
         self._sticking_since: float | None = None
 
     def report_run_away(self, unbounded: bool = True) -> None:
-        """Report that the motion is unbounded, or take that back."""
+        """Report that the motion is unbounded, or take that back.
+
+        Parameters
+        ----------
+        unbounded : bool, optional
+            Whether the motion is unbounded.
+        """
         self._unbounded = unbounded
 
     def feed(

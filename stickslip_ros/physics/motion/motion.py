@@ -112,7 +112,18 @@ class Motion(HybridMotion):
         return self._time - self._origin
 
     def course_times(self, times: FloatArray) -> Sequence[float]:
-        """Return the times of the courses (s) at times of the motion (s), as of breakpoints."""
+        """Return the times of the courses at times of the motion.
+
+        Parameters
+        ----------
+        times : array of shape (instants,)
+            Times of the motion, as of breakpoints, s.
+
+        Returns
+        -------
+        sequence of float
+            Times since the courses started, s.
+        """
         return (times - self._origin).tolist()
 
     @property
