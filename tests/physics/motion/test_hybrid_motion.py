@@ -32,6 +32,7 @@ from stickslip_ros.physics.motion import Motion, RecordedMotion, compiled_flow
 from stickslip_ros.physics.motion.derivatives import parameter_values
 from stickslip_ros.physics.motion.variational import SensitiveMotion
 from tests.examples import examples
+from tests.physics.courses import above_denormal
 from tests.physics.parts import Dahl, Iwan, OneSided, Pieces, Ramp, Swing
 
 LAWS: list[FrictionLaw] = [
@@ -90,11 +91,6 @@ def drive_of(
         scaled(courses[0], back, "m/s"),
         scaled(courses[1], back, "N"),
     )
-
-
-def above_denormal(number: float) -> float:
-    """Return 0 for a speed at which the time of an event is a denormal number."""
-    return number if abs(number) > 1e-100 else 0.0
 
 
 @st.composite
