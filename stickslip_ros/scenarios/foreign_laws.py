@@ -90,18 +90,12 @@ class LawFamily(Generic[_Law]):
             raise InvalidInputError(
                 f"has a constant {name}: the name cannot be that of a parameter"
             )
-        if isinstance(default, tuple):
-            return
-        least = max(constant.at_least, SMALLEST if constant.positive else -LARGEST)
-        number = isinstance(cast(Any, default), int | float)
-        if not number or not (least <= default <= LARGEST or (isinf(default) and default > 0.0)):
-            raise InvalidInputError(
-                f"has the default {default!r} for its constant {name}: must be a number within its "
-                "bounds"
-            )
+        is_tuple = isinstance(default, tuple)
+        if not is_tuple:
+            self._check_default(constant, default)
         for law in self.laws.values() if self.one_namespace else ():
             known = constants_of(law).get(name)
-            if known is not None:
+            if known is not None and not (is_tuple and isinstance(known.default, tuple)):
                 own, other = _one_for_all(constant), _one_for_all(known)
                 different = [what for what in own if own[what] != other[what]]
                 if different:
@@ -111,6 +105,15 @@ class LawFamily(Generic[_Law]):
                         + f": must be {', '.join(other[what] for what in different)} "
                         f"as in law {law.name}, or have another name"
                     )
+
+    def _check_default(self, constant: Constant, default: Any) -> None:
+        least = max(constant.at_least, SMALLEST if constant.positive else -LARGEST)
+        number = isinstance(default, int if constant.whole else int | float)
+        if not number or not (least <= default <= LARGEST or (isinf(default) and default > 0.0)):
+            raise InvalidInputError(
+                f"has the default {default!r} for its constant {constant.name}: must be a "
+                f"{'whole ' if constant.whole else ''}number within its bounds"
+            )
 
 
 FRICTION_LAWS = LawFamily(
@@ -156,7 +159,11 @@ def _one_for_all(constant: Constant) -> Mapping[str, str]:
     return {
         "unit": constant.unit or "none",
         "bounds": " and ".join(bounds) or "none",
-        "default": repr(constant.default if constant.whole else float(cast(Any, constant.default))),
+        "default": repr(
+            constant.default
+            if constant.whole or isinstance(constant.default, tuple)
+            else float(constant.default)
+        ),
     }
 
 

@@ -4,6 +4,7 @@ import importlib
 import importlib.util
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -13,7 +14,8 @@ import pytest
 from stickslip_ros import scenarios
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.control import CONTROL_LAWS
-from stickslip_ros.physics.model.friction import LAWS, Linear
+from stickslip_ros.physics.model.friction import LAWS, Directional, Linear
+from stickslip_ros.physics.motion import Motion
 from stickslip_ros.scenarios import friction_parameters, parameters
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.foreign_laws import (
@@ -121,7 +123,87 @@ def test_a_constant_of_several_laws_names_them_all(install: Install) -> None:
     assert known["friction.kinetic"].meaning == "Kinetic coefficient mu_k (exponential, falling)."
 
 
+def test_its_constants_may_differ_between_the_directions(install: Install) -> None:
+    install()
+    plant = parameters_anew().PlantParameters
+    falling = LAWS["falling"]
+    given = {"friction.law": "falling", "friction.fall": 0.3, "friction.reverse.fall": 0.7}
+    law = plant.validated(given, "test").as_drive().friction
+    assert law == Directional(falling(0.4, fall=0.3), falling(0.4, fall=0.7))
+    with pytest.raises(InvalidInputError) as refused:
+        plant.validated(given | {"friction.reverse.fall": 11}, "test")
+    assert str(refused.value) == (
+        "test: friction.reverse.fall = 11.0 must not exceed 10 friction.static = 10.0"
+    )
+    with pytest.raises(InvalidInputError, match=r"friction.reverse.fall = -1.0 is refused: must"):
+        plant.validated(given | {"friction.reverse.fall": -1.0}, "test")
+
+
 CONSTANT = '    fall: Any = constant(0.2, "Decrease with speed", "s/m", at_least=0.0)'
+TERMS = '    terms: Any = constant(2, "Number of terms.", at_least=1, whole=True)'
+FALLS = '    fall: Any = constant((0.2, 0.1), "Decreases with speed.", "s/m")'
+IN_TERMS = (
+    FALLING.replace(CONSTANT, f"{TERMS}\n{FALLS}")
+    .replace("self.fall * relative_speed", "sum(self.fall[: self.terms]) * relative_speed")
+    .replace(
+        'f"fall = {self.fall} must not exceed 10 static = 10.0" if self.fall > 10.0 else None',
+        'f"terms = {self.terms} must not exceed 2" if self.terms > len(self.fall) else None',
+    )
+)
+
+
+def test_whole_numbers_and_tuples_are_constants(install: Install) -> None:
+    install(IN_TERMS)
+    assert FRICTION_LAWS.refused == {}
+    plant = parameters_anew().PlantParameters
+    known = {parameter.name for parameter in parameters_of(plant)}
+    assert "friction.terms" in known
+    assert known.isdisjoint({"friction.fall", "friction.reverse.fall", "friction.reverse.terms"})
+    given = {"friction.law": "falling", "friction.terms": 1, "friction.reverse.static": 0.3}
+    drive = plant.validated(given, "test").as_drive()
+    falling = LAWS["falling"]
+    assert drive.friction == Directional(falling(0.4, terms=1), falling(0.3, terms=1))
+    assert drive.friction.scaled(2.0).forward == falling(0.4, terms=1, fall=(0.4, 0.2))
+    moved: list[Any] = []
+    for law in (falling(0.4), Linear(0.4, 0.2 + 0.1)):
+        motion = Motion(replace(drive, friction=law), 0.3, 0.0)
+        motion.advance(20.0)
+        moved.append((motion.position, motion.velocity))
+    assert moved[0] == pytest.approx(moved[1], rel=1e-9)
+    for value, reason in (
+        (3, "friction.terms = 3 must not exceed 2"),
+        (0, "friction.terms = 0 is refused: must be a whole number at least 1"),
+        (1.5, "friction.terms = 1.5 is refused: must be a whole number at least 1"),
+    ):
+        with pytest.raises(InvalidInputError) as refused:
+            plant.validated(given | {"friction.terms": value}, "test")
+        assert str(refused.value) == f"test: {reason}"
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "reason"),
+    [
+        (IN_TERMS, FALLING, "bounds at least 0 and default 0.2: must be none, (0.2, 0.1)"),
+        (FALLING, IN_TERMS, "bounds none and default (0.2, 0.1): must be at least 0, 0.2"),
+    ],
+)
+def test_a_name_is_a_number_in_all_laws_or_a_tuple_in_all(
+    install: Install, tmp_path: Path, first: str, second: str, reason: str
+) -> None:
+    write_package(tmp_path, "earlier", {"earlier": first}, {"falling": "earlier:Falling"})
+    other = second.replace('"falling"', '"falling_too"')
+    install(other, falling_too="foreign:Falling")
+    assert FRICTION_LAWS.refused == {
+        "falling_too": f"foreign:Falling of package foreign-laws has a constant fall with {reason} "
+        "as in law falling, or have another name"
+    }
+
+
+def test_tuples_of_one_name_may_have_different_defaults(install: Install, tmp_path: Path) -> None:
+    write_package(tmp_path, "earlier", {"earlier": IN_TERMS}, {"falling": "earlier:Falling"})
+    other = IN_TERMS.replace('"falling"', '"falling_too"').replace("(0.2, 0.1)", "(0.3, 0.1)")
+    install(other, falling_too="foreign:Falling")
+    assert FRICTION_LAWS.refused == {}
 
 
 @pytest.mark.parametrize(
@@ -171,6 +253,16 @@ CONSTANT = '    fall: Any = constant(0.2, "Decrease with speed", "s/m", at_least
             "constant(0.2",
             "constant(-0.2",
             "has the default -0.2 for its constant fall: must be a number within its bounds",
+        ),
+        (
+            CONSTANT,
+            TERMS.replace("(2,", "(1.5,"),
+            "has the default 1.5 for its constant terms: must be a whole number within its bounds",
+        ),
+        (
+            CONSTANT,
+            TERMS.replace("(2,", "(float('inf'),"),
+            "has the default inf for its constant terms: must be a whole number within its bounds",
         ),
         ("constant(0.2", 'constant("0.2"', "has the default '0.2' for its constant fall"),
         ("constant(0.2", 'constant(float("nan")', "has the default nan for its constant fall"),
