@@ -14,6 +14,7 @@ from stickslip_ros.physics.model import equations
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.course import Course, NoCourse
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.physics.model.hybrid import (
     Flow,
     Guard,
@@ -50,6 +51,11 @@ TIME_ROUNDING = 2.0**-49
 _LIFT_ROUNDING = 2.0**-40
 """Normal force, in that of the drive, that is rounding where a load takes all of it away."""
 
+_VISIBLE, _NEGLIGIBLE = 9.0, 110.0
+"""Speeds, in the characteristic one, between which an exponential law reaches its limit: up to the
+first one its series shows it for every exponent, and from the second one on it is below rounding.
+"""
+
 _MOST_AT_ONCE = 100
 """Number of changes of mode at one instant above which there is no end of them."""
 
@@ -62,12 +68,35 @@ class _Parts(NamedTuple):
     load: Sequence[Any]
 
 
-@dataclass(frozen=True)
-class _SymbolicDrive:
+class _SymbolicDrive(NamedTuple):
     """The drive and its control with expressions for their constants."""
 
     drive: Drive
     control: ContinuousControl | None
+
+
+@dataclass(frozen=True)
+class _Expressions:
+    """What the flows of a drive consist of, as expressions."""
+
+    drive: Drive
+    switches: _Parts
+    sign: Any
+    position: Any
+    speed: Any
+    memory: Sequence[Any]
+    belt_speed: Any
+    belt_acceleration: Any
+    normal: Any
+    reaction: Callable[[Any], Any]
+    """Reaction at a speed of the slide."""
+    part_rates: Callable[[Any], tuple[Any, ...]]
+    """Rates of control and actuator at a speed of the slide."""
+
+    @property
+    def law(self) -> FrictionLaw:
+        """The friction law."""
+        return self.drive.friction
 
 
 class DriveSystem(HybridSystem):
@@ -170,43 +199,26 @@ class DriveSystem(HybridSystem):
         the reaction exceeds the limit against backward, and against forward slip. Then come those
         of the law, and that of a load that may lift the slide.
         """
-        kind = type(self)
-        state, _, inputs, all_switches, time = self.symbols
-        symbolic = self._symbolic
-        drive, law = symbolic.drive, symbolic.drive.friction
-        switches, sign = self._by_part(all_switches), all_switches[0]
-        x, y = state[POSITION], state[SPEED]
-        memory = state[MEMORY : self.control_states.start]
-        own, lagging = state[self.control_states], state[self.actuator_states]
-        force = inputs[0]
-        part_rates = ()
-        if symbolic.control is not None:
-            force = symbolic.control.control_force(x, y, own)
-            part_rates = tuple(symbolic.control.state_rates(x, y, own))
-        if self.has_actuator:
-            part_rates += tuple(drive.actuator.state_rates(inputs[0], lagging))
-            if symbolic.control is None:
-                force = drive.actuator.force(inputs[0], lagging) + inputs[1]
-        belt_speed = equations.belt_speed(drive, time, switches.belt)
-        normal = equations.normal_force(drive, time, switches.load)
-        reaction = equations.reaction(drive, x, y, force)
+        kind, parts = type(self), self._expressions
+        drive, law, switches, sign = parts.drive, parts.law, parts.switches, parts.sign
+        y, memory, normal = parts.speed, parts.memory, parts.normal
+        reaction, part_rates = parts.reaction(y), parts.part_rates(y)
         lifted: list[Guard] = []
         if self._may_lift:
             lifted.append(Guard(normal + _LIFT_ROUNDING, kind.lift))
         if name == STICK:
             forward, backward = law.limits
-            belt_acceleration = _by_time(drive, time, switches.belt, 0.0 * y)
-            held = reaction if self._steady else reaction + drive.mass * belt_acceleration
+            held = reaction if self._steady else reaction + drive.mass * parts.belt_acceleration
             return Flow(
-                rates=(y, belt_acceleration, *part_rates),
+                rates=(y, parts.belt_acceleration, *part_rates),
                 guards=(
                     Guard(normal * backward - held, kind.release_backward),
                     Guard(normal * forward + held, kind.release_forward),
                     *lifted,
                 ),
-                marks=self._marks_of_stick(y, belt_acceleration),
+                marks=self._marks_of_stick(y, parts.belt_acceleration),
             )
-        relative_speed = y - belt_speed
+        relative_speed = y - parts.belt_speed
         friction = normal * law.friction(relative_speed, sign, memory, switches.law)
         acceleration = equations.acceleration(drive, friction, reaction)
         margins = law.margins(relative_speed, sign, memory, switches.law)
@@ -379,14 +391,21 @@ class DriveSystem(HybridSystem):
 
         The relative speed, that is: courses change normal force and belt speed. heyoka chooses a
         step from the series at its start. It would miss an exponential that is negligible there and
-        rises before the step ends.
+        rises before the step ends. The steps of a law with a memory are shorter: they are limited
+        only where the exponential is negligible, or becomes so.
         """
         state = instant.state
         acceleration = (
             abs(self.reaction(instant)) + self._stiffness * abs(state[POSITION]) + abs(state[SPEED])
             + self._largest_friction + self._belt_acceleration
         )  # fmt: skip
-        return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
+        change = self._characteristic_speed
+        if not self.sticks and self._steady:
+            speed = abs(state[SPEED] - self.drive.belt_speed)
+            if speed < _VISIBLE * change:
+                return inf
+            change = max(change, speed - _NEGLIGIBLE * change)
+        return change / acceleration if acceleration > 0.0 else inf
 
     def overflow(self, mode: Mode, instant: Instant) -> Mode:
         """Set the speed at which a motion counts as unbounded: what overflows exceeds any speed."""
@@ -453,6 +472,42 @@ class DriveSystem(HybridSystem):
         """The drive with the equations of its courses, which are quicker than the courses."""
         drive = self.drive
         return replace(drive, belt=drive.belt.equations, load=drive.load.equations)
+
+    @cached_property
+    def _expressions(self) -> "_Expressions":
+        state, _, inputs, switches, time = self.symbols
+        drive, control = self._symbolic
+        own, lagging = state[self.control_states], state[self.actuator_states]
+        x = state[POSITION]
+
+        def force(speed: Any) -> Any:
+            if control is not None:
+                return control.control_force(x, speed, own)
+            if self.has_actuator:
+                return drive.actuator.force(inputs[0], lagging) + inputs[1]
+            return inputs[0]
+
+        def part_rates(speed: Any) -> tuple[Any, ...]:
+            of_control = () if control is None else control.state_rates(x, speed, own)
+            of_actuator = ()
+            if self.has_actuator:
+                of_actuator = drive.actuator.state_rates(inputs[0], lagging)
+            return (*of_control, *of_actuator)
+
+        parts = self._by_part(switches)
+        return _Expressions(
+            drive=drive,
+            switches=parts,
+            sign=switches[0],
+            position=x,
+            speed=state[SPEED],
+            memory=state[MEMORY : self.control_states.start],
+            belt_speed=equations.belt_speed(drive, time, parts.belt),
+            belt_acceleration=_by_time(drive, time, parts.belt, 0.0 * state[SPEED]),
+            normal=equations.normal_force(drive, time, parts.load),
+            reaction=lambda speed: equations.reaction(drive, x, speed, force(speed)),
+            part_rates=part_rates,
+        )
 
     @cached_property
     def _symbolic(self) -> _SymbolicDrive:

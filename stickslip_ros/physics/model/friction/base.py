@@ -4,13 +4,17 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
-from math import inf
+from math import inf, isinf
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from stickslip_ros.deprecated_names import Renamed
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import Scales, constant, scaled
+
+_SPEEDS = np.concatenate([[0.0], np.geomspace(1e-6, 1e6, 4001)])
+"""Speeds, in the characteristic one, at which the size of a law is asked for."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,8 @@ class FrictionLaw(ABC):
     """Unit of each state of the memory by name; empty for a static law."""
     switches: ClassVar[Sequence[str]] = ()
     """Names of the values that are constant in each mode of the law."""
+    undirected: ClassVar[Sequence[str]] = ()
+    """Constants that must be the same in both directions of slip: otherwise friction would jump."""
     inverse_speed_power: ClassVar[dict[str, int]] = {}
     """Power n of the unit (s/m)^n of constants without description: laws of version 0.1."""
 
@@ -224,6 +230,39 @@ class FrictionLaw(ABC):
         """
         return (0.0,) * len(self.states)
 
+    def memory_after(
+        self, relative_speed: float, memory: Sequence[float], duration: float
+    ) -> Sequence[float]:
+        """Return the memory after a duration at a constant relative speed.
+
+        With it a sampled controller follows the memory; see `FrictionObserver`.
+
+        Parameters
+        ----------
+        relative_speed : float
+            Speed v_r of the slide relative to the belt, m/s.
+        memory : sequence of float
+            Values of `states`.
+        duration : float
+            Duration, s.
+
+        Returns
+        -------
+        sequence of float
+            Values of `states`.
+
+        Raises
+        ------
+        InvalidInputError
+            If the law has a memory and does not define this.
+        """
+        if self.states:
+            raise InvalidInputError(
+                f"the friction law {self.name} does not say what its memory is after a duration: "
+                "it must define memory_after"
+            )
+        return ()
+
     def initial_memory(self, relative_speed: float) -> Sequence[float]:
         """Return the memory at the start of a motion.
 
@@ -282,6 +321,68 @@ class FrictionLaw(ABC):
             Coefficient with the sign of the force on the slide, dimensionless.
         """
         return self.coefficient(-belt_speed, -np.sign(belt_speed))
+
+    @property
+    def dry(self) -> Self:
+        """The law without its viscous part, the constant `viscous`."""
+        return replace(self, viscous=0.0) if "viscous" in self.constants() else self
+
+    @property
+    def size_range(self) -> tuple[float, float]:
+        """Smallest and largest |mu| in steady slip at any speed."""
+        speeds = _SPEEDS * (1.0 if isinf(self.characteristic_speed) else self.characteristic_speed)
+        signs = np.ones(speeds.shape)
+        sizes = [
+            -sign * self.coefficient(sign * speeds, sign * signs) for sign in (1.0, -1.0)
+        ]  # fmt: skip
+        return float(np.min(sizes)), float(np.max(sizes))
+
+    @property
+    def rate_sensitivity(self) -> Any:
+        """Increase of |mu| where the speed grows e-fold at constant memory, in creep.
+
+        Zero for a law without creep. Any other law has a viscosity that grows without bound as the
+        slide slows down; it must define `creep_speed` and `creep_limit`.
+        """
+        return 0.0
+
+    def creep_speed(self, coefficient: Any, sign: Any, memory: Sequence[Any]) -> Any:
+        """Return the relative speed at which friction has a coefficient: the inverse of `friction`.
+
+        Parameters
+        ----------
+        coefficient : float or expression
+            Coefficient with the sign of the force on the slide, dimensionless.
+        sign : float or expression
+            sgn(v_r), -1 or 1.
+        memory : sequence of float or expression
+            Values of `states`.
+
+        Returns
+        -------
+        float or expression
+            Speed v_r of the slide relative to the belt, m/s.
+        """
+        raise NotImplementedError
+
+    def creep_limit(self, relative_speed: Any, sign: Any, memory: Sequence[Any]) -> Any:
+        """Return `rate_sensitivity` divided by the viscosity -d mu/d v_r.
+
+        Parameters
+        ----------
+        relative_speed : float or expression
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float or expression
+            sgn(v_r), -1 or 1.
+        memory : sequence of float or expression
+            Values of `states`.
+
+        Returns
+        -------
+        float or expression
+            Speed, m/s, above zero; |v_r| where the coefficient is logarithmic.
+        """
+        raise NotImplementedError
 
     sudden_speed = Renamed("characteristic_speed")
 

@@ -214,6 +214,27 @@ class Directional(FrictionLaw):
         """
         return self._of(relative_speed, lambda law: law.initial_memory(relative_speed))
 
+    def memory_after(
+        self, relative_speed: float, memory: Sequence[float], duration: float
+    ) -> Sequence[float]:
+        """Return the memory after a duration; see `FrictionLaw.memory_after`."""
+        return self._of(
+            relative_speed, lambda law: law.memory_after(relative_speed, memory, duration)
+        )
+
+    @property
+    def rate_sensitivity(self) -> Any:
+        """The smaller one of both laws."""
+        return min(self.forward.rate_sensitivity, self.reverse.rate_sensitivity)
+
+    def creep_speed(self, coefficient: Any, sign: Any, memory: Sequence[Any]) -> Any:
+        """Return the speed in creep; see `FrictionLaw.creep_speed`."""
+        return self._of(sign, lambda law: law.creep_speed(coefficient, sign, memory))
+
+    def creep_limit(self, relative_speed: Any, sign: Any, memory: Sequence[Any]) -> Any:
+        """Return a measure of the viscosity; see `FrictionLaw.creep_limit`."""
+        return self._of(sign, lambda law: law.creep_limit(relative_speed, sign, memory))
+
     def refusal(self) -> str | None:
         """Return the refusal of either law; see `FrictionLaw.refusal`.
 
@@ -226,6 +247,10 @@ class Directional(FrictionLaw):
         if refusal is not None:
             return refusal
         refusal = self.reverse.refusal()
+        for name in self.forward.undirected:
+            ahead, back = (getattr(law, name) for law in (self.forward, self.reverse))
+            if ahead != back:
+                return f"reverse.{name} = {back} must equal {name} = {ahead}"
         names = "|".join(self.reverse.constants())
         return refusal and re.sub(rf"\b({names})(?= = )", r"reverse.\1", refusal)
 

@@ -64,6 +64,11 @@ class Exponential(FrictionLaw):
             decay = exp(-power(speed / self.decay_speed, self.exponent))
         return -sign * (self.kinetic + drop * decay + self.viscous * speed)
 
+    @property
+    def size_range(self) -> tuple[float, float]:
+        """The kinetic and the static coefficient; with a viscous part see the base class."""
+        return (self.kinetic, self.static) if self.viscous == 0.0 else super().size_range
+
     def refusal(self) -> str | None:
         """Refuse a kinetic coefficient above the static one, and a drop that is nearly a step.
 

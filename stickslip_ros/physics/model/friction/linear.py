@@ -1,6 +1,7 @@
 """The linear law."""
 
 from dataclasses import dataclass
+from math import copysign, inf
 from typing import Any, ClassVar
 
 from stickslip_ros.physics.model.constants import constant
@@ -38,3 +39,9 @@ class Linear(FrictionLaw):
             Coefficient, dimensionless.
         """
         return -self.static * sign + self.slope * relative_speed
+
+    @property
+    def size_range(self) -> tuple[float, float]:
+        """The static coefficient, and an infinite one in the direction of the slope."""
+        ends = sorted([self.static, -copysign(inf, self.slope)])
+        return ends[0], ends[1]

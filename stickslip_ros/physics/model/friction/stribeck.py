@@ -1,6 +1,7 @@
 """The cubic Stribeck law of the paper."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any, ClassVar
 
 from stickslip_ros.physics.model.constants import constant
@@ -46,6 +47,11 @@ class Stribeck(FrictionLaw):
         drop = self.static - self.minimum
         ratio = relative_speed / self.minimum_speed
         return -self.static * sign + drop / 2.0 * (3.0 * ratio - ratio * ratio * ratio)
+
+    @property
+    def size_range(self) -> tuple[float, float]:
+        """The smallest coefficient; the largest one is infinite."""
+        return self.minimum, inf
 
     def refusal(self) -> str | None:
         """Refuse a smallest coefficient above the static one; see `FrictionLaw.refusal`.

@@ -160,6 +160,12 @@ class Table(FrictionLaw):
         lower, upper, *_ = switches
         return self._piece(upper) if margin else self._piece(nextafter(lower, 0.0))
 
+    @property
+    def size_range(self) -> tuple[float, float]:
+        """The extremes of the points: between them the table is monotone."""
+        sizes = [size for _, size in self.points]
+        return min(sizes), max(sizes)
+
     def refusal(self) -> str | None:
         """Refuse points that make no table; see `FrictionLaw.refusal`.
 

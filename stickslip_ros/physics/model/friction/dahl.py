@@ -1,0 +1,75 @@
+"""Dahl's law."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import exp
+from typing import Any, ClassVar
+
+from stickslip_ros.physics.model.constants import constant
+from stickslip_ros.physics.model.friction.base import FrictionLaw
+
+
+@dataclass(frozen=True)
+class Dahl(FrictionLaw):
+    """Dahl's law: z' = v_r - S |v_r| z / mu_s, mu = -S z.
+
+    The contact is a spring that yields, so that friction lags behind a change of direction. P. Dahl,
+    A Solid Friction Model, Aerospace Corporation TOR-0158(3107-18)-1, 1968.
+
+    Steady friction is mu_s at every speed: no falling part, and therefore no vibration by itself.
+    Friction depends on the path and not on time: a load below break-away does not creep, but every
+    cycle of a load with a bias leaves a drift.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.model.friction import Dahl
+    >>> law = Dahl(static=0.4, bristle_stiffness=1000.0)
+    >>> law.friction(0.1, 1.0, (2e-4,), ())
+    -0.2
+    """
+
+    name: ClassVar[str] = "dahl"
+    states: ClassVar[Mapping[str, str | None]] = {"z": "m"}
+    undirected: ClassVar[Sequence[str]] = ("bristle_stiffness",)
+
+    bristle_stiffness: Any = constant(
+        1000.0, "Stiffness S of the contact, per unit of normal force.", "1/m", positive=True
+    )
+
+    def coefficient(self, relative_speed: Any, sign: Any) -> Any:
+        """Return mu(v_r) = -mu_s s in steady slip; see `FrictionLaw.coefficient`."""
+        return -self.static * sign + 0.0 * relative_speed
+
+    @property
+    def size_range(self) -> tuple[float, float]:
+        """The static coefficient, twice."""
+        return self.static, self.static
+
+    def friction(
+        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
+    ) -> Any:
+        """Return -S z; see `FrictionLaw.friction`."""
+        return -self.bristle_stiffness * memory[0]
+
+    def memory_rates(
+        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
+    ) -> Sequence[Any]:
+        """Return z'; see `FrictionLaw.memory_rates`."""
+        share = self.bristle_stiffness * memory[0] / self.static
+        return (relative_speed - sign * relative_speed * share,)
+
+    def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
+        """Return s mu_s / S; see `FrictionLaw.memory_at`."""
+        return (sign * self.static / self.bristle_stiffness,)
+
+    def memory_after(
+        self, relative_speed: float, memory: Sequence[float], duration: float
+    ) -> Sequence[float]:
+        """Return z, which approaches that of steady slip; see `FrictionLaw.memory_after`."""
+        (steady,) = self.memory_at(relative_speed, 1.0 if relative_speed > 0.0 else -1.0)
+        path = abs(relative_speed) * duration
+        return (steady + (memory[0] - steady) * exp(-path / abs(steady)),)
+
+    def refusal(self) -> str | None:
+        """Refuse a coefficient of zero; see `FrictionLaw.refusal`."""
+        return None if self.static > 0.0 else f"static = {self.static} must be above 0"
