@@ -203,9 +203,6 @@ class DriveSystem(HybridSystem):
         drive, law, switches, sign = parts.drive, parts.law, parts.switches, parts.sign
         y, memory, normal = parts.speed, parts.memory, parts.normal
         reaction, part_rates = parts.reaction(y), parts.part_rates(y)
-        lifted: list[Guard] = []
-        if self._may_lift:
-            lifted.append(Guard(normal + _LIFT_ROUNDING, kind.lift))
         if name == STICK:
             forward, backward = law.limits
             held = reaction if self._steady else reaction + drive.mass * parts.belt_acceleration
@@ -214,14 +211,13 @@ class DriveSystem(HybridSystem):
                 guards=(
                     Guard(normal * backward - held, kind.release_backward),
                     Guard(normal * forward + held, kind.release_forward),
-                    *lifted,
+                    *self._lifted(),
                 ),
                 marks=self._marks_of_stick(y, parts.belt_acceleration),
             )
         relative_speed = y - parts.belt_speed
         friction = normal * law.friction(relative_speed, sign, memory, switches.law)
         acceleration = equations.acceleration(drive, friction, reaction)
-        margins = law.margins(relative_speed, sign, memory, switches.law)
         return Flow(
             rates=(
                 y,
@@ -234,11 +230,21 @@ class DriveSystem(HybridSystem):
                 # The slide diverges in the direction of the slip. The margin is of the order of
                 # one, since heyoka's error is relative to the largest of states and events.
                 Guard(1.0 - sign * y / UNBOUNDED_SPEED, kind.diverge),
-                *_guards(margins, kind.switch_friction),
-                *lifted,
+                *self._guards_of_parts(relative_speed),
             ),
             marks=(y, acceleration),
         )
+
+    def _guards_of_parts(self, relative_speed: Any) -> list[Guard]:
+        """Return the guards of the law, and of a load that may lift the slide."""
+        parts = self._expressions
+        margins = parts.law.margins(relative_speed, parts.sign, parts.memory, parts.switches.law)
+        return [*_guards(margins, type(self).switch_friction), *self._lifted()]
+
+    def _lifted(self) -> list[Guard]:
+        if not self._may_lift:
+            return []
+        return [Guard(self._expressions.normal + _LIFT_ROUNDING, type(self).lift)]
 
     def _marks_of_stick(self, speed: Any, acceleration: Any) -> tuple[Any, ...]:
         if self._steady:

@@ -6,7 +6,7 @@ variational equations and the jumps of the derivatives at a guard.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
 from typing import Any, NamedTuple
@@ -65,6 +65,11 @@ class Flow:
     guards: tuple[Guard, ...]
     marks: tuple[Any, ...] = ()
     """Expressions at whose zeros a recorded motion has breakpoints."""
+    slaved: Mapping[int, Any] = field(default_factory=dict[int, Any])
+    """Expressions of states, by index, that follow from the others; `HybridSystem.slave` sets them.
+
+    Their rates are zero, and nothing of the flow depends on them.
+    """
 
     @cached_property
     def leads(self) -> tuple[Leads, ...]:
@@ -154,6 +159,12 @@ class HybridSystem(ABC):
         heyoka finds the first guard of several at one instant; rounding may put the others behind.
         """
         return mode
+
+    slaves = False
+    """Whether a flow has slaved states, see `Flow`."""
+
+    def slave(self, mode: Mode, instant: Instant) -> None:  # noqa: B027 - none by default
+        """Set the slaved states of a mode, if it has any."""
 
     limits_steps = False
     """Whether `longest_step` limits the steps of the integration."""

@@ -6,6 +6,7 @@ from math import copysign, ulp
 from stickslip_ros.physics.model import equations
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.course import NoCourse
+from stickslip_ros.physics.model.creeping_drive import CreepingDrive
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import (
     POSITION,
@@ -159,4 +160,6 @@ def drive_system(drive: Drive, control: ContinuousControl | None = None) -> Driv
     law, courses = drive.friction, (drive.belt, drive.load)
     constant = all(isinstance(course, NoCourse) for course in courses)
     plain = constant and not law.states and not law.switches and not drive.actuator.states
-    return PlainDriveSystem(drive, control) if plain else DriveSystem(drive, control)
+    if plain:
+        return PlainDriveSystem(drive, control)
+    return (CreepingDrive if law.rate_sensitivity else DriveSystem)(drive, control)

@@ -122,6 +122,7 @@ class HybridMotion:
             self._enter(mode)
         epoch, now = instant.time, 0.0
         limits_steps, clocked, has_parts = system.limits_steps, self._clocked, system.has_parts
+        slaves = system.slaves
         while now < duration:
             end, corner = duration, self._corner - epoch
             if corner < end:
@@ -158,6 +159,9 @@ class HybridMotion:
                         guard, now = _DIVERGED, taylor.time
                     else:
                         guard, now = -outcome - 1, taylor.time
+            if slaves:
+                instant.time = epoch + now
+                system.slave(mode, instant)
             if guard is None:
                 following = mode
                 if now >= corner:

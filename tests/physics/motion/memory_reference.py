@@ -12,7 +12,7 @@ interpolation nor a kink of the equations costs accuracy.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from math import asinh, exp, log, pi, sin
+from math import asinh, exp, floor, log, pi, sin
 from typing import Any
 
 import numpy as np
@@ -132,7 +132,11 @@ class MaxwellSlip(Law):
 
 @dataclass(frozen=True)
 class RateState:
-    """The memory is the age th, s, as its logarithm."""
+    """The memory is the age th, s, as its logarithm.
+
+    The second number of a mode counts the factors of a thousand by which the speed has fallen: near
+    zero the steps of a solver are shorter than the rounding of a time that starts earlier.
+    """
 
     kinetic: float
     direct: float
@@ -148,10 +152,17 @@ class RateState:
         return [exp(-z[0]) - mode[0] * v / self.distance]
 
     def mode(self, s: float, v: float, z: Sequence[float]) -> Mode:
-        return (s,)
+        fallen = log(1e-3 * self.distance / max(s * v, 1e-300)) / log(1e3)
+        return (s, float(min(max(floor(fallen) + 1, 0), 6)))
 
     def guards(self, v: float, z: Sequence[float], mode: Mode) -> list[tuple[float, Mode]]:
-        return []
+        s, steps = mode
+        threshold = self.distance * 1e-3**steps * 1e-3  # of the order of a slow speed, in m/s
+        fallen = log(max(s * v, 1e-300) / threshold)
+        found = [(fallen, (s, steps + 1.0))] if steps < 6.0 else []
+        if steps:
+            found.append((log(3e4) - fallen, (s, steps - 1.0)))
+        return found
 
     def start(self, v: float) -> list[float]:
         return [log(self.distance / max(abs(v), self.reference))]
@@ -190,7 +201,8 @@ class MemoryDrive:
         v = velocity - self.belt_speed
         law = self.law(v)
         state = np.array([position, v, *law.start(v)])
-        self._atol = 1e-3 * self.rtol * np.array([self._length, self._speed, *self._scales(law)])
+        speed = 1e-20 if isinstance(law, RateState) else self._speed
+        self._atol = 1e-3 * self.rtol * np.array([self._length, speed, *self._scales(law)])
         if v == 0.0:
             mode = self._reversed(state)
         else:
@@ -240,7 +252,7 @@ class MemoryDrive:
         return self.solver(self._rates(mode), now, state, end, rtol=self.rtol, atol=atol, **options)
 
     def _advance(self, mode: Mode, now: float, end: float, state: Array) -> tuple[Array, Mode]:
-        while now < end:
+        while now < end * (1.0 - 1e-15):
             now, state, guard = self._phase(mode, now, end, state)
             if guard == 0:
                 state[1] = 0.0
@@ -253,8 +265,11 @@ class MemoryDrive:
     def _phase(
         self, mode: Mode, now: float, end: float, state: Array
     ) -> tuple[float, Array, int | None]:
+        begin, now, end = now, 0.0, end - now
         solver = self._solver(mode, now, state, end)
+        # A guard on which a phase starts is zero, to rounding.
         armed = np.array(self._guards(mode, state)) > 1e-13
+        armed[0] = state[1] != 0.0
         while solver.status == "running":
             failure = solver.step()
             if failure:
@@ -269,12 +284,12 @@ class MemoryDrive:
                     first = int(np.argmin(roots))
                     guard = int(crossed[first])
                     until, reached = self._reach(mode, solver, roots[first], guard)
-                    return until, reached, guard
+                    return begin + until, reached, guard
                 if np.any(~armed & (values < -1e-9)):
                     raise LostError(f"no departure at {time}")
                 armed |= values > 1e-13
                 last = time
-        return end, solver.y, None
+        return begin + end, solver.y, None
 
     def _root(self, mode: Mode, path: Any, guard: int, start: float, end: float) -> float:
         def value(time: float) -> float:
