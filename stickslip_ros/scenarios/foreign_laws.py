@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar, cast
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import Constant, constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
-from stickslip_ros.physics.model.friction import LAWS, FrictionLaw
+from stickslip_ros.physics.model.friction import LAWS, CurveFollower, FrictionLaw
 from stickslip_ros.scenarios.parameter_field import LARGEST, SMALLEST
 from stickslip_ros.scenarios.validation import ParameterGroup
 
@@ -72,8 +72,9 @@ class LawFamily(Generic[_Law]):
         if not is_dataclass(law) or "__dataclass_fields__" not in vars(law):
             raise InvalidInputError("is no dataclass: must have @dataclass(frozen=True)")
         constants = constants_of(law)
+        described = {*constants, "curve"} if issubclass(law, CurveFollower) else constants
         for each in law.constants():
-            if each not in constants:
+            if each not in described:
                 raise InvalidInputError(f"does not describe its constant {each} by `constant`")
         for constant in constants.values():
             self._check_constant(constant)
@@ -120,7 +121,7 @@ FRICTION_LAWS = LawFamily(
     "stickslip_ros.friction_laws",
     FrictionLaw,
     LAWS,
-    reserved={"law", "as_law", "file", "reverse", *dir(ParameterGroup)},
+    reserved={"law", "curve", "as_law", "file", "reverse", *dir(ParameterGroup)},
     one_namespace=True,
 )
 CONTROLLERS = LawFamily(

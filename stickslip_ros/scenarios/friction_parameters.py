@@ -17,7 +17,13 @@ from pydantic import (
 )
 
 from stickslip_ros.physics.model.constants import Constant, constants_of
-from stickslip_ros.physics.model.friction import LAWS, Directional, FrictionLaw, Table
+from stickslip_ros.physics.model.friction import (
+    LAWS,
+    CurveFollower,
+    Directional,
+    FrictionLaw,
+    Table,
+)
 from stickslip_ros.scenarios.constant_field import field_of
 from stickslip_ros.scenarios.curve_file import Pairs, read_curve
 from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, add_laws_of_other_packages
@@ -27,6 +33,23 @@ from stickslip_ros.text import shown
 
 _AS_FORWARD = nan
 """Value of a constant of backward slip that is the one of forward slip."""
+
+
+def _known_curve(name: str) -> str:
+    if name in _known_curves():
+        return name
+    if _known_law(name):
+        raise refused(f"law {name} has a memory: a curve must be a static law")
+    return name
+
+
+def _known_curves() -> list[str]:
+    """Return the names of the laws that a law with a memory can follow."""
+    return [
+        name
+        for name, law in LAWS.items()
+        if not law.states and not issubclass(law, CurveFollower)
+    ]
 
 
 def _known_law(name: str) -> str:
@@ -44,7 +67,9 @@ def _constants_of_laws(*, reverse: bool = False) -> dict[str, Any]:
     constants: dict[str, Constant] = {}
     for law in LAWS.values():
         for name, constant in constants_of(law).items():
-            if isinstance(constant.default, tuple) or (constant.whole and reverse):
+            if isinstance(constant.default, tuple):
+                continue
+            if reverse and (constant.whole or name in law.undirected):
                 continue
             constants.setdefault(name, constant)
             laws.setdefault(name, []).append(law.name)
@@ -96,6 +121,12 @@ class _ChosenLaw(ParameterGroup):
     law: Annotated[str, AfterValidator(_known_law)] = field(
         "stribeck", "Friction law.", choices=LAWS
     )
+    curve: Annotated[str, AfterValidator(_known_curve)] = field(
+        "exponential",
+        "Static law that a law with a memory has in steady slip "
+        f"({', '.join(name for name, law in LAWS.items() if issubclass(law, CurveFollower))}).",
+        choices=_known_curves(),
+    )
 
 
 class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_laws())):
@@ -109,16 +140,16 @@ class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_l
     @model_validator(mode="after")
     def _constants_fit_together(self, info: ValidationInfo) -> Self:
         """Refuse constants that the law refuses, under their names as parameters."""
-        kind = LAWS[self.law]
-        if issubclass(kind, Table) and not self.file:
-            raise ValueError(
-                f"friction.file = {shown(self.file)} is refused: must be the path of a CSV file "
-                f"for law {self.law}"
-            )
-        law = kind(**self._constants(self, "friction", info.context))
+        for kind in self._kinds():
+            if issubclass(kind, Table) and not self.file:
+                raise ValueError(
+                    f"friction.file = {shown(self.file)} is refused: must be the path of a CSV "
+                    f"file for law {kind.name}"
+                )
+        law = self._made(self._constants(self, "friction", info.context))
         reverse = self._constants(self.reverse, "friction.reverse", info.context)
         if reverse:
-            law = Directional(law, replace(law, **reverse))
+            law = Directional(law, self._made(reverse, law))
         refusal = law.refusal()
         if refusal is not None:
 
@@ -126,7 +157,7 @@ class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_l
                 own = "reverse." if match[1] and match[2] in reverse else ""
                 return f"friction.{own}{match[2]} = "
 
-            names = "|".join(kind.constants())
+            names = "|".join(name for kind in self._kinds() for name in kind.constants())
             raise ValueError(re.sub(rf"\b(reverse\.)?({names}) = ", parameter, refusal))
         self._law = law
         return self
@@ -141,25 +172,38 @@ class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_l
         Constants of backward slip that are not given are none of them, and no constant at a default
         that simplifies the equations.
         """
-        law = LAWS[self.law]
-        described = constants_of(law)
-        own = [
+        simple = {
             name
-            for name in law_parameters(law)
-            if not (
-                name in described
-                and described[name].simplifies
-                and getattr(self, name) == described[name].default
-            )
-        ]
+            for law in self._kinds()
+            for name, described in constants_of(law).items()
+            if described.simplifies and getattr(self, name) == described.default
+        }
+        own = [name for name in self._parameters() if name not in simple]
         return [*own, *(f"reverse.{name}" for name in self._given(self.reverse))]
+
+    def _kinds(self) -> list[type[FrictionLaw]]:
+        """Return the law, and the one that it follows if it follows one."""
+        law = LAWS[self.law]
+        return [law, LAWS[self.curve]] if issubclass(law, CurveFollower) else [law]
+
+    def _parameters(self) -> list[str]:
+        return [name for law in self._kinds() for name in law_parameters(law)]
+
+    def _made(self, values: dict[str, Any], law: FrictionLaw | None = None) -> FrictionLaw:
+        """Return the law with these constants, and others at their defaults or as in a `law`."""
+        kind, *curves = self._kinds()
+        values.pop("curve", None)
+        if curves:
+            (curve,) = curves
+            of_curve = {name: values.pop(name) for name in curve.constants() if name in values}
+            known = law.curve if isinstance(law, CurveFollower) else curve()
+            values["curve"] = replace(known, **of_curve)
+        return kind(**values) if law is None else replace(law, **values)
 
     def _given(self, group: "Friction | ReverseFriction") -> dict[str, Any]:
         """Return the values of a group for the parameters of the law, by name."""
         known = type(group).model_fields
-        values = {
-            name: getattr(group, name) for name in law_parameters(LAWS[self.law]) if name in known
-        }
+        values = {name: getattr(group, name) for name in self._parameters() if name in known}
         return {name: value for name, value in values.items() if value not in ("", _AS_FORWARD)}
 
     def _constants(

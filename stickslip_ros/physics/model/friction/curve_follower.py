@@ -1,12 +1,12 @@
 """The base class of the laws with a memory whose steady friction is a static law."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
-from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
+from stickslip_ros.physics.model.friction.bristles import bristle_stiffness
 from stickslip_ros.physics.model.friction.exponential import Exponential
 
 
@@ -25,9 +25,7 @@ class CurveFollower(FrictionLaw):
 
     curve: FrictionLaw = Exponential()
     """Static law that the law follows in steady slip."""
-    bristle_stiffness: Any = constant(
-        1000.0, "Stiffness S of the contact, per unit of normal force.", "1/m", positive=True
-    )
+    bristle_stiffness: Any = bristle_stiffness()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "switches", (*self.own_switches, *self.curve.switches))
@@ -137,6 +135,10 @@ class CurveFollower(FrictionLaw):
             f"curve = {name} must be above 0 at every speed: without its viscous part it falls to "
             f"{least}"
         )
+
+    def scaled(self, speed: float, length: float = 1.0) -> Self:
+        """Return the same law, and its curve, in other units; see `FrictionLaw.scaled`."""
+        return replace(super().scaled(speed, length), curve=self.curve.scaled(speed, length))
 
     @cached_property
     def _dry(self) -> FrictionLaw:

@@ -2,11 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import exp
 from typing import Any, ClassVar
 
-from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
+from stickslip_ros.physics.model.friction.bristles import approached, bristle_stiffness
 
 
 @dataclass(frozen=True)
@@ -32,9 +31,7 @@ class Dahl(FrictionLaw):
     states: ClassVar[Mapping[str, str | None]] = {"z": "m"}
     undirected: ClassVar[Sequence[str]] = ("bristle_stiffness",)
 
-    bristle_stiffness: Any = constant(
-        1000.0, "Stiffness S of the contact, per unit of normal force.", "1/m", positive=True
-    )
+    bristle_stiffness: Any = bristle_stiffness()
 
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
         """Return mu(v_r) = -mu_s s in steady slip; see `FrictionLaw.coefficient`."""
@@ -67,8 +64,7 @@ class Dahl(FrictionLaw):
     ) -> Sequence[float]:
         """Return z, which approaches that of steady slip; see `FrictionLaw.memory_after`."""
         (steady,) = self.memory_at(relative_speed, 1.0 if relative_speed > 0.0 else -1.0)
-        path = abs(relative_speed) * duration
-        return (steady + (memory[0] - steady) * exp(-path / abs(steady)),)
+        return (approached(memory[0], steady, abs(relative_speed) * duration),)
 
     def refusal(self) -> str | None:
         """Refuse a coefficient of zero; see `FrictionLaw.refusal`."""

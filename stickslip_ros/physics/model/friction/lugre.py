@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import exp
 from typing import Any, ClassVar
 
 from stickslip_ros.physics.model.constants import constant
+from stickslip_ros.physics.model.friction.bristles import approached
 from stickslip_ros.physics.model.friction.curve_follower import CurveFollower
 
 
@@ -63,8 +63,7 @@ class LuGre(CurveFollower):
     ) -> Sequence[float]:
         """Return z, which approaches that of steady slip; see `FrictionLaw.memory_after`."""
         (steady,) = self.memory_at(relative_speed, 1.0 if relative_speed > 0.0 else -1.0)
-        path = abs(relative_speed) * duration
-        return (steady + (memory[0] - steady) * exp(-path / abs(steady)),)
+        return (approached(memory[0], steady, abs(relative_speed) * duration),)
 
     @property
     def passivity_margin(self) -> float:
