@@ -1,6 +1,9 @@
 """Report the measures and counts of a recorded run."""
 
+import json
 from collections.abc import Callable
+from contextlib import suppress
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +13,7 @@ from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.physics.measures.observer import RunObserver
 from stickslip_ros.physics.measures.run_meter import RunMeter
+from stickslip_ros.physics.model.friction import LAWS
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -80,6 +84,7 @@ def report_of_bag(
             window or _window_at_recording(recording),
             dropped_known=recording.dropped_known,
             observer=observer,
+            stick_speed=stick_speed_at_recording(recording),
         )
         run = _RunReader(meter, start, end, observer, take)
         # Measuring each chunk by itself would take twice as long.
@@ -173,6 +178,21 @@ class _RunReader:
     def _part(self, stamp: IntArray, first: int) -> BoolArray:
         since = stamp - first
         return (since >= self._start) & (since < self._end)
+
+
+def stick_speed_at_recording(recording: Recording) -> float | None:
+    """Return the stick speed for the samples of a recording, see `SampleMeter`."""
+    analyzer = recording.metadata("stickslip_ros/analyzer") or {}
+    plant = recording.metadata("stickslip_ros/plant") or {}
+    with suppress(KeyError, ValueError):
+        given = float(analyzer["stick_speed"])
+        if 0.0 <= given < inf:
+            return given
+    with suppress(KeyError, ValueError):
+        law = LAWS.get(json.loads(plant["friction.law"]))
+        if law is not None and law.states:
+            return None
+    return 0.0
 
 
 def _window_at_recording(recording: Recording) -> int:

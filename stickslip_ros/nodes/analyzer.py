@@ -88,7 +88,8 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def start(self) -> None:
         """Open a bag, start to measure, and subscribe last, so that no message is lost."""
-        self._meter = RunMeter(self.parameters.window)
+        given = self.parameters.given_stick_speed
+        self._meter = RunMeter(self.parameters.window, stick_speed=given or 0.0)
         self._cycles = self._newest_recorded = 0
         self._logged = ""
         self._bag_failure = ""
@@ -307,6 +308,9 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def _keep_parameters(self, node: str, values: Mapping[str, Any]) -> None:
         """Put the parameters of a node into the bag, and the curves in the files that they name."""
         self._keep(f"stickslip_ros/{node}", values)
+        if node == "plant":
+            law = values.get("friction.law", "")
+            self._meter.motion.stick_speed = self.parameters.stick_speed_of(law)
         known, curves = known_parameters(NODE_PARAMETERS[node]), dict[str, Pairs]()
         for name, path in values.items():
             if known[name].file and path and isinstance(path, str):

@@ -46,9 +46,7 @@ def _known_curve(name: str) -> str:
 def _known_curves() -> list[str]:
     """Return the names of the laws that a law with a memory can follow."""
     return [
-        name
-        for name, law in LAWS.items()
-        if not law.states and not issubclass(law, CurveFollower)
+        name for name, law in LAWS.items() if not law.states and not issubclass(law, CurveFollower)
     ]
 
 

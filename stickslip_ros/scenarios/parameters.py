@@ -22,6 +22,7 @@ from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.courses import CourseKind
 from stickslip_ros.physics.model.disturbance import Disturbance
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import LAWS
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.scenarios.constant_field import field_of, group_of
 from stickslip_ros.scenarios.course_parameters import (
@@ -45,6 +46,8 @@ _OF_DRIVE = [each.name for each in fields(Drive) if each.type is float]
 """Parameters of the plant that the drive takes unchanged."""
 _DEFAULTS = {each.name: each.default for each in fields(Drive)}
 """Defaults of the drive; only constants that may be absent have one."""
+_AUTOMATIC = -1.0
+"""Stick speed that is chosen by the friction law."""
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
 
@@ -354,6 +357,14 @@ class AnalyzerParameters(NodeParameters):
     window: int = field(
         20, "Number of cycles to average.", "cycles", fixed=Fixed.ACTIVE, ge=1, le=100_000
     )
+    stick_speed: float = field(
+        -1.0,
+        "Largest relative speed of a slide that sticks; -1: 0, or a hundredth of the belt speed "
+        "for friction with a memory.",
+        "m/s",
+        fixed=Fixed.ACTIVE,
+        ge=-1.0,
+    )
     flush_period: float = field(
         1.0,
         "Longest wall time until a recorded message is on disk.",
@@ -380,6 +391,27 @@ class AnalyzerParameters(NodeParameters):
     compression: Literal["lz4", "zstd", "none"] = field(
         "lz4", "Compression of the bag.", fixed=Fixed.ACTIVE, choices=("lz4", "zstd", "none")
     )
+
+    @model_validator(mode="after")
+    def _stick_speed_is_given_or_not(self) -> Self:
+        """Refuse a speed below zero other than -1."""
+        if self.stick_speed < 0.0 and self.stick_speed != _AUTOMATIC:
+            raise ValueError(
+                f"stick_speed = {self.stick_speed} m/s is refused: must be at least 0, or -1"
+            )
+        return self
+
+    @property
+    def given_stick_speed(self) -> float | None:
+        """The stick speed, m/s; None if it is automatic."""
+        return None if self.stick_speed == _AUTOMATIC else self.stick_speed
+
+    def stick_speed_of(self, law: str) -> float | None:
+        """Return the stick speed for samples of a slide with a friction law; see `SampleMeter`."""
+        known = LAWS.get(law)
+        remembers = known is not None and len(known.states) > 0
+        given = self.given_stick_speed
+        return 0.0 if given is None and not remembers else given
 
 
 class ReplayParameters(NodeParameters):

@@ -45,12 +45,14 @@ class MotionState:
     """Velocity, m/s."""
     control: tuple[float, ...] | None = None
     """State of the control law; None: its initial state."""
+    memory: tuple[float, ...] | None = None
+    """Memory of the friction law; None: its initial memory."""
 
     @classmethod
     def from_json(cls, values: Sequence[Any]) -> Self:
         """Return the state of the values of a tuple that went through JSON."""
-        position, velocity, control = values
-        return cls(position, velocity, None if control is None else tuple(control))
+        position, velocity, *parts = values
+        return cls(position, velocity, *(None if each is None else tuple(each) for each in parts))
 
 
 @dataclass(frozen=True)
@@ -174,6 +176,8 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) ->
     control = law.continuous if law is not None and case.sampled is None else None
     motion = RecordedMotion(drive, start.position, start.velocity, control)
     motion.recording = False
+    if start.memory is not None and len(start.memory) == len(drive.friction.states):
+        motion.restart(start.position, start.velocity, start.memory)
     motion.take_breakpoints()  # the start is not part of what is measured
     loads = drive.belt_speed != 0.0 and drive.has_spring
     loading = loading_time(drive) if loads else 0.0
@@ -233,7 +237,8 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) ->
     if controller is not None and loop is not None:
         answer(loop, controller)
         state = controller.state
-    return section.settled(MotionState(motion.position, motion.velocity, state))
+    end = MotionState(motion.position, motion.velocity, state, motion.memory)
+    return section.settled(end)
 
 
 def _start_control(

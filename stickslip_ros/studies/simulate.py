@@ -48,7 +48,11 @@ def simulate(
     law = scenario.control_law
     control = law.continuous if continuous and law is not None else None
     motion = RecordedMotion(
-        plant.as_drive(), plant.initial.position, plant.initial.velocity, control
+        plant.as_drive(),
+        plant.initial.position,
+        plant.initial.velocity,
+        control,
+        scenario.analyzer.given_stick_speed,
     )
     meter = CycleMeter(scenario.analyzer.window)
     if continuous:

@@ -48,6 +48,14 @@ class Breakpoints(Table):
         return cls(none, none, none, np.empty(0, dtype=bool))
 
 
+STICK_SHARE = 0.01
+"""Share of the belt speed up to which a slide sticks whose friction has a memory.
+
+Such a slide never has exactly the speed of the belt. On a belt at rest it is a share of the fastest
+relative speed so far.
+"""
+
+
 def sticks(velocity: FloatArray, belt_velocity: FloatArray, stick_speed: float = 0.0) -> BoolArray:
     """Return which samples stick: those with a relative speed of at most `stick_speed` (m/s).
 

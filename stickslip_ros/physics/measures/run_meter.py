@@ -20,7 +20,7 @@ class RunMeter:
         *,
         dropped_known: bool = False,
         observer: RunObserver | None = None,
-        stick_speed: float = 0.0,
+        stick_speed: float | None = 0.0,
     ) -> None:
         """Average over the last `window` cycles at most; an `observer` receives motion and forces.
 

@@ -6,7 +6,7 @@ from math import inf, isfinite
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.breakpoints import breakpoints_from_samples
+from stickslip_ros.physics.measures.breakpoints import STICK_SHARE, breakpoints_from_samples
 from stickslip_ros.physics.measures.cycle_measures import (
     UNBOUNDED_BELT_SPEEDS,
     Cycle,
@@ -29,18 +29,24 @@ class SampleMeter:
     """
 
     def __init__(
-        self, window: int, observer: MotionObserver | None = None, *, stick_speed: float = 0.0
+        self,
+        window: int,
+        observer: MotionObserver | None = None,
+        *,
+        stick_speed: float | None = 0.0,
     ) -> None:
         """Average over the last `window` cycles at most; an `observer` receives the motion.
 
         The slide sticks at a relative speed of at most `stick_speed` (m/s): 0 for exact samples,
-        otherwise less than the belt speed. Raises InvalidInputError if it is negative or not
-        finite.
+        otherwise less than the belt speed, and None for friction with a memory, see `STICK_SHARE`.
+        Raises InvalidInputError if it is negative or not finite.
         """
-        if not (isfinite(stick_speed) and stick_speed >= 0.0):
+        if stick_speed is not None and not (isfinite(stick_speed) and stick_speed >= 0.0):
             raise InvalidInputError(
                 f"stick_speed = {stick_speed} is refused: must be finite and at least 0 (m/s)"
             )
+        self.stick_speed = stick_speed
+        """Largest relative speed, m/s, of a slide that sticks, or None."""
         self.origin = 0
         """Stamp of time zero for the observer, ns."""
         self.samples = 0
@@ -48,12 +54,11 @@ class SampleMeter:
         self.steps_back = 0
         """Number of samples whose stamp is not later than the previous one."""
         self._observer = observer
-        self._stick_speed = stick_speed
         self._grid = SamplingGrid()
         self._meter = CycleMeter(window)
         self._last: SampleColumns | None = None
         self._elapsed = 0
-        self._fastest_belt = 0.0
+        self._fastest_belt = self._fastest_slip = 0.0
         # Highest speed above the limit at its sample: a belt that starts to move is slow at first.
         self._unbounded_speed = 0.0
 
@@ -112,7 +117,7 @@ class SampleMeter:
                 samples.position,
                 samples.velocity,
                 samples.belt_velocity,
-                stick_speed=self._stick_speed,
+                stick_speed=self._present_stick_speed(samples),
                 exact_times=not jittered,
             )
         if self._last is not None:
@@ -133,6 +138,13 @@ class SampleMeter:
                 )
             )
         return cycles
+
+    def _present_stick_speed(self, samples: SampleColumns) -> float:
+        if self.stick_speed is not None:
+            return self.stick_speed
+        slip = np.abs(samples.velocity - samples.belt_velocity)
+        self._fastest_slip = max(self._fastest_slip, float(slip.max()))
+        return STICK_SHARE * (self._fastest_belt or self._fastest_slip)
 
     def _look_for_unbounded(self, samples: SampleColumns) -> None:
         belt_speed = np.abs(samples.belt_velocity)

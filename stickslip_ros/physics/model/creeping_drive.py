@@ -28,7 +28,7 @@ _LEAVE = 2.0
 """Ratio of the speeds at which creep ends and begins."""
 
 _BEHIND = 1e-9
-"""Change of the speed, in that at which creep begins, of a slide that is too fast to creep there."""
+"""Change of the speed, in that at which creep begins, of a slide that is too fast for it."""
 
 _MOST_GROWTH = 8.0
 """Logarithm of the growth of the speed of creep in one step."""
@@ -56,7 +56,9 @@ class CreepingDrive(DriveSystem):
         self.constants = {**self.constants, "creep.limit": self._limit}
         self.limits_steps = True
         law, drive = self.drive.friction, self.drive
-        steepest = [each if each < inf else 0.0 for each in (drive.belt.steepest, drive.load.steepest)]
+        steepest = [
+            each if each < inf else 0.0 for each in (drive.belt.steepest, drive.load.steepest)
+        ]
         self._loading = self._stiffness * drive.fastest_belt + drive.damping * steepest[0]
         self._loading += float(law.static) * steepest[1]
 

@@ -173,6 +173,8 @@ class DriveSystem(HybridSystem):
             **numbers(load, "load"),
             **numbers(self.drive.actuator, "actuator"),
             **(numbers(self.control, "control") if self.control is not None else {}),
+            # Of a slide with a memory that counts as sticking; it has no part in the motion.
+            **({} if law.sticks else {"stick_speed": 0.0}),
         }
         self._friction = law.friction
         self.sticks = law.sticks
@@ -232,8 +234,15 @@ class DriveSystem(HybridSystem):
                 Guard(1.0 - sign * y / UNBOUNDED_SPEED, kind.diverge),
                 *self._guards_of_parts(relative_speed),
             ),
-            marks=(y, acceleration),
+            marks=(y, acceleration, *self._marks_of_slow_slip(relative_speed)),
         )
+
+    def _marks_of_slow_slip(self, relative_speed: Any) -> tuple[Any, ...]:
+        """Return where a slide that never sticks becomes slow or fast."""
+        if self.sticks:
+            return ()
+        slow = self.symbols.constants["stick_speed"]
+        return relative_speed - slow, relative_speed + slow
 
     def _guards_of_parts(self, relative_speed: Any) -> list[Guard]:
         """Return the guards of the law, and of a load that may lift the slide."""

@@ -65,6 +65,17 @@ class HybridMotion:
         self._prepared_by_detail: dict[Detail, dict[str, _Prepared]] = {}
         self._prepared = self._prepared_by_detail.setdefault(self._detail, {})
 
+    def _set_constant(self, name: str, value: float) -> None:
+        """Set a constant of the system, for this motion only."""
+        index = self._system.index[name]
+        if self._constants[index] == value:
+            return
+        self._constants[index] = value
+        for prepared in self._prepared_by_detail.values():
+            for flow, _ in prepared.values():
+                if flow is not None and index < len(flow.parameters):
+                    flow.parameters[index] = value
+
     def _set_detail(self, detail: Detail) -> None:
         """Continue with another detail."""
         self._detail, self._watched = detail, detail is not Detail.STATES

@@ -80,7 +80,9 @@ class Motion(HybridMotion):
         state = system.initial_state(position / drive.length_scale, velocity / drive.speed_scale)
         super().__init__(system, state, self._first_detail)
 
-    def restart(self, position: float, velocity: float) -> None:
+    def restart(
+        self, position: float, velocity: float, memory: Sequence[float] | None = None
+    ) -> None:
         """Set the state of the slide; forces and gains are kept, the controller is at rest.
 
         An actuator with states gives no force. The courses of belt and load continue.
@@ -91,11 +93,30 @@ class Motion(HybridMotion):
             Displacement of the slide, m.
         velocity : float
             Velocity of the slide, m/s.
+        memory : sequence of float, optional
+            Memory of the friction law, SI units, as in `memory`; by default its initial memory.
         """
         drive = self._drive
         x, y = position / drive.length_scale, velocity / drive.speed_scale
+        state = self._system.initial_state(x, y)
+        if memory is not None:
+            for number, (each, unit) in enumerate(zip(memory, self._memory_units, strict=True)):
+                state[MEMORY + number] = each / unit
         self._set_clock()
-        self._set_state(self._system.initial_state(x, y))
+        self._set_state(state)
+
+    @property
+    def memory(self) -> tuple[float, ...]:
+        """Memory of the friction law, SI units, in the order of its `states`."""
+        units = self._memory_units
+        own = self._instant.state[MEMORY : MEMORY + len(units)].tolist()
+        return tuple(each * unit for each, unit in zip(own, units, strict=True))
+
+    @property
+    def _memory_units(self) -> Sequence[float]:
+        """SI value of one, for each state of the memory."""
+        drive = self._drive
+        return [1.0 / drive.scales.factor(unit) for unit in drive.friction.states.values()]
 
     def restart_courses(self) -> None:
         """Start the courses of belt and load again, at their time zero; the slide moves on."""
@@ -287,17 +308,16 @@ class Motion(HybridMotion):
         position, velocity = self.position, self.velocity
         control_state = self.control_state
         lagging = self._instant.state[self._system.actuator_states].tolist()
-        x, y, *memory = self._instant.state.tolist()
-        law = drive.friction
+        x, y, *_ = self._instant.state.tolist()
+        memory, law, old_law = self.memory, drive.friction, old.friction
         self._drive, self._control = drive, control
         system = drive_system(drive, control)
         if drive.speed_scale != old.speed_scale or drive.length_scale != old.length_scale:
             x, y = position / drive.length_scale, velocity / drive.speed_scale
         state = system.initial_state(x, y)
-        if type(law) is type(old.friction):
-            for number, unit in enumerate(law.states.values()):
-                ratio = drive.scales.factor(unit) / old.scales.factor(unit)
-                state[MEMORY + number] = memory[number] * ratio
+        if (law.name, law.states) == (old_law.name, old_law.states):
+            for number, (each, unit) in enumerate(zip(memory, self._memory_units, strict=True)):
+                state[MEMORY + number] = each / unit
         if control is not None:
             state[system.control_states] = [
                 each / scale

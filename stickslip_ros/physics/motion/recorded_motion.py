@@ -1,15 +1,20 @@
 """A motion that records its breakpoints."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from stickslip_ros.deprecated_names import Renamed
-from stickslip_ros.physics.measures.breakpoints import Breakpoints
+from stickslip_ros.physics.measures.breakpoints import STICK_SHARE, Breakpoints
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import POSITION, SPEED, STICK
-from stickslip_ros.physics.model.hybrid import Mode
+from stickslip_ros.physics.model.hybrid import HybridSystem, Mode
 from stickslip_ros.physics.motion.compiled_flow import Detail
 from stickslip_ros.physics.motion.motion import Motion
+
+_ROUNDING = 1e-9
+"""Share of the speed at which a slide becomes slow that is rounding."""
 
 
 class RecordedMotion(Motion):
@@ -25,6 +30,10 @@ class RecordedMotion(Motion):
         Velocity of the slide at the start, m/s.
     control : ContinuousControl, optional
         Controller that acts without sampling; see `Motion`.
+    stick_speed : float, optional
+        Relative speed, m/s, up to which the slide sticks, for friction with a memory, where it
+        never has exactly the speed of the belt. By default it is a hundredth of the fastest belt
+        speed, or, on a belt at rest, of the fastest relative speed so far.
 
     Examples
     --------
@@ -50,23 +59,19 @@ class RecordedMotion(Motion):
         position: float,
         velocity: float,
         control: ContinuousControl | None = None,
+        stick_speed: float | None = None,
     ) -> None:
         self._recorded: list[tuple[float, float, float, bool]] = []
         self._breakpoint_time = 0.0
+        self._stick_speed, self._peak, self._was_slow = stick_speed, 0.0, False
         super().__init__(drive, position, velocity, control)
         self._append_present()
 
-    def restart(self, position: float, velocity: float) -> None:
-        """Set the state of the slide; see `Motion.restart`.
-
-        Parameters
-        ----------
-        position : float
-            Displacement of the slide, m.
-        velocity : float
-            Velocity of the slide, m/s.
-        """
-        super().restart(position, velocity)
+    def restart(
+        self, position: float, velocity: float, memory: Sequence[float] | None = None
+    ) -> None:
+        """Set the state of the slide; see `Motion.restart`."""
+        super().restart(position, velocity, memory)
         self._append_present()
 
     @property
@@ -102,12 +107,43 @@ class RecordedMotion(Motion):
             np.array(sticking),
         )
 
+    def advance(self, duration: float) -> None:
+        """Integrate over a duration; see `Motion.advance`."""
+        if not self._system.sticks:
+            self._set_stick_speed()
+        super().advance(duration)
+
+    def _use(self, system: HybridSystem) -> None:
+        super()._use(system)
+        if not self._system.sticks:
+            self._set_stick_speed()
+
+    def _set_stick_speed(self) -> None:
+        """Set the relative speed up to which a slide with a law that has a memory sticks."""
+        fastest = self._drive.fastest_belt
+        automatic = STICK_SHARE * (fastest / self._drive.speed_scale or self._peak)
+        given = self._stick_speed
+        self._slow = automatic if given is None else given / self._drive.speed_scale
+        self._set_constant("stick_speed", self._slow)
+
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
-        sticking, state = mode.flow == STICK, self._instant.state
-        if self._flow is not None:
-            for instant, x, y in self._flow.take_marks():
-                self._append(instant, x, y, sticking=sticking)
-        self._append(now, state[POSITION], state[SPEED], sticking=sticking)
+        state, sticks = self._instant.state, self._system.sticks
+        found = [] if self._flow is None else self._flow.take_marks()
+        found.append((now, state[POSITION], state[SPEED]))
+        for instant, x, y in found:
+            sticking = mode.flow == STICK if sticks else self._stays_slow(mode, instant, y)
+            self._append(instant, x, y, sticking=sticking)
+
+    def _stays_slow(self, mode: Mode, now: float, y: float) -> bool:
+        """Return whether the slide has been slow since the last breakpoint.
+
+        The marks of the flow are where it becomes slow, or fast, and its peaks.
+        """
+        time = (self._time - self._origin) * self._drive.angular_frequency + now
+        speed = abs(y - self._system.belt_speed(mode, time))
+        self._peak = max(self._peak, speed)
+        before, self._was_slow = self._was_slow, speed <= self._slow * (1.0 + _ROUNDING)
+        return before and self._was_slow
 
     def _append_present(self) -> None:
         if self.recording:

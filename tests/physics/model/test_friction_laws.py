@@ -1,8 +1,7 @@
 """The friction laws: properties of every law in `LAWS`, and values of those known here."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
-from functools import cache
+from dataclasses import replace
 from math import exp, inf
 from typing import Any
 
@@ -12,16 +11,21 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import Constant, constants_of
 from stickslip_ros.physics.model.friction import (
     LAWS,
     Coulomb,
+    CurveFollower,
     Exponential,
     FrictionLaw,
     Linear,
+    RateState,
     Stribeck,
     Table,
 )
+from stickslip_ros.physics.model.symbols import numbers, structure, with_symbols
+from tests.physics import parts
 
 STRIBECK = Stribeck(static=0.4, minimum=0.25, minimum_speed=0.5)
 COULOMB = Coulomb(static=0.4)
@@ -34,11 +38,15 @@ LARGEST = 10.0
 
 speeds = st.floats(-5.0, 5.0)
 signs = st.sampled_from([-1.0, 1.0])
+CURVES = (Stribeck, Coulomb, Exponential, Table)
+"""Laws that a law with a memory can follow; a linear one falls below zero."""
 every_law = pytest.mark.parametrize("kind", LAWS.values(), ids=LAWS)
 
 
 def values(constant: Constant) -> st.SearchStrategy[float]:
     """Values within the bounds of a constant."""
+    if constant.whole:
+        return st.integers(int(constant.at_least), 6)
     least = max(constant.at_least, 0.05 if constant.positive else -LARGEST)
     return st.just(constant.default) | st.floats(least, max(least, 0.0) + LARGEST)
 
@@ -50,6 +58,8 @@ def laws(draw: st.DrawFn, kind: type[FrictionLaw]) -> FrictionLaw:
     made: dict[str, Any] = {name: draw(values(constant)) for name, constant in described}
     if issubclass(kind, Table):
         made["points"] = draw(points())
+    if issubclass(kind, CurveFollower):
+        made["curve"] = draw(st.sampled_from(CURVES).flatmap(laws))
     law = kind(**made)
     assume(law.refusal() is None)
     return law
@@ -63,14 +73,25 @@ def points(draw: st.DrawFn) -> tuple[tuple[float, float], ...]:
     return tuple((speed, draw(st.floats(0.0, LARGEST))) for speed in speeds)
 
 
-@cache
-def compiled(kind: type[FrictionLaw]) -> Any:
-    """Friction as a function of speed, sign, constants and switches, compiled from its symbols."""
-    names = tuple(constants_of(kind))
-    speed, sign, *others = heyoka.make_vars("speed", "sign", *names, *kind.switches)
-    constants, switches = others[: len(names)], others[len(names) :]
-    law = kind(**dict(zip(names, constants, strict=True)))
-    return heyoka.cfunc([law.friction(speed, sign, (), switches)], [speed, sign, *others])
+_compiled: dict[Any, Any] = {}
+
+
+def compiled(law: FrictionLaw) -> Any:
+    """Friction and the rates of the memory, compiled from symbols for laws of a structure.
+
+    They are functions of speed, sign, memory, switches and constants.
+    """
+    key = structure(law)
+    if key not in _compiled:
+        names = (*law.states, *law.switches, *numbers(law, "law"))
+        speed, sign, *others = heyoka.make_vars("speed", "sign", *names)
+        symbols = dict(zip(names, others, strict=True))
+        symbolic = with_symbols(law, "law", symbols)
+        memory, switches = ([symbols[name] for name in each] for each in (law.states, law.switches))
+        arguments = (speed, sign, memory, switches)
+        results = [symbolic.friction(*arguments), *symbolic.memory_rates(*arguments)]
+        _compiled[key] = heyoka.cfunc(results, [speed, sign, *others])
+    return _compiled[key]
 
 
 # The cubic has a = 3 (0.4 - 0.25) / (2 0.5) = 0.45 and b = (0.4 - 0.25) / (2 0.5^3) = 0.6.
@@ -108,15 +129,16 @@ def test_stribeck_friction_is_smallest_at_the_minimum_speed(speed: float) -> Non
 @every_law
 def test_a_law_is_found_by_its_name_and_made_from_its_constants(kind: type[FrictionLaw]) -> None:
     law = kind()
-    assert LAWS[law.name](**asdict(law)) == law
-    assert law.constants()[0] == "static" or isinstance(law, Table)
+    made = {name: getattr(law, name) for name in law.constants()}
+    assert LAWS[law.name](**made) == law
 
 
 @every_law
 def test_every_constant_is_described(kind: type[FrictionLaw]) -> None:
     described = constants_of(kind)
-    data = ("static", "points") if issubclass(kind, Table) else ()
-    assert (*described, *data) == kind.constants()
+    data = {"static", "points"} if issubclass(kind, Table) else set()
+    curve = {"curve"} if issubclass(kind, CurveFollower) else set()
+    assert {*described, *data, *curve} == set(kind.constants())
     for constant in described.values():
         assert constant.meaning.endswith(".")
         assert constant.at_least <= constant.default < inf
@@ -175,6 +197,7 @@ def test_friction_with_equal_limits_is_odd(
     law = data.draw(laws(kind))
     forward, backward = law.limits
     assume(forward == backward)
+    assume(law.sticks or speed * sign > 0.0)
     assert law.coefficient(-speed, -sign) == -law.coefficient(speed, sign)
 
 
@@ -189,6 +212,7 @@ def test_scaled_law_gives_the_same_coefficient(
     length: float,
 ) -> None:
     law = data.draw(laws(kind))
+    assume(law.sticks or speed * sign >= 0.0)  # a memory of steady slip has its direction
     assert law.scaled(unit, length).coefficient(speed / unit, sign) == pytest.approx(
         law.coefficient(speed, sign), rel=1e-12, abs=1e-12
     )
@@ -214,22 +238,29 @@ def test_arrays_and_symbols_give_what_numbers_give(
         float(law.coefficient(float(speed), float(sign)))
         for speed, sign in zip(relative_speeds, directions, strict=True)
     ]
-    constants = [np.full(len(directions), getattr(law, name)) for name in constants_of(kind)]
-    pieces = np.array(
-        [law.switches_at(*each, ()) for each in zip(relative_speeds, directions, strict=True)]
-    )
-    of_symbols = compiled(kind)(np.array([relative_speeds, directions, *constants, *pieces.T]))[0]
     close = {"rtol": 1e-14, "atol": 1e-14 * largest_term(law)}
     np.testing.assert_allclose(law.coefficient(relative_speeds, directions), one_by_one, **close)
-    if kind is Exponential:  # a power of a symbol keeps 1e-12 away from zero
-        close["atol"] *= 100.0
-    np.testing.assert_allclose(of_symbols, one_by_one, **close)
+    constants = list(numbers(law, "law").values())
+    # A power of a symbol keeps 1e-12 away from zero. Bristles are stiff.
+    close["atol"] *= 100.0 * (1.0 + getattr(law, "bristle_damping", 0.0))
+    for speed, sign in zip(relative_speeds.tolist(), directions.tolist(), strict=True):
+        share = data.draw(st.floats(-1.2, 1.2))
+        memory = [share * each for each in law.memory_at(speed, sign)]
+        switches = law.switches_at(speed, sign, memory)
+        friction, *rates = compiled(law)(np.array([speed, sign, *memory, *switches, *constants]))
+        expected = law.memory_rates(speed, sign, memory, switches)
+        assert friction == pytest.approx(law.friction(speed, sign, memory, switches), **_of(close))
+        assert rates == pytest.approx(list(expected), **_of(close))
+
+
+def _of(tolerance: dict[str, float]) -> dict[str, float]:
+    return {"rel": tolerance["rtol"], "abs": tolerance["atol"]}
 
 
 def largest_term(law: FrictionLaw) -> float:
     """Size of what may cancel in a coefficient at speeds below 5 m/s."""
     of_speeds = law.coefficient(np.array([-5.0, -1.0, 1.0, 5.0]), np.array([-1.0, -1.0, 1.0, 1.0]))
-    constants = (abs(getattr(law, name)) for name in constants_of(type(law)))
+    constants = map(abs, numbers(law, "law").values())
     return max(1.0, *np.abs(of_speeds).tolist(), *constants)
 
 
@@ -248,3 +279,48 @@ def test_memory_and_switches_have_the_length_that_their_names_give(
     margins: Sequence[Any] = law.margins(speed, sign, memory, switches)
     for index in range(len(margins)):
         assert len(law.switches_after(index, sign, switches)) == len(law.switches)
+
+
+@pytest.mark.parametrize("kind", [law for law in LAWS.values() if law.states])
+@given(st.data(), st.floats(1e-3, 1.0), signs, st.floats(-1.0, 1.0), st.floats(1e-3, 3.0))
+def test_the_memory_after_a_duration_is_the_solution_of_its_rates(
+    kind: type[FrictionLaw],
+    data: st.DataObject,
+    speed: float,
+    sign: float,
+    share: float,
+    part: float,
+) -> None:
+    law = data.draw(laws(kind))
+    relative_speed = sign * speed
+    start = [share * each for each in law.memory_at(relative_speed, sign)]
+    duration, scale = part * memory_time(law, speed), memory_scale(law, relative_speed)
+    found = law.memory_after(relative_speed, start, duration)
+    halfway = law.memory_after(relative_speed, start, 0.5 * duration)
+    again = law.memory_after(relative_speed, halfway, 0.5 * duration)
+    np.testing.assert_allclose(np.array(again) / scale, np.array(found) / scale, atol=2e-7)
+    step = 1e-6 * duration
+    slope = (np.array(law.memory_after(relative_speed, start, step)) - start) / step
+    switches = law.switches_at(relative_speed, sign, start)
+    rates = np.array(law.memory_rates(relative_speed, sign, start, switches))
+    unit = scale / duration
+    np.testing.assert_allclose(slope / unit, rates / unit, rtol=1e-3, atol=1e-3)
+
+
+def memory_time(law: FrictionLaw, speed: float) -> float:
+    """Time in which the memory changes at a speed, s."""
+    if isinstance(law, RateState):
+        return law.slip_distance / speed
+    return float(np.abs(law.memory_at(speed, 1.0)).max()) / speed
+
+
+def memory_scale(law: FrictionLaw, relative_speed: float) -> Any:
+    """Change of the memory that counts."""
+    if isinstance(law, RateState):
+        return 1.0
+    return np.abs(law.memory_at(relative_speed, 1.0)) + 1e-300
+
+
+def test_the_memory_of_a_law_that_does_not_say_it_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="dahl does not say what its memory is"):
+        parts.Dahl().memory_after(0.1, (0.0,), 1.0)

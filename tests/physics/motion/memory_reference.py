@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import DOP853, Radau
+from scipy.integrate import Radau
 from scipy.optimize import brentq
 
 Array = npt.NDArray[np.float64]
@@ -302,10 +302,9 @@ class MemoryDrive:
         return float(brentq(value, start, end, xtol=1e-300, rtol=1e-15))
 
     def _reach(self, mode: Mode, solver: Any, time: float, guard: int) -> tuple[float, Array]:
-        """Return the time at which a guard is zero, and the state, integrated from the last step."""
-        start, state = solver.t_old, solver.y_old if hasattr(solver, "y_old") else None
-        if state is None:
-            state = solver.dense_output()(start)
+        """Return the time at which a guard is zero, and the state, integrated up to there."""
+        start = solver.t_old
+        state = solver.dense_output()(start)
         rates = self._rates(mode)
         for _ in range(6):
             if time <= start:

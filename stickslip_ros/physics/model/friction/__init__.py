@@ -17,9 +17,17 @@ from stickslip_ros.physics.model.friction.table import Table
 LAWS: dict[str, type[FrictionLaw]] = {
     law.name: law
     for law in (
-        Stribeck, Coulomb, Linear, Exponential, Table,
-        Dahl, LuGre, ElastoPlastic, MaxwellSlip, RateState,
-    )  # fmt: skip
+        Stribeck,
+        Coulomb,
+        Linear,
+        Exponential,
+        Table,
+        Dahl,
+        LuGre,
+        ElastoPlastic,
+        MaxwellSlip,
+        RateState,
+    )
 }
 """Every friction law by the name it has in parameters.
 

@@ -5,6 +5,9 @@ from typing import Any
 
 from stickslip_ros.physics.model.constants import constant
 
+LEAST_SIZE = 1e-12
+"""Least coefficient at which bristles yield."""
+
 
 def bristle_stiffness() -> Any:
     """Describe the constant of this name."""

@@ -1,12 +1,12 @@
 """The base class of the laws with a memory whose steady friction is a static law."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
 from stickslip_ros.physics.model.friction.base import FrictionLaw
-from stickslip_ros.physics.model.friction.bristles import bristle_stiffness
+from stickslip_ros.physics.model.friction.bristles import LEAST_SIZE, bristle_stiffness
 from stickslip_ros.physics.model.friction.exponential import Exponential
 
 
@@ -23,7 +23,7 @@ class CurveFollower(FrictionLaw):
     """Switches of the law itself."""
     static: ClassVar[Any]  # type: ignore[misc]
 
-    curve: FrictionLaw = Exponential()
+    curve: FrictionLaw = field(default_factory=Exponential)
     """Static law that the law follows in steady slip."""
     bristle_stiffness: Any = bristle_stiffness()
 
@@ -121,7 +121,7 @@ class CurveFollower(FrictionLaw):
         return switches
 
     def refusal(self) -> str | None:
-        """Refuse a curve with a memory, or one that is not above zero; see `FrictionLaw.refusal`."""
+        """Refuse a curve with a memory, or one that is not above 0; see `FrictionLaw.refusal`."""
         name = self.curve.name
         if self.curve.states:
             return f"curve = {name} must be a static law: it has a memory"
@@ -129,11 +129,11 @@ class CurveFollower(FrictionLaw):
         if refusal is not None:
             return refusal
         least, _ = self._dry.size_range
-        if least > 0.0:
+        if least >= LEAST_SIZE:
             return None
         return (
-            f"curve = {name} must be above 0 at every speed: without its viscous part it falls to "
-            f"{least}"
+            f"curve = {name} must be at least {LEAST_SIZE:g} at every speed: without its viscous "
+            f"part it falls to {least}"
         )
 
     def scaled(self, speed: float, length: float = 1.0) -> Self:

@@ -5,15 +5,19 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from stickslip_ros.physics.model.friction.base import FrictionLaw
-from stickslip_ros.physics.model.friction.bristles import approached, bristle_stiffness
+from stickslip_ros.physics.model.friction.bristles import (
+    LEAST_SIZE,
+    approached,
+    bristle_stiffness,
+)
 
 
 @dataclass(frozen=True)
 class Dahl(FrictionLaw):
     """Dahl's law: z' = v_r - S |v_r| z / mu_s, mu = -S z.
 
-    The contact is a spring that yields, so that friction lags behind a change of direction. P. Dahl,
-    A Solid Friction Model, Aerospace Corporation TOR-0158(3107-18)-1, 1968.
+    The contact is a spring that yields, so that friction lags behind a change of direction.
+    P. Dahl, A Solid Friction Model, Aerospace Corporation TOR-0158(3107-18)-1, 1968.
 
     Steady friction is mu_s at every speed: no falling part, and therefore no vibration by itself.
     Friction depends on the path and not on time: a load below break-away does not creep, but every
@@ -68,4 +72,6 @@ class Dahl(FrictionLaw):
 
     def refusal(self) -> str | None:
         """Refuse a coefficient of zero; see `FrictionLaw.refusal`."""
-        return None if self.static > 0.0 else f"static = {self.static} must be above 0"
+        if self.static >= LEAST_SIZE:
+            return None
+        return f"static = {self.static} must be at least {LEAST_SIZE:g} for law {self.name}"

@@ -15,11 +15,11 @@ _ABOVE = 1.0 + 2.0**-40
 
 @dataclass(frozen=True)
 class MaxwellSlip(CurveFollower):
-    """Generalised Maxwell-slip law (GMS): n elements that stick or slip, mu = -(sum S_i z_i + mu_v v_r).
+    """Maxwell-slip law (GMS): mu = -(sum S_i z_i + mu_v v_r), n elements that stick or slip.
 
     An element of weight 1/n that sticks has z_i' = v_r, until s S_i z_i = g(v_r)/n. Then it slips
-    with S_i z_i' = C (s/n - S_i z_i / g(v_r)) until v_r changes its sign. The stiffnesses S_i add up
-    to S; element i yields at i/n of the deflection of the last one. F. Al-Bender, V. Lampaert,
+    with S_i z_i' = C (s/n - S_i z_i / g(v_r)) until v_r changes its sign. The stiffnesses S_i add
+    up to S; element i yields at i/n of the deflection of the last one. F. Al-Bender, V. Lampaert,
     J. Swevers, The generalized Maxwell-slip model, IEEE Transactions on Automatic Control 50(11),
     2005. g and mu_v are those of `curve`.
 

@@ -12,8 +12,8 @@ from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
 from stickslip_ros.physics.model.functions import exp, log, sqrt
 
-_LARGEST_RATIO = 500.0
-"""Largest ratio of the coefficient to the direct effect."""
+_LARGEST_RATIOS = {"kinetic": 200.0, "evolution_effect": 10.0}
+"""Largest ratios of constants to the direct effect: its exponentials must not overflow."""
 _OLDEST = 10.0
 """Logarithm of the age, in L/v_0, of a contact whose friction counts as the limit of the law."""
 _SLOWEST = 1e-20
@@ -24,11 +24,11 @@ _SLOWEST = 1e-20
 class RateState(FrictionLaw):
     """Rate-and-state law with ageing: mu = -a asinh(v_r/(2 v_0) exp((f_0 + b ln(v_0 th/L))/a)).
 
-    th' = 1 - |v_r| th / L is the age of the contact; its memory is ln(v_0 th/L), whose range is
-    smaller. Fast slip has |mu| = f_0 + a ln(|v_r|/v_0) + b ln(v_0 th/L). J. H. Dieterich, Journal of
-    Geophysical Research 84, 1979; A. Ruina, Journal of Geophysical Research 88, 1983; the regular
-    form at v_r = 0 is that of J. R. Rice, N. Lapusta, K. Ranjith, Journal of the Mechanics and
-    Physics of Solids 49, 2001.
+    th is the age of the contact, th' = 1 - |v_r| th / L; the memory is ln(v_0 th/L), whose range
+    is smaller. Fast slip has |mu| = f_0 + a ln(|v_r|/v_0) + b ln(v_0 th/L). J. H. Dieterich,
+    Journal of Geophysical Research 84, 1979; A. Ruina, Journal of Geophysical Research 88, 1983;
+    the regular form at v_r = 0 is that of J. R. Rice, N. Lapusta, K. Ranjith, Journal of the
+    Mechanics and Physics of Solids 49, 2001.
 
     The slide never sticks: it creeps under every load. There is no bound on the friction of an old
     contact. Its constants hold for some decades of speed around v_0 only.
@@ -118,19 +118,15 @@ class RateState(FrictionLaw):
         return sqrt(relative_speed * relative_speed + least * least)
 
     def refusal(self) -> str | None:
-        """Refuse a direct effect that is too small for the range of numbers.
-
-        Returns
-        -------
-        str or None
-            Sentence with both values; see `FrictionLaw.refusal`.
-        """
-        if self.kinetic <= _LARGEST_RATIO * self.direct_effect:
-            return None
-        return (
-            f"direct_effect = {self.direct_effect} must be at least kinetic = {self.kinetic} "
-            f"divided by {_LARGEST_RATIO:g}"
-        )
+        """Refuse a direct effect that is too small for numbers; see `FrictionLaw.refusal`."""
+        for name, ratio in _LARGEST_RATIOS.items():
+            value = getattr(self, name)
+            if value > ratio * self.direct_effect:
+                return (
+                    f"direct_effect = {self.direct_effect} must be at least {name} = {value} "
+                    f"divided by {ratio:g}"
+                )
+        return None
 
     def _strength(self, memory: Sequence[Any]) -> Any:
         """Return (f_0 + b ln(v_0 th/L))/a."""
