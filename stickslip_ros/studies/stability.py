@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from math import copysign, isclose
+from math import copysign, isclose, isnan
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -25,7 +25,6 @@ from stickslip_ros.physics.theory.linear_sampled_loop import (
 )
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
-    STATIC,
     NotCoveredError,
     require,
 )
@@ -52,11 +51,11 @@ _SAMPLED_LOOP = ("spectral_radius", "stable", "decay_rate", "settling_time", *_S
 def stability(scenario: Scenario) -> tuple[Section, Notes]:
     """Return the theoretical quantities of the scenario, in SI units, and notes on them.
 
-    Raises InvalidInputError if belt or load follow a course, or if the friction law has a memory.
+    Raises InvalidInputError if belt or load follow a course.
     """
     plant = scenario.plant
     drive = plant.as_drive()
-    require("the theory of stability", drive, AUTONOMOUS, STATIC)
+    require("the theory of stability", drive, AUTONOMOUS)
     law = scenario.control_law
     notes: Notes = {}
     expansion = expand(drive)
@@ -145,8 +144,13 @@ def _hopf_points(points: list[HopfPoint]) -> Section:
         "hopf_speeds": [point.belt_speed for point in points],
         "hopf_angular_frequencies": [point.angular_frequency for point in points],
         "crossing_speeds": [point.crossing_speed for point in points],
-        "first_lyapunov_coefficients": [point.first_lyapunov_coefficient for point in points],
+        "first_lyapunov_coefficients": [_known(p.first_lyapunov_coefficient) for p in points],
     }
+
+
+def _known(value: float) -> float | None:
+    """Return None for nan."""
+    return None if isnan(value) else value
 
 
 def _sticking(drive: Drive, notes: Notes) -> Section:
@@ -221,7 +225,7 @@ def _critical_gains(drive: Drive, law: ControlLaw, notes: Notes) -> Section:
     gains = gains_of(law)
     critical = None if gains is None else critical_gains(drive, gains)
     if critical is not None:
-        values = critical.linear, critical.first_lyapunov_coefficient, critical.cubic
+        values = critical.linear, _known(critical.first_lyapunov_coefficient), critical.cubic
         return dict(zip(_GAINS, values, strict=True))
     reason = why_no_gains(law) if gains is None else why_no_linear_gain(drive, gains)
     if reason is not None:

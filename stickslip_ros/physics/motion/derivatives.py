@@ -18,7 +18,9 @@ class FlowRates:
         """Compile them; the flow must not depend on the time."""
         flow, variables = system.shared_flow(name), system.variables
         margins = [guard.margin for guard in flow.guards]
-        rows = [*flow.rates, *margins]
+        rows = [*flow.rates, *margins, *flow.slaved.values()]
+        self.slaved = tuple(flow.slaved)
+        """Indices of the slaved states; their gradients come after those of the margins."""
         gradients = [hy.diff(row, variable) for row in rows for variable in variables]
         self._order = len(variables)
         self._compiled = hy.cfunc([*flow.rates, *gradients], list(variables))

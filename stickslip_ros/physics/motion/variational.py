@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import copysign
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SLIP, SPEED
+from stickslip_ros.physics.model.drive_system import MEMORY, SLIP, SPEED
 from stickslip_ros.physics.model.hybrid import Mode
 from stickslip_ros.physics.motion.compiled_flow import Detail
 from stickslip_ros.physics.motion.derivatives import flow_rates, parameter_values
@@ -67,15 +68,30 @@ class SensitiveMotion(RecordedMotion):
         """Derivative of the state by dimensionless time."""
         return self._rates(self._mode)[0]
 
-    def state_at(self, position: float, filter_states: float | Sequence[float]) -> FloatArray:
+    def state_at(
+        self,
+        position: float,
+        filter_states: float | Sequence[float],
+        memory: Sequence[float] | None = None,
+    ) -> FloatArray:
         """Return the state at rest at a position (m), with these states of the control.
 
-        They are given times N/k, so that W of eq. 17 is in m; one number applies to all.
+        They are given times N/k, so that W of eq. 17 is in m; one number applies to all. The memory
+        of the friction law (SI) is that of steady slip by default.
         """
-        scale = self._drive.length_scale
+        scale, drive = self._drive.length_scale, self._drive
         state = np.array(self._system.initial_state(position / scale, 0.0))
+        if memory is None:
+            memory = drive.friction.memory_at(-drive.belt_speed, -copysign(1.0, drive.belt_speed))
+        own = slice(MEMORY, MEMORY + len(self._memory_units))
+        state[own] = np.array(memory) / self._memory_units
         state[self._system.control_states] = np.asarray(filter_states) / scale
         return state
+
+    def memory_of(self, state: FloatArray) -> tuple[float, ...]:
+        """Return the memory of the friction law in a state, SI units."""
+        own = state[MEMORY : MEMORY + len(self._memory_units)] * self._memory_units
+        return tuple(own.tolist())
 
     def filter_states_of(self, state: FloatArray) -> FloatArray:
         """Return the states of the control in a state; none without control."""
@@ -105,8 +121,8 @@ class SensitiveMotion(RecordedMotion):
 
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
         super()._pass(mode, guard, following, now)
-        self.transition = self._derivatives @ self.transition
         before, gradients = self._rates(mode)
+        self.transition = self._enslaving(mode) @ self._derivatives @ self.transition
         if mode.flow == SLIP:
             self._effort += (now - self._begun) * (1.0 + abs(float(gradients[SPEED, SPEED])))
             if self._effort > _GREATEST_EFFORT:
@@ -114,8 +130,10 @@ class SensitiveMotion(RecordedMotion):
         if guard is None or following is None:
             return
         normal = gradients[self.order + guard]
-        jump = self._rates(following)[0] - before
-        self.transition += np.outer(jump / (normal @ before), normal @ self.transition)
+        reset = self._enslaving(following)
+        jump = self._rates(following)[0] - reset @ before
+        change = np.outer(jump / (normal @ before), normal @ self.transition)
+        self.transition = reset @ self.transition + change
         self.landed |= following.flow != SLIP
 
     @property
@@ -127,4 +145,15 @@ class SensitiveMotion(RecordedMotion):
     def _rates(self, mode: Mode) -> tuple[FloatArray, FloatArray]:
         """Return the rates at the present state in a mode, and the gradients; see `FlowRates`."""
         parameters = parameter_values(self._system, mode, self._instant.inputs)
-        return flow_rates(self._system, mode.flow).at(self.state, parameters)
+        rates, gradients = flow_rates(self._system, mode.flow).at(self.state, parameters)
+        return self._enslaving(mode, gradients) @ rates, gradients
+
+    def _enslaving(self, mode: Mode, gradients: FloatArray | None = None) -> FloatArray:
+        """Return the derivatives of the state by itself where a mode sets its slaved states."""
+        found = np.eye(self.order)
+        flow = flow_rates(self._system, mode.flow)
+        if flow.slaved:
+            if gradients is None:
+                _, gradients = self._rates(mode)
+            found[list(flow.slaved)] = gradients[-len(flow.slaved) :]
+        return found

@@ -1,14 +1,23 @@
 """The theory of gains without sampling: critical gains of the loop of eq. 19."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import inf, isfinite, isinf, nan
+
+import numpy as np
 
 from stickslip_ros.physics.model.control import ContinuousControl, WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
-from stickslip_ros.physics.theory.gain_intervals import covered_gains
+from stickslip_ros.physics.theory.gain_intervals import (
+    GainInterval,
+    covered_gains,
+    nearest_to_zero,
+)
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SPRING, STATIC, require
+from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SMOOTH, SPRING, STATIC, require
+from stickslip_ros.physics.theory.roots import zero_between
 
 _ROUNDING = 1e-9
 """Relative change of a determinant with the gain below which it is treated as zero."""
@@ -21,7 +30,7 @@ class CriticalGains:
     linear: float
     """Critical linear gain k1*, N s/m; the equilibrium is stable below it."""
     first_lyapunov_coefficient: float
-    """sigma at k1* with the given cubic gain, dimensionless (see `first_lyapunov_coefficient`)."""
+    """sigma at k1* with the given cubic gain, dimensionless (see `HopfPoint`)."""
     cubic: float | None
     """Cubic gain at which sigma changes sign, N s^3/m^3; below it small vibrations are stable."""
 
@@ -45,7 +54,7 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     Raises
     ------
     InvalidInputError
-        If the friction law has a memory, belt or load follow a course, or the drive has no spring.
+        If belt or load follow a course, or the drive has no spring.
 
     Examples
     --------
@@ -61,12 +70,16 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     >>> round(critical.linear, 6), round(critical.cubic, 4)
     (-0.935296, 31.468)
     """
-    require("the critical gain", drive, SPRING, AUTONOMOUS, STATIC)
+    require("the critical gain", drive, SPRING, AUTONOMOUS)
     own = covered_gains(gains)
-    linear = None if own is None else _critical_linear_gain(drive, own)
+    static = STATIC.lack(drive) is None
+    find = _critical_linear_gain if static else _critical_gain_of_any_order
+    linear = None if own is None else find(drive, own)
     if own is None or linear is None:
         return None
     critical = replace(own, linear=linear)
+    if SMOOTH.lack(drive) is not None:
+        return CriticalGains(linear, nan, None)
     sigma = _sigma(drive, critical)
     # sigma is affine in the cubic gain: only the third derivatives contain it, linearly. With a
     # large one the rounding of the other terms does not matter.
@@ -85,6 +98,8 @@ def why_no_linear_gain(drive: Drive, gains: WashoutGains) -> str | None:
     expansion = expand(drive)
     if expansion is None:
         return None
+    if STATIC.lack(drive) is not None:
+        return "no linear gain stabilises the equilibrium"
     product = expansion.jacobian[SPEED, SPEED] * gains.scaled(drive).corner_frequency
     return (
         "no linear gain stabilises the equilibrium: by the Routh-Hurwitz criterion p d must be "
@@ -109,6 +124,58 @@ def _critical_linear_gain(drive: Drive, gains: WashoutGains) -> float | None:
     slope = margins[1] - margins[0]
     least = _ROUNDING * max(1.0, *map(abs, margins))
     return None if slope > -least else -margins[0] / slope * unit
+
+
+def _critical_gain_of_any_order(drive: Drive, gains: WashoutGains) -> float | None:
+    """Return the end nearest to zero of the gains with which the equilibrium is stable.
+
+    The characteristic polynomial is p(s) + k q(s): where s = j w is an eigenvalue, p conj(q) is
+    real there, which is a polynomial equation for w^2, and k = -p/q.
+    """
+    unit = drive.normal_force / drive.speed_scale
+    expansions = [expand(drive, replace(gains, linear=linear)) for linear in (0.0, unit)]
+    if expansions[0] is None or expansions[1] is None:
+        return None
+    without, with_unit = (each.jacobian for each in expansions if each is not None)
+    p = np.poly(without)
+    q = np.poly(with_unit) - p
+    powers = 1j ** np.arange(len(p))[::-1]
+    crossing = np.polymul(p * powers, np.conj(q * powers)).imag
+    frequencies = [root.real for root in np.roots(crossing) if _is_frequency(root)]
+
+    def margin(gain: float) -> float:
+        """Return the largest real part of the eigenvalues."""
+        return float(np.linalg.eigvals(without + gain * (with_unit - without)).real.max())
+
+    found = [-np.polyval(p, 1j * w) / np.polyval(q, 1j * w) for w in frequencies]
+    ends = sorted({float(each.real) for each in found})
+    bounds = [-inf, *ends, inf]
+    intervals: list[GainInterval] = []
+    for low, high in pairwise(bounds):
+        inside = _between(low, high)
+        if margin(inside) < 0.0:
+            intervals.append(GainInterval(low, high))
+    if not intervals:
+        return None
+    end = nearest_to_zero(intervals).critical
+    if not isfinite(end):
+        return None
+    step = 1e-6 * max(abs(end), 1.0)
+    if margin(end - step) * margin(end + step) < 0.0:
+        end = zero_between(margin, end - step, end + step)
+    return end * unit
+
+
+def _is_frequency(root: complex) -> bool:
+    """Return whether a root is a frequency, and not the rounding of one at zero, of the filter."""
+    return root.real > 1e-6 and abs(root.imag) < 1e-6 * abs(root)
+
+
+def _between(low: float, high: float) -> float:
+    """Return a number in an interval, also an unbounded one."""
+    if isinf(low):
+        return high - 1.0 - abs(high) if isfinite(high) else 0.0
+    return low + 1.0 + abs(low) if isinf(high) else 0.5 * (low + high)
 
 
 def _sigma(drive: Drive, gains: WashoutGains) -> float:

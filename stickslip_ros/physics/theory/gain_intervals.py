@@ -15,6 +15,7 @@ from stickslip_ros.physics.model.control import (
     Washout,
     WashoutGains,
 )
+from stickslip_ros.physics.model.drive_system import SPEED
 
 _ROUNDING = 1e-14
 """Relative error of a multiplier."""
@@ -73,10 +74,11 @@ class GainBoundary:
     """1/G(e^(j theta)), the gains that put a multiplier there; dimensionless.
 
     From the force to v, with l = e^(j theta) and the whole periods m of the delay,
-    G = (l - 1)^2 (b l + c) / (l^(m+1) (l - e^(-d T)) (l - e^(s1 T)) (l - e^(s2 T))),
-    s1 and s2 being the eigenvalues of the open loop. One factor l - 1 is the filter's; the other
+    G = (l - 1)^2 (b l + c) / (l^(m+1) (l - e^(-d T)) (l - e^(s1 T)) (l - e^(s2 T)) ...),
+    s1, s2, ... being the eigenvalues of the open loop. One factor l - 1 is the filter's; the other
     one shows that a constant force does not move the slide permanently. b and c are the force that
-    starts during a period, and the one that ends in it. In this form nothing cancels at high rates.
+    starts during a period, and the one that ends in it: numbers, or polynomials in l if friction
+    has a memory. In this form nothing cancels at high rates.
     """
 
     def __init__(
@@ -93,8 +95,11 @@ class GainBoundary:
         self._period = period
         values = np.linalg.eigvals(jacobian).astype(np.complex128)
         self._poles = np.array([-corner_frequency, *values]) * period
-        self._starting = float(starting[1])
-        self._ending = float(slide[0, 0] * ending[1] - slide[1, 0] * ending[0])
+        if len(slide) == 2:
+            self._starting = np.array([starting[1]])
+            self._ending = np.array([slide[0, 0] * ending[1] - slide[1, 0] * ending[0]])
+        else:
+            self._starting, self._ending = (_numerator(slide, each) for each in (starting, ending))
 
     def gain(self, theta: Any) -> Any:
         """Return 1/G, an array of the shape of theta."""
@@ -109,7 +114,7 @@ class GainBoundary:
             ],
             axis=0,
         )
-        zeros = np.expm1(1j * theta) ** 2 * (self._starting * forward + self._ending)
+        zeros = np.expm1(1j * theta) ** 2 * self._of_forces(forward)
         with np.errstate(divide="ignore", invalid="ignore"):
             return forward ** (self._whole + 1) * differences / zeros
 
@@ -163,11 +168,15 @@ class GainBoundary:
             yield gain, 2 * int(number)
         # One real multiplier at -1. By symmetry 1/G is real there; the sum is exact.
         poles = np.exp(self._poles)
-        difference = self._ending - self._starting
+        difference = float(self._of_forces(-1.0))
         if difference != 0.0:
             gain = float(np.prod(-1.0 - poles).real) / (4.0 * difference)
             if isfinite(gain):
                 yield gain * (-1.0) ** (self._whole + 1), -int(np.sign(imaginary[-1]))
+
+    def _of_forces(self, forward: Any) -> Any:
+        """Return b l + c."""
+        return np.polyval(self._starting, forward) * forward + np.polyval(self._ending, forward)
 
     def _angles(self) -> FloatArray:
         """Return angles above 0 and below pi between which the phase of each factor changes little.
@@ -178,8 +187,10 @@ class GainBoundary:
         parts: list[Any] = [np.arange(1, steps) * (pi / steps), self._near(0.0, self._period)]
         for pole in self._poles:
             parts.append(self._near(abs(float(np.angle(np.exp(1j * pole.imag)))), abs(pole.real)))
-        if self._ending > 0.0 and self._starting > 0.0:
-            parts.append(self._near(pi, abs(log(self._ending / self._starting))))
+        for zero in np.roots(np.polyadd([*self._starting, 0.0], self._ending)):
+            size = abs(complex(zero))
+            if size > 0.0 and zero.real < 0.0:
+                parts.append(self._near(pi, abs(log(size)) + abs(pi - abs(np.angle(zero)))))
         theta = np.sort(np.concatenate(parts))
         return theta[(theta > 0.0) & (theta < pi)]
 
@@ -187,6 +198,18 @@ class GainBoundary:
     def _near(angle: float, width: float) -> FloatArray:
         distances: Any = np.geomspace(1e-3 * max(width, 1e-12), pi, 200)
         return np.concatenate([angle - distances, angle + distances])
+
+
+def _numerator(slide: FloatArray, force: FloatArray) -> FloatArray:
+    """Return the polynomial of the speed after a force, without its factor l - 1.
+
+    By the determinant lemma it is det(l I - slide + force e^T) - det(l I - slide).
+    """
+    seen = np.zeros(len(slide))
+    seen[SPEED] = 1.0
+    whole = np.poly(slide - np.outer(force, seen)) - np.poly(slide)
+    quotient: Any = np.polydiv(whole[1:], [1.0, -1.0])[0]
+    return quotient
 
 
 def _distance(interval: GainInterval) -> float:

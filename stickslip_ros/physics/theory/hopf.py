@@ -1,6 +1,7 @@
 """Hopf bifurcations over the belt speed: points, crossing speeds and Lyapunov coefficients."""
 
 from dataclasses import dataclass, replace
+from math import nan
 from typing import Any, Self
 
 import numpy as np
@@ -11,11 +12,21 @@ from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.theory.linear import Expansion, expand, hurwitz_determinants, jacobians
-from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SPRING, SYMMETRIC, require
+from stickslip_ros.physics.theory.requirements import (
+    AUTONOMOUS,
+    SMOOTH,
+    SPRING,
+    SYMMETRIC,
+    require,
+)
 from stickslip_ros.physics.theory.roots import zero_between
 
 _BELT_SPEEDS = np.geomspace(1e-6, 1e3, 4001)
 """Dimensionless belt speeds, half a percent apart, between which sign changes are searched for."""
+
+
+_ON_AXIS = 1e-6
+"""Share of its frequency up to which the growth of a pair is rounding."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +43,14 @@ class HopfPoint:
     crossing_speed: float
     """Rate of change of the pair's real part with the belt speed, 1/s per m/s; eq. 11 and 22."""
     first_lyapunov_coefficient: float
-    """sigma, dimensionless; see the function `first_lyapunov_coefficient`."""
+    """sigma, dimensionless; see the function `first_lyapunov_coefficient`.
+
+    It is nan where friction has no second derivative, as that of the elasto-plastic law.
+    """
 
     @property
     def supercritical(self) -> bool:
-        """Whether a stable vibration starts here with a small amplitude."""
+        """Whether a stable vibration is known to start here with a small amplitude."""
         return self.first_lyapunov_coefficient < 0.0
 
 
@@ -104,6 +118,7 @@ def hopf_points(drive: Drive, gains: ContinuousControl | None = None) -> list[Ho
     (0.488763, True)
     """
     require("the search for Hopf points", drive, SPRING, AUTONOMOUS)
+    smooth = SMOOTH.lack(drive) is None
     mirrored = SYMMETRIC.lack(drive) is None
     belt_speeds = _BELT_SPEEDS if mirrored or drive.belt_speed >= 0.0 else -_BELT_SPEEDS
     margins = _hopf_margins(drive, gains, belt_speeds)
@@ -119,14 +134,14 @@ def hopf_points(drive: Drive, gains: ContinuousControl | None = None) -> list[Ho
         expansion = expand(at_point, gains)
         assert expansion is not None
         crossing, sigma = crossing_speed(expansion), first_lyapunov_coefficient(expansion)
-        if crossing is None or sigma is None:  # two real eigenvalues of opposite sign
+        if crossing is None or sigma is None or not _crosses(expansion):
             continue
         points.append(
             HopfPoint(
                 belt_speed=at_point.belt_speed,
                 angular_frequency=float(expansion.eigenvalues[0].imag) * drive.angular_frequency,
                 crossing_speed=crossing * drive.angular_frequency / drive.speed_scale,
-                first_lyapunov_coefficient=sigma,
+                first_lyapunov_coefficient=sigma if smooth else nan,
             )
         )
     return points
@@ -185,6 +200,15 @@ def crossing_speed(expansion: Expansion) -> float | None:
     if pair is None:
         return None
     return float((pair.left.conj() @ expansion.jacobian_by_belt_speed @ pair.right).real)
+
+
+def _crosses(expansion: Expansion) -> bool:
+    """Return whether a complex pair is on the imaginary axis, to rounding.
+
+    Otherwise two real eigenvalues have opposite signs, or the margin is rounding.
+    """
+    values = expansion.eigenvalues[expansion.eigenvalues.imag > 0.0]
+    return bool(np.any(np.abs(values.real) < _ON_AXIS * np.abs(values.imag)))
 
 
 def _hopf_margins(

@@ -1,14 +1,14 @@
 """The limit cycle that starts at the critical linear gain, continued to other gains."""
 
 from dataclasses import replace
-from math import pi, sqrt
+from math import isnan, pi, sqrt
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.control import ContinuousControl, WashoutGains
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SPEED
+from stickslip_ros.physics.model.drive_system import MEMORY, POSITION, SPEED
 from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.physics.theory.gain_intervals import covered_gains
 from stickslip_ros.physics.theory.hopf import ComplexPair
@@ -71,22 +71,29 @@ def limit_cycle_from_hopf(drive: Drive, gains: ContinuousControl) -> LimitCycle 
         )
         if guess is None:
             return None
-        position, filter_state, period = guess.tolist()
-        cycle = shoot(drive, position, period, gains=at_gain, filter_state=filter_state)
+        position, filter_state, period, *memory = guess.tolist()
+        cycle = shoot(
+            drive, position, period, gains=at_gain, filter_state=filter_state, memory=memory
+        )
         if cycle is None or cycle.filter_state is None:
             return None
-        found.append(np.array([cycle.position, cycle.filter_state, cycle.period]))
+        found.append(np.array([cycle.position, cycle.filter_state, cycle.period, *cycle.memory]))
     return cycle
 
 
 def _by_normal_form(drive: Drive, gains: WashoutGains, sigma: float) -> FloatArray | None:
-    """Return displacement (m) and filter state (m) at the upward turning point, and period (s)."""
+    """Return what a cycle has at the upward turning point.
+
+    That are displacement (m), filter state (m), period (s), and the memory of the law (SI).
+    """
     expansion = expand(drive, gains)
     pair = None if expansion is None else ComplexPair.from_expansion(expansion)
-    if pair is None or sigma * pair.growth >= 0.0:
+    if expansion is None or pair is None or isnan(sigma) or sigma * pair.growth >= 0.0:
         return None
     # Y = r cos(theta) is zero and rises at -pi/2.
-    deviation = np.real(-1j * pair.right / pair.right[SPEED]) * drive.length_scale
-    position, _, filter_state = (sqrt(-pair.growth / sigma) * deviation).tolist()
+    deviation = sqrt(-pair.growth / sigma) * np.real(-1j * pair.right / pair.right[SPEED])
+    units = [drive.scales.factor(unit) for unit in drive.friction.states.values()]
+    memory = (expansion.equilibrium + deviation)[MEMORY : MEMORY + len(units)] / units
+    position, filter_state = deviation[[POSITION, -1]] * drive.length_scale
     period = 2.0 * pi / pair.frequency / drive.angular_frequency
-    return np.array([drive.equilibrium_position + position, filter_state, period])
+    return np.array([drive.equilibrium_position + position, filter_state, period, *memory])

@@ -18,7 +18,7 @@ from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.measures.cycle_measures import EQUILIBRIUM_SPEED, CycleMeter, Measures
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SPEED, UNBOUNDED_SPEED
+from stickslip_ros.physics.model.drive_system import POSITION, SPEED, UNBOUNDED_SPEED
 from stickslip_ros.physics.motion.variational import SensitiveMotion, TooStiffError
 from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.cycle_bounds import (
@@ -27,7 +27,9 @@ from stickslip_ros.physics.theory.cycle_bounds import (
     least_cycle,
     longest_return,
     release_position,
+    without_memory,
 )
+from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
     SPRING,
@@ -64,6 +66,8 @@ class LimitCycle:
     """Floquet multipliers without the trivial one, the largest first; the last is 0 with stick."""
     measures: Measures
     """Measures of one cycle."""
+    memory: tuple[float, ...] = ()
+    """Memory of the friction law at the turning point, SI units, in the order of its `states`."""
 
     @property
     def filter_state(self) -> float | None:
@@ -83,6 +87,7 @@ def shoot(
     *,
     gains: ContinuousControl | None = None,
     filter_state: float | Sequence[float] = 0.0,
+    memory: Sequence[float] | None = None,
 ) -> LimitCycle | None:
     """Return the limit cycle near a guess, by Newton's method.
 
@@ -102,6 +107,9 @@ def shoot(
     filter_state : float or sequence of float, optional
         Guess of the states of the control at the turning point, times N/k: in m for W of eq. 17.
         One number applies to all of them. It is used with `gains` only.
+    memory : sequence of float, optional
+        Guess of the memory of the friction law at the turning point, SI units. By default it is
+        that of the equilibrium.
 
     Returns
     -------
@@ -129,7 +137,7 @@ def shoot(
     if drive.belt_speed == 0.0:
         return None
     motion = SensitiveMotion(drive, gains)
-    state = motion.state_at(position, filter_state)
+    state = motion.state_at(position, filter_state, memory)
     try:
         return _solve(motion, state, period)
     except TooStiffError:
@@ -171,11 +179,12 @@ def limit_cycle_of_run(
     Raises
     ------
     InvalidInputError
-        If the friction law has a memory or differs between the directions, belt or load follow a
-        course, or the drive has no spring.
+        If friction differs between the directions, belt or load follow a course, or the drive has
+        no spring.
     """
-    require("the limit cycle of a run", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
-    if drive.belt_speed == 0.0 or least_cycle(drive, gains) is None:
+    require("the limit cycle of a run", drive, SPRING, AUTONOMOUS, SYMMETRIC)
+    static = STATIC.lack(drive) is None
+    if drive.belt_speed == 0.0 or (static and least_cycle(drive, gains) is None):
         return None
     motion = SensitiveMotion(drive, gains)
     motion.restart(position, velocity)
@@ -193,6 +202,10 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
     itself; the cycles are the fixed points of this map. The search goes outward as long as the
     slide comes back.
 
+    With friction that has a memory the search starts with the memory of the equilibrium, and each
+    change of sign is a guess from which `shoot` solves for the cycle in all states: it finds the
+    cycles on which the memory follows the motion quickly, and may miss others.
+
     Parameters
     ----------
     drive : Drive
@@ -207,8 +220,8 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
     Raises
     ------
     InvalidInputError
-        If the friction law has a memory or differs between the directions, belt or load follow a
-        course, or the drive has no spring.
+        If friction differs between the directions, belt or load follow a course, or the drive has
+        no spring.
 
     Examples
     --------
@@ -223,8 +236,9 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
     >>> round(cycle.measures.amplitude, 6), cycle.stable
     (0.434086, True)
     """
-    require("the search for limit cycles", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)
-    if drive.belt_speed == 0.0 or least_cycle(drive) is None:
+    require("the search for limit cycles", drive, SPRING, AUTONOMOUS, SYMMETRIC)
+    static = STATIC.lack(drive) is None
+    if drive.belt_speed == 0.0 or (static and least_cycle(drive) is None):
         return []
     returns = _ReturnMap(drive)
     try:
@@ -257,10 +271,14 @@ class _ReturnMap:
 
     def __init__(self, drive: Drive) -> None:
         self._motion = SensitiveMotion(drive)
-        self._equilibrium = float(self._motion.rate[SPEED])
+        expansion = expand(drive)
+        assert expansion is not None
+        self._rest = expansion.equilibrium
+        self._equilibrium = float(self._rest[POSITION])
+        guide = without_memory(drive)
         speed = min(abs(drive.belt_speed), drive.friction.characteristic_speed) / drive.speed_scale
-        self._innermost = max(1e-4 * min(speed, 1.0), least_cycle(drive) or 0.0)
-        self._outermost = _outermost(drive)
+        self._innermost = max(1e-4 * min(speed, 1.0), least_cycle(guide) or 0.0)
+        self._outermost = _outermost(guide)
 
     def growth(self, distance: float) -> float:
         """Return the growth of the distance; -`distance` if the slide does not turn again."""
@@ -329,7 +347,8 @@ class _ReturnMap:
         """
         drive = self._motion.drive
         position = release_position(drive) / drive.length_scale
-        released = np.array([position, drive.belt_speed / drive.speed_scale])
+        released = self._rest.copy()
+        released[[POSITION, SPEED]] = position, drive.belt_speed / drive.speed_scale
         found = _next_turn(self._motion, released)
         if found is None:
             return []
@@ -359,7 +378,7 @@ class _ReturnMap:
         return float(self._motion.transition[0, 0]) - 1.0
 
     def _state(self, distance: float) -> FloatArray:
-        return np.array([self._equilibrium - distance, 0.0])
+        return self._rest - distance * np.eye(len(self._rest))[POSITION]
 
 
 def _outermost(drive: Drive) -> float:
@@ -504,4 +523,5 @@ def _cycle(motion: SensitiveMotion, shot: _Shot) -> LimitCycle | None:
         period=period,
         multipliers=shot.multipliers(),
         measures=replace(measures, steady=True, trend=None),
+        memory=motion.memory_of(start),
     )

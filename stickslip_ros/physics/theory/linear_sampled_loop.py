@@ -17,6 +17,7 @@ from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.sampled_loop import whole_and_rest
 from stickslip_ros.physics.model.control import LinearFeedback
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.theory.gain_intervals import (
     GainBoundary,
     GainInterval,
@@ -28,7 +29,6 @@ from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
     IMMEDIATE,
     SPRING,
-    STATIC,
     require,
 )
 
@@ -38,8 +38,8 @@ LONGEST_DELAY = 300
 SETTLED = 0.01
 """Share of its first size that a deviation has at the 1 % settling time."""
 
-_SLIDE = slice(0, 2)
-"""Indices of X and Y in the state; the states of the law follow, then the forces under way."""
+_SEEN = slice(0, 2)
+"""Indices of X and Y in the state, which the controller sees."""
 
 
 class SampledControl(Protocol):
@@ -67,14 +67,15 @@ class LinearSampledLoop:
     """Drive at its equilibrium under sampled control, linearised; for any linear control law.
 
     With the period T, force n = C z_n + D (x_n, y_n) of the law (see `LinearFeedback`) acts from
-    n T + delay to (n + 1) T + delay. The state is X, Y, the states z of the law, and the forces
-    under way, the newest first.
+    n T + delay to (n + 1) T + delay. The state is X, Y, the memory of the friction law, the states
+    z of the control law, and the forces under way, the newest first.
 
     Examples
     --------
     The slide of a machine tool, sampled at 1 kHz without delay:
 
     >>> from stickslip_ros.physics.model.drive import Drive
+    from stickslip_ros.physics.model.drive_system import SPEED
     >>> from stickslip_ros.physics.model.control import WashoutGains
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
@@ -94,7 +95,7 @@ class LinearSampledLoop:
     force_delay: float
     """Delay from a sample to the start of its force, s."""
     jacobian: FloatArray
-    """Jacobian of the open loop, dimensionless (see `Expansion.jacobian`); shape (2, 2)."""
+    """Jacobian of the open loop, dimensionless (see `Expansion.jacobian`); shape (n, n)."""
 
     of = Renamed("from_drive")
 
@@ -119,10 +120,9 @@ class LinearSampledLoop:
         Raises
         ------
         InvalidInputError
-            If the friction law has a memory, belt or load follow a course, the actuator has
-            states, or the drive has no spring.
+            If belt or load follow a course, the actuator has states, or the drive has no spring.
         """
-        require("the theory of the sampled loop", drive, SPRING, AUTONOMOUS, STATIC, IMMEDIATE)
+        require("the theory of the sampled loop", drive, SPRING, AUTONOMOUS, IMMEDIATE)
         expansion = expand(drive)
         if expansion is None or why_no_linear_loop(drive, rate, force_delay):
             return None
@@ -139,8 +139,8 @@ class LinearSampledLoop:
         Returns
         -------
         ndarray
-            Matrix for the dimensionless state, shape (n, n); n is 2 plus the number of states of
-            the law plus the number of periods of the delay, rounded up.
+            Matrix for the dimensionless state, shape (m, m); m is the order of the open loop plus
+            the number of states of the law plus the periods of the delay, rounded up.
 
         Raises
         ------
@@ -291,8 +291,8 @@ class LinearSampledLoop:
     def held(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Effect of one period: transition of the slide, and the effects of two unit forces.
 
-        The first force starts during the period (or with it), and the second ends in it. Shapes (2,
-        2), (2,), (2,).
+        The first force starts during the period (or with it), and the second ends in it. Shapes (n,
+        n), (n,), (n,).
         """
         split = self.delay[1]
         before, ending = self._slide(split)
@@ -301,11 +301,12 @@ class LinearSampledLoop:
 
     def _slide(self, periods: float) -> tuple[FloatArray, FloatArray]:
         """Return the transition of the slide over some periods, and the effect of a unit force."""
-        block = np.zeros((3, 3))
-        block[:2, :2] = self.jacobian
-        block[1, 2] = 1.0
+        order = len(self.jacobian)
+        block = np.zeros((order + 1, order + 1))
+        block[:order, :order] = self.jacobian
+        block[SPEED, order] = 1.0
         transition = _exponential(block * (periods * self.period))
-        return transition[:2, :2], transition[:2, 2]
+        return transition[:order, :order], transition[:order, order]
 
     def _radii(self, corner_frequency: float, linear_gains: FloatArray) -> FloatArray:
         family = feedback_family(corner_frequency, linear_gains, 1.0 / self.rate)
@@ -320,18 +321,19 @@ class LinearSampledLoop:
         under_way, drive = self.under_way, self.drive
         slide, starting, ending = self.held
         stacked, states = feedback.output.shape[:-1], feedback.output.shape[-1]
-        own, first = slice(2, 2 + states), 2 + states
+        order = len(slide)
+        own, first = slice(order, order + states), order + states
         matrix = np.zeros((*stacked, first + under_way, first + under_way))
         forces = np.zeros((*stacked, 1 + under_way, first + under_way))
         units = np.array([drive.length_scale, drive.speed_scale])
-        forces[..., 0, _SLIDE] = feedback.direct * units / drive.normal_force
+        forces[..., 0, _SEEN] = feedback.direct * units / drive.normal_force
         forces[..., 0, own] = feedback.output * drive.speed_scale / drive.normal_force
         forces[..., 1:, first:] = np.eye(under_way)
-        matrix[..., _SLIDE, _SLIDE] = slide
-        matrix[..., _SLIDE, :] += starting[:, None] * forces[..., whole, None, :]
+        matrix[..., :order, :order] = slide
+        matrix[..., :order, :] += starting[:, None] * forces[..., whole, None, :]
         if split > 0.0:
-            matrix[..., _SLIDE, :] += ending[:, None] * forces[..., whole + 1, None, :]
-        matrix[..., own, _SLIDE] = feedback.input * (units / drive.speed_scale)
+            matrix[..., :order, :] += ending[:, None] * forces[..., whole + 1, None, :]
+        matrix[..., own, _SEEN] = feedback.input * (units / drive.speed_scale)
         matrix[..., own, own] = feedback.state
         matrix[..., first:, :] = forces[..., :-1, :]
         return matrix

@@ -70,6 +70,11 @@ def _memory(drive: Drive) -> str | None:
     return f"the friction law {law.name} has a memory ({states})" if states else None
 
 
+def _kinks(drive: Drive) -> str | None:
+    law = drive.friction
+    return f"the friction law {law.name} has no second derivative there" if law.kinked else None
+
+
 def _asymmetry(drive: Drive) -> str | None:
     law = drive.friction
     forward, backward = law.limits
@@ -94,6 +99,9 @@ AUTONOMOUS = Requirement("a constant belt speed and a constant normal force", _c
 
 STATIC = Requirement("a friction law without memory", _memory)
 """Friction depends on the relative speed only: without control the motion is planar."""
+
+SMOOTH = Requirement("friction that is smooth in steady slip", _kinks)
+"""Friction in steady slip has derivatives of the first three orders."""
 
 SYMMETRIC = Requirement("friction that is the same in both directions", _asymmetry)
 """The coefficient is an odd function of the relative speed."""

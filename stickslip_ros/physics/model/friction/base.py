@@ -58,6 +58,8 @@ class FrictionLaw(ABC):
     """Unit of each state of the memory by name; empty for a static law."""
     switches: ClassVar[Sequence[str]] = ()
     """Names of the values that are constant in each mode of the law."""
+    kinked: ClassVar[bool] = False
+    """Whether friction has no second derivative in steady slip: no Lyapunov coefficient exists."""
     undirected: ClassVar[Sequence[str]] = ()
     """Constants that must be the same in both directions of slip: otherwise friction would jump."""
     inverse_speed_power: ClassVar[dict[str, int]] = {}

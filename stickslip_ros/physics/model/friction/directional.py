@@ -34,7 +34,7 @@ class Directional(FrictionLaw):
     def __post_init__(self) -> None:
         if type(self.forward) is not type(self.reverse):
             raise TypeError("a directional law needs two laws of one class")
-        for shared in ("name", "states", "switches"):
+        for shared in ("name", "states", "switches", "kinked"):
             object.__setattr__(self, shared, getattr(self.forward, shared))
 
     @property
