@@ -72,7 +72,7 @@ def _constants_of_laws(*, reverse: bool = False) -> dict[str, Any]:
             constants.setdefault(name, constant)
             laws.setdefault(name, []).append(law.name)
     return {
-        name: described(constant, laws[name] if len(laws[name]) < _LAWS_WITH_CONSTANTS else [])
+        name: described(constant, [] if name in constants_of(FrictionLaw) else laws[name])
         for name, constant in constants.items()
     }
 
@@ -93,7 +93,6 @@ def _curve(direction: str = "") -> Any:
 
 
 add_laws_of_other_packages()
-_LAWS_WITH_CONSTANTS = sum(bool(constants_of(law)) for law in LAWS.values())
 
 
 class ReverseFriction(

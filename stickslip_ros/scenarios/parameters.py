@@ -46,8 +46,6 @@ _OF_DRIVE = [each.name for each in fields(Drive) if each.type is float]
 """Parameters of the plant that the drive takes unchanged."""
 _DEFAULTS = {each.name: each.default for each in fields(Drive)}
 """Defaults of the drive; only constants that may be absent have one."""
-_AUTOMATIC = -1.0
-"""Stick speed that is chosen by the friction law."""
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(f"/?({_NAME}/)*{_NAME}")
 
@@ -359,8 +357,8 @@ class AnalyzerParameters(NodeParameters):
     )
     stick_speed: float = field(
         -1.0,
-        "Largest relative speed of a slide that sticks; -1: 0, or a hundredth of the belt speed "
-        "for friction with a memory.",
+        "Largest relative speed of a slide that sticks; below 0: automatic, that is 0, or for "
+        "friction with a memory a hundredth of the belt speed.",
         "m/s",
         fixed=Fixed.ACTIVE,
         ge=-1.0,
@@ -392,19 +390,10 @@ class AnalyzerParameters(NodeParameters):
         "lz4", "Compression of the bag.", fixed=Fixed.ACTIVE, choices=("lz4", "zstd", "none")
     )
 
-    @model_validator(mode="after")
-    def _stick_speed_is_given_or_not(self) -> Self:
-        """Refuse a speed below zero other than -1."""
-        if self.stick_speed < 0.0 and self.stick_speed != _AUTOMATIC:
-            raise ValueError(
-                f"stick_speed = {self.stick_speed} m/s is refused: must be at least 0, or -1"
-            )
-        return self
-
     @property
     def given_stick_speed(self) -> float | None:
         """The stick speed, m/s; None if it is automatic."""
-        return None if self.stick_speed == _AUTOMATIC else self.stick_speed
+        return None if self.stick_speed < 0.0 else self.stick_speed
 
     def stick_speed_of(self, law: str) -> float | None:
         """Return the stick speed for samples of a slide with a friction law; see `SampleMeter`."""

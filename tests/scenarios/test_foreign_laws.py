@@ -120,7 +120,9 @@ def test_a_constant_of_several_laws_names_them_all(install: Install) -> None:
     )
     assert FRICTION_LAWS.refused == {}
     known = {each.name: each for each in parameters_of(parameters_anew().PlantParameters)}
-    assert known["friction.kinetic"].meaning == "Kinetic coefficient mu_k (exponential, falling)."
+    assert known["friction.kinetic"].meaning == (
+        "Kinetic coefficient mu_k (exponential, rate_state, falling)."
+    )
 
 
 def test_its_constants_may_differ_between_the_directions(install: Install) -> None:

@@ -157,6 +157,13 @@ def test_every_friction_law_can_be_chosen_and_made() -> None:
 
 # Name, default, bounds and meaning that people rely on.
 FRICTION = [
+    (
+        "curve",
+        "exponential",
+        "one of stribeck, coulomb, linear, exponential, table",
+        "Static law that a law with a memory has in steady slip "
+        "(lugre, elasto_plastic, maxwell_slip).",
+    ),
     ("static", 0.4, "at least 0", "Static (break-away) coefficient mu_s."),
     ("minimum", 0.25, "at least 0", "Smallest kinetic coefficient mu_m (stribeck)."),
     (
@@ -167,7 +174,7 @@ FRICTION = [
     ),
     ("viscous", 0.0, "", "Increase of the coefficient with speed (coulomb, exponential)."),
     ("slope", 0.45, "", "Decrease of the coefficient with relative speed (linear)."),
-    ("kinetic", 0.25, "at least 0", "Kinetic coefficient mu_k (exponential)."),
+    ("kinetic", 0.25, "at least 0", "Kinetic coefficient mu_k (exponential, rate_state)."),
     ("decay_speed", 0.5, "above 0", "Speed v_s of the decay from mu_s to mu_k (exponential)."),
     ("exponent", 1.0, "at least 1", "Exponent n of the decay from mu_s to mu_k (exponential)."),
 ]
@@ -179,7 +186,7 @@ def test_the_constants_of_the_laws_are_parameters() -> None:
         (each.name.removeprefix("friction."), each.default, each.bounds, each.meaning)
         for each in found[1 : len(FRICTION) + 1]
     ] == FRICTION
-    assert {each.kind for each in found[1 : len(FRICTION) + 1]} == {float}
+    assert {each.kind for each in found[2 : len(FRICTION) + 1]} == {float}
 
 
 def test_a_law_gets_the_constants_of_its_formula() -> None:
@@ -235,7 +242,10 @@ def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
     if any(name.endswith((".static", ".minimum", ".kinetic")) for name in values):
         # The largest of the coefficients.
         values |= {"friction.static": 1e6, "friction.reverse.static": 1e6}
-    assume(values.get("friction.law") != "table")  # it needs a file
+    assume(values.get("friction.law") not in ("table", "rate_state"))  # a file; ratios of constants
+    values.pop("friction.curve", None)
+    values |= {"friction.break_away": 0.5} if "friction.break_away" in values else {}
+    values |= {"friction.elements": 3} if "friction.elements" in values else {}
     for name in values.keys() & {"friction.exponent", "friction.reverse.exponent"}:
         values[name] = 2.0
     for part in ("belt", "load", "disturbance"):

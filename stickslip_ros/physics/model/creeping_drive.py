@@ -30,6 +30,9 @@ _LEAVE = 2.0
 _BEHIND = 1e-9
 """Change of the speed, in that at which creep begins, of a slide that is too fast for it."""
 
+_PASSED_OVER = 1e-4
+"""Speed, in that at which creep begins, below which a slide that does not creep is not followed."""
+
 _MOST_GROWTH = 8.0
 """Logarithm of the growth of the speed of creep in one step."""
 
@@ -52,8 +55,14 @@ class CreepingDrive(DriveSystem):
         super().__init__(drive, control)
         self._sensitivity = sensitivity = float(self.drive.friction.rate_sensitivity)
         change = self.drive.fastest_belt + _SLOWEST_CHANGE * sensitivity
-        self._limit = _INERTIA * sensitivity * sensitivity / change
-        self.constants = {**self.constants, "creep.limit": self._limit}
+        rounding = ulp(max(self.drive.fastest_belt, 1.0))
+        self._limit = max(_INERTIA * sensitivity * sensitivity / change, 1e6 * rounding)
+        self._least = max(_PASSED_OVER * self._limit, 1e3 * rounding)
+        self.constants = {
+            **self.constants,
+            "creep.limit": self._limit,
+            "creep.least": self._least,
+        }
         self.limits_steps = True
         law, drive = self.drive.friction, self.drive
         steepest = [
@@ -63,14 +72,17 @@ class CreepingDrive(DriveSystem):
         self._loading += float(law.static) * steepest[1]
 
     def flow(self, name: str) -> Flow:
-        """Return the flow `SLIP` or `CREEP`; in slip the last guard leads to creep."""
+        """Return the flow `SLIP` or `CREEP`; in slip the last guards lead to creep, or past it."""
         if name == SLIP:
             flow = super().flow(name)
-            parts, limit = self._expressions, self.symbols.constants["creep.limit"]
+            parts, constants = self._expressions, self.symbols.constants
             relative_speed = parts.speed - parts.belt_speed
             reached = parts.law.creep_limit(relative_speed, parts.sign, parts.memory)
-            creeps = Guard(1.0 - limit / reached, type(self).slow_down)
-            return Flow(flow.rates, (*flow.guards, creeps), flow.marks)
+            slow = (
+                Guard(1.0 - constants["creep.limit"] / reached, type(self).slow_down),
+                Guard(1.0 - constants["creep.least"] / reached, type(self).pass_belt),
+            )
+            return Flow(flow.rates, (*flow.guards, *slow), flow.marks)
         return self._creep.flow
 
     @cached_property
@@ -124,6 +136,24 @@ class CreepingDrive(DriveSystem):
         speed, sign = instant.state[SPEED], mode.switches[0]
         instant.state[SPEED] = speed - sign * max(4.0 * ulp(speed), _BEHIND * self._limit)
         return mode
+
+    def pass_belt(self, mode: Mode, instant: Instant) -> Mode:
+        """Creep, or pass the speed of the belt at once: there the equations are too steep."""
+        following = self._creeping(mode, instant)
+        if following is not None:
+            return following
+        instant.state[SPEED] = self.belt_speed(mode, instant.time)
+        return self._slip(mode, -mode.switches[0], instant)
+
+    def separate(self, mode: Mode, instant: Instant) -> None:
+        """Move a slide that slips off the speed of the belt."""
+        if mode.flow != SLIP:
+            return
+        belt_speed, sign = self.belt_speed(mode, instant.time), mode.switches[0]
+        relative_speed = instant.state[SPEED] - belt_speed
+        reached = self.drive.friction.creep_limit(relative_speed, sign, self._memory(instant))
+        if reached < self._least or relative_speed == 0.0:
+            instant.state[SPEED] = belt_speed + sign * self._least * (1.0 + _BEHIND)
 
     def speed_up(self, mode: Mode, instant: Instant) -> Mode:
         """Slip where the slide has become fast."""

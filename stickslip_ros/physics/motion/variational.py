@@ -20,6 +20,9 @@ from stickslip_ros.physics.motion.recorded_motion import RecordedMotion
 _GREATEST_EFFORT = 8e6
 """Limit of slip time times stiffness, dimensionless, for a motion: some seconds of work."""
 
+_EFFORT_OF_A_STEP = 7.0
+"""Time of a step, times the stiffness that limits it."""
+
 _LONGEST_SLIP = 30.0
 """Dimensionless time after which the effort of a slip is added up."""
 
@@ -50,6 +53,7 @@ class SensitiveMotion(RecordedMotion):
         self.landed = False
         """Whether the slide has stuck since the start."""
         self._effort = self._begun = 0.0
+        self._steps_before = 0
         super().__init__(replace(drive, actuator=IDEAL_ACTUATOR), 0.0, 0.0, gains)
         self.start(np.zeros(self.order))
 
@@ -116,17 +120,19 @@ class SensitiveMotion(RecordedMotion):
     def _begin(self, now: float, end: float) -> float:
         # Start from the identity: heyoka's error is relative to the largest of the variables.
         self._derivatives[:] = np.eye(self.order)
-        self._begun = now
+        self._begun, self._steps_before = now, self._steps_left
         return min(end, now + _LONGEST_SLIP) if self._mode.flow == SLIP else end
 
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
         super()._pass(mode, guard, following, now)
         before, gradients = self._rates(mode)
         self.transition = self._enslaving(mode) @ self._derivatives @ self.transition
-        if mode.flow == SLIP:
+        if not self._system.sticks:
+            self._effort += _EFFORT_OF_A_STEP * (self._steps_before - self._steps_left)
+        elif mode.flow == SLIP:
             self._effort += (now - self._begun) * (1.0 + abs(float(gradients[SPEED, SPEED])))
-            if self._effort > _GREATEST_EFFORT:
-                raise TooStiffError
+        if self._effort > _GREATEST_EFFORT:
+            raise TooStiffError
         if guard is None or following is None:
             return
         normal = gradients[self.order + guard]

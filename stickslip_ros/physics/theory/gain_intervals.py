@@ -77,8 +77,8 @@ class GainBoundary:
     G = (l - 1)^2 (b l + c) / (l^(m+1) (l - e^(-d T)) (l - e^(s1 T)) (l - e^(s2 T)) ...),
     s1, s2, ... being the eigenvalues of the open loop. One factor l - 1 is the filter's; the other
     one shows that a constant force does not move the slide permanently. b and c are the force that
-    starts during a period, and the one that ends in it: numbers, or polynomials in l if friction
-    has a memory. In this form nothing cancels at high rates.
+    starts during a period, and the one that ends in it; with each state of a friction law b l + c
+    becomes a polynomial of one degree more. In this form nothing cancels at high rates.
     """
 
     def __init__(
@@ -95,11 +95,11 @@ class GainBoundary:
         self._period = period
         values = np.linalg.eigvals(jacobian).astype(np.complex128)
         self._poles = np.array([-corner_frequency, *values]) * period
-        if len(slide) == 2:
-            self._starting = np.array([starting[1]])
-            self._ending = np.array([slide[0, 0] * ending[1] - slide[1, 0] * ending[0]])
-        else:
-            self._starting, self._ending = (_numerator(slide, each) for each in (starting, ending))
+        self._forces: Any = [starting[1], slide[0, 0] * ending[1] - slide[1, 0] * ending[0]]
+        if len(slide) > 2:
+            starts, ends = (_speed_after(slide, each) for each in (starting, ending))
+            self._forces = np.polydiv(np.polyadd([*starts, 0.0], ends), [1.0, -1.0])[0]
+        """b l + c, as coefficients."""
 
     def gain(self, theta: Any) -> Any:
         """Return 1/G, an array of the shape of theta."""
@@ -114,7 +114,7 @@ class GainBoundary:
             ],
             axis=0,
         )
-        zeros = np.expm1(1j * theta) ** 2 * self._of_forces(forward)
+        zeros = np.expm1(1j * theta) ** 2 * np.polyval(self._forces, forward)
         with np.errstate(divide="ignore", invalid="ignore"):
             return forward ** (self._whole + 1) * differences / zeros
 
@@ -168,15 +168,11 @@ class GainBoundary:
             yield gain, 2 * int(number)
         # One real multiplier at -1. By symmetry 1/G is real there; the sum is exact.
         poles = np.exp(self._poles)
-        difference = float(self._of_forces(-1.0))
+        difference = float(np.polyval(self._forces, -1.0))
         if difference != 0.0:
             gain = float(np.prod(-1.0 - poles).real) / (4.0 * difference)
             if isfinite(gain):
                 yield gain * (-1.0) ** (self._whole + 1), -int(np.sign(imaginary[-1]))
-
-    def _of_forces(self, forward: Any) -> Any:
-        """Return b l + c."""
-        return np.polyval(self._starting, forward) * forward + np.polyval(self._ending, forward)
 
     def _angles(self) -> FloatArray:
         """Return angles above 0 and below pi between which the phase of each factor changes little.
@@ -187,7 +183,7 @@ class GainBoundary:
         parts: list[Any] = [np.arange(1, steps) * (pi / steps), self._near(0.0, self._period)]
         for pole in self._poles:
             parts.append(self._near(abs(float(np.angle(np.exp(1j * pole.imag)))), abs(pole.real)))
-        for zero in np.roots(np.polyadd([*self._starting, 0.0], self._ending)):
+        for zero in np.roots(self._forces):
             size = abs(complex(zero))
             if size > 0.0 and zero.real < 0.0:
                 parts.append(self._near(pi, abs(log(size)) + abs(pi - abs(np.angle(zero)))))
@@ -200,16 +196,15 @@ class GainBoundary:
         return np.concatenate([angle - distances, angle + distances])
 
 
-def _numerator(slide: FloatArray, force: FloatArray) -> FloatArray:
-    """Return the polynomial of the speed after a force, without its factor l - 1.
+def _speed_after(slide: FloatArray, force: FloatArray) -> Any:
+    """Return the polynomial e^T adj(l I - slide) force, that of the speed after a force.
 
     By the determinant lemma it is det(l I - slide + force e^T) - det(l I - slide).
     """
     seen = np.zeros(len(slide))
     seen[SPEED] = 1.0
-    whole = np.poly(slide - np.outer(force, seen)) - np.poly(slide)
-    quotient: Any = np.polydiv(whole[1:], [1.0, -1.0])[0]
-    return quotient
+    difference = np.poly(slide - np.outer(force, seen)) - np.poly(slide)
+    return difference[1:]
 
 
 def _distance(interval: GainInterval) -> float:

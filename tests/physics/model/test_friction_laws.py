@@ -45,6 +45,8 @@ every_law = pytest.mark.parametrize("kind", LAWS.values(), ids=LAWS)
 
 def values(constant: Constant) -> st.SearchStrategy[float]:
     """Values within the bounds of a constant."""
+    if constant.name == "break_away":
+        return st.floats(0.0, 0.99)
     if constant.whole:
         return st.integers(int(constant.at_least), 6)
     least = max(constant.at_least, 0.05 if constant.positive else -LARGEST)
@@ -294,6 +296,7 @@ def test_the_memory_after_a_duration_is_the_solution_of_its_rates(
     law = data.draw(laws(kind))
     relative_speed = sign * speed
     start = [share * each for each in law.memory_at(relative_speed, sign)]
+    assume(not isinstance(law, RateState) or law.reference_speed < 0.1)
     duration, scale = part * memory_time(law, speed), memory_scale(law, relative_speed)
     found = law.memory_after(relative_speed, start, duration)
     halfway = law.memory_after(relative_speed, start, 0.5 * duration)

@@ -9,8 +9,8 @@ from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.curve_follower import CurveFollower
 
 _MOST_ELEMENTS = 20
-_ABOVE = 1.0 + 2.0**-40
-"""Ratio by which the memory of steady slip is put above the limit at which an element slips."""
+_AT_LIMIT = 1.0 - 2.0**-40
+"""Share of its limit from which an element slips at the start of a mode, as in steady slip."""
 
 
 @dataclass(frozen=True)
@@ -85,15 +85,15 @@ class MaxwellSlip(CurveFollower):
 
     def own_switches_at(self, sign: float, memory: Sequence[float], size: float) -> Sequence[float]:
         """Return which elements slip: those at their limit in the direction of the slip."""
-        return [float(sign * force >= size) for force in self._forces(memory)]
+        return [float(sign * force >= _AT_LIMIT * size) for force in self._forces(memory)]
 
     def own_switches_after(self, margin: int, switches: Sequence[float]) -> Sequence[float]:
         """Return the switches with one more element that slips."""
         return (*switches[:margin], 1.0, *switches[margin + 1 :])
 
     def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
-        """Return s g / (n S_i), with rounding upward; see `FrictionLaw.memory_at`."""
-        steady = -float(self._dry.coefficient(relative_speed, sign)) / self.elements * _ABOVE
+        """Return s g / (n S_i); see `FrictionLaw.memory_at`."""
+        steady = -float(self._dry.coefficient(relative_speed, sign)) / self.elements
         return [steady / stiffness for stiffness in self.stiffnesses]
 
     def memory_after(
