@@ -265,6 +265,9 @@ def scenario_of(
             "--base SCENARIO takes omitted values from another scenario"
         )
         print(printable(sentence), file=sys.stderr)
+    warning = scenario.plant.friction.as_law().warning()
+    if warning is not None:
+        print(printable(f"{scenario.path}: {warning}"), file=sys.stderr)
     return scenario
 
 

@@ -42,9 +42,11 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._has_started = False
         self.elapsed = 0.0
         """Simulated time, s, before the last pause that counts as part of the duration."""
+        self._warned: str | None = None
 
     def connect(self) -> None:
         """Compile the motion; publish the state, subscribe to forces and to the recorder."""
+        self._warn_of_friction()
         initial = self.parameters.initial
         self._motion = Motion(self.parameters.as_drive(), initial.position, initial.velocity)
         self._moved = False
@@ -109,8 +111,16 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._answerable = self._loop.sample.stamp
         super().stop()
 
+    def _warn_of_friction(self) -> None:
+        """Log what a user of the friction law should know, once."""
+        warning = self.parameters.friction.as_law().warning()
+        if warning is not None and warning != self._warned:
+            self.get_logger().warning(warning)
+        self._warned = warning
+
     def apply_parameters(self) -> None:
         """Use the new drive and disturbance from the next sample on."""
+        self._warn_of_friction()
         if self.active:
             with self._lock:
                 self._loop.change_drive(self.parameters.as_drive())

@@ -73,7 +73,21 @@ def documented_parameters(name: str) -> Iterator[tuple[str, list[str], list[str]
     for member, value in vars(found).items():
         method: Any = getattr(value, "__func__", value)
         if inspect.isfunction(method) and not member.startswith("_"):
-            yield f"{name}.{member}", parameters(getattr(found, member)), section(method)
+            yield (
+                f"{name}.{member}",
+                parameters(getattr(found, member)),
+                documented_of(found, member),
+            )
+
+
+def documented_of(found: type, member: str) -> list[str]:
+    """The parameters that a method documents, or the one that it overrides and refers to."""
+    for each in found.__mro__:
+        if member in vars(each):
+            method = getattr(vars(each)[member], "__func__", vars(each)[member])
+            if f".{member}`." not in (inspect.getdoc(method) or "") or section(method):
+                return section(method)
+    return []
 
 
 def is_own_constructor(found: type) -> bool:

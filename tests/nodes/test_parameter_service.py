@@ -141,6 +141,7 @@ def test_good_values_are_taken_exactly_in_every_state(graph: Graph, name: str) -
                     "at least a thousandth",
                     "must be the path of a CSV file",
                     "must be above 0 and finite for a ",
+                    "must be at least friction.",
                 ]
                 allowed = refusals if reason else [""]
                 if parameter not in settable and value != start[parameter]:

@@ -75,8 +75,7 @@ class LinearSampledLoop:
     The slide of a machine tool, sampled at 1 kHz without delay:
 
     >>> from stickslip_ros.physics.model.drive import Drive
-    from stickslip_ros.physics.model.drive_system import SPEED
-    >>> from stickslip_ros.physics.model.control import WashoutGains
+        >>> from stickslip_ros.physics.model.control import WashoutGains
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
     >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,

@@ -10,6 +10,7 @@ from stickslip_ros.physics.model.friction.exponential import Exponential
 from stickslip_ros.physics.model.friction.linear import Linear
 from stickslip_ros.physics.model.friction.lugre import LuGre
 from stickslip_ros.physics.model.friction.maxwell_slip import MaxwellSlip
+from stickslip_ros.physics.model.friction.observer import FrictionObserver
 from stickslip_ros.physics.model.friction.rate_state import RateState
 from stickslip_ros.physics.model.friction.stribeck import Stribeck
 from stickslip_ros.physics.model.friction.table import Table
@@ -43,6 +44,7 @@ __all__ = [
     "ElastoPlastic",
     "Exponential",
     "FrictionLaw",
+    "FrictionObserver",
     "Linear",
     "LuGre",
     "MaxwellSlip",

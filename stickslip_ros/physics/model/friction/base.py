@@ -291,6 +291,16 @@ class FrictionLaw(ABC):
         """
         return None
 
+    def warning(self) -> str | None:
+        """Return a sentence that says what a user of the law should know, or None.
+
+        Returns
+        -------
+        str or None
+            Sentence with names and values of constants.
+        """
+        return None
+
     def above_static(self, name: str) -> str | None:
         """Return the refusal of a constant above the static coefficient, or None.
 

@@ -80,11 +80,11 @@ class CurveFollower(FrictionLaw):
         """Return those of the law itself and of the curve; see `FrictionLaw.margins`."""
         own = len(self.own_switches)
         return (
-            *self.own_margins(relative_speed, sign, memory, switches),
+            *self._own_margins(relative_speed, sign, memory, switches),
             *self._dry.margins(relative_speed, sign, (), switches[own:]),
         )
 
-    def own_margins(
+    def _own_margins(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Sequence[Any]:
         """Return the margins of the law itself, one for each of `own_switches` or fewer."""
@@ -98,10 +98,12 @@ class CurveFollower(FrictionLaw):
         own: Sequence[float] = (0.0,) * len(self.own_switches)
         if own:
             size = self.size(relative_speed, sign, (*own, *of_curve))
-            own = self.own_switches_at(sign, memory, float(size))
+            own = self._own_switches_at(sign, memory, float(size))
         return (*own, *of_curve)
 
-    def own_switches_at(self, sign: float, memory: Sequence[float], size: float) -> Sequence[float]:
+    def _own_switches_at(
+        self, sign: float, memory: Sequence[float], size: float
+    ) -> Sequence[float]:
         """Return the switches of the law itself in a state; `size` is g(v_r)."""
         return ()
 
@@ -114,9 +116,9 @@ class CurveFollower(FrictionLaw):
         further = margin - self._own_margin_count
         if further >= 0:
             return (*own, *self.curve.switches_after(further, sign, of_curve))
-        return (*self.own_switches_after(margin, own), *of_curve)
+        return (*self._own_switches_after(margin, own), *of_curve)
 
-    def own_switches_after(self, margin: int, switches: Sequence[float]) -> Sequence[float]:
+    def _own_switches_after(self, margin: int, switches: Sequence[float]) -> Sequence[float]:
         """Return the switches of the law itself after one of its margins."""
         return switches
 
@@ -147,4 +149,4 @@ class CurveFollower(FrictionLaw):
     @cached_property
     def _own_margin_count(self) -> int:
         memory, own = (0.0,) * len(self.states), (0.0,) * len(self.switches)
-        return len(self.own_margins(0.0, 1.0, memory, own))
+        return len(self._own_margins(0.0, 1.0, memory, own))

@@ -235,6 +235,10 @@ class Directional(FrictionLaw):
         """Return a measure of the viscosity; see `FrictionLaw.creep_limit`."""
         return self._of(sign, lambda law: law.creep_limit(relative_speed, sign, memory))
 
+    def warning(self) -> str | None:
+        """Return the warning of either law; see `FrictionLaw.warning`."""
+        return self.forward.warning() or self.reverse.warning()
+
     def refusal(self) -> str | None:
         """Return the refusal of either law; see `FrictionLaw.refusal`.
 

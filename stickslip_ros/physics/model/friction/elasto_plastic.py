@@ -31,8 +31,9 @@ class ElastoPlastic(LuGre):
     --------
     >>> from stickslip_ros.physics.model.friction import ElastoPlastic, Exponential
     >>> law = ElastoPlastic(Exponential(static=0.4, kinetic=0.25), bristle_stiffness=1000.0)
-    >>> law.memory_rates(0.1, 1.0, (1e-4,), law.switches_at(0.1, 1.0, (1e-4,)))
-    (0.1,)
+    >>> switches = law.switches_at(0.1, 1.0, (1e-4,))  # elastic: z' is the relative speed
+    >>> [float(each) for each in law.memory_rates(0.1, 1.0, (1e-4,), switches)]
+    [0.1]
     """
 
     name: ClassVar[str] = "elasto_plastic"
@@ -56,7 +57,7 @@ class ElastoPlastic(LuGre):
         yields = plastic + (1.0 - elastic - plastic) * (0.5 + 0.5 * sin(angle))
         return (relative_speed * (1.0 - yields * force / size),)
 
-    def own_margins(
+    def _own_margins(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Sequence[Any]:
         """Return the distances to the two ends of the range in which alpha changes."""
@@ -68,13 +69,15 @@ class ElastoPlastic(LuGre):
             elastic + (1.0 - elastic) * (1.0 - 2.0 * plastic) * (size - force),
         )
 
-    def own_switches_at(self, sign: float, memory: Sequence[float], size: float) -> Sequence[float]:
+    def _own_switches_at(
+        self, sign: float, memory: Sequence[float], size: float
+    ) -> Sequence[float]:
         """Return whether the contact is elastic, or fully plastic, and S z_b."""
         limit = self.break_away * self._dry.size_range[0]
         force = sign * self.bristle_stiffness * memory[0]
         return (float(force <= limit), float(force >= size), limit)
 
-    def own_switches_after(self, margin: int, switches: Sequence[float]) -> Sequence[float]:
+    def _own_switches_after(self, margin: int, switches: Sequence[float]) -> Sequence[float]:
         """Return the switches on the other side of an end."""
         elastic, plastic, limit = switches
         return (1.0 - elastic, 0.0, limit) if margin == 0 else (0.0, 1.0 - plastic, limit)
@@ -109,6 +112,10 @@ class ElastoPlastic(LuGre):
             z += step * (first + 2.0 * second + 2.0 * third + fourth) / 6.0
             left -= step
         return (z,)
+
+    def warning(self) -> str | None:
+        """Say nothing: the condition of LuGre is not one of this law."""
+        return None
 
     def refusal(self) -> str | None:
         """Refuse a break-away of one or more; see `FrictionLaw.refusal`."""

@@ -26,7 +26,7 @@ class LuGre(CurveFollower):
     >>> from stickslip_ros.physics.model.friction import Exponential, LuGre
     >>> curve = Exponential(static=0.4, kinetic=0.25, decay_speed=0.05)
     >>> law = LuGre(curve, bristle_stiffness=1000.0, bristle_damping=0.0)
-    >>> law.friction(0.0, 1.0, (2e-4,), ())
+    >>> float(law.friction(0.0, 1.0, (2e-4,), ()))
     -0.2
     """
 
@@ -64,6 +64,17 @@ class LuGre(CurveFollower):
         """Return z, which approaches that of steady slip; see `FrictionLaw.memory_after`."""
         (steady,) = self.memory_at(relative_speed, 1.0 if relative_speed > 0.0 else -1.0)
         return (approached(memory[0], steady, abs(relative_speed) * duration),)
+
+    def warning(self) -> str | None:
+        """Say that the law is not passive, if so; see `FrictionLaw.warning`."""
+        margin = self.passivity_margin
+        if margin > 0.0 or self.bristle_damping == 0.0:
+            return None
+        return (
+            f"friction law {self.name} is not passive, and may supply energy: viscous = "
+            f"{self.viscous_part:g} s/m is {-margin:.4g} s/m below "
+            "bristle_damping * (max g / min g - 1)"
+        )
 
     @property
     def passivity_margin(self) -> float:

@@ -73,7 +73,7 @@ class MaxwellSlip(CurveFollower):
             for stiffness, z, slips in zip(self.stiffnesses, memory, switches, strict=False)
         ]
 
-    def own_margins(
+    def _own_margins(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Sequence[Any]:
         """Return the distance of each element that sticks to its limit."""
@@ -83,11 +83,13 @@ class MaxwellSlip(CurveFollower):
             for force, slips in zip(self._forces(memory), switches, strict=False)
         ]
 
-    def own_switches_at(self, sign: float, memory: Sequence[float], size: float) -> Sequence[float]:
+    def _own_switches_at(
+        self, sign: float, memory: Sequence[float], size: float
+    ) -> Sequence[float]:
         """Return which elements slip: those at their limit in the direction of the slip."""
         return [float(sign * force >= _AT_LIMIT * size) for force in self._forces(memory)]
 
-    def own_switches_after(self, margin: int, switches: Sequence[float]) -> Sequence[float]:
+    def _own_switches_after(self, margin: int, switches: Sequence[float]) -> Sequence[float]:
         """Return the switches with one more element that slips."""
         return (*switches[:margin], 1.0, *switches[margin + 1 :])
 
