@@ -160,8 +160,11 @@ class CreepingDrive(DriveSystem):
         return Mode(SLIP, mode.switches)
 
     def reverse_creep(self, mode: Mode, instant: Instant) -> Mode:
-        """Creep in the other direction."""
-        return self._toward(-mode.switches[0], mode, instant)
+        """Creep in the other direction, or slip if the law of that direction is less viscous."""
+        following = self._toward(-mode.switches[0], mode, instant)
+        _, viscous = self._compiled(following, instant)
+        creeps = viscous < _LEAVE * self._limit
+        return following if creeps else Mode(SLIP, following.switches)
 
     def reach_belt(self, mode: Mode, instant: Instant) -> Mode:
         """Slip in the other direction, or creep."""

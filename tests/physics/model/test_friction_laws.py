@@ -298,13 +298,14 @@ def test_the_memory_after_a_duration_is_the_solution_of_its_rates(
     start = [share * each for each in law.memory_at(relative_speed, sign)]
     assume(not isinstance(law, RateState) or law.reference_speed < 0.1)
     duration, scale = part * memory_time(law, speed), memory_scale(law, relative_speed)
-    found = law.memory_after(relative_speed, start, duration)
-    halfway = law.memory_after(relative_speed, start, 0.5 * duration)
-    again = law.memory_after(relative_speed, halfway, 0.5 * duration)
+    switches = law.switches_at(relative_speed, sign, start)
+    found = law.memory_after(relative_speed, start, switches, duration)
+    halfway = law.memory_after(relative_speed, start, switches, 0.5 * duration)
+    then = law.switches_following(switches, relative_speed, sign, halfway)
+    again = law.memory_after(relative_speed, halfway, then, 0.5 * duration)
     np.testing.assert_allclose(np.array(again) / scale, np.array(found) / scale, atol=2e-7)
     step = 1e-6 * duration
-    slope = (np.array(law.memory_after(relative_speed, start, step)) - start) / step
-    switches = law.switches_at(relative_speed, sign, start)
+    slope = (np.array(law.memory_after(relative_speed, start, switches, step)) - start) / step
     rates = np.array(law.memory_rates(relative_speed, sign, start, switches))
     unit = scale / duration
     np.testing.assert_allclose(slope / unit, rates / unit, rtol=1e-3, atol=1e-3)
@@ -326,4 +327,4 @@ def memory_scale(law: FrictionLaw, relative_speed: float) -> Any:
 
 def test_the_memory_of_a_law_that_does_not_say_it_is_refused() -> None:
     with pytest.raises(InvalidInputError, match="dahl does not say what its memory is"):
-        parts.Dahl().memory_after(0.1, (0.0,), 1.0)
+        parts.Dahl().memory_after(0.1, (0.0,), (), 1.0)

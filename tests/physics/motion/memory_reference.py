@@ -192,6 +192,7 @@ class MemoryDrive:
         rate = (self.stiffness / self.mass) ** 0.5 if self.stiffness else 1.0
         length = self.normal / self.stiffness if self.stiffness else 1.0
         self._speed, self._length, self._time = length * rate, length, 1.0 / rate
+        self._returns = 0
 
     def law(self, s: float) -> Any:
         return self.forward if s > 0.0 else self.backward
@@ -285,8 +286,12 @@ class MemoryDrive:
                     guard = int(crossed[first])
                     until, reached = self._reach(mode, solver, roots[first], guard)
                     return begin + until, reached, guard
-                if np.any(~armed & (values < -1e-9)):
-                    raise LostError(f"no departure at {time}")
+                late = np.flatnonzero(~armed & (values < -1e-9))
+                if len(late):  # the phase has left through the guard on which it starts
+                    if late[0] == 0 or self._returns > 1000:
+                        raise LostError(f"no departure at {begin + time}")
+                    self._returns += 1
+                    return begin, state, int(late[0])
                 armed |= values > 1e-13
                 last = time
         return begin + end, solver.y, None

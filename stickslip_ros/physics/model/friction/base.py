@@ -233,7 +233,11 @@ class FrictionLaw(ABC):
         return (0.0,) * len(self.states)
 
     def memory_after(
-        self, relative_speed: float, memory: Sequence[float], duration: float
+        self,
+        relative_speed: float,
+        memory: Sequence[float],
+        switches: Sequence[float],
+        duration: float,
     ) -> Sequence[float]:
         """Return the memory after a duration at a constant relative speed.
 
@@ -245,6 +249,8 @@ class FrictionLaw(ABC):
             Speed v_r of the slide relative to the belt, m/s.
         memory : sequence of float
             Values of `states`.
+        switches : sequence of float
+            Values of `switches` at the start.
         duration : float
             Duration, s.
 
@@ -264,6 +270,33 @@ class FrictionLaw(ABC):
                 "it must define memory_after"
             )
         return ()
+
+    def switches_following(
+        self,
+        switches: Sequence[float],
+        relative_speed: float,
+        sign: float,
+        memory: Sequence[float],
+    ) -> Sequence[float]:
+        """Return the switches of a state that follows others, in the same direction of slip.
+
+        Parameters
+        ----------
+        switches : sequence of float
+            Values of `switches` before.
+        relative_speed : float
+            Speed v_r of the slide relative to the belt, m/s.
+        sign : float
+            sgn(v_r), -1 or 1.
+        memory : sequence of float
+            Values of `states`.
+
+        Returns
+        -------
+        sequence of float
+            Values of `switches`; by default those of the state, as `switches_at` gives them.
+        """
+        return self.switches_at(relative_speed, sign, memory)
 
     def initial_memory(self, relative_speed: float) -> Sequence[float]:
         """Return the memory at the start of a motion.

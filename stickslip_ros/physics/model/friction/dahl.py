@@ -64,7 +64,11 @@ class Dahl(FrictionLaw):
         return (sign * self.static / self.bristle_stiffness,)
 
     def memory_after(
-        self, relative_speed: float, memory: Sequence[float], duration: float
+        self,
+        relative_speed: float,
+        memory: Sequence[float],
+        switches: Sequence[float],
+        duration: float,
     ) -> Sequence[float]:
         """Return z, which approaches that of steady slip; see `FrictionLaw.memory_after`."""
         (steady,) = self.memory_at(relative_speed, 1.0 if relative_speed > 0.0 else -1.0)

@@ -214,12 +214,29 @@ class Directional(FrictionLaw):
         """
         return self._of(relative_speed, lambda law: law.initial_memory(relative_speed))
 
+    def switches_following(
+        self,
+        switches: Sequence[float],
+        relative_speed: float,
+        sign: float,
+        memory: Sequence[float],
+    ) -> Sequence[float]:
+        """Return the switches of a state that follows; see `FrictionLaw.switches_following`."""
+        return self._of(
+            sign, lambda law: law.switches_following(switches, relative_speed, sign, memory)
+        )
+
     def memory_after(
-        self, relative_speed: float, memory: Sequence[float], duration: float
+        self,
+        relative_speed: float,
+        memory: Sequence[float],
+        switches: Sequence[float],
+        duration: float,
     ) -> Sequence[float]:
         """Return the memory after a duration; see `FrictionLaw.memory_after`."""
         return self._of(
-            relative_speed, lambda law: law.memory_after(relative_speed, memory, duration)
+            relative_speed,
+            lambda law: law.memory_after(relative_speed, memory, switches, duration),
         )
 
     @property

@@ -83,7 +83,11 @@ class ElastoPlastic(LuGre):
         return (1.0 - elastic, 0.0, limit) if margin == 0 else (0.0, 1.0 - plastic, limit)
 
     def memory_after(
-        self, relative_speed: float, memory: Sequence[float], duration: float
+        self,
+        relative_speed: float,
+        memory: Sequence[float],
+        switches: Sequence[float],
+        duration: float,
     ) -> Sequence[float]:
         """Return z by Runge-Kutta steps along the path; see `FrictionLaw.memory_after`."""
         if relative_speed == 0.0 or duration == 0.0:

@@ -98,16 +98,31 @@ class MaxwellSlip(CurveFollower):
         steady = -float(self._dry.coefficient(relative_speed, sign)) / self.elements
         return [steady / stiffness for stiffness in self.stiffnesses]
 
+    def switches_following(
+        self,
+        switches: Sequence[float],
+        relative_speed: float,
+        sign: float,
+        memory: Sequence[float],
+    ) -> Sequence[float]:
+        """Keep the elements that slip; see `FrictionLaw.switches_following`."""
+        reached, count = self.switches_at(relative_speed, sign, memory), self.elements
+        return (*map(max, switches[:count], reached[:count]), *reached[count:])
+
     def memory_after(
-        self, relative_speed: float, memory: Sequence[float], duration: float
+        self,
+        relative_speed: float,
+        memory: Sequence[float],
+        switches: Sequence[float],
+        duration: float,
     ) -> Sequence[float]:
         """Return z_i, each as it sticks and then slips; see `FrictionLaw.memory_after`."""
         sign = 1.0 if relative_speed > 0.0 else -1.0
         size = abs(float(self._dry.coefficient(relative_speed, sign)))
         after: list[float] = []
-        for stiffness, z in zip(self.stiffnesses, memory, strict=True):
+        for stiffness, z, slips in zip(self.stiffnesses, memory, switches, strict=False):
             limit = sign * size / self.elements / stiffness
-            path = max(sign * (limit - z), 0.0)
+            path = 0.0 if slips else max(sign * (limit - z), 0.0)
             if abs(relative_speed) * duration <= path:
                 after.append(z + relative_speed * duration)
                 continue

@@ -28,6 +28,8 @@ class FrictionObserver:
         """Law that is followed."""
         self.memory = tuple(law.initial_memory(0.0) if memory is None else memory)
         """Present values of its `states`."""
+        self._switches = tuple[float, ...]()
+        self._sign = 0.0
 
     def step(self, relative_speed: float, duration: float) -> float:
         """Follow the memory over a sample at a constant speed; return the coefficient at its end.
@@ -49,7 +51,11 @@ class FrictionObserver:
         InvalidInputError
             If the law has a memory and does not define `memory_after`.
         """
-        self.memory = tuple(self.law.memory_after(relative_speed, self.memory, duration))
-        sign = -1.0 if relative_speed < 0.0 else 1.0
-        switches = self.law.switches_at(relative_speed, sign, self.memory)
-        return float(self.law.friction(relative_speed, sign, self.memory, switches))
+        law, sign = self.law, -1.0 if relative_speed < 0.0 else 1.0
+        switches = law.switches_at(relative_speed, sign, self.memory)
+        if sign == self._sign:
+            switches = law.switches_following(self._switches, relative_speed, sign, self.memory)
+        self.memory = tuple(law.memory_after(relative_speed, self.memory, switches, duration))
+        switches = law.switches_following(switches, relative_speed, sign, self.memory)
+        self._switches, self._sign = tuple(switches), sign
+        return float(law.friction(relative_speed, sign, self.memory, switches))

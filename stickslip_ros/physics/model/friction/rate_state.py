@@ -43,6 +43,7 @@ class RateState(FrictionLaw):
 
     name: ClassVar[str] = "rate_state"
     states: ClassVar[Mapping[str, str | None]] = {"log_age": None}
+    undirected: ClassVar[Sequence[str]] = ("slip_distance", "reference_speed")
     static: ClassVar[Any]  # type: ignore[misc]
 
     kinetic: Any = constant(0.25, "Kinetic coefficient mu_k.", at_least=0.0)
@@ -99,7 +100,11 @@ class RateState(FrictionLaw):
         return (-float_log(max(abs(relative_speed) / self.reference_speed, 1.0)),)
 
     def memory_after(
-        self, relative_speed: float, memory: Sequence[float], duration: float
+        self,
+        relative_speed: float,
+        memory: Sequence[float],
+        switches: Sequence[float],
+        duration: float,
     ) -> Sequence[float]:
         """Return the memory of the age then; see `FrictionLaw.memory_after`."""
         path = abs(relative_speed) * duration / self.slip_distance
