@@ -82,7 +82,7 @@ class CreepingDrive(DriveSystem):
                 Guard(1.0 - constants["creep.limit"] / reached, type(self).slow_down),
                 Guard(1.0 - constants["creep.least"] / reached, type(self).pass_belt),
             )
-            return Flow(flow.rates, (*flow.guards, *slow), flow.marks)
+            return Flow(flow.rates, (*flow.guards, *slow), flow.marks, flow.pace)
         return self._creep.flow
 
     @cached_property

@@ -51,9 +51,10 @@ TIME_ROUNDING = 2.0**-49
 _LIFT_ROUNDING = 2.0**-40
 """Normal force, in that of the drive, that is rounding where a load takes all of it away."""
 
-_VISIBLE, _NEGLIGIBLE = 9.0, 110.0
-"""Speeds, in the characteristic one, between which an exponential law reaches its limit: up to the
-first one its series shows it for every exponent, and from the second one on it is below rounding.
+_CHANGE_IN_A_STEP = 8.0
+"""Change of the speed in a step, in the characteristic one, for a law with a memory.
+
+An exponential that is below rounding at the start of a step is then hardly above it at the end.
 """
 
 _MOST_AT_ONCE = 100
@@ -163,6 +164,7 @@ class DriveSystem(HybridSystem):
             )
         )
         self._steady = isinstance(self.drive.belt, NoCourse)
+        self._paced = law.characteristic_speed != inf and not law.sticks
         self._frequency, self._stiffness = drive.angular_frequency, self.drive.stiffness
         self.constants = {
             "damping": self.drive.damping,
@@ -175,6 +177,11 @@ class DriveSystem(HybridSystem):
             **(numbers(self.control, "control") if self.control is not None else {}),
             # Of a slide with a memory that counts as sticking; it has no part in the motion.
             **({} if law.sticks else {"stick_speed": 0.0}),
+            **(
+                {}
+                if not self._paced
+                else {"pace": 1.0 / (_CHANGE_IN_A_STEP * law.characteristic_speed)}
+            ),
         }
         self._friction = law.friction
         self.sticks = law.sticks
@@ -187,7 +194,7 @@ class DriveSystem(HybridSystem):
         # Time at which the speed of the belt was last asked for, and that speed.
         self._seen_at = self._seen_belt_speed = inf
         self._characteristic_speed = law.characteristic_speed
-        self.limits_steps = law.characteristic_speed != inf
+        self.limits_steps = law.characteristic_speed != inf and law.sticks
 
     @cached_property
     def autonomous(self) -> bool:
@@ -235,7 +242,17 @@ class DriveSystem(HybridSystem):
                 *self._guards_of_parts(relative_speed),
             ),
             marks=(y, acceleration, *self._marks_of_slow_slip(relative_speed)),
+            pace=self._pace_of(relative_speed),
         )
+
+    def _pace_of(self, relative_speed: Any) -> tuple[Any, ...]:
+        """Return what makes heyoka see an exponential that is negligible, see `longest_step`.
+
+        The acceleration of a slide with a memory has no useful bound.
+        """
+        if not self._paced:
+            return ()
+        return (0.2 + 0.1 * hy.cos(relative_speed * self.symbols.constants["pace"]),)
 
     def _marks_of_slow_slip(self, relative_speed: Any) -> tuple[Any, ...]:
         """Return where a slide that never sticks becomes slow or fast."""
@@ -406,21 +423,14 @@ class DriveSystem(HybridSystem):
 
         The relative speed, that is: courses change normal force and belt speed. heyoka chooses a
         step from the series at its start. It would miss an exponential that is negligible there and
-        rises before the step ends. The steps of a law with a memory are shorter: they are limited
-        only where the exponential is negligible, or becomes so.
+        rises before the step ends.
         """
         state = instant.state
         acceleration = (
             abs(self.reaction(instant)) + self._stiffness * abs(state[POSITION]) + abs(state[SPEED])
             + self._largest_friction + self._belt_acceleration
         )  # fmt: skip
-        change = self._characteristic_speed
-        if not self.sticks and self._steady:
-            speed = abs(state[SPEED] - self.drive.belt_speed)
-            if speed < _VISIBLE * change:
-                return inf
-            change = max(change, speed - _NEGLIGIBLE * change)
-        return change / acceleration if acceleration > 0.0 else inf
+        return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
 
     def overflow(self, mode: Mode, instant: Instant) -> Mode:
         """Set the speed at which a motion counts as unbounded: what overflows exceeds any speed."""

@@ -65,6 +65,8 @@ class Flow:
     guards: tuple[Guard, ...]
     marks: tuple[Any, ...] = ()
     """Expressions at whose zeros a recorded motion has breakpoints."""
+    pace: tuple[Any, ...] = ()
+    """Expressions above zero whose series the steps of the integration resolve, too."""
     slaved: Mapping[int, Any] = field(default_factory=dict[int, Any])
     """Expressions of states, by index, that follow from the others; `HybridSystem.slave` sets them.
 

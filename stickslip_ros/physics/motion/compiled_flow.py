@@ -142,7 +142,8 @@ def _compile(system: HybridSystem, name: str, detail: Detail) -> CompiledFlow:
         nt_events=[
             hy.nt_event(mark, callback=_Finder(zero_speed=number == 0))
             for number, mark in enumerate(flow.marks if detail is not Detail.STATES else ())
-        ],
+        ]
+        + [hy.nt_event(each, callback=_Finder(zero_speed=False)) for each in flow.pace],
         fast_math=True,  # a quarter faster; the error stays below 2e-12 over 190 periods
     )
     return CompiledFlow(taylor, system)
