@@ -33,6 +33,7 @@ from tests.physics.motion.random_memory_drives import (
     LAWS,
     PERIODS,
     SAMPLES,
+    STORED_EVERY,
     random_memory_drive,
 )
 
@@ -94,7 +95,7 @@ def compared(case: tuple[str, int]) -> tuple[Result, list[list[float]]]:
     except StickslipError as error:
         return Result(law, seed, reference_error=own, failure=str(error)), []
     result = Result(law, seed, drive.error(found, expected), own, slow / max(quick, 1e-6))
-    return result, expected[::SAMPLES].tolist()
+    return result, expected[::STORED_EVERY].tolist()
 
 
 def summary(results: list[Result]) -> dict[str, Any]:

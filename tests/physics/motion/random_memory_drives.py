@@ -22,6 +22,8 @@ CURVES = ("exponential", "exponent", "stribeck", "coulomb", "table")
 PERIODS = 20
 SAMPLES = 4
 """Per natural period."""
+STORED_EVERY = 3
+"""Every so many samples are stored: at equal phases of the period they would be much alike."""
 
 Random = np.random.Generator
 Scales = tuple[float, float, float]
