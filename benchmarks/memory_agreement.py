@@ -16,7 +16,6 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from itertools import product
@@ -24,11 +23,12 @@ from math import inf, isfinite
 from pathlib import Path
 from statistics import median
 from time import process_time
+from timeit import Timer
 from typing import Any
 
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.versions import versions
-from tests.physics.motion.memory_reference import Array, LostError
+from tests.physics.motion.memory_reference import LostError
 from tests.physics.motion.random_memory_drives import (
     LAWS,
     PERIODS,
@@ -69,12 +69,6 @@ def _stop(*_: Any) -> None:
     raise LostError(f"takes more than {LIMIT} s")
 
 
-def timed(function: Callable[[], Array]) -> tuple[Array, float]:
-    start = process_time()
-    found = function()
-    return found, process_time() - start
-
-
 def compared(case: tuple[str, int]) -> tuple[Result, list[list[float]]]:
     """Compare the motion of one drive with its reference; return the reference, too."""
     law, seed = case
@@ -82,7 +76,9 @@ def compared(case: tuple[str, int]) -> tuple[Result, list[list[float]]]:
     signal.signal(signal.SIGVTALRM, _stop)
     try:
         signal.setitimer(signal.ITIMER_VIRTUAL, LIMIT)
-        expected, slow = timed(lambda: drive.reference(RTOL[law]))
+        start = process_time()
+        expected = drive.reference(RTOL[law])
+        slow = process_time() - start
         coarse = drive.reference(10.0 * RTOL[law])
     except (LostError, ArithmeticError, ValueError) as error:
         return Result(law, seed, failure=f"reference: {error}"), []
@@ -90,11 +86,11 @@ def compared(case: tuple[str, int]) -> tuple[Result, list[list[float]]]:
         signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
     own = drive.error(coarse, expected)
     try:
-        drive.motion()  # compiles
-        found, quick = timed(drive.motion)
+        found = drive.motion()  # compiles
+        times, quick = Timer(drive.motion, timer=process_time).autorange()
     except StickslipError as error:
         return Result(law, seed, reference_error=own, failure=str(error)), []
-    result = Result(law, seed, drive.error(found, expected), own, slow / max(quick, 1e-6))
+    result = Result(law, seed, drive.error(found, expected), own, slow / quick * times)
     return result, expected[::STORED_EVERY].tolist()
 
 

@@ -11,7 +11,7 @@ from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear
+from stickslip_ros.physics.model.friction import Coulomb, Exponential, Linear, LuGre
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies import settling
 from stickslip_ros.studies.settling import (
@@ -93,6 +93,22 @@ def test_the_feed_drive_is_the_papers_in_other_units() -> None:
     )
     assert one.amplitude is not None
     assert other.amplitude == pytest.approx(1e-3 * one.amplitude, rel=1e-9)
+
+
+def test_a_motion_begins_with_the_memory_that_another_one_ended_with() -> None:
+    """On a belt at rest bent bristles hold the spring: without them the slide would move."""
+    law = LuGre(Exponential(0.4, 0.25, 0.1), bristle_stiffness=100.0, bristle_damping=5.0)
+    case = ControlledDrive(replace(PAPER, belt_speed=0.0, friction=law))
+    bent = MotionState(-0.2, 0.0, None, (0.002,))
+    end = settle(case, bent).end
+    assert end.position == pytest.approx(bent.position, rel=1e-9)
+    assert end.memory == pytest.approx(bent.memory, rel=1e-9)
+    assert settle(case, replace(bent, memory=None)).end.position > -0.199
+    # Of another law the memory does not count.
+    other = replace(case, drive=replace(case.drive, friction=Coulomb(0.4)))
+    assert settle(other, bent).end.memory == ()
+    assert MotionState.from_json([-0.2, 0.0, None, [0.002]]) == bent
+    assert MotionState.from_json([-0.2, 0.0, [0.1]]) == MotionState(-0.2, 0.0, (0.1,))
 
 
 def _case(*overrides: str, continuous: bool = False, **drive: Any) -> ControlledDrive:

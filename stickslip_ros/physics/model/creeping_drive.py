@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SLIP, SPEED, DriveSystem
+from stickslip_ros.physics.model.drive_system import SLIP, SPEED, UNSEEN, DriveSystem
 from stickslip_ros.physics.model.hybrid import Flow, Guard, Instant, Mode
 
 CREEP = "creep"
@@ -122,7 +122,7 @@ class CreepingDrive(DriveSystem):
                     Guard(1.0 - viscous / (_LEAVE * limit), kind.speed_up),
                     *self._guards_of_parts(relative_speed),
                 ),
-                marks=(speed,),
+                marks=(UNSEEN * speed,),
                 slaved={SPEED: speed},
             ),
         )

@@ -57,6 +57,9 @@ _CHANGE_IN_A_STEP = 8.0
 An exponential that is below rounding at the start of a step is then hardly above it at the end.
 """
 
+UNSEEN = 2.0**-60
+"""Factor of a series that has no part in the choice of steps."""
+
 _MOST_AT_ONCE = 100
 """Number of changes of mode at one instant above which there is no end of them."""
 
@@ -185,6 +188,7 @@ class DriveSystem(HybridSystem):
         }
         self._friction = law.friction
         self.sticks = law.sticks
+        self.many_steps = not law.sticks
         self.forward_limit, self.backward_limit = map(float, law.limits)
         # Where a bound is not known, the course is taken to change less than the state does.
         heaviest, steepest = 1.0 + self.drive.load.bounds[1], self.drive.belt.steepest
@@ -241,7 +245,7 @@ class DriveSystem(HybridSystem):
                 Guard(1.0 - sign * y / UNBOUNDED_SPEED, kind.diverge),
                 *self._guards_of_parts(relative_speed),
             ),
-            marks=(y, acceleration, *self._marks_of_slow_slip(relative_speed)),
+            marks=self._marks_of_slip(y, acceleration, relative_speed),
             pace=self._pace_of(relative_speed),
         )
 
@@ -254,12 +258,17 @@ class DriveSystem(HybridSystem):
             return ()
         return (0.2 + 0.1 * hy.cos(relative_speed * self.symbols.constants["pace"]),)
 
-    def _marks_of_slow_slip(self, relative_speed: Any) -> tuple[Any, ...]:
-        """Return where a slide that never sticks becomes slow or fast."""
+    def _marks_of_slip(self, speed: Any, acceleration: Any, relative_speed: Any) -> tuple[Any, ...]:
+        """Return turning points and peaks, and where a slide that never sticks becomes slow.
+
+        heyoka chooses its steps by the largest series. Those of the marks must not be: otherwise a
+        motion that is recorded would differ in its rounding from one that is not.
+        """
         if self.sticks:
-            return ()
+            return speed, acceleration
         slow = self.symbols.constants["stick_speed"]
-        return relative_speed - slow, relative_speed + slow
+        found = (speed, acceleration, relative_speed - slow, relative_speed + slow)
+        return tuple(UNSEEN * each for each in found)
 
     def _guards_of_parts(self, relative_speed: Any) -> list[Guard]:
         """Return the guards of the law, and of a load that may lift the slide."""

@@ -162,6 +162,9 @@ class HybridSystem(ABC):
         """
         return mode
 
+    many_steps = False
+    """Whether an integration takes many steps, which must not depend on what is recorded."""
+
     slaves = False
     """Whether a flow has slaved states, see `Flow`."""
 

@@ -135,15 +135,17 @@ def _compile(system: HybridSystem, name: str, detail: Detail) -> CompiledFlow:
     if detail is Detail.DERIVATIVES:
         equations = hy.var_ode_sys(equations, hy.var_args.vars, order=1)
     downward = hy.event_direction.negative
+    watched = detail is not Detail.STATES
+    # The compiler rounds by all that it compiles together.
+    marks = flow.marks if watched or system.many_steps else ()
     taylor = hy.taylor_adaptive(
         equations,
         [0.0] * len(system.states),
         t_events=[hy.t_event(guard.margin, direction=downward) for guard in flow.guards],
         nt_events=[
-            hy.nt_event(mark, callback=_Finder(zero_speed=number == 0))
-            for number, mark in enumerate(flow.marks if detail is not Detail.STATES else ())
-        ]
-        + [hy.nt_event(each, callback=_Finder(zero_speed=False)) for each in flow.pace],
+            hy.nt_event(mark, callback=_Finder(zero_speed=number == 0, keep=watched))
+            for number, mark in enumerate((*marks, *flow.pace))
+        ],
         fast_math=True,  # a quarter faster; the error stays below 2e-12 over 190 periods
     )
     return CompiledFlow(taylor, system)
@@ -152,11 +154,13 @@ def _compile(system: HybridSystem, name: str, detail: Detail) -> CompiledFlow:
 class _Finder:
     """Callback of a mark, with what it has found."""
 
-    def __init__(self, *, zero_speed: bool) -> None:
-        """Record zeros of a mark; at one of the speed (`zero_speed`) it is exactly zero."""
+    def __init__(self, *, zero_speed: bool, keep: bool) -> None:
+        """Keep zeros of a mark, or not; at one of the speed (`zero_speed`) it is exactly zero."""
         self.found: Marks = []
-        self._zero_speed = zero_speed
+        self._zero_speed, self._keep = zero_speed, keep
 
     def __call__(self, integrator: Any, now: float, _: int) -> None:
+        if not self._keep:
+            return
         x, y = integrator.update_d_output(now)[:2].tolist()
         self.found.append((now, x, 0.0 if self._zero_speed else y))

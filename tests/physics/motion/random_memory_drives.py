@@ -31,10 +31,10 @@ Scales = tuple[float, float, float]
 
 
 def size_of(curve: Curve, viscous: float, speed: float) -> Curve:
-    """Return the size of a curve without its viscous part; a solver may go beyond zero speed."""
+    """Return the size of a curve without its viscous part, also where only a solver tries it."""
 
     def size(w: float) -> float:
-        w = max(w, -1e-3 * speed)
+        w = min(max(w, -1e-3 * speed), 1e3 * speed)
         return curve(w) - viscous * w
 
     return size
@@ -156,5 +156,5 @@ def random_memory_drive(law: str, seed: int) -> RandomMemoryDrive:
         friction=made,
     )
     velocity = [0.0, belt, draw.uniform(-0.5, 0.5) * scales[1]][draw.integers(3)]
-    position = draw.choice([0.0, draw.uniform(-1.0, 1.0)]) * length
+    position = draw.choice([0.0 if belt else 1.0, draw.uniform(-1.0, 1.0)]) * length
     return RandomMemoryDrive(drive, forward, backward, float(position), float(velocity))
