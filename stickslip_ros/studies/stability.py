@@ -25,6 +25,7 @@ from stickslip_ros.physics.theory.linear_sampled_loop import (
 )
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
+    SMOOTH,
     NotCoveredError,
     require,
 )
@@ -43,6 +44,12 @@ _NO_CONTROL = "the scenario has no controller"
 
 _GAINS = ("critical_linear_gain", "first_lyapunov_coefficient", "critical_cubic_gain")
 
+_BY_THIRD_DERIVATIVES = (
+    "open_loop.first_lyapunov_coefficients",
+    "closed_loop.first_lyapunov_coefficients",
+    "closed_loop.first_lyapunov_coefficient",
+    "closed_loop.critical_cubic_gain",
+)
 _SAMPLED_GAINS = ("critical_linear_gain", "stable_linear_gains")
 
 _SAMPLED_LOOP = ("spectral_radius", "stable", "decay_rate", "settling_time", *_SAMPLED_GAINS)
@@ -81,6 +88,12 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
                 notes[place] = reason
     elif found["closed_forms"] is None:
         notes["closed_forms"] = "closed forms exist for the cubic Stribeck law only"
+    kink = SMOOTH.lack(drive)
+    if kink is not None:
+        reason = f"the first Lyapunov coefficient needs {SMOOTH.need}: {kink}"
+        for place in _BY_THIRD_DERIVATIVES:
+            if not {place, place.split(".")[0]} & notes.keys():
+                notes[place] = reason
     return found, notes
 
 

@@ -101,11 +101,21 @@ class SensitiveMotion(RecordedMotion):
         """Return the states of the control in a state; none without control."""
         return state[self._system.control_states]
 
-    def start(self, state: FloatArray) -> None:
-        """Start again at `state`, at time zero and without breakpoints."""
+    @property
+    def mode(self) -> Mode:
+        """The mode of the system at present."""
+        return self._mode
+
+    def start(self, state: FloatArray, mode: Mode | None = None) -> None:
+        """Start again at `state`, at time zero and without breakpoints.
+
+        The state gives the mode, except where a law has parts that stick or slip by their past.
+        """
         self._recorded.clear()
         self._time = self._breakpoint_time = 0.0
         self._set_state(state.tolist())
+        if mode is not None and mode.flow == self._mode.flow:
+            self._enter(mode)
         self._append_present()
         self.transition = np.eye(self.order)
         self.landed = False

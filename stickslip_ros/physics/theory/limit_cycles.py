@@ -19,6 +19,7 @@ from stickslip_ros.physics.measures.cycle_measures import EQUILIBRIUM_SPEED, Cyc
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import POSITION, SPEED, UNBOUNDED_SPEED
+from stickslip_ros.physics.model.hybrid import Mode
 from stickslip_ros.physics.motion.variational import SensitiveMotion, TooStiffError
 from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.cycle_bounds import (
@@ -263,7 +264,7 @@ def _cycle_ahead(motion: SensitiveMotion, turns: int) -> LimitCycle | None:
             return None
         if np.abs(state - before).max() < _NEAR * np.abs(state).max():
             break
-    return _solve(motion, state, duration)
+    return _solve(motion, state, duration, motion.mode)
 
 
 class _ReturnMap:
@@ -292,7 +293,11 @@ class _ReturnMap:
         """Return the limit cycle at that distance."""
         state = self._state(distance)
         found = _next_turn(self._motion, state)
-        return None if found is None else _solve(self._motion, state, found[1])
+        if found is None:
+            return None
+        turn, duration = found
+        follows = len(self._motion.drive.friction.states) > 0
+        return _solve(self._motion, turn if follows else state, duration, self._motion.mode)
 
     def brackets(self) -> Iterator[tuple[float, float]]:
         """Yield pairs of distances between which the growth changes sign."""
@@ -436,14 +441,16 @@ class _Shot:
     """Derivative of the state at the end by time."""
     landed: bool
     """Whether the slide stuck on the way."""
+    mode: Mode
+    """Mode at the end, in which the next shot starts."""
 
     @classmethod
-    def fire(cls, motion: SensitiveMotion, unknowns: FloatArray) -> Self | None:
+    def fire(cls, motion: SensitiveMotion, unknowns: FloatArray, mode: Mode | None) -> Self | None:
         """Return the shot; None if it does not start upward, or does not end."""
         drive = motion.drive
         start, period = unknowns.copy(), float(unknowns[SPEED]) / drive.angular_frequency
         start[SPEED] = 0.0
-        motion.start(start)
+        motion.start(start, mode)
         distance = float(motion.rate[SPEED])
         # Closer than this the state is treated as the equilibrium.
         smallest = 1e-6 * abs(drive.belt_speed) / drive.speed_scale
@@ -454,7 +461,8 @@ class _Shot:
             return None
         residual = motion.state - start
         miss = float(np.abs(residual).max()) / max(abs(float(start[0])), distance)
-        return cls(unknowns, residual, miss, motion.transition, motion.rate, motion.landed)
+        found = motion.transition, motion.rate, motion.landed, motion.mode
+        return cls(unknowns, residual, miss, *found)
 
     def newton_step(self) -> FloatArray:
         """Return the change of the unknowns after which the linearised motion would close."""
@@ -474,7 +482,9 @@ class _Shot:
         return tuple(multipliers)
 
 
-def _solve(motion: SensitiveMotion, state: FloatArray, period: float) -> LimitCycle | None:
+def _solve(
+    motion: SensitiveMotion, state: FloatArray, period: float, mode: Mode | None = None
+) -> LimitCycle | None:
     """Solve for the cycle by Newton's method; each step is halved until the residual decreases.
 
     The iteration ends where rounding prevents any further decrease. None if the residual is still
@@ -482,7 +492,7 @@ def _solve(motion: SensitiveMotion, state: FloatArray, period: float) -> LimitCy
     """
     guess = state.copy()
     guess[SPEED] = period * motion.drive.angular_frequency
-    shot = _Shot.fire(motion, guess)
+    shot = _Shot.fire(motion, guess, mode)
     if shot is None:
         return None
     for _ in range(40):
@@ -498,7 +508,7 @@ def _solve(motion: SensitiveMotion, state: FloatArray, period: float) -> LimitCy
 def _nearer(motion: SensitiveMotion, shot: _Shot) -> _Shot | None:
     step = shot.newton_step()
     for halvings in range(10):
-        trial = _Shot.fire(motion, shot.unknowns + 2.0**-halvings * step)
+        trial = _Shot.fire(motion, shot.unknowns + 2.0**-halvings * step, shot.mode)
         if trial is not None and trial.miss < shot.miss:
             return trial
     return None
@@ -510,7 +520,7 @@ def _cycle(motion: SensitiveMotion, shot: _Shot) -> LimitCycle | None:
     start = shot.unknowns.copy()
     start[SPEED] = 0.0
     period = float(shot.unknowns[SPEED]) / drive.angular_frequency
-    motion.start(start)
+    motion.start(start, shot.mode)
     motion.advance(2.25 * period)  # the meter needs both sides of an upward turning point
     meter = CycleMeter(window=1)
     meter.feed(motion.take_breakpoints(), drive.belt_speed)

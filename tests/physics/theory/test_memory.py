@@ -29,14 +29,15 @@ from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.02)
 FEED = Drive(100.0, 200.0, 1e6, 1000.0, 0.04, LuGre(CURVE, 1e5, 100.0))
 """The slide of a machine tool, with bristles of 4 um."""
+MAXWELL_SLIP = replace(FEED, friction=MaxwellSlip(CURVE, 1e5, 3, 1000.0))
 ELASTO_PLASTIC = replace(FEED, friction=ElastoPlastic(CURVE, 1e5, 100.0))
 CREEPING = Drive(1.0, 0.05, 1.0, 1.0, 0.03, RateState(0.3, 0.005, 0.02, 1e-4, 1e-6))
 GAINS = WashoutGains(20.0, linear=-3000.0, cubic=0.0)
 
 LAWS = [
-    LuGre(CURVE, 1e5, 100.0),
-    ElastoPlastic(CURVE, 1e5, 100.0),
-    MaxwellSlip(CURVE, 1e5, 3, 1000.0),
+    FEED.friction,
+    ELASTO_PLASTIC.friction,
+    MAXWELL_SLIP.friction,
     Dahl(0.4, 1e5),
     RateState(0.3, 0.01, 0.03, 1e-4, 1e-6),
 ]
@@ -182,7 +183,9 @@ def cycle_by_simulation(drive: Drive, duration: float) -> tuple[float, float, fl
     return measures.amplitude, measures.period, measures.stick_fraction
 
 
-@pytest.mark.parametrize("drive", [FEED, ELASTO_PLASTIC], ids=["lugre", "elasto_plastic"])
+@pytest.mark.parametrize(
+    "drive", [FEED, ELASTO_PLASTIC, MAXWELL_SLIP], ids=lambda drive: drive.friction.name
+)
 def test_the_stable_cycle_is_that_of_a_long_run(drive: Drive) -> None:
     cycles = [cycle for cycle in limit_cycles(drive) if cycle.stable]
     assert len(cycles) == 1
