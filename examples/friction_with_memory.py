@@ -41,22 +41,22 @@ def rows(drive: Drive, law: FrictionLaw, forces: np.ndarray, period: float) -> n
         motion.force = force
         motion.advance(period)
         relative_speed = motion.velocity - drive.belt_speed
-        coefficient = -motion.friction_force / drive.normal_force
+        coefficient = motion.friction_force / drive.normal_force
         found.append((motion.position, relative_speed, coefficient, motion.memory[0]))
     return np.array(found).T
 
 
 figure = Figure(figsize=(9.0, 7.6), layout="constrained")
 panes = figure.subplots(3, 3)
-cycle, swing = np.zeros(4000), 150.0 + 70.0 * np.sin(np.linspace(0.0, 16.0 * np.pi, 1600))
+cycle, swing = np.zeros(4000), 150.0 + 70.0 * np.sin(np.arange(1600) * (np.pi / 100.0))
 for law, (loop, memory, presliding) in zip(LAWS, panes, strict=True):
     _, speed, coefficient, deflection = rows(FEED, law, cycle, 1e-4)
     loop.plot(1e3 * speed[-700:], coefficient[-700:])
     loop.set(title=law.name, xlabel="relative speed, mm/s", ylabel="friction coefficient")
     memory.plot(1e-1 * np.arange(1500), 1e6 * deflection[-1500:])
     memory.set(title="memory", xlabel="time, ms", ylabel="deflection, µm")
-    x, _, coefficient, _ = rows(FREE, law, swing, 5e-2)
-    presliding.plot(1e6 * x, coefficient, lw=0.8)
-    presliding.set(title="presliding", xlabel="displacement, µm", ylabel="friction coefficient")
+    x, *_ = rows(FREE, law, swing, 5e-2)
+    presliding.plot(1e6 * x, swing, lw=0.8)
+    presliding.set(title="presliding", xlabel="displacement, µm", ylabel="force, N")
     print(f"{law.name}: drift of {1e9 * (x[-1] - x[-201]):.2f} nm in the last of eight cycles")
 figure.savefig(folder / "friction_with_memory.png")

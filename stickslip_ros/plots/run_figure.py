@@ -222,7 +222,10 @@ class _Panels:
         self._label_time(stick_fraction, self._run)
 
     def law(self, axes: Axes) -> None:
-        """Draw the friction law, and the range of relative speeds."""
+        """Draw the friction law, and the range of relative speeds.
+
+        Friction with a memory leaves the curve of steady slip: its loop is drawn.
+        """
         axes.set_title("friction law, with the range of this run")
         drive, reached = self._drive, self._history.relative_speeds
         if drive is None:
@@ -239,8 +242,13 @@ class _Panels:
         self._law_between(axes, *ends, scale, color="black", lw=0.8, ls="-.")
         if reached is not None:
             axes.axvspan(least / scale, largest / scale, color=LIGHT_GREY, alpha=0.4, lw=0.0)
-        if len(self._last.time):
-            relative = self._last.velocity - self._last.belt_velocity
+        curve, followed = "friction law", Line2D([], [], **_MOTION | {"lw": 3.0})
+        followed.set_label("range of the last cycles")
+        relative = self._last.velocity - self._last.belt_velocity
+        if drive.friction.states:
+            curve, followed = "in steady slip", Line2D([], [], **_MOTION, label="last cycles")
+            self._loop(axes, relative / scale)
+        elif len(relative):
             span = float(relative.min()), float(relative.max())
             self._law_between(axes, *span, scale, **_MOTION | {"lw": 3.0})
         if at_rest != 0.0:
@@ -249,12 +257,21 @@ class _Panels:
         axes.axvline(at_rest / scale, **_BELT)
         axes.set_xlim(ends[0] / scale, ends[1] / scale)
         handles = [
-            Line2D([], [], color="black", lw=0.8, ls="-.", label="friction law"),
-            Line2D([], [], **_MOTION | {"lw": 3.0}, label="range of the last cycles"),
+            Line2D([], [], color="black", lw=0.8, ls="-.", label=curve),
+            followed,
             Patch(color=LIGHT_GREY, alpha=0.4, lw=0.0, label="range of the whole run"),
             Line2D([], [], **_BELT, label="slide at rest"),
         ]
         axes.legend(handles=handles, loc="best")
+
+    def _loop(self, axes: Axes, relative: FloatArray) -> None:
+        """Draw the friction of the last cycles over their relative speed."""
+        assert self._drive is not None
+        if len(relative):
+            time, force = self._history.friction.since(float(self._last.time[0]))
+            coefficient = force / self._drive.normal_force
+            speed = np.interp(time, self._last.time, relative)
+            axes.plot(speed, coefficient, label="loop", **_MOTION)
 
     def _law_between(
         self, axes: Axes, least: float, largest: float, scale: float, **look: Any

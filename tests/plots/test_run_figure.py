@@ -11,6 +11,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+import stickslip_ros as ss
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures
@@ -430,3 +431,15 @@ def test_forces_that_did_not_act_are_dots() -> None:
     texts = {text.get_text() for text in legend.get_texts()}
     assert "sent, did not act" in texts
     assert "no new force: last one" not in texts
+
+
+def test_friction_with_a_memory_is_drawn_as_its_loop() -> None:
+    """The loop has the samples of the last cycles: they leave the curve of steady slip."""
+    law = {"friction_law": "lugre", "friction_bristle_stiffness": 1e5}
+    run = ss.simulate(ss.scenario("feed_drive", expects_control=False, **law), duration=2.0)
+    (loop,) = (line for line in run.plot().axes[LAW].lines if line.get_label() == "loop")
+    speed, coefficient = np.asarray(loop.get_xydata(), dtype=float).T
+    table = run.to_pandas()[-len(speed) :]
+    assert 1000.0 * (table["velocity"] - 0.04).to_numpy() == pytest.approx(speed, abs=1e-9)
+    assert (table["friction_force"] / 1000.0).to_numpy() == pytest.approx(coefficient, abs=1e-12)
+    assert len(speed) > LAST_CYCLES * 60
