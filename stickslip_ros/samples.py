@@ -1,7 +1,8 @@
 """Samples of the motion and of forces, one by one and as columns; SI units."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -80,6 +81,24 @@ class SampleColumns(Table):
     """Displacement of the belt, m."""
     belt_velocity: FloatArray
     """Velocity of the belt, m/s."""
+
+    @classmethod
+    def from_samples(cls, samples: Sequence[Sample]) -> Self:
+        """Return single samples as columns.
+
+        Parameters
+        ----------
+        samples : sequence of Sample
+            Consecutive samples.
+
+        Returns
+        -------
+        SampleColumns
+            Their columns.
+        """
+        stamp = np.array([sample.stamp for sample in samples], np.int64)
+        others = np.array([sample[1:] for sample in samples]).reshape(-1, len(Sample._fields) - 1)
+        return cls(stamp, *others.T.copy())
 
     @property
     def believed(self) -> BoolArray:

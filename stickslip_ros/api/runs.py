@@ -6,9 +6,14 @@ from typing import TYPE_CHECKING
 from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
 from stickslip_ros.api.frames import Quantity, data_frame, data_set, made_of
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
-from stickslip_ros.physics.loop.trajectory import QUANTITIES, Trajectory, TrajectoryRecorder
+from stickslip_ros.physics.loop.trajectory import (
+    MEASURED,
+    QUANTITIES,
+    Trajectory,
+    TrajectoryRecorder,
+)
 from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.plots.measure_table import measure_table
+from stickslip_ros.plots.measure_table import measure_table, told_and_true
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
 from stickslip_ros.plots.why_no_cycle import why_no_cycle
@@ -21,7 +26,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-_COLUMNS = {name: Quantity(*labelled) for name, labelled in QUANTITIES.items()}
+_COLUMNS = {name: Quantity(*labelled) for name, labelled in {**QUANTITIES, **MEASURED}.items()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,7 +41,9 @@ class Run(Shown):
     """Whether the controller acted without sampling."""
     measures: Measures
     """Amplitude, regime and the other measures of the last cycles, as `stickslip simulate` prints
-    them."""
+    them; with a sensor, of what it tells."""
+    truth: Measures | None
+    """With a sensor, the measures of the motion itself; else None."""
     trajectory: Trajectory
     """The motion at the samples t = n/rate, as numpy arrays."""
     _history: RunHistory
@@ -52,7 +59,8 @@ class Run(Shown):
         """
         from stickslip_ros.plots.simulated_run import simulated_run_figure
 
-        return shown_in_notebooks(simulated_run_figure(self.scenario, self._history, self.measures))
+        measures = self.truth or self.measures
+        return shown_in_notebooks(simulated_run_figure(self.scenario, self._history, measures))
 
     def to_pandas(self) -> "DataFrame":
         """Return the trajectory as a table.
@@ -95,9 +103,10 @@ class Run(Shown):
 
     def _parts(self) -> Parts:
         title = f"{self.scenario.name}, {self.duration:g} {self._units.of_unit('s')}".rstrip()
-        yield measure_table(title, {"": self.measures.as_dict()}, {"": self._units})
+        columns = told_and_true(self.measures, self.truth)
+        yield measure_table(title, columns, dict.fromkeys(columns, self._units))
         drive = self.scenario.plant.as_drive()
-        reason = why_no_cycle(self.measures.regime, self.duration, drive)
+        reason = why_no_cycle((self.truth or self.measures).regime, self.duration, drive)
         if reason is not None:
             yield reason
 
@@ -144,13 +153,17 @@ def simulate(
     """
     chosen = as_scenario(scenario)
     length = simulation.default_duration(chosen) if duration is None else float(duration)
-    history, recorder = RunHistory(), TrajectoryRecorder(chosen.plant.rate)
-    measures = simulation.simulate(
+    told = simulation.sensor_meter(chosen)
+    history = RunHistory()
+    recorder = TrajectoryRecorder(chosen.plant.rate, measured=told is not None)
+    true = simulation.simulate(
         chosen,
         length,
         continuous=continuous,
         progress=progress,
         observer=history,
         recorder=recorder,
+        told=told,
     )
-    return Run(chosen, length, continuous, measures, recorder.trajectory(), history)
+    measures, truth = (true, None) if told is None else (told.measures(), true)
+    return Run(chosen, length, continuous, measures, truth, recorder.trajectory(), history)

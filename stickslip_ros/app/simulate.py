@@ -27,6 +27,7 @@ from stickslip_ros.studies.options import DEFAULT_PERIODS
 
 if TYPE_CHECKING:
     from stickslip_ros.physics.loop.trajectory import SampleRecorder
+    from stickslip_ros.scenarios.files import Scenario
 
 _ROUNDING = 1e-9
 """Share of an interval by which it may differ from a whole number of sample periods."""
@@ -53,7 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE.csv",
         help="write time, position, velocity, friction force, control force, position and velocity "
-        "of the belt at the samples (CSV, SI units); an existing file is refused",
+        "of the belt at the samples, and what a sensor tells (CSV, SI units); an existing file is "
+        "refused",
     )
     parser.add_argument(
         "--every",
@@ -68,10 +70,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     with interrupts_kept():
+        from stickslip_ros.plots.measure_table import told_and_true
         from stickslip_ros.plots.run_history import RunHistory
         from stickslip_ros.plots.units import Units
         from stickslip_ros.studies.settling import check_continuous
-        from stickslip_ros.studies.simulate import default_duration, simulate
+        from stickslip_ros.studies.simulate import default_duration, sensor_meter, simulate
     scenario = scenario_of(arguments)
     duration = arguments.duration
     if duration is None:
@@ -82,37 +85,45 @@ def run(arguments: argparse.Namespace) -> int:
         with naming("--continuous-control:"):
             check_continuous(scenario)
     history = None if plot is None else RunHistory()
+    told = sensor_meter(scenario)
     units = Units.for_drive(scenario.plant.as_drive())
     shown = f"{duration:g} {units.of_unit('s')}".rstrip()
     with (
-        _recorder(arguments, scenario.plant.rate) as recorder,
+        _recorder(arguments, scenario) as recorder,
         progress_bar(f"simulating {shown}", 1.0) as progress,
     ):
-        measures = simulate(
+        true = simulate(
             scenario,
             duration,
             continuous=arguments.continuous_control,
             progress=progress,
             observer=history,
             recorder=recorder,
+            told=told,
         )
+    measures = true if told is None else told.measures()
     if plot is not None and history is not None:
         from stickslip_ros.plots.simulated_run import simulated_run_figure
 
-        write_figure(arguments, simulated_run_figure(scenario, history, measures))
+        write_figure(arguments, simulated_run_figure(scenario, history, true))
     if arguments.json:
-        print_json({**measures.as_dict(), "duration": duration, **made_of(scenario)})
+        truth = {} if told is None else {"truth": true.as_dict()}
+        figures = {**measures.as_dict(), **truth, "duration": duration}
+        print_json({**figures, **made_of(scenario)})
     else:
-        print_figures(f"{scenario.name}, {shown}", {"": measures.as_dict()}, {"": units})
-        reason = why_no_cycle(measures.regime, duration, scenario.plant.as_drive())
+        columns = told_and_true(measures, None if told is None else true)
+        print_figures(f"{scenario.name}, {shown}", columns, dict.fromkeys(columns, units))
+        reason = why_no_cycle(true.regime, duration, scenario.plant.as_drive())
         if reason is not None:
             print(reason)
     return 0
 
 
 @contextmanager
-def _recorder(arguments: argparse.Namespace, rate: float) -> "Generator[SampleRecorder | None]":
-    """Provide what writes the file of --out, if it is given; `rate` is that of the samples, Hz."""
+def _recorder(
+    arguments: argparse.Namespace, scenario: "Scenario"
+) -> "Generator[SampleRecorder | None]":
+    """Provide what writes the file of --out, if it is given."""
     out: Path | None = arguments.out
     if out is None:
         if arguments.every is not None:
@@ -121,7 +132,9 @@ def _recorder(arguments: argparse.Namespace, rate: float) -> "Generator[SampleRe
             )
         yield None
         return
+    rate = scenario.plant.rate
     every = _samples(arguments.every, rate)
+    measured = not scenario.plant.as_sensor().exact
     if out.suffix.lower() != ".csv":
         raise InvalidInputError(f"--out {out}: must end in .csv")
     check_new("--out", out)
@@ -132,7 +145,7 @@ def _recorder(arguments: argparse.Namespace, rate: float) -> "Generator[SampleRe
         stack.enter_context(writing("--out", out))
         stack.callback(new.unlink, missing_ok=True)
         with new.open("x", encoding="utf-8", newline="") as stream:
-            yield TrajectoryFile(stream, rate, every)
+            yield TrajectoryFile(stream, rate, every, measured=measured)
         new.replace(out)
 
 

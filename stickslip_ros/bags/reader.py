@@ -22,11 +22,13 @@ from stickslip_ros.messages.cdr import Refused
 from stickslip_ros.messages.codec import joint_states_in, references_in, wrenches_in
 from stickslip_ros.messages.topics import (
     APPLIED_DISTURBANCE,
+    APPLIED_FORCE,
     CONTROL_FORCE,
     DROPPED_FORCE,
     JOINT_STATES,
     RECORDED_TOPICS,
     REFERENCE,
+    TRUE_JOINT_STATES,
     Topic,
 )
 from stickslip_ros.samples import ForceColumns, ReferenceColumns, SampleColumns
@@ -139,6 +141,19 @@ class Recording:
     def joint_states(self) -> SampleColumns:
         """All joint states; raises BagError as `blocks` does."""
         return self._whole(JOINT_STATES, joint_states_in)
+
+    @cached_property
+    def true_joint_states(self) -> SampleColumns:
+        """All true states; none without `publish_truth`. Raises BagError as `blocks` does."""
+        return self._whole(TRUE_JOINT_STATES, joint_states_in)
+
+    @cached_property
+    def applied_forces(self) -> ForceColumns:
+        """All forces of the actuator; none without `publish_truth`.
+
+        Raises BagError as `blocks` does.
+        """
+        return self._whole(APPLIED_FORCE, wrenches_in)
 
     @cached_property
     def control_forces(self) -> ForceColumns:

@@ -13,7 +13,7 @@ from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.physics.measures.observer import RunObserver
 from stickslip_ros.physics.measures.run_meter import RunMeter
-from stickslip_ros.physics.model.friction import LAWS
+from stickslip_ros.physics.measures.stick_speed import automatic_stick_speed
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -188,10 +188,8 @@ def stick_speed_at_recording(recording: Recording) -> float | None:
         given = float(analyzer["stick_speed"])
         if 0.0 <= given < inf:
             return given
-    with suppress(KeyError, ValueError):
-        law = LAWS.get(json.loads(plant["friction.law"]))
-        if law is not None and law.states:
-            return None
+    with suppress(TypeError, ValueError):
+        return automatic_stick_speed({name: json.loads(value) for name, value in plant.items()})
     return 0.0
 
 

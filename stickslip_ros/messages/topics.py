@@ -39,8 +39,16 @@ JOINT_STATES = Topic(
     "joint_states",
     "sensor_msgs/msg/JointState",
     DEEP,
-    meaning="State at each sample: `name` slide and belt, `position` m, `velocity` m/s, `effort` N "
-    "(friction on the slide and its reaction on the belt, under the force held up to this sample).",
+    meaning="State at each sample, as the sensor tells it: `name` slide and belt, `position` m, "
+    "`velocity` m/s, `effort` N (friction on the slide and its reaction on the belt, under the "
+    "force held up to this sample).",
+    decode=unpack_joint_state,
+)
+TRUE_JOINT_STATES = Topic(
+    "true_joint_states",
+    "sensor_msgs/msg/JointState",
+    DEEP,
+    meaning="True state at each sample, from a plant with `publish_truth`.",
     decode=unpack_joint_state,
 )
 CONTROL_FORCE = Topic(
@@ -65,6 +73,14 @@ DISTURBANCE_FORCE = Topic(
     _WRENCH,
     meaning="External force on the slide, `wrench.force.x` N, from the next sample until the next "
     "message; the stamp is ignored.",
+    decode=unpack_wrench,
+)
+APPLIED_FORCE = Topic(
+    "applied_force",
+    _WRENCH,
+    DEEP,
+    meaning="Force of the actuator on the slide, `wrench.force.x` N, at each sample, from a plant "
+    "with `publish_truth`; `control_force` is the command.",
     decode=unpack_wrench,
 )
 APPLIED_DISTURBANCE = Topic(
@@ -119,7 +135,9 @@ CLOCK: Topic[Any] = Topic(
 
 TOPICS = (
     JOINT_STATES,
+    TRUE_JOINT_STATES,
     CONTROL_FORCE,
+    APPLIED_FORCE,
     DISTURBANCE_FORCE,
     APPLIED_DISTURBANCE,
     DROPPED_FORCE,
@@ -131,7 +149,7 @@ TOPICS = (
     DIAGNOSTICS,
     CLOCK,
 )
-RECORDED_TOPICS = (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE, DROPPED_FORCE, REFERENCE)
+RECORDED_IF_PUBLISHED = (DROPPED_FORCE, REFERENCE, TRUE_JOINT_STATES, APPLIED_FORCE)
+"""Topics that a bag has only if a node publishes them."""
+RECORDED_TOPICS = (JOINT_STATES, CONTROL_FORCE, APPLIED_DISTURBANCE, *RECORDED_IF_PUBLISHED)
 """Topics that the analyzer records."""
-RECORDED_IF_PUBLISHED = (DROPPED_FORCE, REFERENCE)
-"""Those that a bag has only if a node publishes them."""

@@ -309,8 +309,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         """Put the parameters of a node into the bag, and the curves in the files that they name."""
         self._keep(f"stickslip_ros/{node}", values)
         if node == "plant":
-            law = values.get("friction.law", "")
-            self._meter.motion.stick_speed = self.parameters.stick_speed_of(law)
+            self._meter.motion.stick_speed = self.parameters.stick_speed_of(values)
         known, curves = known_parameters(NODE_PARAMETERS[node]), dict[str, Pairs]()
         for name, path in values.items():
             if known[name].file and path and isinstance(path, str):

@@ -13,12 +13,14 @@ from stickslip_ros.errors import InvalidInputError, MessageError
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench, unpack_wrench
 from stickslip_ros.messages.topics import (
     APPLIED_DISTURBANCE,
+    APPLIED_FORCE,
     CLOCK,
     CONTROL_FORCE,
     DISTURBANCE_FORCE,
     DROPPED_FORCE,
     JOINT_STATES,
     RECORDED,
+    TRUE_JOINT_STATES,
 )
 from stickslip_ros.nodes.base.duplicate_publishers import duplicate_publishers
 from stickslip_ros.nodes.base.managed import ERROR, OK, Diagnosis, ManagedNode, diagnosis
@@ -54,6 +56,10 @@ class PlantNode(ManagedNode[PlantParameters]):
         self._disturbance = 0.0
         self._lock = threading.Lock()
         self._state = self.advertise(JOINT_STATES)
+        self._truth = self._applied_force = None
+        if self.parameters.publish_truth:
+            self._truth = self.advertise(TRUE_JOINT_STATES)
+            self._applied_force = self.advertise(APPLIED_FORCE)
         self._applied = self.advertise(APPLIED_DISTURBANCE)
         self._dropped_force = self.advertise(DROPPED_FORCE)
         self._answerable = 0
@@ -168,15 +174,10 @@ class PlantNode(ManagedNode[PlantParameters]):
         return diagnosis(complaints, figures)
 
     def _publish(self, sample: Sample) -> None:
-        friction = sample.friction_force
-        self._state.publish(
-            pack_joint_state(
-                sample.stamp,
-                (sample.position, sample.belt_position),
-                (sample.velocity, sample.belt_velocity),
-                (friction, -friction),
-            )
-        )
+        self._state.publish(_packed(sample))
+        if self._truth is not None and self._applied_force is not None:
+            self._truth.publish(_packed(self._loop.true_sample))
+            self._applied_force.publish(pack_wrench(sample.stamp, self._loop.applied_force))
         if self._loop.disturbance != self._disturbance:
             self._disturbance = self._loop.disturbance
             self._applied.publish(pack_wrench(sample.stamp, self._disturbance))
@@ -234,6 +235,16 @@ class PlantNode(ManagedNode[PlantParameters]):
             self._motion.restart(initial.position, initial.velocity)
         response.success = True
         return response
+
+
+def _packed(sample: Sample) -> bytes:
+    friction = sample.friction_force
+    return pack_joint_state(
+        sample.stamp,
+        (sample.position, sample.belt_position),
+        (sample.velocity, sample.belt_velocity),
+        (friction, -friction),
+    )
 
 
 def main() -> None:

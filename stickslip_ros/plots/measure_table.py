@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from stickslip_ros.physics.measures.cycle_measures import Regime, with_trend
+from stickslip_ros.physics.measures.cycle_measures import Measures, Regime, with_trend
 from stickslip_ros.plots.units import NOISE, SI, Units
 from stickslip_ros.tables import TextTable
 
@@ -48,6 +48,13 @@ _SAME_SCALE = {
 """The quantity with which a value is compared to see whether it is rounding error."""
 
 _ALL_SI: Mapping[str, Units] = {}
+
+
+def told_and_true(measures: Measures, truth: Measures | None) -> dict[str, dict[str, Any]]:
+    """Return the columns of a simulated run: with a sensor also those of the motion itself."""
+    if truth is None:
+        return {"": measures.as_dict()}
+    return {"measured": measures.as_dict(), "true": truth.as_dict()}
 
 
 def measure_table(

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-from stickslip_ros.physics.measures.breakpoints import STICK_SHARE
 from stickslip_ros.scenarios.files import Scenario
 
 
@@ -14,10 +13,9 @@ def node_parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
     """
     values = scenario.as_dict()
     values["analyzer"]["bag"] = str(bag)
-    drive = scenario.plant.as_drive()
-    if not drive.friction.sticks and scenario.analyzer.given_stick_speed is None:
-        # The analyzer may know the law of a short run only at its end.
-        values["analyzer"]["stick_speed"] = STICK_SHARE * drive.fastest_belt or -1.0
+    # The analyzer may know the parameters of the plant of a short run only at its end.
+    if scenario.stick_speed:
+        values["analyzer"]["stick_speed"] = scenario.stick_speed
     controllers = [scenario.controller.node] if scenario.plant.expects_control else []
     nodes = ["analyzer", *controllers, "plant"]
     return {node: {**values[node], "autostart": False} for node in nodes}

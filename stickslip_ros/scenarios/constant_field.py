@@ -1,5 +1,6 @@
 """The parameters for the constants of laws and parts: one for each, from its description."""
 
+from enum import StrEnum
 from math import ceil, inf, isinf, isnan
 from typing import Any
 
@@ -25,6 +26,9 @@ def field_of(constant: Constant, laws: list[str] | None = None, fixed: Fixed = F
     least = max(constant.at_least, SMALLEST if constant.positive else -inf)
     bounds: dict[str, Any] = {} if least == -inf else {"ge": least}
     default: Any = constant.default
+    if isinstance(default, StrEnum):
+        kind = type(default)
+        return kind, field(default, meaning, choices=kind, strict=False, fixed=fixed)
     if constant.whole:
         bounds = {bound: ceil(value) for bound, value in bounds.items()}
         return int, field(int(default), meaning, constant.unit, fixed=fixed, **bounds)

@@ -97,6 +97,15 @@ class Scenario:
         return self.controller.as_law() if self.plant.expects_control else None
 
     @property
+    def stick_speed(self) -> float | None:
+        """Largest relative speed of a slide that sticks, m/s, as its samples tell it.
+
+        None for friction with a memory on a belt that never moves; see `automatic_stick_speed`.
+        """
+        plant = self.plant
+        return self.analyzer.stick_speed_of(plant.flat(), plant.as_drive().fastest_belt)
+
+    @property
     def nodes(self) -> tuple[str, ...]:
         """Names of the nodes: plant, the controller in use, and analyzer."""
         return "plant", self.controller.node, "analyzer"

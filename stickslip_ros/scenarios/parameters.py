@@ -5,7 +5,7 @@ models. The nested field `friction.static` is the ROS parameter of that name.
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from math import isinf, pi, sqrt
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
@@ -16,14 +16,14 @@ from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.reference import ReferenceCourse
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
+from stickslip_ros.physics.measures.stick_speed import automatic_stick_speed
+from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.courses import CourseKind
 from stickslip_ros.physics.model.disturbance import Disturbance
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import LAWS
-from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
+from stickslip_ros.physics.model.sensor import Sensor
 from stickslip_ros.scenarios.constant_field import field_of, group_of
 from stickslip_ros.scenarios.course_parameters import (
     BeltParameters,
@@ -81,6 +81,14 @@ class NodeParameters(ParameterGroup):
 
 class SensorParameters(group_of(Sensor, Fixed.ACTIVE)):
     """Constants of the sensor."""
+
+    @model_validator(mode="after")
+    def _constants_fit_together(self) -> Self:
+        """Refuse constants that the sensor refuses."""
+        refusal = Sensor(**dict(self)).refusal()
+        if refusal is not None:
+            raise ValueError(f"sensor.{refusal}")
+        return self
 
 
 class ActuatorParameters(group_of(Actuator, Fixed.NEVER)):
@@ -155,10 +163,13 @@ class PlantParameters(NodeParameters):
     load: LoadParameters = LoadParameters()
     belt: BeltParameters = BeltParameters()
     disturbance: DisturbanceParameters = DisturbanceParameters()
-    if constants_of(Sensor):
-        sensor: SensorParameters = SensorParameters()
-    if constants_of(Actuator):
-        actuator: ActuatorParameters = ActuatorParameters()
+    sensor: SensorParameters = SensorParameters()
+    actuator: ActuatorParameters = ActuatorParameters()
+    publish_truth: bool = field(
+        False,
+        "Publish the true state and the force of the actuator, too.",
+        fixed=Fixed.CONFIGURED,
+    )
 
     @model_validator(mode="after")
     def _spring_is_none_or_some(self) -> Self:
@@ -223,13 +234,11 @@ class PlantParameters(NodeParameters):
 
     def as_actuator(self) -> Actuator:
         """Return the actuator."""
-        own: ParameterGroup | None = getattr(self, "actuator", None)
-        return IDEAL_ACTUATOR if own is None else Actuator(**dict(own))
+        return Actuator(**dict(self.actuator))
 
     def as_sensor(self) -> Sensor:
         """Return the sensor."""
-        own: ParameterGroup | None = getattr(self, "sensor", None)
-        return EXACT_SENSOR if own is None else Sensor(**dict(own))
+        return Sensor(**dict(self.sensor))
 
     def drive_names(self) -> list[str]:
         """Return the flat names of the drive's parameters, with those of its friction law.
@@ -357,8 +366,8 @@ class AnalyzerParameters(NodeParameters):
     )
     stick_speed: float = field(
         -1.0,
-        "Largest relative speed of a slide that sticks; below 0: automatic, that is 0, or for "
-        "friction with a memory a hundredth of the belt speed.",
+        "Largest relative speed of a slide that sticks; below 0: automatic, that is 0, with "
+        "friction with a memory a hundredth of the belt speed, and with a sensor its error more.",
         "m/s",
         fixed=Fixed.ACTIVE,
         ge=-1.0,
@@ -395,12 +404,10 @@ class AnalyzerParameters(NodeParameters):
         """The stick speed, m/s; None if it is automatic."""
         return None if self.stick_speed < 0.0 else self.stick_speed
 
-    def stick_speed_of(self, law: str) -> float | None:
-        """Return the stick speed for samples of a slide with a friction law; see `SampleMeter`."""
-        known = LAWS.get(law)
-        remembers = known is not None and len(known.states) > 0
+    def stick_speed_of(self, plant: Mapping[str, Any], fastest_belt: float = 0.0) -> float | None:
+        """Return the stick speed for samples of a plant; see `automatic_stick_speed`."""
         given = self.given_stick_speed
-        return 0.0 if given is None and not remembers else given
+        return automatic_stick_speed(plant, fastest_belt) if given is None else given
 
 
 class ReplayParameters(NodeParameters):

@@ -19,10 +19,8 @@ from stickslip_ros.physics.loop.reference import ReferenceKind
 from stickslip_ros.physics.loop.simulation import measure_block, simulate_sampled
 from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, CycleMeter, Measures, Regime
 from stickslip_ros.physics.measures.observer import MeasuredMotion
-from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.physics.model.control import ContinuousControl, ControlLaw
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.sensor import EXACT_SENSOR
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
 from stickslip_ros.scenarios.files import Scenario
@@ -134,10 +132,13 @@ def check_continuous(scenario: Scenario) -> None:
         raise InvalidInputError(
             f"the control law {law.name} is defined for samples only: it has no continuous form"
         )
-    for part, ideal in ((plant.as_sensor(), EXACT_SENSOR), (plant.as_actuator(), IDEAL_ACTUATOR)):
-        if part != ideal:
-            kind = type(part).__name__.lower()
-            raise InvalidInputError(f"{part} is refused: continuous control has no {kind}")
+    for group in ("sensor", "actuator"):
+        default = type(getattr(plant, group))().flat()
+        for name, value in getattr(plant, group).flat().items():
+            if value != default[name]:
+                raise InvalidInputError(
+                    f"plant.{group}.{name} = {value} is refused: continuous control has no {group}"
+                )
     limit = float("inf") if law is None else law.force_limit
     for name, value, needed in (
         (f"{controller.node}.force_limit", limit, float("inf")),

@@ -8,6 +8,7 @@ from stickslip_ros.physics.loop.simulation import simulate_continuous, simulate_
 from stickslip_ros.physics.loop.trajectory import SampleRecorder
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import RunObserver
+from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
@@ -25,6 +26,13 @@ def default_duration(scenario: Scenario) -> float:
     return DEFAULT_PERIODS * unit_period(scenario.plant.as_drive(), scenario.plant.duration)
 
 
+def sensor_meter(scenario: Scenario) -> SampleMeter | None:
+    """Return what measures the samples that a sensor tells; None with an exact sensor."""
+    if scenario.plant.as_sensor().exact:
+        return None
+    return SampleMeter(scenario.analyzer.window, stick_speed=scenario.stick_speed)
+
+
 def simulate(
     scenario: Scenario,
     duration: float,
@@ -33,10 +41,12 @@ def simulate(
     progress: Progress = lambda _: None,
     observer: RunObserver | None = None,
     recorder: SampleRecorder | None = None,
+    told: SampleMeter | None = None,
 ) -> Measures:
     """Return the measures of the scenario's motion over `duration` (s).
 
-    An `observer` receives the motion, a `recorder` takes its samples. Raises InvalidInputError for
+    An `observer` receives the motion, a `recorder` takes its samples, and `told` those that the
+    sensor tells. Raises InvalidInputError for
     a duration that is not allowed, or if `continuous` control does not support the scenario.
     """
     if not 0.0 <= duration < float("inf"):
@@ -60,4 +70,6 @@ def simulate(
     tracer = None if observer is None else MotionTracer(motion, observer)
     loop = plant.as_loop(motion, advance=None if tracer is None else tracer.advance)
     controller = None if law is None else scenario.controller.as_controller()
-    return simulate_sampled(loop, motion, controller, duration, meter, progress, tracer, recorder)
+    return simulate_sampled(
+        loop, motion, controller, duration, meter, progress, tracer, recorder, told
+    )

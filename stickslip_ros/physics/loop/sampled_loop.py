@@ -182,6 +182,14 @@ class SampledLoop:
         """Whether the motion is unbounded."""
         return self._motion.unbounded
 
+    @property
+    def applied_force(self) -> float:
+        """Force of the actuator on the slide, N, held up to the present sample or lagging."""
+        motion = self._motion
+        if motion.drive.actuator.states:
+            return motion.applied_force - motion.disturbance
+        return self._acting
+
     def stamp(self, number: int) -> int:
         """Return the stamp of a sample.
 
@@ -300,8 +308,8 @@ class SampledLoop:
         """Return a sample as the sensor measures it."""
         if self._measure is None:
             return sample
-        position, velocity = self._measure(self.sample_number, sample.position, sample.velocity)
-        return sample._replace(position=position, velocity=velocity)
+        stamp, position, velocity, *others = sample
+        return Sample(stamp, *self._measure(self.sample_number, position, velocity), *others)
 
     def _deliver(self) -> float:
         """Apply the forces that arrive in the present period; return when the newest one does.

@@ -8,10 +8,12 @@ from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.loop.trajectory import SampleRecorder
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver, RunObserver
+from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.physics.model.course import NO_COURSE
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.progress import Progress
+from stickslip_ros.samples import SampleColumns
 
 
 def measure_block(
@@ -36,6 +38,7 @@ def simulate_sampled(
     progress: Progress = lambda _: None,
     observer: MotionObserver | None = None,
     recorder: SampleRecorder | None = None,
+    told: SampleMeter | None = None,
 ) -> Measures:
     """Simulate the sampled loop and measure its motion.
 
@@ -57,6 +60,8 @@ def simulate_sampled(
         Receives the motion in blocks.
     recorder : SampleRecorder, optional
         Takes each sample with the control force that answers it.
+    told : SampleMeter, optional
+        Receives the samples as the sensor measures them.
 
     Returns
     -------
@@ -89,19 +94,25 @@ def simulate_sampled(
     'equilibrium'
     """
     samples = round(duration / loop.period)
+    measured = [loop.sample]
     for number in range(1, samples + 1):
         force = 0.0 if controller is None else answer(loop, controller)
         if recorder is not None:
-            recorder.take(loop.true_sample, force)
-        loop.advance()
+            recorder.take(loop.true_sample, force, loop.sample)
+        sample = loop.advance()
+        if told is not None:
+            measured.append(sample)
         if number % 1000 == 0 or number == samples or motion.unbounded:
             measure_block(motion, meter, observer)
+            if told is not None:
+                told.feed(SampleColumns.from_samples(measured))
+                measured.clear()
             progress(number / samples)
             if motion.unbounded:
                 meter.report_run_away()
                 break
     if recorder is not None:
-        recorder.take(loop.true_sample, answer(loop, controller))
+        recorder.take(loop.true_sample, answer(loop, controller), loop.sample)
     return meter.measures()
 
 

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,6 +38,16 @@ class Trajectory(Table):
     """Velocity of the belt, m/s."""
 
 
+@dataclass(frozen=True, eq=False)
+class MeasuredTrajectory(Trajectory):
+    """A trajectory with what a sensor tells of it."""
+
+    measured_position: FloatArray
+    """Measured displacement of the slide, m."""
+    measured_velocity: FloatArray
+    """Measured velocity of the slide, m/s."""
+
+
 QUANTITIES = {
     "time": ("time", "s"),
     "position": ("displacement", "m"),
@@ -49,29 +59,47 @@ QUANTITIES = {
 }
 """Label and unit of each column of a trajectory."""
 
+MEASURED = {
+    "measured_position": ("measured displacement", "m"),
+    "measured_velocity": ("measured velocity", "m/s"),
+}
+"""The same of the columns that a sensor adds."""
+
 
 class SampleRecorder(ABC):
     """Receives the samples of a run as they come, and keeps each one or every nth."""
 
-    def __init__(self, rate: float, every: int = 1) -> None:
-        """Keep one in `every` samples; they are taken `rate` (Hz) times per second."""
-        self._rate, self._every = rate, every
+    def __init__(self, rate: float, every: int = 1, *, measured: bool = False) -> None:
+        """Keep one in `every` samples; they are taken `rate` (Hz) times per second.
+
+        With `measured` also what a sensor tells.
+        """
+        self._rate, self._every, self._measured = rate, every, measured
         self._number = 0
         """Number of the next sample."""
         self._now = 0.0
 
     @abstractmethod
     def keep(self, row: tuple[float, ...]) -> None:
-        """Keep the values of one sample, in the order of `QUANTITIES`."""
+        """Keep the values of one sample, in the order of `QUANTITIES` and of `MEASURED`."""
 
-    def take(self, sample: Sample, control_force: float) -> None:
-        """Receive the next sample, and the control force (N) that answers it."""
+    @property
+    def quantities(self) -> Mapping[str, tuple[str, str]]:
+        """Label and unit of each column."""
+        return {**QUANTITIES, **MEASURED} if self._measured else QUANTITIES
+
+    def take(self, sample: Sample, control_force: float, measured: Sample | None = None) -> None:
+        """Receive the next sample, and the control force (N) that answers it.
+
+        `measured` is the sample as a sensor tells it.
+        """
         number = self._number
         if number % self._every == 0:
             _, position, velocity, friction_force, *belt = sample
-            self.keep(
-                (number / self._rate, position, velocity, friction_force, control_force, *belt)
-            )
+            row = (number / self._rate, position, velocity, friction_force, control_force, *belt)
+            if self._measured:
+                row += (measured or sample)[1:3]
+            self.keep(row)
         self._number = number + 1
 
     def sampling(self, motion: Motion, advance: Callable[[float], None]) -> Callable[[float], None]:
@@ -108,9 +136,9 @@ class SampleRecorder(ABC):
 class TrajectoryRecorder(SampleRecorder):
     """Keeps the samples of a run in memory."""
 
-    def __init__(self, rate: float, every: int = 1) -> None:
-        """Keep one in `every` samples; they are taken `rate` (Hz) times per second."""
-        super().__init__(rate, every)
+    def __init__(self, rate: float, every: int = 1, *, measured: bool = False) -> None:
+        """Keep samples as `SampleRecorder` does."""
+        super().__init__(rate, every, measured=measured)
         self._values = array("d")
 
     def keep(self, row: tuple[float, ...]) -> None:
@@ -119,4 +147,5 @@ class TrajectoryRecorder(SampleRecorder):
 
     def trajectory(self) -> Trajectory:
         """Return the samples so far."""
-        return Trajectory(*np.array(self._values).reshape(-1, len(QUANTITIES)).T.copy())
+        columns = np.array(self._values).reshape(-1, len(self.quantities)).T.copy()
+        return MeasuredTrajectory(*columns) if self._measured else Trajectory(*columns)

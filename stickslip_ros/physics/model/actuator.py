@@ -2,28 +2,65 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any
+
+from stickslip_ros.physics.model.constants import constant
+
+_FINEST = 2.0**53
+"""Number of steps from which on floats are coarser than the steps."""
 
 
 @dataclass(frozen=True)
 class Actuator:
-    """What exerts the control force on the slide; it exerts exactly what is commanded.
+    """What exerts the control force on the slide. By default it exerts exactly what is commanded.
 
-    An actuator is a frozen dataclass of its constants, each described by `constant`. They become
-    the parameters `actuator.*` of the plant. A command passes `limiter` when it arrives. An
-    actuator with `states`, such as a lag, is a part of the drive: its equations accept floats and
-    heyoka expressions, in the scales of the drive. A disturbance does not pass the actuator.
+    A command passes `limiter` when it arrives: it is limited, rounded to the resolution, half to
+    even, and limited again. This held force F acts through a lag of first order, tau F_a' = F - F_a
+    with F_a = 0 at the start. A disturbance does not pass the actuator.
+
+    The lag is a part of the drive: its equations accept floats and heyoka expressions, in the
+    scales of the drive.
+
+    Examples
+    --------
+    >>> from stickslip_ros.physics.model.actuator import Actuator
+    >>> actuator = Actuator(limit=100.0, resolution=30.0)
+    >>> [actuator.limiter(force) for force in (44.0, 46.0, 500.0)]
+    [30.0, 60.0, 90.0]
     """
+
+    limit: float = constant(inf, "Largest force of the actuator.", "N", positive=True)
+    resolution: float = constant(0.0, "Step of its force; 0 for none.", "N", at_least=0.0)
+    time_constant: float = constant(
+        0.0,
+        "Time constant of its lag of first order; 0 for none.",
+        "s",
+        at_least=0.0,
+        simplifies=True,
+    )
 
     @property
     def states(self) -> Sequence[str]:
-        """Names of the states: forces, zero at the start. The constants may decide about them."""
-        return ()
+        """Names of the states: forces, zero at the start. The constants decide about them."""
+        time: Any = self.time_constant  # of the equations, an expression
+        return () if isinstance(time, int | float) and time == 0.0 else ("force",)
 
     @property
     def limiter(self) -> Callable[[float], float] | None:
         """What turns a command (N) into the force (N) that is held; None if they are equal."""
-        return None
+        limit, resolution = self.limit, self.resolution
+        if not resolution:
+            return None if limit == inf else lambda force: max(-limit, min(limit, force))
+
+        def rounded(force: float) -> float:
+            force = max(-limit, min(limit, force))
+            steps = force / resolution
+            if not -_FINEST < steps < _FINEST:
+                return force
+            return max(-limit, min(limit, round(steps) * resolution))
+
+        return rounded
 
     def state_rates(self, held: Any, states: Sequence[Any]) -> Sequence[Any]:
         """Return the rates of the states.
@@ -40,7 +77,7 @@ class Actuator:
         sequence of float or expression
             Rates.
         """
-        return ()
+        return [(held - force) / self.time_constant for force in states]
 
     def force(self, held: Any, states: Sequence[Any]) -> Any:
         """Return the force on the slide.
@@ -57,7 +94,7 @@ class Actuator:
         float or expression
             Force.
         """
-        return held
+        return states[0] if states else held
 
 
 IDEAL_ACTUATOR = Actuator()

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
+from enum import StrEnum
 from functools import cache
 from math import inf
 from typing import Any, TypeVar
@@ -30,8 +31,8 @@ class Constant:
 
     name: str
     """Name of the field."""
-    default: float | tuple[float, ...]
-    """Default value."""
+    default: float | tuple[float, ...] | StrEnum
+    """Default value; a member of the enumeration where the constant is a choice."""
     meaning: str
     """Meaning, as a sentence."""
     unit: str | None
@@ -63,7 +64,7 @@ class Constant:
 
 
 def constant(
-    default: float | tuple[float, ...],
+    default: float | tuple[float, ...] | StrEnum,
     meaning: str,
     unit: str | None = None,
     *,
@@ -76,8 +77,8 @@ def constant(
 
     Parameters
     ----------
-    default : float or tuple of float
-        Default value; a tuple for a table.
+    default : float, tuple of float or StrEnum
+        Default value; a tuple for a table, a member of an enumeration for a choice.
     meaning : str
         Meaning, as a sentence; shown in help texts and in the documentation.
     unit : str, optional

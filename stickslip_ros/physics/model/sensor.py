@@ -1,20 +1,138 @@
 """The sensor between the motion and its samples."""
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import StrEnum
+from math import sqrt
+from typing import Any, Self
+
+import numpy as np
+
+from stickslip_ros.physics.model.constants import constant, constants_of
 
 Measure = Callable[[int, float, float], tuple[float, float]]
 """Returns the measured position (m) and velocity (m/s) for the number of a sample, and its true
 position and velocity. It is called once for each sample, in order."""
 
+LONGEST_DIFFERENCE = 300
+"""Largest number of samples of a difference; the order of the sampled loop grows with it."""
+
+_BLOCK = 1024
+"""Number of deviates that are made at once."""
+_DEVIATIONS = 4.0
+"""Standard deviations that noise hardly ever exceeds."""
+_WORD = 2**32
+_FINEST = 2.0**53
+"""Number of steps from which on floats are coarser than the steps."""
+
+
+class MeasuredVelocity(StrEnum):
+    """What a sensor tells as the velocity."""
+
+    EXACT = "exact"
+    DIFFERENCE = "difference"
+
 
 @dataclass(frozen=True)
 class Sensor:
-    """What measures the slide; it is exact. The state of the belt is known.
+    """What measures the slide: an encoder, and what gives the velocity. By default it is exact.
 
-    A sensor is a frozen dataclass of its constants, each described by `constant`. They become the
-    parameters `sensor.*` of the plant.
+    The measured position is the true one with noise, rounded to the resolution, half to even. The
+    velocity is exact, with noise if asked, or the difference of measured positions over n samples,
+    (p_k - p_(k-n)) / (n T); over fewer at the start and after a reset, and 0 at the first sample.
+    Noise is normally distributed and independent from sample to sample; that of sample n depends on
+    seed and n only. The state of the belt is known.
+
+    Examples
+    --------
+    An encoder of 1 um:
+
+    >>> from stickslip_ros.physics.model.sensor import MeasuredVelocity, Sensor
+    >>> sensor = Sensor(position_resolution=1e-6, velocity=MeasuredVelocity.DIFFERENCE)
+    >>> measure = sensor.start(period=1e-3)
+    >>> [measure(n, 0.02 * n * 1e-3 + 3e-7, 0.02)[1] for n in range(3)]
+    [0.0, 0.02, 0.02]
     """
+
+    position_resolution: float = constant(
+        0.0, "Step of the measured position; 0 for none.", "m", at_least=0.0
+    )
+    position_noise: float = constant(
+        0.0, "Standard deviation of the noise of the position.", "m", at_least=0.0
+    )
+    velocity: MeasuredVelocity = constant(
+        MeasuredVelocity.EXACT, "Velocity: the true one, or the difference of measured positions."
+    )
+    difference_samples: int = constant(
+        1, "Number of samples that a difference spans.", at_least=1, whole=True
+    )
+    velocity_noise: float = constant(
+        0.0, "Standard deviation of the noise of an exact velocity.", "m/s", at_least=0.0
+    )
+    seed: int = constant(0, "Seed of the noise.", at_least=0, whole=True)
+
+    @property
+    def exact(self) -> bool:
+        """Whether measured samples are the true ones."""
+        rough = self.position_resolution or self.position_noise or self.velocity_noise
+        return not rough and not self.spans
+
+    @property
+    def spans(self) -> int:
+        """Number of samples that the difference for the velocity spans; 0 without one."""
+        return self.difference_samples if self.velocity is MeasuredVelocity.DIFFERENCE else 0
+
+    @classmethod
+    def from_values(cls, values: Mapping[str, Any]) -> Self:
+        """Return a sensor from values by name, as a recording or a scenario has them.
+
+        Parameters
+        ----------
+        values : mapping
+            Values of some constants; those of others are ignored.
+
+        Returns
+        -------
+        Sensor
+            Sensor with the defaults for what is not given.
+        """
+        known = {name: values[name] for name in constants_of(cls) if name in values}
+        if "velocity" in known:
+            known["velocity"] = MeasuredVelocity(known["velocity"])
+        return cls(**known)
+
+    def velocity_error(self, period: float) -> float:
+        """Return how much the measured velocity differs from a constant one, at most.
+
+        Parameters
+        ----------
+        period : float
+            Sample period, s.
+
+        Returns
+        -------
+        float
+            Largest error, m/s, with noise of up to four standard deviations.
+        """
+        if not self.spans:
+            return _DEVIATIONS * self.velocity_noise
+        position = self.position_resolution + sqrt(2.0) * _DEVIATIONS * self.position_noise
+        return position / (self.spans * period)
+
+    def refusal(self) -> str | None:
+        """Return why the constants do not fit together, as a sentence, or None."""
+        if self.spans and self.velocity_noise:
+            return (
+                f"velocity_noise = {self.velocity_noise} m/s must be 0 with velocity = "
+                f"{self.velocity}, which has the noise of the positions"
+            )
+        if self.difference_samples > LONGEST_DIFFERENCE:
+            return (
+                f"difference_samples = {self.difference_samples} must not exceed "
+                f"{LONGEST_DIFFERENCE}"
+            )
+        return None
 
     def start(self, period: float) -> Measure | None:
         """Return what measures a segment of samples, or what follows a reset.
@@ -29,7 +147,72 @@ class Sensor:
         callable or None
             See `Measure`; None for an exact sensor.
         """
-        return None
+        return None if self.exact else Encoder(self, period)
+
+
+class Encoder:
+    """What measures sample after sample, see `Sensor`."""
+
+    def __init__(self, sensor: Sensor, period: float) -> None:
+        """Measure for a sensor at a sample period, s."""
+        self._resolution = sensor.position_resolution
+        self._position_noise = _Noise.of(sensor.position_noise, sensor.seed, 0)
+        self._velocity_noise = _Noise.of(sensor.velocity_noise, sensor.seed, 1)
+        self._period = period
+        self._positions: deque[float] | None = None
+        if sensor.spans:
+            self._positions = deque(maxlen=sensor.spans + 1)
+
+    def __call__(self, number: int, position: float, velocity: float) -> tuple[float, float]:
+        """Measure a sample; see `Measure`."""
+        if self._position_noise is not None:
+            position += self._position_noise.at(number)
+        if self._resolution:
+            steps = position / self._resolution
+            if -_FINEST < steps < _FINEST:
+                position = round(steps) * self._resolution
+        positions = self._positions
+        if positions is not None:
+            positions.append(position)
+            spanned = len(positions) - 1
+            velocity = (position - positions[0]) / (spanned * self._period) if spanned else 0.0
+        elif self._velocity_noise is not None:
+            velocity += self._velocity_noise.at(number)
+        return position, velocity
+
+    def copy(self) -> Self:
+        """Return one that continues from here on its own."""
+        other = object.__new__(type(self))
+        other.__dict__ |= self.__dict__
+        if self._positions is not None:
+            other._positions = self._positions.copy()
+        return other
+
+
+class _Noise:
+    """Normal deviates, of which each depends on the seed and on its number only."""
+
+    def __init__(self, deviation: float, seed: int, kind: int) -> None:
+        self._deviation = deviation
+        self._key = (seed % _WORD, seed // _WORD, kind)
+        self._first = 0
+        self._values: list[float] = []
+
+    @classmethod
+    def of(cls, deviation: float, seed: int, kind: int) -> Self | None:
+        """Return noise with a standard deviation, or None without any."""
+        return cls(deviation, seed, kind) if deviation else None
+
+    def at(self, number: int) -> float:
+        """Return the deviate of a sample."""
+        place = number - self._first
+        if not 0 <= place < len(self._values):
+            block, place = divmod(number, _BLOCK)
+            self._first = number - place
+            # The only normal deviates of numpy with a guarantee that they stay the same.
+            random = np.random.RandomState([*self._key, block % _WORD, block // _WORD])
+            self._values = (self._deviation * random.standard_normal(_BLOCK)).tolist()
+        return self._values[place]
 
 
 EXACT_SENSOR = Sensor()

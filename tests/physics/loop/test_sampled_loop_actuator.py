@@ -11,12 +11,13 @@ from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.loop.simulation import simulate_sampled
 from stickslip_ros.physics.measures import CycleMeter, Regime
+from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.examples import examples
-from tests.physics.actuators import Lag
+from tests.physics.actuators import lag
 from tests.physics.drives import FEED_DRIVE, PAPER
 
 SECOND = 10**9
@@ -26,7 +27,7 @@ def commands(number: int) -> float:
     return 0.5 * (-1.0) ** number * (1.0 + 0.1 * number)
 
 
-class Counting(Lag):
+class Counting(Actuator):
     """Counts the commands that it limits."""
 
     taken: list[float] = []  # noqa: RUF012 - of the class, since a lag is frozen
@@ -39,7 +40,7 @@ class Counting(Lag):
 @pytest.mark.parametrize("delay", [0.0, 0.3, 1.0, 2.25])
 def test_a_command_is_limited_when_it_arrives_and_then_held(delay: float) -> None:
     """Delay in periods; the arrived force acts, and none before the first."""
-    motion = Motion(replace(PAPER, actuator=Lag(largest=0.6)), 0.0, 0.0)
+    motion = Motion(replace(PAPER, actuator=Actuator(limit=0.6)), 0.0, 0.0)
     loop = SampledLoop(motion, 10.0, SECOND, force_delay=delay / 10.0)
     acting: list[float] = []
     for number in range(8):
@@ -52,7 +53,7 @@ def test_a_command_is_limited_when_it_arrives_and_then_held(delay: float) -> Non
 
 
 def test_a_disturbance_is_not_limited() -> None:
-    motion = Motion(replace(PAPER, actuator=Lag(largest=0.1)), 0.0, 0.0)
+    motion = Motion(replace(PAPER, actuator=Actuator(limit=0.1)), 0.0, 0.0)
     step = Disturbance(DisturbanceKind.STEP, 5.0)
     loop = SampledLoop(motion, 10.0, SECOND, disturbance=step)
     loop.offer(SECOND, 3.0)
@@ -71,14 +72,15 @@ def test_each_command_passes_the_actuator_once() -> None:
     assert motion.force == commands(4) / 2.0
 
 
-@pytest.mark.parametrize("lag", [0.0, 0.05])
-def test_a_new_actuator_limits_from_the_next_command_on(lag: float) -> None:
-    motion = Motion(replace(PAPER, actuator=Lag(lag)), 0.0, 0.0)
+@pytest.mark.parametrize("time_constant", [0.0, 0.05])
+def test_a_new_actuator_limits_from_the_next_command_on(time_constant: float) -> None:
+    motion = Motion(replace(PAPER, actuator=lag(time_constant)), 0.0, 0.0)
     loop = SampledLoop(motion, 10.0, SECOND)
     forces: list[float] = []
     for number, largest in enumerate((0.4, 0.2, 5.0, 5.0)):
         loop.offer(loop.sample.stamp, 3.0)
-        loop.change_drive(replace(PAPER, actuator=Lag(lag, largest)))
+        actuator = Actuator(limit=largest, time_constant=time_constant)
+        loop.change_drive(replace(PAPER, actuator=actuator))
         loop.advance()
         forces.append(motion.force)
         assert loop.sample_number == number + 1
@@ -90,12 +92,12 @@ def test_a_new_actuator_limits_from_the_next_command_on(lag: float) -> None:
 )
 @examples(quick=15, thorough=100)
 def test_a_lag_behind_delay_and_jitter_is_that_of_the_switched_command(
-    delay: float, jitter: float, lag: float, data: st.DataObject
+    delay: float, jitter: float, time_constant: float, data: st.DataObject
 ) -> None:
     """Delay and jitter in periods. The force is that of u' = (held - u)/lag, by hand."""
     seed = data.draw(st.integers(0, 1000))
     disturbance = data.draw(st.floats(-0.2, 0.2))
-    drive = replace(PAPER, actuator=Lag(lag))
+    drive = replace(PAPER, actuator=lag(time_constant))
 
     class Switched(Motion):
         """Keeps how long which command was held."""
@@ -122,7 +124,7 @@ def test_a_lag_behind_delay_and_jitter_is_that_of_the_switched_command(
     for command, extra, duration in pieces:
         hand.set_forces(command, extra)
         hand.advance(duration)
-        force = command + (force - command) * exp(-duration / lag)
+        force = command + (force - command) * exp(-duration / time_constant)
         assert hand.applied_force - extra == pytest.approx(force, abs=1e-12)
     assert sum(duration for *_, duration in pieces) == pytest.approx(1.0)
     assert {command for command, *_ in pieces} <= {0.0, *map(commands, range(10))}
@@ -131,7 +133,7 @@ def test_a_lag_behind_delay_and_jitter_is_that_of_the_switched_command(
 
 
 def test_a_reset_puts_the_lag_at_rest() -> None:
-    motion = Motion(replace(PAPER, actuator=Lag(0.5)), 0.0, 0.0)
+    motion = Motion(replace(PAPER, actuator=lag(0.5)), 0.0, 0.0)
     loop = SampledLoop(motion, 10.0, SECOND)
     for _ in range(10):
         loop.offer(loop.sample.stamp, 1.0)
@@ -144,12 +146,12 @@ def test_a_reset_puts_the_lag_at_rest() -> None:
 
 
 def test_a_new_drive_keeps_the_lag_in_the_loop() -> None:
-    motion = Motion(replace(PAPER, actuator=Lag(0.5)), 0.0, 0.0)
+    motion = Motion(replace(PAPER, actuator=lag(0.5)), 0.0, 0.0)
     loop = SampledLoop(motion, 10.0, SECOND)
     for number in range(10):
         loop.offer(loop.sample.stamp, 1.0)
         if number == 4:
-            loop.change_drive(replace(PAPER, normal_force=3.0, actuator=Lag(0.5)))
+            loop.change_drive(replace(PAPER, normal_force=3.0, actuator=lag(0.5)))
         loop.advance()
     assert motion.applied_force == pytest.approx(1.0 - exp(-2.0), rel=1e-12)
 
@@ -163,5 +165,5 @@ def controlled(drive: Drive) -> Regime:
 
 def test_a_small_lag_leaves_the_washout_stable_and_a_large_one_does_not() -> None:
     """As a delay does, by up to 10.45 ms."""
-    assert controlled(replace(FEED_DRIVE, actuator=Lag(0.002))) is Regime.EQUILIBRIUM
-    assert controlled(replace(FEED_DRIVE, actuator=Lag(0.05))) is Regime.STICK_SLIP
+    assert controlled(replace(FEED_DRIVE, actuator=lag(0.002))) is Regime.EQUILIBRIUM
+    assert controlled(replace(FEED_DRIVE, actuator=lag(0.05))) is Regime.STICK_SLIP

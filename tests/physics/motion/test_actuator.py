@@ -18,12 +18,12 @@ from stickslip_ros.physics.model.friction import Coulomb, Stribeck
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.physics.motion.variational import SensitiveMotion
 from tests.examples import examples
-from tests.physics.actuators import Lag
+from tests.physics.actuators import lag
 from tests.physics.drives import FEED_DRIVE, PAPER
 from tests.physics.parts import Dahl, Ramp
 
-LAG = replace(PAPER, actuator=Lag(0.7))
-SLOW = replace(FEED_DRIVE, actuator=Lag(0.004))
+LAG = replace(PAPER, actuator=lag(0.7))
+SLOW = replace(FEED_DRIVE, actuator=lag(0.004))
 
 
 def lagged(motion: Motion) -> float:
@@ -33,7 +33,7 @@ def lagged(motion: Motion) -> float:
 
 def test_through_slip_the_motion_is_the_exact_solution() -> None:
     """Coulomb friction is constant in slip: the drive and its lag are linear."""
-    drive = replace(PAPER, friction=Coulomb(0.1), belt_speed=5.0, actuator=Lag(0.7))
+    drive = replace(PAPER, friction=Coulomb(0.1), belt_speed=5.0, actuator=lag(0.7))
     motion = Motion(drive, 0.2, 0.0)
     # x, y, u and 1; friction drives the slide forward.
     state = np.array([0.2, 0.0, 0.0, 1.0])
@@ -62,7 +62,7 @@ def phase_by_scipy(
     The state is position, velocity and lagged force; the forces are command and disturbance.
     """
     command, disturbance = forces
-    time_constant = getattr(drive.actuator, "time_constant")  # noqa: B009 - of the test's class
+    time_constant = drive.actuator.time_constant
     belt, normal = drive.belt_speed, drive.normal_force
     limit = normal * float(drive.friction.static)
 
@@ -104,7 +104,10 @@ def phase_by_scipy(
 
 @pytest.mark.parametrize(
     "drive",
-    [replace(LAG, damping=0.4), replace(FEED_DRIVE, damping=4000.0, actuator=Lag(0.007))],
+    [
+        replace(LAG, damping=0.4),
+        replace(FEED_DRIVE, damping=4000.0, actuator=lag(0.007)),
+    ],
     ids=["paper", "feed_drive"],
 )
 def test_through_stick_and_slip_it_is_that_of_another_integrator(drive: Drive) -> None:
@@ -176,7 +179,7 @@ CHANGES = {
     "normal force": {"normal_force": 2000.0},
     "belt": {"belt_speed": -0.01},
     "friction": {"friction": Stribeck(0.3, 0.2, 0.07)},
-    "lag": {"actuator": Lag(0.02)},
+    "lag": {"actuator": lag(0.02)},
     "courses": {"belt": Ramp(0.01, 0.0, 0.5)},
     "memory": {"friction": Dahl(0.4, bristle=2e5)},
 }
@@ -192,7 +195,7 @@ def test_a_change_of_drive_keeps_lag_and_held_forces(change: dict[str, object]) 
     motion.drive = replace(SLOW, **change)  # type: ignore[arg-type]
     assert (motion.force, motion.disturbance) == pytest.approx((200.0, -30.0), rel=1e-13)
     assert lagged(motion) == pytest.approx(exerted, rel=1e-13)
-    tau = motion.drive.actuator.time_constant  # type: ignore[attr-defined]
+    tau = motion.drive.actuator.time_constant
     motion.advance(0.002)
     left = (200.0 - exerted) * exp(-0.002 / tau)
     assert lagged(motion) == pytest.approx(200.0 - left, rel=1e-11)
@@ -216,7 +219,11 @@ def test_a_lag_may_come_and_go() -> None:
 @pytest.mark.parametrize("drive", [FEED_DRIVE, replace(FEED_DRIVE, belt=Ramp(0.01, 0.0, 0.5))])
 def test_drives_with_and_without_lag_of_one_class_do_not_share_equations(drive: Drive) -> None:
     ends: list[float] = []
-    for actuator in (Lag(0.0), Lag(0.004), Lag(0.0)):
+    for actuator in (
+        lag(0.0),
+        lag(0.004),
+        lag(0.0),
+    ):
         motion = Motion(replace(drive, actuator=actuator), 0.0, 0.0)
         motion.set_forces(100.0, 0.0)
         motion.advance(0.02)
@@ -248,9 +255,9 @@ def test_restart_puts_the_lag_at_rest_and_keeps_the_held_forces() -> None:
 )
 @examples(quick=20, thorough=200)
 def test_cutting_a_motion_anywhere_changes_nothing(
-    lag: float, belt_speed: float, command: float, cuts: list[float]
+    time_constant: float, belt_speed: float, command: float, cuts: list[float]
 ) -> None:
-    drive = replace(PAPER, belt_speed=belt_speed, actuator=Lag(lag))
+    drive = replace(PAPER, belt_speed=belt_speed, actuator=lag(time_constant))
     whole, cut, recorded = (kind(drive, 0.1, 0.2) for kind in (Motion, Motion, RecordedMotion))
     for motion in (whole, cut, recorded):
         motion.set_forces(command, 0.05)
