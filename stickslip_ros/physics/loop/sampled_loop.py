@@ -167,10 +167,16 @@ class SampledLoop:
         motion.restart_courses()
         self.sample_number = 0
         """Number of the present sample."""
-        self.true_sample = self._take_sample(0.0)
-        """State of slide and belt at the present sample."""
-        self.sample = self._measured(self.true_sample)
+        self.sample = self._take_sample(0.0)
         """The present sample, as the sensor measures it."""
+
+    @property
+    def true_sample(self) -> Sample:
+        """State of slide and belt at the present sample."""
+        if self._measure is None:
+            return self.sample
+        position, velocity = self._true
+        return self.sample._replace(position=position, velocity=velocity)
 
     @property
     def answered(self) -> bool:
@@ -298,18 +304,8 @@ class SampledLoop:
             number = self.sample_number
             belt_position += drive.belt.integral(number * period, (number + 1) * period)
         self.sample_number += 1
-        sample = self.true_sample = self._take_sample(belt_position)
-        if self._measure is not None:
-            sample = self._measured(sample)
-        self.sample = sample
-        return sample
-
-    def _measured(self, sample: Sample) -> Sample:
-        """Return a sample as the sensor measures it."""
-        if self._measure is None:
-            return sample
-        stamp, position, velocity, *others = sample
-        return Sample(stamp, *self._measure(self.sample_number, position, velocity), *others)
+        self.sample = self._take_sample(belt_position)
+        return self.sample
 
     def _deliver(self) -> float:
         """Apply the forces that arrive in the present period; return when the newest one does.
@@ -362,14 +358,12 @@ class SampledLoop:
             friction_force = motion.friction_force
         scenario = self.scenario_disturbance.force(number, self.period)
         self.disturbance = scenario + self.asked_disturbance
-        return Sample(
-            self.stamp(number),
-            motion.position,
-            motion.velocity,
-            friction_force,
-            belt_position,
-            motion.belt_speed,
-        )
+        stamp, belt_speed = self.stamp(number), motion.belt_speed
+        position, velocity = self._true = motion.position, motion.velocity
+        if self._measure is not None:
+            position, velocity = self._measure(number, position, velocity)
+        values = stamp, position, velocity, friction_force, belt_position, belt_speed
+        return tuple.__new__(Sample, values)  # half as long as the constructor
 
     def _stand_in(self) -> tuple[int, float]:
         """Return the replacement for the missing force of the present sample.

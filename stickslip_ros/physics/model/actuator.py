@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import copysign, inf
 from typing import Any
 
 from stickslip_ros.physics.model.constants import constant
@@ -50,17 +50,22 @@ class Actuator:
     def limiter(self) -> Callable[[float], float] | None:
         """What turns a command (N) into the force (N) that is held; None if they are equal."""
         limit, resolution = self.limit, self.resolution
-        if not resolution:
-            return None if limit == inf else lambda force: max(-limit, min(limit, force))
+        if limit == inf and not resolution:
+            return None
 
-        def rounded(force: float) -> float:
-            force = max(-limit, min(limit, force))
-            steps = force / resolution
-            if not -_FINEST < steps < _FINEST:
-                return force
-            return max(-limit, min(limit, round(steps) * resolution))
+        def held(command: float) -> float:
+            force = command
+            if not -limit < force < limit:
+                force = copysign(limit, force)
+            if resolution:
+                steps = force / resolution
+                if -_FINEST < steps < _FINEST:
+                    force = round(steps) * resolution
+                    if not -limit < force < limit:
+                        force = copysign(limit, force)
+            return force
 
-        return rounded
+        return held
 
     def state_rates(self, held: Any, states: Sequence[Any]) -> Sequence[Any]:
         """Return the rates of the states.

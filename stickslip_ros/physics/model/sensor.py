@@ -1,9 +1,10 @@
 """The sensor between the motion and its samples."""
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import count
 from math import sqrt
 from typing import Any, Self
 
@@ -147,72 +148,53 @@ class Sensor:
         callable or None
             See `Measure`; None for an exact sensor.
         """
-        return None if self.exact else Encoder(self, period)
+        if self.exact:
+            return None
+        resolution = self.position_resolution
+        of_position = _Noise(self.position_noise, self.seed, 0) if self.position_noise else None
+        of_velocity = _Noise(self.velocity_noise, self.seed, 1) if self.velocity_noise else None
+        positions = deque[float](maxlen=self.spans + 1) if self.spans else None
 
+        # Without calls or objects that could be avoided: it is a part of each tick.
+        def measure(number: int, position: float, velocity: float) -> tuple[float, float]:
+            if of_position is not None:
+                position += next(of_position.upcoming or of_position.start(number))
+            if resolution:
+                steps = position / resolution
+                if -_FINEST < steps < _FINEST:
+                    position = round(steps) * resolution
+            if positions is not None:
+                positions.append(position)
+                spanned = len(positions) - 1
+                velocity = (position - positions[0]) / (spanned * period) if spanned else 0.0
+            elif of_velocity is not None:
+                velocity += next(of_velocity.upcoming or of_velocity.start(number))
+            return position, velocity
 
-class Encoder:
-    """What measures sample after sample, see `Sensor`."""
-
-    def __init__(self, sensor: Sensor, period: float) -> None:
-        """Measure for a sensor at a sample period, s."""
-        self._resolution = sensor.position_resolution
-        self._position_noise = _Noise.of(sensor.position_noise, sensor.seed, 0)
-        self._velocity_noise = _Noise.of(sensor.velocity_noise, sensor.seed, 1)
-        self._period = period
-        self._positions: deque[float] | None = None
-        if sensor.spans:
-            self._positions = deque(maxlen=sensor.spans + 1)
-
-    def __call__(self, number: int, position: float, velocity: float) -> tuple[float, float]:
-        """Measure a sample; see `Measure`."""
-        if self._position_noise is not None:
-            position += self._position_noise.at(number)
-        if self._resolution:
-            steps = position / self._resolution
-            if -_FINEST < steps < _FINEST:
-                position = round(steps) * self._resolution
-        positions = self._positions
-        if positions is not None:
-            positions.append(position)
-            spanned = len(positions) - 1
-            velocity = (position - positions[0]) / (spanned * self._period) if spanned else 0.0
-        elif self._velocity_noise is not None:
-            velocity += self._velocity_noise.at(number)
-        return position, velocity
-
-    def copy(self) -> Self:
-        """Return one that continues from here on its own."""
-        other = object.__new__(type(self))
-        other.__dict__ |= self.__dict__
-        if self._positions is not None:
-            other._positions = self._positions.copy()
-        return other
+        return measure
 
 
 class _Noise:
-    """Normal deviates, of which each depends on the seed and on its number only."""
+    """Normal deviates, each of which depends on the seed and the number of the sample only."""
 
     def __init__(self, deviation: float, seed: int, kind: int) -> None:
         self._deviation = deviation
-        self._key = (seed % _WORD, seed // _WORD, kind)
-        self._first = 0
-        self._values: list[float] = []
+        self._key = seed % _WORD, seed // _WORD, kind
+        self.upcoming: Iterator[float] | None = None
+        """Deviates of the next sample and those that follow, once it is known."""
 
-    @classmethod
-    def of(cls, deviation: float, seed: int, kind: int) -> Self | None:
-        """Return noise with a standard deviation, or None without any."""
-        return cls(deviation, seed, kind) if deviation else None
+    def start(self, number: int) -> Iterator[float]:
+        """Return the deviates from a sample on."""
+        self.upcoming = self._from(number)
+        return self.upcoming
 
-    def at(self, number: int) -> float:
-        """Return the deviate of a sample."""
-        place = number - self._first
-        if not 0 <= place < len(self._values):
-            block, place = divmod(number, _BLOCK)
-            self._first = number - place
+    def _from(self, number: int) -> Iterator[float]:
+        first, place = divmod(number, _BLOCK)
+        for block in count(first):
             # The only normal deviates of numpy with a guarantee that they stay the same.
             random = np.random.RandomState([*self._key, block % _WORD, block // _WORD])
-            self._values = (self._deviation * random.standard_normal(_BLOCK)).tolist()
-        return self._values[place]
+            yield from (self._deviation * random.standard_normal(_BLOCK))[place:].tolist()
+            place = 0
 
 
 EXACT_SENSOR = Sensor()

@@ -187,7 +187,8 @@ class Motion(HybridMotion):
             Disturbance force on the slide, N.
         """
         if self._system.has_actuator:
-            self._hold(1, disturbance)
+            if disturbance != self._instant.inputs[1] * self._drive.normal_force:
+                self._hold(1, disturbance)
         else:
             control += disturbance
         self._hold(0, control)
