@@ -107,8 +107,8 @@ def run(arguments: argparse.Namespace) -> int:
 
         write_figure(arguments, simulated_run_figure(scenario, history, true))
     if arguments.json:
-        truth = {} if told is None else {"truth": true.as_dict()}
-        figures = {**measures.as_dict(), **truth, "duration": duration}
+        truth = None if told is None else true.as_dict()
+        figures = {**measures.as_dict(), "truth": truth, "duration": duration}
         print_json({**figures, **made_of(scenario)})
     else:
         columns = told_and_true(measures, None if told is None else true)

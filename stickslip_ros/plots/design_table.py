@@ -29,6 +29,12 @@ WORST = {
 }
 CHECKS = {"belt_speed": ("belt speed", "m/s"), "vibrates": ("vibrates", "")} | WORST
 
+REST = {
+    "amplitude": ("amplitude", "m"),
+    "peak_force": ("peak force", "N"),
+    "rms_force": ("rms force", "N"),
+}
+
 
 def design_tables(name: str, found: Design) -> Iterator[TextTable | str]:
     """Yield the tables of a design for the scenario of that name, and the remark on it."""
@@ -53,8 +59,21 @@ def design_tables(name: str, found: Design) -> Iterator[TextTable | str]:
         headings = [label for label, _ in CHECKS.values()]
         rows = list(zip(*columns, strict=True))
         yield TextTable("verification", headings, rows)
+        yield from _at_rest(found, units)
     if found.remark is not None:
         yield found.remark
+
+
+def _at_rest(found: Design, units: Units) -> Iterator[TextTable]:
+    """Yield what noise and rounding leave at the equilibrium, if there are any."""
+    left = [(check.belt_speed, check.rest) for check in found.checks if check.rest is not None]
+    if not left:
+        return
+    columns = [units.texts([speed for speed, _ in left], "m/s")]
+    for name, (_, unit) in REST.items():
+        columns.append(units.texts([getattr(rest, name) for _, rest in left], unit))
+    headings = ["belt speed", *(label for label, _ in REST.values())]
+    yield TextTable("at rest, by noise and rounding", headings, list(zip(*columns, strict=True)))
 
 
 def _rows(

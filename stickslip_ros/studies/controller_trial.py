@@ -1,6 +1,6 @@
 """Trials of a control law: simulated vibrations while the control is switched on."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,6 +15,7 @@ from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.control import ControlLaw, WashoutGains
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Measure, Sensor
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
 from stickslip_ros.physics.theory.linear_sampled_loop import SETTLED
@@ -97,13 +98,36 @@ class Outcome:
     """Whether the motion diverged, or ended no nearer to the equilibrium than it started."""
 
 
+@dataclass(frozen=True)
+class Rest:
+    """What noise and rounding leave at the equilibrium under control; SI units."""
+
+    amplitude: float
+    """Half the range of the displacement, m."""
+    peak_force: float
+    """Largest force, N."""
+    rms_force: float
+    """Root mean square of the force, N."""
+
+
+@dataclass(frozen=True)
+class _Going(Sensor):
+    """A sensor that measures already."""
+
+    measure: Measure | None = None
+
+    def start(self, period: float) -> Measure | None:
+        return self.measure
+
+
 class Bench:
     """Trials at one sampling rate with one delay of the force."""
 
-    def __init__(self, rate: float, force_delay: float) -> None:
+    def __init__(self, rate: float, force_delay: float, sensor: Sensor = EXACT_SENSOR) -> None:
         """Prepare trials at `rate` (Hz) with `force_delay` (s)."""
         self._rate = rate
         self._force_delay = force_delay
+        self._sensor = sensor
 
     def vibration(self, drive: Drive) -> Vibration:
         """Return the vibration of `drive`, the largest if there are several.
@@ -158,14 +182,18 @@ class Bench:
         cycle = vibration.period * self._rate
         rows = {int(phase * cycle / phases) for phase in range(phases)}
         due = {settled + row for row in rows | {worst}}
+        columns = zip(vibration.position.tolist(), vibration.velocity.tolist(), strict=True)
+        states, drive = list(columns), vibration.drive
+        measure = self._measure([])
         for number in range(max(due) + 1):
             row = number % count
-            stamp = self._stamp(number)
-            start = float(vibration.position[row]), float(vibration.velocity[row])
+            stamp, start = self._stamp(number), states[row]
             if number in due:
-                trial = copy(controller)
-                yield self._run(vibration.drive, trial, stamp, start, patience, vibration.size)
-            controller.answer(_sample(vibration.drive, stamp, *start))
+                before = [states[(row - back) % count] for back in range(self._sensor.spans, 0, -1)]
+                trial = copy(controller), self._measure(before)
+                yield self._run(drive, *trial, stamp, start, patience, vibration.size)
+            told = start if measure is None else measure(number, *start)
+            controller.answer(_sample(drive, stamp, *told))
 
     def throw(self, drive: Drive, law: ControlLaw, speed: float, patience: float) -> list[Outcome]:
         """Start the slide from its equilibrium at `speed` (m/s) in either direction.
@@ -181,9 +209,40 @@ class Bench:
                 if resting:
                     controller.answer(_sample(drive, self._stamp(0), rest, 0.0))
                 start = rest, velocity
+                trial = controller, self._measure([(rest, 0.0)] * self._sensor.spans * resting)
                 stamp = self._stamp(1)
-                outcomes.append(self._run(drive, controller, stamp, start, patience, speed))
+                outcomes.append(self._run(drive, *trial, stamp, start, patience, speed))
         return outcomes
+
+    def rest(self, drive: Drive, law: ControlLaw, settling: float, duration: float) -> Rest:
+        """Return what is left at the equilibrium over `duration` (s), after `settling` (s)."""
+        # Exactly at the equilibrium rounding would hide that it is unstable without control.
+        offset = SETTLED * abs(drive.belt_speed) / drive.angular_frequency
+        motion = Motion(drive, drive.equilibrium_position + offset, 0.0)
+        loop = self._loop(motion, self._sensor, self._stamp(0))
+        controller = Controller(replace(law, start_after=0.0))
+        settled, samples = ceil(settling * self._rate), ceil(duration * self._rate)
+        rows: list[tuple[float, float]] = []
+        for number in range(settled + samples):
+            force = answer(loop, controller)
+            if number >= settled:
+                rows.append((loop.true_sample.position, force))
+            loop.advance()
+        position, force = np.array(rows).T
+        rms = float(np.sqrt(np.mean(force**2)))
+        return Rest(float(np.ptp(position)) / 2.0, float(np.abs(force).max()), rms)
+
+    def _measure(self, before: Sequence[tuple[float, float]]) -> Measure | None:
+        """Return what measures, after it has measured these positions and velocities."""
+        measure = self._sensor.start(1.0 / self._rate)
+        if measure is not None:
+            for number, state in enumerate(before):
+                measure(number, *state)
+        return measure
+
+    def _loop(self, motion: Motion, sensor: Sensor, stamp: int) -> SampledLoop:
+        delay = self._force_delay
+        return SampledLoop(motion, self._rate, stamp, force_delay=delay, sensor=sensor)
 
     def _stamp(self, number: int) -> int:
         return LOCKSTEP_START + round(number * NANOSECONDS / self._rate)
@@ -192,6 +251,7 @@ class Bench:
         self,
         drive: Drive,
         controller: Controller,
+        measure: Measure | None,
         stamp: int,
         start: tuple[float, float],
         patience: float,
@@ -199,7 +259,7 @@ class Bench:
     ) -> Outcome:
         """Run the loop until the distance has stayed small for a natural period, or `patience`."""
         motion = Motion(drive, *start)
-        loop = SampledLoop(motion, self._rate, stamp, force_delay=self._force_delay)
+        loop = self._loop(motion, _Going(measure=measure), stamp)
         omega, equilibrium = drive.angular_frequency, drive.equilibrium_position
         calm = ceil((drive.natural_period + self._force_delay) * self._rate)
         peak, last, recent = 0.0, 0, 0.0

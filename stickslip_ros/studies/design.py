@@ -139,7 +139,7 @@ def _design(task: Task, progress: Progress) -> Design:
     reason = why_no_linear_loop(drives[0], task.rate, task.force_delay)
     if reason is not None:
         return Design(task, remark=reason)
-    bench = Bench(task.rate, task.force_delay)
+    bench = Bench(task.rate, task.force_delay, task.sensor)
     vibrations: list[Vibration] = []
     for number, drive in enumerate(drives, 1):
         vibrations.append(bench.vibration(drive))

@@ -7,9 +7,12 @@ from math import inf
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.linear_sampled_loop import settling_time
 from stickslip_ros.progress import Progress
-from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench
+from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench, Rest
 from stickslip_ros.studies.design_search import Candidates
 from stickslip_ros.studies.design_task import DesignedLaw, Task
+
+_PERIODS_AT_REST = 100.0
+"""Natural periods over which the loop is observed at its equilibrium."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,8 @@ class Check:
     """Predicted peak force when the control is activated at the worst phase, N."""
     peak_force: float | None
     """Simulated peak force at the worst phase, N; None without vibration."""
+    rest: Rest | None = None
+    """What noise and rounding leave at the equilibrium, simulated; None without them."""
 
 
 def check_at_speed(
@@ -43,9 +48,9 @@ def check_at_speed(
     assert predicted is not None
     slowest: float | None = None
     peaks: list[float] = []
+    settling = FILTER_SETTLED / controller.corner_frequency
     if vibration.vibrates:
         patience = 5.0 * predicted + 20.0 * loop.drive.natural_period
-        settling = FILTER_SETTLED / controller.corner_frequency
         worst = vibration.worst_sample(gains)
         for outcome in bench.catch(vibration, controller, settling, worst, 4, patience):
             peaks.append(outcome.peak_force)
@@ -53,6 +58,10 @@ def check_at_speed(
                 slowest = None
                 break
             slowest = max(slowest or 0.0, outcome.settling_time)
+    rest: Rest | None = None
+    if candidates.task.rough:
+        settled, periods = max(predicted, settling), _PERIODS_AT_REST * loop.drive.natural_period
+        rest = bench.rest(loop.drive, controller, settled, periods)
     return Check(
         belt_speed=loop.drive.belt_speed,
         vibrates=vibration.vibrates,
@@ -61,6 +70,7 @@ def check_at_speed(
         settling_time=slowest,
         predicted_peak_force=vibration.peak_force(gains),
         peak_force=max(peaks, default=None),
+        rest=rest,
     )
 
 

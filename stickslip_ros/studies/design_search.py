@@ -34,9 +34,7 @@ class Candidates:
     def __init__(self, task: Task, vibrations: Sequence[Vibration]) -> None:
         self.vibrations = vibrations
         self.loops = [
-            loop
-            for vibration in vibrations
-            if (loop := LinearSampledLoop.from_drive(vibration.drive, task.rate, task.force_delay))
+            loop for vibration in vibrations if (loop := task.linear_loop(vibration.drive))
         ]
         self.task = task
         # The loops differ in the slope of the friction only: the two extreme ones decide.

@@ -10,6 +10,8 @@ from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies.options import OWN_SPEED_RANGE
 
@@ -31,6 +33,8 @@ class Task:
     """Largest allowed force, N."""
     belt_speeds: tuple[float, float]
     """Lowest and highest belt speed, m/s, above zero; the opposite direction is symmetric."""
+    sensor: Sensor = EXACT_SENSOR
+    """Sensor that measures the samples."""
     scenario: Scenario | None = field(default=None, compare=False, repr=False)
     """The scenario that the task comes from, if any."""
 
@@ -82,8 +86,25 @@ class Task:
             raise InvalidInputError(
                 f"belt speeds {low:g} to {high:g} m/s: must be finite, above zero, the lower first"
             )
-        limit = law.force_limit
-        return cls(plant.as_drive(), plant.rate, plant.force_delay, limit, (low, high), scenario)
+        return cls(
+            plant.as_drive(),
+            plant.rate,
+            plant.force_delay,
+            law.force_limit,
+            (low, high),
+            plant.as_sensor(),
+            scenario,
+        )
+
+    @property
+    def rough(self) -> bool:
+        """Whether noise or rounding keep the loop from resting."""
+        rounded = self.sensor.position_resolution or self.drive.actuator.resolution
+        return bool(rounded or self.sensor.position_noise or self.sensor.velocity_noise)
+
+    def linear_loop(self, drive: Drive) -> LinearSampledLoop | None:
+        """Return the linear loop of a drive in this task; see `LinearSampledLoop.from_drive`."""
+        return LinearSampledLoop.from_drive(drive, self.rate, self.force_delay, self.sensor)
 
     def drives(self) -> list[Drive]:
         """Return the drive at five speeds across the range, or at the only one."""

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from math import copysign, isclose, isnan
+from math import copysign, isclose, isinf, isnan
 from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
@@ -32,6 +33,7 @@ from stickslip_ros.physics.theory.requirements import (
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.text import quantity
 
 _Found = TypeVar("_Found")
@@ -71,11 +73,12 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
         "open_loop": _open_loop(drive, expansion, notes),
         "sticking": _sticking(drive, notes),
         "closed_loop": _closed_loop(drive, law, notes),
-        "sampled_loop": _sampled_loop(drive, law, plant.rate, plant.force_delay, notes),
+        "sampled_loop": _sampled_loop(drive, law, plant, notes),
         "closed_forms": _closed_forms(drive, law),
     }
-    if plant.force_jitter > 0.0 and "sampled_loop" not in notes:
-        notes["sampled_loop"] = "force_jitter is omitted: the delay of the force is constant here"
+    omitted = _omitted(plant)
+    if omitted and "sampled_loop" not in notes:
+        notes["sampled_loop"] = "; ".join(omitted)
     if expansion is None:
         reach = float(max(drive.friction.limits)) * drive.length_scale
         shown = f"{reach:.4g}" if drive.is_dimensionless else quantity(reach, "m")
@@ -94,7 +97,30 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
         for place in _BY_THIRD_DERIVATIVES:
             if not {place, place.split(".")[0]} & notes.keys():
                 notes[place] = reason
+    ideal = plant.as_sensor().exact and plant.as_actuator() == IDEAL_ACTUATOR
+    if not ideal and "closed_loop" not in notes:
+        notes["closed_loop"] = "sensor and actuator are omitted: control is continuous here"
     return found, notes
+
+
+def _omitted(plant: PlantParameters) -> list[str]:
+    """Return sentences on what of the loop the linear theory leaves out."""
+    sentences: list[str] = []
+    if plant.force_jitter > 0.0:
+        sentences.append("force_jitter is omitted: the delay of the force is constant here")
+    sensor, actuator = plant.as_sensor(), plant.as_actuator()
+    values = {
+        "sensor.position_resolution": sensor.position_resolution,
+        "sensor.position_noise": sensor.position_noise,
+        "sensor.velocity_noise": sensor.velocity_noise,
+        "actuator.limit": 0.0 if isinf(actuator.limit) else actuator.limit,
+        "actuator.resolution": actuator.resolution,
+    }
+    names = [name for name, value in values.items() if value]
+    if names:
+        verb = "is" if len(names) == 1 else "are"
+        sentences.append(f"{', '.join(names)} {verb} omitted: the loop is linear here")
+    return sentences
 
 
 def _covered(place: str, notes: Notes, otherwise: _Found, function: Callable[[], _Found]) -> _Found:
@@ -247,12 +273,13 @@ def _critical_gains(drive: Drive, law: ControlLaw, notes: Notes) -> Section:
 
 
 def _sampled_loop(
-    drive: Drive, law: ControlLaw | None, rate: float, force_delay: float, notes: Notes
+    drive: Drive, law: ControlLaw | None, plant: PlantParameters, notes: Notes
 ) -> Section:
+    rate, force_delay = plant.rate, plant.force_delay
     if law is None:
         notes["sampled_loop"] = _NO_CONTROL
         return dict.fromkeys(_SAMPLED_LOOP)
-    loop = LinearSampledLoop.from_drive(drive, rate, force_delay)
+    loop = LinearSampledLoop.from_drive(drive, rate, force_delay, plant.as_sensor())
     if loop is None or law.linear_feedback(1.0 / rate) is None:
         reason = why_no_linear_loop(drive, rate, force_delay)
         notes["sampled_loop"] = reason or not_linear(law.name)
@@ -345,11 +372,13 @@ def stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]
     """
     plant = scenario.plant
     drive, gains = plant.as_drive(), gains_of(scenario.control_law)
-    loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay)
+    loop = LinearSampledLoop.from_drive(drive, plant.rate, plant.force_delay, plant.as_sensor())
     assert loop is not None
     assert gains is not None
     rates = plant.rate * np.array((0.1, 0.3, 1.0))
     latest = min(0.2 * drive.natural_period, LONGEST_DELAY / rates.max())
     delays = np.linspace(0.0, latest, 41)
-    curves = CriticalGainCurves.over(drive, gains.corner_frequency, rates, delays)
+    curves = CriticalGainCurves.over(
+        drive, gains.corner_frequency, rates, delays, plant.as_sensor()
+    )
     return StabilityMap.around(loop, gains), curves

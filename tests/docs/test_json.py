@@ -117,9 +117,11 @@ SHORT = ("--transient", "20", "--cycles", "3")
 BELT = ("--over", "plant.belt_speed=0.3:0.6:3")
 GRID = ("--position=-1:1:2", "--velocity=-1:1:2")
 RIG = ("feed_drive", "--belt-speed")
+ENCODER = ("-p", "plant.sensor.position_resolution=1e-6")
 CALLS = [
     ("simulate", ("simulate", "paper", "--duration", "100")),
     ("simulate", ("simulate", "paper", "--duration", "0.1", "--no-control")),
+    ("simulate", ("simulate", "feed_drive", "--duration", "1", *ENCODER)),
     ("report", ("report", REFERENCE)),
     ("report of several bags", ("report", REFERENCE, f"{REFERENCE}/reference_0.mcap")),
     ("sweep", ("sweep", "paper", "--no-control", *BELT, *SHORT)),
@@ -134,6 +136,7 @@ CALLS = [
     ("design", ("design", *RIG, "0.06")),
     ("design", ("design", *RIG, "0.02:0.04", "-p", "plant.force_delay=0.02")),
     pytest.param("design", ("design", *RIG, "0.03"), marks=pytest.mark.long),
+    ("design", ("design", *RIG, "0.03", *ENCODER)),
     ("repair", ("repair", REFERENCE, "sound")),
     ("list", ("list",)),
     ("show", ("show", "feed_drive", "-p", "plant.mass=2")),

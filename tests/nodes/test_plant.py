@@ -18,6 +18,7 @@ from stickslip_ros.messages.codec import (
 )
 from stickslip_ros.messages.topics import (
     APPLIED_DISTURBANCE,
+    APPLIED_FORCE,
     CLOCK,
     CONTROL_FORCE,
     DIAGNOSTICS,
@@ -25,6 +26,7 @@ from stickslip_ros.messages.topics import (
     DROPPED_FORCE,
     JOINT_STATES,
     RECORDED,
+    TRUE_JOINT_STATES,
 )
 from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
@@ -212,6 +214,42 @@ def test_a_disturbance_acts_from_the_next_sample_and_is_told(graph: Graph) -> No
     force.publish(pack_wrench(SECOND, 0.0))
     graph.wait_until(lambda: applied, "the disturbance is told")
     assert unpack_wrench(applied[0]) == (SECOND + SECOND // 100, 0.5)
+
+
+def test_the_truth_is_told_if_asked(graph: Graph) -> None:
+    heard = graph.listen(JOINT_STATES, raw=True)
+    true, applied = graph.listen(TRUE_JOINT_STATES, raw=True), graph.listen(APPLIED_FORCE, raw=True)
+    graph.add(
+        PlantNode,
+        wait_for=["observer"],
+        publish_truth=True,
+        **{"initial.position": 0.13, "sensor.position_resolution": 0.1, "actuator.limit": 0.2},
+    )
+    force = answers(graph)
+    graph.wait_until(lambda: len(heard) == len(true) == len(applied) == 1, "sample 0")
+    force.publish(pack_wrench(SECOND, 0.5))
+    graph.wait_until(lambda: len(heard) == len(true) == len(applied) == 2, "sample 1")
+    told, _ = joint_state_columns(heard)
+    found, _ = joint_state_columns(true)
+    assert told.position.tolist() == [0.1, 0.1]
+    assert found.position[0] == 0.13
+    assert found.position[1] != 0.13
+    assert told.stamp.tolist() == found.stamp.tolist()
+    stamps, forces = zip(*map(unpack_wrench, applied), strict=True)
+    assert list(stamps) == told.stamp.tolist()
+    assert forces == (0.0, 0.2)
+
+
+def test_a_sensor_changes_while_the_plant_is_not_active(graph: Graph) -> None:
+    plant = graph.add(PlantNode, wait_for=["observer"])
+    heard = graph.listen(JOINT_STATES, raw=True)
+    graph.wait_until(lambda: len(heard) == 1, "sample 0")
+    name = "sensor.position_resolution"
+    assert (
+        "sensor.position_resolution" in plant.set_parameters([Parameter(name, value=0.1)])[0].reason
+    )
+    graph.deactivate("plant")
+    assert plant.set_parameters([Parameter(name, value=0.1)])[0].successful
 
 
 def test_parameters_change_all_at_once_or_not_at_all(graph: Graph) -> None:

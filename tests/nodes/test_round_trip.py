@@ -35,6 +35,27 @@ def test_what_is_replayed_and_recorded_again_is_the_same(graph: Graph, tmp_path:
     assert report_of_bag(second) == report_of_bag(first)
 
 
+def test_a_run_with_sensor_and_actuator_is_replayed_with_its_truth(
+    graph: Graph, tmp_path: Path
+) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    encoder = {"sensor.position_resolution": 1e-4, "sensor.velocity": "difference"}
+    truth = {"actuator.time_constant": 0.05, "publish_truth": True}
+    record_run(first, belt_speed=0.45, duration=30.0, **encoder, **truth)
+
+    # The nodes that are replayed tell no parameters.
+    graph.add(AnalyzerNode, bag=str(second), stick_speed=0.01)
+    replay = graph.add(ReplayNode, bag=str(first), rate=1e6, wait_for=["analyzer"])
+    graph.wait_until(lambda: replay.diagnose()[2] and not replay.active, "the bag is replayed")
+    graph.deactivate("analyzer")
+
+    messages = messages_of(first)
+    assert len(messages["/test/true_joint_states"]) == len(messages["/test/applied_force"]) == 3001
+    assert messages["/test/true_joint_states"] != messages["/test/joint_states"]
+    assert messages_of(second) == messages
+    assert report_of_bag(second) == report_of_bag(first)
+
+
 def check_against_the_reference(report: dict[str, Any]) -> None:
     expected = json.loads(REFERENCE.with_suffix(".json").read_text())
     assert expected.pop("bag") == "bags/reference"

@@ -7,7 +7,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.control import ControlLaw, LinearFeedback, Reference
 from stickslip_ros.physics.model.course import Course
@@ -241,20 +240,6 @@ class Switching(ControlLaw):
         self, state: tuple[float, ...], elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, tuple[float, ...]]:
         return -float(np.sign(sample.velocity)) * self.size, state
-
-
-@dataclass(frozen=True)
-class Lag(Actuator):
-    """Force that follows the command with a lag of first order."""
-
-    states: ClassVar[Sequence[str]] = ("force",)
-    rate: float = constant(3.0, "Inverse of the lag.", "value")
-
-    def state_rates(self, held: Any, states: Sequence[Any]) -> Sequence[Any]:
-        return (self.rate * (held - states[0]),)
-
-    def force(self, held: Any, states: Sequence[Any]) -> Any:
-        return states[0]
 
 
 @dataclass(frozen=True)

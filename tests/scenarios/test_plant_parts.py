@@ -1,85 +1,93 @@
 """Sensor and actuator as parameters of the plant: the constants of their classes."""
 
-import sys
-from dataclasses import dataclass
-from importlib.util import module_from_spec, spec_from_file_location
-from types import ModuleType
-from typing import Any
-
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model import actuator as actuators
-from stickslip_ros.physics.model import sensor as sensors
-from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
-from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Measure, Sensor
+from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
+from stickslip_ros.physics.model.sensor import EXACT_SENSOR, MeasuredVelocity, Sensor
 from stickslip_ros.physics.motion import Motion
-from stickslip_ros.scenarios import parameters
+from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameter_field import Fixed, known_parameters
 from stickslip_ros.scenarios.parameters import PlantParameters
-from tests.physics.actuators import Lag
 
 
-@dataclass(frozen=True)
-class Offset(Sensor):
-    offset: float = constant(0.0, "Offset of the position.", "m")
-    every: int = constant(1, "Number of samples.", at_least=1, whole=True)
-
-    def start(self, period: float) -> Measure | None:
-        if self.offset == 0.0:
-            return None
-        return lambda number, position, velocity: (position + self.offset, velocity)
-
-
-@pytest.fixture
-def with_parts(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """The parameters where sensor and actuator have constants."""
-    monkeypatch.setattr(sensors, "Sensor", Offset)
-    monkeypatch.setattr(actuators, "Actuator", Lag)
-    spec = spec_from_file_location("parameters_with_parts", parameters.__file__)
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    monkeypatch.setitem(sys.modules, module.__name__, module)
-    spec.loader.exec_module(module)
-    return module
+def test_their_constants_are_parameters_of_the_plant() -> None:
+    known = known_parameters(PlantParameters)
+    sensor = {name: each for name, each in known.items() if name.startswith("sensor.")}
+    actuator = {name: each for name, each in known.items() if name.startswith("actuator.")}
+    assert {each.fixed for each in sensor.values()} == {Fixed.ACTIVE}
+    assert {each.fixed for each in actuator.values()} == {Fixed.NEVER}
+    units = {name: each.unit for name, each in (sensor | actuator).items()}
+    assert units == {
+        "sensor.position_resolution": "m",
+        "sensor.position_noise": "m",
+        "sensor.velocity": None,
+        "sensor.difference_samples": None,
+        "sensor.velocity_noise": "m/s",
+        "sensor.seed": None,
+        "actuator.limit": "N",
+        "actuator.resolution": "N",
+        "actuator.time_constant": "s",
+    }
+    assert known["sensor.velocity"].choices == ("exact", "difference")
+    assert known["sensor.difference_samples"].bounds == "at least 1"
+    assert not known["actuator.limit"].finite
 
 
-def test_ideal_parts_have_no_parameters() -> None:
-    names = known_parameters(PlantParameters)
-    assert not [name for name in names if name.startswith(("sensor", "actuator"))]
+def test_they_are_ideal_by_default() -> None:
     plant = PlantParameters()
     assert plant.as_sensor() == EXACT_SENSOR
     assert plant.as_drive().actuator == IDEAL_ACTUATOR
-    assert not {"sensor", "actuator"} & plant.model_dump().keys()
 
 
-def test_their_constants_are_parameters_of_the_plant(with_parts: ModuleType) -> None:
-    known = known_parameters(with_parts.PlantParameters)
-    names = [name for name in known if name not in known_parameters(PlantParameters)]
-    assert names == [
-        "sensor.offset",
-        "sensor.every",
-        "actuator.time_constant",
-        "actuator.largest",
-    ]
-    assert [known[name].fixed for name in names] == [Fixed.ACTIVE] * 2 + [Fixed.NEVER] * 2
-    assert [known[name].kind for name in names] == [float, int, float, float]
-    assert [known[name].unit for name in names] == ["m", None, "s", "N"]
-    assert known["actuator.time_constant"].bounds == "at least 0"
-    assert not known["actuator.largest"].finite
-
-
-def test_the_plant_has_the_parts_of_its_parameters(with_parts: ModuleType) -> None:
-    values: dict[str, Any] = {"sensor.offset": 0.25, "actuator.time_constant": 0.5}
-    plant = with_parts.PlantParameters.validated(values, "here")
-    assert plant.as_sensor() == Offset(0.25)
+def test_the_plant_has_the_parts_of_its_parameters() -> None:
+    plant = PlantParameters.validated(
+        {
+            "sensor.position_resolution": 0.25,
+            "sensor.velocity": "difference",
+            "actuator.time_constant": 0.5,
+        },
+        "here",
+    )
+    assert plant.as_sensor() == Sensor(0.25, velocity=MeasuredVelocity.DIFFERENCE)
     drive = plant.as_drive()
-    assert drive.actuator == Lag(0.5)
-    loop = plant.as_loop(Motion(drive, 0.1, 0.0))
-    assert loop.sample.position == 0.35
-    assert loop.true_sample.position == 0.1
-    assert with_parts.PlantParameters().as_drive().actuator == Lag()
-    with pytest.raises(InvalidInputError, match=r"actuator\.time_constant = -1"):
-        with_parts.PlantParameters.validated({"actuator.time_constant": -1.0}, "here")
+    assert drive.actuator == Actuator(time_constant=0.5)
+    loop = plant.as_loop(Motion(drive, 0.15, 0.3))
+    assert (loop.sample.position, loop.sample.velocity) == (0.25, 0.0)
+    assert (loop.true_sample.position, loop.true_sample.velocity) == (0.15, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("override", "sentence"),
+    [
+        ("sensor.position_noise=-1", "must be a finite number at least 0 m"),
+        ("sensor.velocity=exactly", "sensor.velocity = 'exactly' is refused: must be one of"),
+        ("sensor.difference_samples=0", "must be a whole number at least 1"),
+        ("sensor.difference_samples=301", "difference_samples = 301 must not exceed 300"),
+        ("sensor.seed=-1", "sensor.seed = -1 is refused: must be a whole number at least 0"),
+        ("actuator.limit=0", "actuator.limit = 0 is refused: must be a number above 0 N"),
+        ("actuator.time_constant=nan", "actuator.time_constant = nan is refused: must be a finite"),
+    ],
+)
+def test_a_value_that_is_not_allowed_is_refused(override: str, sentence: str) -> None:
+    with pytest.raises(InvalidInputError) as refused:
+        load_scenario("feed_drive", [f"plant.{override}"])
+    assert sentence in str(refused.value)
+
+
+def test_a_difference_has_the_noise_of_the_positions() -> None:
+    both = ["plant.sensor.velocity=difference", "plant.sensor.velocity_noise=0.1"]
+    with pytest.raises(InvalidInputError, match=r"sensor\.velocity_noise = 0\.1 m/s must be 0"):
+        load_scenario("feed_drive", both)
+
+
+def test_the_automatic_stick_speed_covers_the_error_of_the_sensor() -> None:
+    """At 1 kHz a difference over two samples errs by at most 1 um / 2 ms."""
+    given = ["plant.sensor.position_resolution=1e-6", "plant.sensor.velocity=difference"]
+    wide = [*given, "plant.sensor.difference_samples=2"]
+    assert load_scenario("feed_drive", []).stick_speed == 0.0
+    assert load_scenario("feed_drive", given[:1]).stick_speed == 0.0
+    assert load_scenario("feed_drive", wide).stick_speed == pytest.approx(5e-4)
+    assert load_scenario("feed_drive", [*wide, "analyzer.stick_speed=0.001"]).stick_speed == 0.001
+    memory = [*wide, "plant.friction.law=dahl"]
+    assert load_scenario("feed_drive", memory).stick_speed == pytest.approx(5e-4 + 4e-4)

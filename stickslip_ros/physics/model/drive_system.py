@@ -188,7 +188,7 @@ class DriveSystem(HybridSystem):
         }
         self._friction = law.friction
         self.sticks = law.sticks
-        self.many_steps = not law.sticks
+        self.many_steps = not law.sticks or self.has_actuator
         self.forward_limit, self.backward_limit = map(float, law.limits)
         # Where a bound is not known, the course is taken to change less than the state does.
         heaviest, steepest = 1.0 + self.drive.load.bounds[1], self.drive.belt.steepest
@@ -264,10 +264,12 @@ class DriveSystem(HybridSystem):
         heyoka chooses its steps by the largest series. Those of the marks must not be: otherwise a
         motion that is recorded would differ in its rounding from one that is not.
         """
-        if self.sticks:
+        if not self.many_steps:
             return speed, acceleration
-        slow = self.symbols.constants["stick_speed"]
-        found = (speed, acceleration, relative_speed - slow, relative_speed + slow)
+        found = [speed, acceleration]
+        if not self.sticks:
+            slow = self.symbols.constants["stick_speed"]
+            found += [relative_speed - slow, relative_speed + slow]
         return tuple(UNSEEN * each for each in found)
 
     def _guards_of_parts(self, relative_speed: Any) -> list[Guard]:
@@ -286,7 +288,8 @@ class DriveSystem(HybridSystem):
             return ()
         epoch = hy.par[self.index["epoch"]]  # added to the time everywhere
         varies = hy.diff(acceleration, epoch) != hy.expression(0.0)
-        return (speed, acceleration) if varies else (speed,)
+        found = (speed, acceleration) if varies else (speed,)
+        return tuple(UNSEEN * each for each in found) if self.many_steps else found
 
     def reach_belt(self, mode: Mode, instant: Instant) -> Mode:
         """Stick, or slip on in either direction, where the slide reaches the belt speed."""

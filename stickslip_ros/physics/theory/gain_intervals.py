@@ -15,10 +15,12 @@ from stickslip_ros.physics.model.control import (
     Washout,
     WashoutGains,
 )
-from stickslip_ros.physics.model.drive_system import SPEED
+from stickslip_ros.physics.model.drive_system import POSITION, SPEED
 
 _ROUNDING = 1e-14
 """Relative error of a multiplier."""
+_UNSEEN = 1e-9
+"""Share of a turn, next to one that a difference does not see, in which gains are infinite."""
 
 
 class GainInterval(NamedTuple):
@@ -78,7 +80,9 @@ class GainBoundary:
     s1, s2, ... being the eigenvalues of the open loop. One factor l - 1 is the filter's; the other
     one shows that a constant force does not move the slide permanently. b and c are the force that
     starts during a period, and the one that ends in it; with each state of a friction law b l + c
-    becomes a polynomial of one degree more. In this form nothing cancels at high rates.
+    or of the actuator becomes a polynomial of one degree more. With a difference of x over n
+    samples for the velocity, that polynomial for x takes its place, times 1 + l + ... + l^(n-1)
+    over n T, and the delay is n periods longer. In this form nothing cancels at high rates.
     """
 
     def __init__(
@@ -88,16 +92,23 @@ class GainBoundary:
         whole_delay: int,
         period: float,
         corner_frequency: float,
+        difference_samples: int = 0,
     ) -> None:
         """Take the open loop, see `LinearSampledLoop`, and a cutoff frequency; dimensionless."""
         slide, starting, ending = held
+        self._spans = difference_samples
         self._whole = whole_delay
         self._period = period
         values = np.linalg.eigvals(jacobian).astype(np.complex128)
         self._poles = np.array([-corner_frequency, *values]) * period
         self._forces: Any = [starting[1], slide[0, 0] * ending[1] - slide[1, 0] * ending[0]]
-        if len(slide) > 2:
-            starts, ends = (_speed_after(slide, each) for each in (starting, ending))
+        if difference_samples:
+            starts, ends = (_after(POSITION, slide, each) for each in (starting, ending))
+            mean = np.ones(difference_samples) / (difference_samples * period)
+            self._forces = np.polymul(np.polyadd([*starts, 0.0], ends), mean)
+            self._whole += difference_samples
+        elif len(slide) > 2:
+            starts, ends = (_after(SPEED, slide, each) for each in (starting, ending))
             self._forces = np.polydiv(np.polyadd([*starts, 0.0], ends), [1.0, -1.0])[0]
         """b l + c, as coefficients."""
 
@@ -161,6 +172,10 @@ class GainBoundary:
             above = self.gain(middle).imag * rising > 0.0
             low, high = np.where(above, low, middle), np.where(above, middle, high)
         gains = self.gain(low)
+        if self._spans:  # where a difference sees nothing, 1/G changes its sign through infinity
+            turns = low * (self._spans / (2.0 * pi))
+            finite = (np.abs(turns - np.rint(turns)) > _UNSEEN) | (np.rint(turns) == 0.0)
+            low, gains, rising = low[finite], gains[finite], rising[finite]
         # An undamped drive's own multipliers are on the circle, which is a gain of zero.
         unsure = np.abs(self.gain(low + _ROUNDING * self._period) - gains)
         gains = np.where(np.abs(gains) > unsure, gains.real, 0.0)
@@ -169,7 +184,8 @@ class GainBoundary:
         # One real multiplier at -1. By symmetry 1/G is real there; the sum is exact.
         poles = np.exp(self._poles)
         difference = float(np.polyval(self._forces, -1.0))
-        if difference != 0.0:
+        unseen = self._spans > 0 and self._spans % 2 == 0
+        if difference != 0.0 and not unseen:
             gain = float(np.prod(-1.0 - poles).real) / (4.0 * difference)
             if isfinite(gain):
                 yield gain * (-1.0) ** (self._whole + 1), -int(np.sign(imaginary[-1]))
@@ -183,6 +199,8 @@ class GainBoundary:
         parts: list[Any] = [np.arange(1, steps) * (pi / steps), self._near(0.0, self._period)]
         for pole in self._poles:
             parts.append(self._near(abs(float(np.angle(np.exp(1j * pole.imag)))), abs(pole.real)))
+        for turn in range(1, self._spans // 2 + 1):
+            parts.append(self._near(2.0 * pi * turn / self._spans, 0.0))
         for zero in np.roots(self._forces):
             size = abs(complex(zero))
             if size > 0.0 and zero.real < 0.0:
@@ -196,13 +214,13 @@ class GainBoundary:
         return np.concatenate([angle - distances, angle + distances])
 
 
-def _speed_after(slide: FloatArray, force: FloatArray) -> Any:
-    """Return the polynomial e^T adj(l I - slide) force, that of the speed after a force.
+def _after(state: int, slide: FloatArray, force: FloatArray) -> Any:
+    """Return the polynomial e^T adj(l I - slide) force, that of a state after a force.
 
     By the determinant lemma it is det(l I - slide + force e^T) - det(l I - slide).
     """
     seen = np.zeros(len(slide))
-    seen[SPEED] = 1.0
+    seen[state] = 1.0
     difference = np.poly(slide - np.outer(force, seen)) - np.poly(slide)
     return difference[1:]
 

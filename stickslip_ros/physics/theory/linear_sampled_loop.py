@@ -1,7 +1,9 @@
 """The loop of the nodes, linear near its equilibrium: sampled, held, controlled and delayed.
 
 It is exactly the loop of `SampledLoop` and `Controller`: between samples the force is constant, so
-that the matrix exponential gives the motion from one sample to the next.
+that the matrix exponential gives the motion from one sample to the next. The lag of the actuator
+and a velocity that is a difference of positions are linear, and have their part in it. Noise,
+rounding and limits are not, and are left out.
 """
 
 from dataclasses import dataclass, replace
@@ -15,9 +17,11 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.sampled_loop import whole_and_rest
+from stickslip_ros.physics.model.constants import scaled
 from stickslip_ros.physics.model.control import LinearFeedback
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SPEED
+from stickslip_ros.physics.model.drive_system import POSITION, SPEED
+from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.physics.theory.gain_intervals import (
     GainBoundary,
     GainInterval,
@@ -27,7 +31,6 @@ from stickslip_ros.physics.theory.gain_intervals import (
 from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
-    IMMEDIATE,
     SPRING,
     require,
 )
@@ -38,8 +41,9 @@ LONGEST_DELAY = 300
 SETTLED = 0.01
 """Share of its first size that a deviation has at the 1 % settling time."""
 
-_SEEN = slice(0, 2)
-"""Indices of X and Y in the state, which the controller sees."""
+ROUNDING_LEFT_OUT = (
+    "rounding, noise and limits of sensor and actuator are left out: the loop is linear"
+)
 
 
 class SampledControl(Protocol):
@@ -66,9 +70,11 @@ def why_no_linear_loop(drive: Drive, rate: float, force_delay: float) -> str | N
 class LinearSampledLoop:
     """Drive at its equilibrium under sampled control, linearised; for any linear control law.
 
-    With the period T, force n = C z_n + D (x_n, y_n) of the law (see `LinearFeedback`) acts from
-    n T + delay to (n + 1) T + delay. The state is X, Y, the memory of the friction law, the states
-    z of the control law, and the forces under way, the newest first.
+    With the period T, force n = C z_n + D (x_n, y_n) of the law (see `LinearFeedback`) is held from
+    n T + delay to (n + 1) T + delay. y_n is the velocity, or with m samples of difference
+    (x_n - x_(n-m)) / (m T). The state is X, Y, the memory of the friction law, the states of the
+    actuator, the states z of the control law, the forces under way, the newest first, and the
+    earlier positions that a difference needs, the newest first.
 
     Examples
     --------
@@ -95,11 +101,15 @@ class LinearSampledLoop:
     """Delay from a sample to the start of its force, s."""
     jacobian: FloatArray
     """Jacobian of the open loop, dimensionless (see `Expansion.jacobian`); shape (n, n)."""
+    difference_samples: int = 0
+    """Samples that a difference for the velocity spans; 0 if the velocity is exact."""
 
     of = Renamed("from_drive")
 
     @classmethod
-    def from_drive(cls, drive: Drive, rate: float, force_delay: float = 0.0) -> Self | None:
+    def from_drive(
+        cls, drive: Drive, rate: float, force_delay: float = 0.0, sensor: Sensor = EXACT_SENSOR
+    ) -> Self | None:
         """Return the linear loop of a drive.
 
         Parameters
@@ -110,6 +120,8 @@ class LinearSampledLoop:
             Samples per second, Hz.
         force_delay : float, optional
             Delay from a sample to the start of its force, s.
+        sensor : Sensor, optional
+            Sensor, of which only the difference for the velocity is used.
 
         Returns
         -------
@@ -119,13 +131,13 @@ class LinearSampledLoop:
         Raises
         ------
         InvalidInputError
-            If belt or load follow a course, the actuator has states, or the drive has no spring.
+            If belt or load follow a course, or the drive has no spring.
         """
-        require("the theory of the sampled loop", drive, SPRING, AUTONOMOUS, IMMEDIATE)
+        require("the theory of the sampled loop", drive, SPRING, AUTONOMOUS)
         expansion = expand(drive)
         if expansion is None or why_no_linear_loop(drive, rate, force_delay):
             return None
-        return cls(drive, rate, force_delay, expansion.jacobian)
+        return cls(drive, rate, force_delay, expansion.jacobian, sensor.spans)
 
     def transition_matrix(self, gains: SampledControl) -> FloatArray:
         """Return the matrix from the state at one sample to the state at the next.
@@ -138,8 +150,9 @@ class LinearSampledLoop:
         Returns
         -------
         ndarray
-            Matrix for the dimensionless state, shape (m, m); m is the order of the open loop plus
-            the number of states of the law plus the periods of the delay, rounded up.
+            Matrix for the dimensionless state, shape (m, m); m is the order of the open loop with
+            its actuator, plus the number of states of the law, the periods of the delay, rounded
+            up, and the samples of a difference.
 
         Raises
         ------
@@ -232,8 +245,15 @@ class LinearSampledLoop:
         list of GainInterval
             Stable intervals in ascending order; empty if no gain is stable.
         """
-        scaled = corner_frequency / self.drive.angular_frequency
-        boundary = GainBoundary(self.jacobian, self.held, self.delay[0], self.period, scaled)
+        corner = corner_frequency / self.drive.angular_frequency
+        boundary = GainBoundary(
+            self.plant[0],
+            self.held,
+            self.delay[0],
+            self.period,
+            corner,
+            self.difference_samples,
+        )
         return boundary.stable_intervals(
             self.drive.normal_force / self.drive.speed_scale,
             lambda gain: float(self._radii(corner_frequency, np.array([gain]))[0]),
@@ -261,14 +281,18 @@ class LinearSampledLoop:
     def coarsened(self) -> Self:
         """Return a similar loop at a rate at which even a long delay is few periods, for searches.
 
-        To hold the force also delays it, by half a period on average; the sum is kept. A loop of
-        small order is returned as it is.
+        To hold the force also delays it, by half a period on average, and so does a difference, by
+        half of what it spans; the sum is kept. A loop of small order is returned as it is.
         """
-        if self.under_way <= 21:  # searching many gains is quick
+        spans = self.difference_samples
+        if self.under_way + spans <= 21:  # searching many gains is quick
             return self
-        rate = min(self.rate, max(20.0 / self.force_delay, 5.0 * self.drive.angular_frequency))
-        mean_delay = self.force_delay + 0.5 / self.rate
-        return replace(self, rate=rate, force_delay=mean_delay - 0.5 / rate)
+        latest = self.force_delay + spans / self.rate
+        rate = min(self.rate, max(20.0 / latest, 5.0 * self.drive.angular_frequency))
+        coarse = max(round(spans * rate / self.rate), 1) if spans else 0
+        mean_delay = self.force_delay + 0.5 * (1 + spans) / self.rate
+        delay = max(mean_delay - 0.5 * (1 + coarse) / rate, 0.0)
+        return replace(self, rate=rate, force_delay=delay, difference_samples=coarse)
 
     @property
     def under_way(self) -> int:
@@ -287,6 +311,24 @@ class LinearSampledLoop:
         return whole_and_rest(self.force_delay * self.rate)
 
     @cached_property
+    def plant(self) -> tuple[FloatArray, FloatArray]:
+        """Jacobian of the open loop with its actuator, and the rates by a held force of one.
+
+        Shapes (n, n), (n,); dimensionless.
+        """
+        actuator, order = scaled(self.drive.actuator, self.drive.scales), len(self.jacobian)
+        count = len(actuator.states)
+        rest, units = [0.0] * count, np.eye(count).tolist()
+        matrix, force = np.zeros((order + count, order + count)), np.zeros(order + count)
+        matrix[:order, :order] = self.jacobian
+        for column, unit in enumerate(units, order):
+            matrix[SPEED, column] = actuator.force(0.0, unit)
+            matrix[order:, column] = actuator.state_rates(0.0, unit)
+        force[SPEED] = actuator.force(1.0, rest)
+        force[order:] = actuator.state_rates(1.0, rest)
+        return matrix, force
+
+    @cached_property
     def held(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Effect of one period: transition of the slide, and the effects of two unit forces.
 
@@ -300,10 +342,10 @@ class LinearSampledLoop:
 
     def _slide(self, periods: float) -> tuple[FloatArray, FloatArray]:
         """Return the transition of the slide over some periods, and the effect of a unit force."""
-        order = len(self.jacobian)
+        matrix, force = self.plant
+        order = len(force)
         block = np.zeros((order + 1, order + 1))
-        block[:order, :order] = self.jacobian
-        block[SPEED, order] = 1.0
+        block[:order, :order], block[:order, order] = matrix, force
         transition = _exponential(block * (periods * self.period))
         return transition[:order, :order], transition[:order, order]
 
@@ -320,21 +362,30 @@ class LinearSampledLoop:
         under_way, drive = self.under_way, self.drive
         slide, starting, ending = self.held
         stacked, states = feedback.output.shape[:-1], feedback.output.shape[-1]
-        order = len(slide)
-        own, first = slice(order, order + states), order + states
-        matrix = np.zeros((*stacked, first + under_way, first + under_way))
-        forces = np.zeros((*stacked, 1 + under_way, first + under_way))
+        order, spans = len(slide), self.difference_samples
+        own, first, past = slice(order, order + states), order + states, order + states + under_way
+        size = past + spans
+        matrix = np.zeros((*stacked, size, size))
+        forces = np.zeros((*stacked, 1 + under_way, size))
         units = np.array([drive.length_scale, drive.speed_scale])
-        forces[..., 0, _SEEN] = feedback.direct * units / drive.normal_force
+        seen = np.eye(2, size)  # what the controller sees of the state
+        if spans:
+            seen[SPEED, SPEED] = 0.0
+            seen[SPEED, POSITION] = 1.0 / (spans * self.period)
+            seen[SPEED, -1] = -seen[SPEED, POSITION]
+        forces[..., 0, :] = (feedback.direct * units / drive.normal_force) @ seen
         forces[..., 0, own] = feedback.output * drive.speed_scale / drive.normal_force
-        forces[..., 1:, first:] = np.eye(under_way)
+        forces[..., 1:, first:past] = np.eye(under_way)
         matrix[..., :order, :order] = slide
         matrix[..., :order, :] += starting[:, None] * forces[..., whole, None, :]
         if split > 0.0:
             matrix[..., :order, :] += ending[:, None] * forces[..., whole + 1, None, :]
-        matrix[..., own, _SEEN] = feedback.input * (units / drive.speed_scale)
-        matrix[..., own, own] = feedback.state
-        matrix[..., first:, :] = forces[..., :-1, :]
+        matrix[..., own, :] += (feedback.input * (units / drive.speed_scale)) @ seen
+        matrix[..., own, own] += feedback.state
+        matrix[..., first:past, :] = forces[..., :-1, :]
+        if spans:
+            matrix[..., past, POSITION] = 1.0
+            matrix[..., past + 1 :, past:-1] = np.eye(spans - 1)
         return matrix
 
 

@@ -86,11 +86,6 @@ def _asymmetry(drive: Drive) -> str | None:
     return f"the friction law {law.name} differs between forward and backward slip"
 
 
-def _actuator(drive: Drive) -> str | None:
-    states = ", ".join(drive.actuator.states)
-    return f"the actuator has states ({states})" if states else None
-
-
 SPRING = Requirement("a spring", _no_spring)
 """The stiffness is above zero: the drive has a natural frequency."""
 
@@ -105,6 +100,3 @@ SMOOTH = Requirement("friction that is smooth in steady slip", _kinks)
 
 SYMMETRIC = Requirement("friction that is the same in both directions", _asymmetry)
 """The coefficient is an odd function of the relative speed."""
-
-IMMEDIATE = Requirement("an actuator without states", _actuator)
-"""The actuator exerts a held force from its arrival on."""

@@ -8,6 +8,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 
@@ -57,13 +58,18 @@ class CriticalGainCurves:
 
     @classmethod
     def over(
-        cls, drive: Drive, corner_frequency: float, rates: FloatArray, force_delays: FloatArray
+        cls,
+        drive: Drive,
+        corner_frequency: float,
+        rates: FloatArray,
+        force_delays: FloatArray,
+        sensor: Sensor = EXACT_SENSOR,
     ) -> Self:
         """Return the curves of a drive for this cutoff frequency (rad/s)."""
         gains = np.full((len(rates), len(force_delays)), np.nan)
         for row, rate in enumerate(rates.tolist()):
             for column, force_delay in enumerate(force_delays.tolist()):
-                loop = LinearSampledLoop.from_drive(drive, rate, force_delay)
+                loop = LinearSampledLoop.from_drive(drive, rate, force_delay, sensor)
                 critical = loop.critical_linear_gain(corner_frequency) if loop else None
                 if critical is not None:
                     gains[row, column] = critical

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.averaging import averaged_growth
@@ -26,7 +27,7 @@ from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.physics.theory.sticking import sticking_onset
 from tests.physics.drives import PAPER
-from tests.physics.parts import Dahl, Lag, OneSided, Swing
+from tests.physics.parts import Dahl, OneSided, Swing
 
 GAINS = WashoutGains(2.0, -1.0, -1.0)
 
@@ -37,10 +38,9 @@ ONE_WAY = replace(PAPER, friction=OneSided())
 LOADED = replace(PAPER, load=SWING)
 CARRIED = replace(PAPER, belt=SWING, load=SWING)
 
-LAGGING = replace(PAPER, actuator=Lag())
+LAGGING = replace(PAPER, actuator=Actuator(time_constant=0.5))
 
 SENTENCES = {
-    "actuator": (LAGGING, "the actuator has states (force)"),
     "memory": (REMEMBERS, "the friction law dahl has a memory (z)"),
     "one way": (ONE_WAY, "the friction law one_sided differs between forward and backward slip"),
     "load": (LOADED, "the drive has a course of its load"),
@@ -77,7 +77,6 @@ REFUSED = [
     *((*each, "memory") for each in WITHOUT_MEMORY),
     *((*each, lack) for each in SYMMETRIC for lack in ("one way", "load")),
     ("the closed form", CubicLoop.from_drive, "load"),
-    (*COVERED_GAINS[-1], "actuator"),
     *((*each, "spring") for each in (*SMOOTH, *COVERED_GAINS, *SYMMETRIC)),
     ("the closed form", CubicLoop.from_drive, "spring"),
     ("the release by the belt", release_position, "spring"),
