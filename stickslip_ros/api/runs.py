@@ -1,5 +1,6 @@
 """Simulated runs: trajectory and measures of a scenario."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -75,7 +76,7 @@ class Run(Shown):
         RunError
             If pandas is not installed.
         """
-        return data_frame(vars(self.trajectory), _COLUMNS, self._units, index="time")
+        return data_frame(vars(self.trajectory), self._columns, self._units, index="time")
 
     def to_xarray(self) -> "Dataset":
         """Return the trajectory as a data set.
@@ -95,7 +96,11 @@ class Run(Shown):
         time = columns.pop("time")
         variables = {name: (("time",), values) for name, values in columns.items()}
         attrs = made_of(self.scenario)
-        return data_set(variables, {"time": time}, _COLUMNS, self._units, attrs)
+        return data_set(variables, {"time": time}, self._columns, self._units, attrs)
+
+    @property
+    def _columns(self) -> Mapping[str, Quantity]:
+        return {name: _COLUMNS[name] for name in vars(self.trajectory)}
 
     @property
     def _units(self) -> Units:

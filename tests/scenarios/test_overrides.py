@@ -73,7 +73,7 @@ def test_an_override_without_a_node_is_guessed() -> None:
         ("plant.beltspeed=1", ["parameter beltspeed; did you mean plant.belt_speed?"]),
         ("plant.static=1", ["parameter static; did you mean plant.friction.static?"]),
         ("plant.linear_gain=1", ["; did you mean washout_controller.linear_gain?"]),
-        ("plant.colour=1", ["parameter colour; plant has autostart, belt.amplitude,"]),
+        ("plant.colour=1", ["parameter colour; plant has actuator.limit,"]),
         (
             "plant.mass=-1",
             ["plant.mass=-1", "plant: mass = -1", "must be a finite number above 0 kg"],

@@ -208,8 +208,8 @@ def test_values_that_do_not_go_together(
         ("{friction: {statik: 0.4}}", "friction.statik", "0.4", "did you mean friction.static?"),
         ("{friction: 0.4}", "friction", "0.4", "did you mean friction."),
         ("{mass: {kg: 1}}", "mass.kg", "1", "did you mean mass?"),
-        ("{linear_gain: -1.0}", "linear_gain", "-1.0", "known are autostart, belt.*,"),
-        ("{1: a}", "1", "'a'", "known are autostart, belt.*,"),
+        ("{linear_gain: -1.0}", "linear_gain", "-1.0", "known are actuator.*, autostart,"),
+        ("{1: a}", "1", "'a'", "known are actuator.*, autostart,"),
     ],
 )
 def test_a_parameter_that_is_not_known(
