@@ -103,7 +103,18 @@ class Task:
         return bool(rounded or self.sensor.position_noise or self.sensor.velocity_noise)
 
     def linear_loop(self, drive: Drive) -> LinearSampledLoop | None:
-        """Return the linear loop of a drive in this task; see `LinearSampledLoop.from_drive`."""
+        """Return the linear loop of a drive in this task.
+
+        Parameters
+        ----------
+        drive : Drive
+            Drive in SI units.
+
+        Returns
+        -------
+        LinearSampledLoop or None
+            Loop; see `LinearSampledLoop.from_drive`.
+        """
         return LinearSampledLoop.from_drive(drive, self.rate, self.force_delay, self.sensor)
 
     def drives(self) -> list[Drive]:

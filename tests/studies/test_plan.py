@@ -62,7 +62,7 @@ FORM = "must be NODE.PARAMETER=A:B:COUNT, or A:B:COUNT:log"
         ("=1:2:3", "must be a parameter of plant or washout_controller"),
         (
             "plant=1:2:3",
-            r"unknown parameter; numbers of plant are actuator\.\*, belt\.\*, belt_speed, bias_force",
+            r"unknown parameter; numbers of plant are actuator\.\*, belt\.\*, belt_speed",
         ),
         ("plant.speed=1:2:3", r"unknown parameter; did you mean plant\.belt_speed or "),
         (

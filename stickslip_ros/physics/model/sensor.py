@@ -52,7 +52,7 @@ class Sensor:
     >>> from stickslip_ros.physics.model.sensor import MeasuredVelocity, Sensor
     >>> sensor = Sensor(position_resolution=1e-6, velocity=MeasuredVelocity.DIFFERENCE)
     >>> measure = sensor.start(period=1e-3)
-    >>> [measure(n, 0.02 * n * 1e-3 + 3e-7, 0.02)[1] for n in range(3)]
+    >>> [round(measure(n, 0.02 * n * 1e-3 + 3e-7, 0.02)[1], 6) for n in range(3)]
     [0.0, 0.02, 0.02]
     """
 
