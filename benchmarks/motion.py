@@ -11,6 +11,9 @@ Taylor series of the same motion in decimal arithmetic with 40 digits.
 A tick is the work of the plant per sample: a new force, then a step of 1 or 10 ms. Peer: a bare
 heyoka integrator of the same slipping motion with the same two terminal events. The peer of a tick
 with a course is the tick of the same drive without it.
+
+A tick of the loop also has the sensor, the washout controller and the actuator, of `feed_drive` at
+1 kHz. The peer of one with a sensor or an actuator is the same tick with ideal ones.
 """
 
 import time
@@ -23,12 +26,14 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from benchmarks.slices import Row, by_turns, compare_times, show
+from stickslip_ros.physics.loop.controller import answer
 from stickslip_ros.physics.model.course import Course
 from stickslip_ros.physics.model.courses import Ramp, Sine
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import UNBOUNDED_SPEED
 from stickslip_ros.physics.model.friction import Stribeck
 from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.scenarios.files import load_scenario
 
 DAMPING, STATIC, MINIMUM, MINIMUM_SPEED = 0.02, 0.4, 0.25, 0.5
 SLOPE = 3.0 * (STATIC - MINIMUM) / (2.0 * MINIMUM_SPEED)
@@ -41,6 +46,7 @@ PERIODS, SCIPY_PERIODS = 190, 19
 ROUNDS, MOTIONS, TICKS = 9, 20, 2000
 FORCES = [0.001 * (n % 2) for n in range(TICKS)]
 RTOL, ATOL = 1e-11, 1e-12
+ENCODER, DIFFERENCE = "sensor.position_resolution=1e-6", "sensor.velocity=difference"
 
 State = tuple[float, float]
 
@@ -220,6 +226,26 @@ def course_row(name: str, **courses: Course) -> Row:
     return compare_times(what, times, "no course", plain, required=1.0 / 1.2)
 
 
+def loop_ticks(*overrides: str) -> Callable[[], float]:
+    """Return a function that times a tick of the loop of feed_drive."""
+    scenario = load_scenario("feed_drive", ["washout_controller.start_after=0", *overrides])
+    loop = scenario.plant.as_loop(Motion(scenario.plant.as_drive(), 0.0, 0.0))
+    controller = scenario.controller.as_controller()
+
+    def run() -> None:
+        for _ in range(TICKS):
+            answer(loop, controller)
+            loop.advance()
+
+    return timed(run, TICKS)
+
+
+def part_row(name: str, *overrides: str) -> Row:
+    rough, ideal = loop_ticks(*(f"plant.{each}" for each in overrides)), loop_ticks()
+    times, plain = by_turns(3 * ROUNDS, rough, ideal)
+    return compare_times(f"tick of the loop, {name}", times, "ideal", plain, required=1.0 / 1.1)
+
+
 def measure() -> list[Row]:
     return [
         *(row for belt_speed in BELT_SPEEDS for row in motion_rows(belt_speed)),
@@ -227,6 +253,10 @@ def measure() -> list[Row]:
         course_row("belt in a ramp", belt=Ramp(0.1, duration=1e4)),
         course_row("belt in a sine", belt=Sine(0.02, frequency=0.3)),
         course_row("load in a sine", load=Sine(0.1, frequency=0.3)),
+        part_row("encoder and difference", ENCODER, DIFFERENCE),
+        part_row("the same with noise", ENCODER, DIFFERENCE, "sensor.position_noise=1e-7"),
+        part_row("limit and rounding", "actuator.limit=500", "actuator.resolution=1"),
+        part_row("lag", "actuator.time_constant=1e-3"),
     ]
 
 
