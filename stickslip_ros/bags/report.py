@@ -188,9 +188,11 @@ def stick_speed_at_recording(recording: Recording) -> float | None:
         given = float(analyzer["stick_speed"])
         if 0.0 <= given < inf:
             return given
-    with suppress(TypeError, ValueError):
-        return automatic_stick_speed({name: json.loads(value) for name, value in plant.items()})
-    return 0.0
+    known: dict[str, Any] = {}
+    for name, text in plant.items():
+        with suppress(RecursionError, ValueError):
+            known[name] = json.loads(text)
+    return automatic_stick_speed(known)
 
 
 def _window_at_recording(recording: Recording) -> int:

@@ -142,6 +142,7 @@ def test_good_values_are_taken_exactly_in_every_state(graph: Graph, name: str) -
                     "must be the path of a CSV file",
                     "must be above 0 and finite for a ",
                     "must be at least friction.",
+                    "must be 0 with velocity = difference",
                 ]
                 allowed = refusals if reason else [""]
                 if parameter not in settable and value != start[parameter]:

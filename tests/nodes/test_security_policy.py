@@ -65,8 +65,9 @@ def run(
     request: pytest.FixtureRequest, process_environment: dict[str, str], tmp_path: Path
 ) -> Iterator[subprocess.Popen[bytes]]:
     command = ["-m", "stickslip_ros.app.main", "run", "paper", "--pace", "realtime"]
+    truth = ["-p", "plant.publish_truth=true"]
     run = subprocess.Popen(
-        [sys.executable, *command, *request.param], cwd=tmp_path, env=process_environment
+        [sys.executable, *command, *truth, *request.param], cwd=tmp_path, env=process_environment
     )
     yield run
     run.kill()

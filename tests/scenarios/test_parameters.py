@@ -246,6 +246,8 @@ def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
     values.pop("friction.curve", None)
     values |= {"friction.break_away": 0.5} if "friction.break_away" in values else {}
     values |= {"friction.elements": 3} if "friction.elements" in values else {}
+    values |= {"sensor.difference_samples": 3} if "sensor.difference_samples" in values else {}
+    values.pop("sensor.velocity", None)  # a difference has no noise of its own
     for name in values.keys() & {"friction.exponent", "friction.reverse.exponent"}:
         values[name] = 2.0
     for part in ("belt", "load", "disturbance"):

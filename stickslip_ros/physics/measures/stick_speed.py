@@ -1,6 +1,7 @@
 """The relative speed up to which a slide counts as sticking, where none is given."""
 
 from collections.abc import Mapping
+from math import inf, isfinite
 from typing import Any
 
 from stickslip_ros.physics.measures.breakpoints import STICK_SHARE
@@ -17,7 +18,8 @@ def automatic_stick_speed(plant: Mapping[str, Any], fastest_belt: float = 0.0) -
     Parameters
     ----------
     plant : mapping
-        Parameters of the plant by flat name, as far as they are known.
+        Parameters of the plant by flat name, as far as they are known. Those that no plant can have
+        count as unknown.
     fastest_belt : float, optional
         Fastest belt speed, m/s. By default it is not known beforehand.
 
@@ -28,10 +30,32 @@ def automatic_stick_speed(plant: Mapping[str, Any], fastest_belt: float = 0.0) -
         `SampleMeter`.
     """
     law = LAWS.get(str(plant.get("friction.law")))
-    sensor = {name.removeprefix("sensor."): plant[name] for name in plant if "sensor." in name}
-    rate = float(plant.get("rate", 1.0))
-    error = Sensor.from_values(sensor).velocity_error(1.0 / rate) if sensor else 0.0
+    error = _velocity_error(plant)
     if law is None or not law.states:
         return error
-    belt_speed = fastest_belt or (abs(float(plant.get("belt_speed", 0.0))) if error else 0.0)
-    return STICK_SHARE * belt_speed + error if belt_speed or error else None
+    if error and not fastest_belt:
+        fastest_belt = abs(_number(plant, "belt_speed"))
+    return STICK_SHARE * fastest_belt + error if fastest_belt or error else None
+
+
+def _velocity_error(plant: Mapping[str, Any]) -> float:
+    """Return what the sensor may err in the velocity, m/s; 0 without a possible sensor."""
+    prefix = "sensor."
+    values = {name.removeprefix(prefix): plant[name] for name in plant if name.startswith(prefix)}
+    rate = _number(plant, "rate")
+    if not values or rate <= 0.0:
+        return 0.0
+    try:
+        error = Sensor.from_values(values).velocity_error(1.0 / rate)
+    except (ArithmeticError, TypeError, ValueError):
+        return 0.0
+    return error if 0.0 <= error < inf else 0.0
+
+
+def _number(plant: Mapping[str, Any], name: str) -> float:
+    """Return a parameter that is a finite number; otherwise 0."""
+    try:
+        value = float(plant.get(name, 0.0))
+    except (OverflowError, TypeError, ValueError):
+        return 0.0
+    return value if isfinite(value) else 0.0
