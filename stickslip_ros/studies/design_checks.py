@@ -78,6 +78,11 @@ def failure_of(task: Task, check: Check) -> str | None:
     """Return how the simulated control fails; None if it does not."""
     speed = f"at a belt speed of {task.shown(check.belt_speed, 'm/s')}"
     if check.vibrates and check.settling_time is None:
+        if task.rough:
+            return (
+                f"{speed} the vibration does not decay to 1 % with the noise and rounding of sensor "
+                "and actuator"
+            )
         return f"{speed} the vibration does not decay, although a small one would"
     if check.peak_force is not None and check.peak_force > task.force_limit:
         return (

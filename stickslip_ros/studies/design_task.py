@@ -30,7 +30,7 @@ class Task:
     force_delay: float
     """Delay from a sample to the start of its force, s."""
     force_limit: float
-    """Largest allowed force, N."""
+    """Largest allowed force, N: that of the controller, or the limit of a weaker actuator."""
     belt_speeds: tuple[float, float]
     """Lowest and highest belt speed, m/s, above zero; the opposite direction is symmetric."""
     sensor: Sensor = EXACT_SENSOR
@@ -90,7 +90,7 @@ class Task:
             plant.as_drive(),
             plant.rate,
             plant.force_delay,
-            law.force_limit,
+            min(law.force_limit, plant.as_actuator().limit),
             (low, high),
             plant.as_sensor(),
             scenario,

@@ -147,3 +147,15 @@ def test_a_design_is_tried_with_them_and_tells_what_they_leave() -> None:
     assert forces[1] < 0.3 * forces[0]
     (check,) = ss.design("feed_drive", belt_speed=(0.03, 0.03)).checks
     assert check.rest is None
+
+
+def test_a_design_stays_within_the_limit_of_the_actuator() -> None:
+    """Even where the controller has none, or a larger one."""
+    scenario = ss.scenario("feed_drive", actuator_limit=200.0, actuator_resolution=0.5)
+    (check,) = ss.design(scenario, belt_speed=(0.04, 0.04)).checks
+    assert check.settling_time is not None
+    assert check.peak_force is not None
+    assert check.peak_force < 200.0
+    coarse = ss.scenario(scenario, actuator_resolution=20.0)
+    remark = ss.design(coarse, belt_speed=(0.04, 0.04)).remark
+    assert "does not decay to 1 % with the noise and rounding of sensor and actuator" in remark
