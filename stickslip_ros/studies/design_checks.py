@@ -80,8 +80,8 @@ def failure_of(task: Task, check: Check) -> str | None:
     if check.vibrates and check.settling_time is None:
         if task.rough:
             return (
-                f"{speed} the vibration does not decay to 1 % with the noise and rounding of sensor "
-                "and actuator"
+                f"{speed} the vibration does not decay to 1 % with the noise and rounding of "
+                "sensor and actuator"
             )
         return f"{speed} the vibration does not decay, although a small one would"
     if check.peak_force is not None and check.peak_force > task.force_limit:
