@@ -88,8 +88,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def start(self) -> None:
         """Open a bag, start to measure, and subscribe last, so that no message is lost."""
-        given = self.parameters.given_stick_speed
-        self._meter = RunMeter(self.parameters.window, stick_speed=given or 0.0)
+        self._meter = RunMeter(self.parameters.window, reading=self.parameters.reading_of({}))
         self._cycles = self._newest_recorded = 0
         self._logged = ""
         self._bag_failure = ""
@@ -150,7 +149,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         """Return regime and steadiness, counts of samples, and problems with them."""
         if not self.active:
             return OK, "", {}
-        report = self._meter.report()
+        report = self._meter.report(quick=True)
         counts = {name: report[name] for name in ("regime", "steady", "samples", "lost_samples")}
         counts["trend"] = report["trend"] or ""
         figures = {**counts, **self.dropped.figures, "notes": "; ".join(report["notes"])}
@@ -254,7 +253,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def _log_measures(self) -> None:
         """Log the measures of the last window of cycles, unless the text is unchanged."""
-        measures = self._meter.motion.measures()
+        measures = self._meter.motion.measures(quick=True)
         if measures.amplitude is None or measures.frequency is None:
             text = f"{measures.regime}"
         else:
@@ -309,7 +308,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         """Put the parameters of a node into the bag, and the curves in the files that they name."""
         self._keep(f"stickslip_ros/{node}", values)
         if node == "plant":
-            self._meter.motion.stick_speed = self.parameters.stick_speed_of(values)
+            self._meter.motion.reading = self.parameters.reading_of(values)
         known, curves = known_parameters(NODE_PARAMETERS[node]), dict[str, Pairs]()
         for name, path in values.items():
             if known[name].file and path and isinstance(path, str):

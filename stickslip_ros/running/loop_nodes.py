@@ -14,8 +14,9 @@ def node_parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
     values = scenario.as_dict()
     values["analyzer"]["bag"] = str(bag)
     # The analyzer may know the parameters of the plant of a short run only at its end.
-    if scenario.stick_speed:
-        values["analyzer"]["stick_speed"] = scenario.stick_speed
+    stick_speed, noisy = scenario.reading
+    if stick_speed and not noisy:
+        values["analyzer"]["stick_speed"] = stick_speed
     controllers = [scenario.controller.node] if scenario.plant.expects_control else []
     nodes = ["analyzer", *controllers, "plant"]
     return {node: {**values[node], "autostart": False} for node in nodes}

@@ -8,6 +8,7 @@ from typing import Any, Self
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.installed_packages import prefixes
+from stickslip_ros.physics.measures.reading import Reading
 from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.scenarios import ros_yaml
 from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
@@ -97,13 +98,10 @@ class Scenario:
         return self.controller.as_law() if self.plant.expects_control else None
 
     @property
-    def stick_speed(self) -> float | None:
-        """Largest relative speed of a slide that sticks, m/s, as its samples tell it.
-
-        None for friction with a memory on a belt that never moves; see `automatic_stick_speed`.
-        """
+    def reading(self) -> Reading:
+        """How the samples of the plant are to be read."""
         plant = self.plant
-        return self.analyzer.stick_speed_of(plant.flat(), plant.as_drive().fastest_belt)
+        return self.analyzer.reading_of(plant.flat(), plant.as_drive().fastest_belt)
 
     @property
     def nodes(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.reference import ReferenceCourse
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.measures.stick_speed import automatic_stick_speed
+from stickslip_ros.physics.measures.reading import Reading, reading_of
 from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
@@ -367,7 +367,7 @@ class AnalyzerParameters(NodeParameters):
     stick_speed: float = field(
         -1.0,
         "Largest relative speed of a slide that sticks; below 0: automatic, that is 0, with "
-        "friction with a memory a hundredth of the belt speed, and with a sensor its error more.",
+        "friction with a memory a hundredth of the belt speed, and found by fits under noise.",
         "m/s",
         fixed=Fixed.ACTIVE,
         ge=-1.0,
@@ -404,10 +404,9 @@ class AnalyzerParameters(NodeParameters):
         """The stick speed, m/s; None if it is automatic."""
         return None if self.stick_speed < 0.0 else self.stick_speed
 
-    def stick_speed_of(self, plant: Mapping[str, Any], fastest_belt: float = 0.0) -> float | None:
-        """Return the stick speed for samples of a plant; see `automatic_stick_speed`."""
-        given = self.given_stick_speed
-        return automatic_stick_speed(plant, fastest_belt) if given is None else given
+    def reading_of(self, plant: Mapping[str, Any], fastest_belt: float = 0.0) -> Reading:
+        """Return how samples of a plant are to be read."""
+        return reading_of(plant, fastest_belt, given=self.given_stick_speed)
 
 
 class ReplayParameters(NodeParameters):

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 from stickslip_ros.bags.reader import Recording
+from stickslip_ros.bags.table_file import is_table
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.scenarios.curve_file import CURVES, as_pairs
@@ -12,7 +13,12 @@ from stickslip_ros.scenarios.parameters import PlantParameters
 
 
 def recorded_drive(bag: Path, namespace: str | None = None) -> Drive | None:
-    """Return the drive whose parameters were recorded, None where they are not or not all."""
+    """Return the drive whose parameters were recorded, None where they are not or not all.
+
+    A table has none.
+    """
+    if is_table(bag):
+        return None
     with Recording(bag, namespace) as recording:
         texts = recording.metadata("stickslip_ros/plant") or {}
         curves = recording.metadata(CURVES) or {}

@@ -30,7 +30,7 @@ def sensor_meter(scenario: Scenario) -> SampleMeter | None:
     """Return what measures the samples that a sensor tells; None with an exact sensor."""
     if scenario.plant.as_sensor().exact:
         return None
-    return SampleMeter(scenario.analyzer.window, stick_speed=scenario.stick_speed)
+    return SampleMeter(scenario.analyzer.window, reading=scenario.reading)
 
 
 def simulate(

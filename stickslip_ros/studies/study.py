@@ -17,7 +17,9 @@ from stickslip_ros.studies.settling import (
 )
 
 MEASURES = tuple(
-    measure.name for measure in fields(Measures) if measure.name not in ("steady", "trend")
+    measure.name
+    for measure in fields(Measures)
+    if measure.name not in ("steady", "trend", "errors")
 )
 """Names of the measures of a point, which has `steady` as an attribute of its own."""
 

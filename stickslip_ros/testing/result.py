@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags import Recording
-from stickslip_ros.bags.report import stick_speed_at_recording
+from stickslip_ros.bags.report import reading_at_recording
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.physics.measures.run_meter import RunMeter
@@ -94,8 +94,8 @@ def result_of(bag: Path, window: int, diagnostics: dict[str, Diagnostics]) -> Ru
         disturbances, dropped = recording.applied_disturbances, recording.dropped_forces
         if not recording.complete:
             raise RunError(f"the recording of the run failed: {'; '.join(recording.missing)}")
-        stick_speed = stick_speed_at_recording(recording)
-    meter = RunMeter(window, stick_speed=stick_speed)
+        reading = reading_at_recording(recording)
+    meter = RunMeter(window, reading=reading)
     meter.motion.feed(states)
     meter.feed_forces(forces, dropped)
     meter.finish()

@@ -3,6 +3,7 @@
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.measures.reading import Reading
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, MeasuredVelocity, Sensor
 from stickslip_ros.physics.motion import Motion
@@ -81,13 +82,11 @@ def test_a_difference_has_the_noise_of_the_positions() -> None:
         load_scenario("feed_drive", both)
 
 
-def test_the_automatic_stick_speed_covers_the_error_of_the_sensor() -> None:
-    """At 1 kHz a difference over two samples errs by at most 1 um / 2 ms."""
-    given = ["plant.sensor.position_resolution=1e-6", "plant.sensor.velocity=difference"]
-    wide = [*given, "plant.sensor.difference_samples=2"]
-    assert load_scenario("feed_drive", []).stick_speed == 0.0
-    assert load_scenario("feed_drive", given[:1]).stick_speed == 0.0
-    assert load_scenario("feed_drive", wide).stick_speed == pytest.approx(5e-4)
-    assert load_scenario("feed_drive", [*wide, "analyzer.stick_speed=0.001"]).stick_speed == 0.001
-    memory = [*wide, "plant.friction.law=dahl"]
-    assert load_scenario("feed_drive", memory).stick_speed == pytest.approx(5e-4 + 4e-4)
+def test_the_samples_of_a_sensor_that_errs_are_read_as_noisy() -> None:
+    encoder = ["plant.sensor.position_resolution=1e-6", "plant.sensor.velocity=difference"]
+    assert load_scenario("feed_drive", []).reading == Reading(0.0, noisy=False)
+    assert load_scenario("feed_drive", encoder).reading == Reading(0.0, noisy=True)
+    given = [*encoder, "analyzer.stick_speed=0.001"]
+    assert load_scenario("feed_drive", given).reading == Reading(0.001, noisy=False)
+    memory = [*encoder, "plant.friction.law=dahl"]
+    assert load_scenario("feed_drive", memory).reading == Reading(pytest.approx(4e-4), noisy=True)

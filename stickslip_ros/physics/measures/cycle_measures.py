@@ -33,7 +33,7 @@ rounding the belt speed.
 _NOISE = 1e-9
 """Speeds below this share of the belt speed, or of the highest speed so far, are rounding."""
 
-_STALE_PERIODS = 3.0
+STALE_PERIODS = 3.0
 """A motion without a turning point for this many of its last periods has stopped cycling."""
 
 
@@ -146,8 +146,10 @@ class Measures:
     """
     trend: Trend | None = None
     """Change of the amplitude; None unless `steady` is False."""
+    errors: Mapping[str, float] | None = None
+    """Standard error of each mean by the name of the measure; None below three cycles."""
 
-    def as_dict(self) -> dict[str, float | int | str | None]:
+    def as_dict(self) -> dict[str, Any]:
         """Return the measures by name, ready for JSON.
 
         Returns
@@ -330,33 +332,40 @@ class CycleMeter:
             Measures in SI units.
         """
         if self._unbounded:
-            return _without_cycles(None, Regime.UNBOUNDED, steady=True)
+            return without_cycles(None, Regime.UNBOUNDED, steady=True)
         period = self._cycles[-1].period if self._cycles else 0.0
         now = self._open.end if self._open else 0.0
         since = self._sticking_since
         if self._belt_speed == 0.0 and since is not None and now - since >= period:
             steady = True if self._lasts(now - since) else None
-            return _without_cycles(self._recent_motion(), Regime.STUCK, steady=steady)
+            return without_cycles(self._recent_motion(), Regime.STUCK, steady=steady)
         since_turn = self._open.duration if self._open else 0.0
-        if not self._cycles or since_turn > _STALE_PERIODS * period:
+        if not self._cycles or since_turn > STALE_PERIODS * period:
             recent = self._recent_motion()
             if (
                 recent is None
                 or recent.velocity_amplitude >= self._equilibrium_speed
                 or recent.stick_fraction > 0.0  # it sticks to a slow belt
             ):
-                return _without_cycles(None, None)
+                return without_cycles(None, None)
             steady = True if self._lasts(since_turn) else None
-            return _without_cycles(recent, Regime.EQUILIBRIUM, steady=steady)
+            return without_cycles(recent, Regime.EQUILIBRIUM, steady=steady)
         mean = Cycle(*np.mean(self._cycles, axis=0).tolist())
         resting = mean.velocity_amplitude < self._equilibrium_speed
         trend = _trend(self._amplitudes, resting)
         steady = trend is None if len(self._amplitudes) >= LEAST_CYCLES else None
         count = len(self._cycles)
         if resting:
-            return _without_cycles(mean, Regime.EQUILIBRIUM, count, steady=steady, trend=trend)
+            return without_cycles(mean, Regime.EQUILIBRIUM, count, steady=steady, trend=trend)
         regime = Regime.STICK_SLIP if mean.stick_fraction > 0.0 else Regime.PURE_SLIP
-        return Measures(**mean._asdict(), cycles=count, regime=regime, steady=steady, trend=trend)
+        return Measures(
+            **mean._asdict(),
+            cycles=count,
+            regime=regime,
+            steady=steady,
+            trend=trend,
+            errors=errors_of_means(self._cycles),
+        )
 
     def _lasts(self, rest: float) -> bool:
         """Return whether a rest of this duration (s) has lasted for a window of the last cycles."""
@@ -447,7 +456,26 @@ def _trend(amplitudes: Sequence[float], resting: bool) -> Trend | None:
     return Trend.DECAYING if first - last > STEADY * first else Trend.VARYING
 
 
-def _without_cycles(
+def errors_of_means(cycles: Sequence[Cycle]) -> dict[str, float] | None:
+    """Return the standard error of the mean of each measure by its name, from their scatter.
+
+    Parameters
+    ----------
+    cycles : sequence of Cycle
+        Cycles of the window.
+
+    Returns
+    -------
+    dict or None
+        None below three cycles.
+    """
+    if len(cycles) < LEAST_CYCLES:
+        return None
+    errors = np.std(cycles, axis=0, ddof=1) / len(cycles) ** 0.5
+    return dict(zip(Cycle._fields, errors.tolist(), strict=True))
+
+
+def without_cycles(
     motion: Cycle | None,
     regime: Regime | None,
     cycles: int = 0,

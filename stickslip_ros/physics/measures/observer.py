@@ -1,12 +1,13 @@
 """Observers: they receive a run as it is measured, whether simulated, live or recorded."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import Protocol
+from typing import Any, Protocol
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
+from stickslip_ros.physics.measures.cycle_fit import MeanCycle
 from stickslip_ros.physics.measures.cycle_measures import Cycle
 
 
@@ -23,6 +24,16 @@ class MeasuredMotion:
     """Time at which each of these cycles ended, s."""
     longest_step: float = inf
     """Longest time between two breakpoints, s, over which the motion between them is known."""
+
+
+@dataclass(frozen=True)
+class Conclusions:
+    """What was concluded from a record beyond its measures."""
+
+    mean_cycle: MeanCycle | None
+    """Mean cycle under noise; None for exact samples, and cycles that are not alike."""
+    slips: Mapping[str, Any] | None
+    """Slips as `SlipMeter.report` has them; None if they were not asked for."""
 
 
 class MotionObserver(Protocol):
@@ -42,4 +53,8 @@ class RunObserver(MotionObserver, Protocol):
 
     def take_control(self, time: FloatArray, force: FloatArray, acted: BoolArray) -> None:
         """Receive the control forces that follow, and whether each acted, as far as it is known."""
+        ...
+
+    def take_conclusions(self, conclusions: Conclusions) -> None:
+        """Receive what was concluded, at the end of the run."""
         ...

@@ -6,6 +6,7 @@ import numpy as np
 
 from stickslip_ros.physics.measures.control_forces import ForceMeter, ForceSettler, SettledForces
 from stickslip_ros.physics.measures.observer import RunObserver
+from stickslip_ros.physics.measures.reading import EXACT, Reading
 from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.samples import ForceColumns
 from stickslip_ros.stamps import NANOSECONDS
@@ -20,14 +21,14 @@ class RunMeter:
         *,
         dropped_known: bool = False,
         observer: RunObserver | None = None,
-        stick_speed: float | None = 0.0,
+        reading: Reading = EXACT,
     ) -> None:
         """Average over the last `window` cycles at most; an `observer` receives motion and forces.
 
         `dropped_known` says whether dropped forces are reported; only then is it known which forces
-        acted. `stick_speed` (m/s) as in `SampleMeter`.
+        acted. `reading` as in `SampleMeter`.
         """
-        self.motion = SampleMeter(window, observer, stick_speed=stick_speed)
+        self.motion = SampleMeter(window, observer, reading=reading)
         self.force = ForceMeter()
         """Control force as it was published."""
         self.applied = ForceMeter()
@@ -56,10 +57,10 @@ class RunMeter:
             self._observer.take_control(time, sent.force, acted)
         return settled
 
-    def report(self) -> dict[str, Any]:
+    def report(self, *, quick: bool = False) -> dict[str, Any]:
         """Return the measures and counts by name, ready for JSON; SI units.
 
-        `notes` are sentences that say why the measures may be wrong.
+        `notes` are sentences that say why the measures may be wrong. `quick` as in `SampleMeter`.
         """
         motion = self.motion
         notes: list[str] = []
@@ -70,7 +71,8 @@ class RunMeter:
                 "samples of several plants are mixed"
             )
         return {
-            **motion.measures().as_dict(),
+            **motion.measures(quick=quick).as_dict(),
+            "position_noise": motion.position_noise,
             "peak_force": self.force.peak_force,
             "resting_force": self.force.resting_force,
             "peak_applied_force": self.applied.peak_force if self.dropped_known else None,

@@ -1,22 +1,28 @@
 """The measures of a motion from its samples."""
 
 from dataclasses import replace
-from math import inf, isfinite
+from math import inf
 
 import numpy as np
 
-from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.physics.measures.breakpoints import STICK_SHARE, breakpoints_from_samples
+from stickslip_ros.physics.measures.cycle_fit import MeanCycle
 from stickslip_ros.physics.measures.cycle_measures import (
     UNBOUNDED_BELT_SPEEDS,
     Cycle,
     CycleMeter,
     Measures,
 )
+from stickslip_ros.physics.measures.noisy_meter import NoisyCycleMeter
 from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver
+from stickslip_ros.physics.measures.reading import EXACT, Reading
 from stickslip_ros.physics.measures.sampling_grid import LONGEST_GAP, SamplingGrid
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
+
+_SEVERAL = 4
+"""Number of fast samples in one direction that are no impulse of a noisy record."""
 
 
 class SampleMeter:
@@ -33,20 +39,14 @@ class SampleMeter:
         window: int,
         observer: MotionObserver | None = None,
         *,
-        stick_speed: float | None = 0.0,
+        reading: Reading = EXACT,
     ) -> None:
         """Average over the last `window` cycles at most; an `observer` receives the motion.
 
-        The slide sticks at a relative speed of at most `stick_speed` (m/s): 0 for exact samples,
-        otherwise less than the belt speed, and None for friction with a memory, see `STICK_SHARE`.
-        Raises InvalidInputError if it is negative or not finite.
+        `reading` says how the samples are to be read, and may change as more is known of them.
+        Raises InvalidInputError if its stick speed is negative or not finite.
         """
-        if stick_speed is not None and not (isfinite(stick_speed) and stick_speed >= 0.0):
-            raise InvalidInputError(
-                f"stick_speed = {stick_speed} is refused: must be finite and at least 0 (m/s)"
-            )
-        self.stick_speed = stick_speed
-        """Largest relative speed, m/s, of a slide that sticks, or None."""
+        self.reading = reading.checked()
         self.origin = 0
         """Stamp of time zero for the observer, ns."""
         self.samples = 0
@@ -56,6 +56,7 @@ class SampleMeter:
         self._observer = observer
         self._grid = SamplingGrid()
         self._meter = CycleMeter(window)
+        self._noisy_meter = NoisyCycleMeter(window)
         self._last: SampleColumns | None = None
         self._elapsed = 0
         self._fastest_belt = self._fastest_slip = 0.0
@@ -86,6 +87,7 @@ class SampleMeter:
                 continue  # a single sample is no motion, and there may be very many of them
             if start > 0:
                 self._meter.interrupt()
+                self._noisy_meter.interrupt()
                 self._last = None
             cycles += self._feed_segment(segment, jittered)
         self._last = samples[-1:]
@@ -101,16 +103,53 @@ class SampleMeter:
         """Simulated time covered, s."""
         return self._elapsed * 1e-9
 
-    def measures(self) -> Measures:
-        """Return the means over the last whole cycles."""
+    @property
+    def noisy(self) -> bool:
+        """Whether the samples have noise, as far as it is known."""
+        told = self.reading.noisy
+        return self._noisy_meter.noisy if told is None else told
+
+    @property
+    def position_noise(self) -> float | None:
+        """Standard deviation of the noise of the positions, m; None for exact samples."""
+        return self._noisy_meter.noise if self.noisy else None
+
+    @property
+    def held(self) -> int:
+        """Number of samples that are held for the fits under noise."""
+        return self._noisy_meter.held
+
+    @property
+    def mean_cycle(self) -> MeanCycle | None:
+        """Fit of the cycles under noise; None for exact samples and cycles that are not alike."""
+        return self._noisy_meter.measures()[1] if self.noisy else None
+
+    def measures(self, *, quick: bool = False) -> Measures:
+        """Return the means over the last whole cycles.
+
+        With `quick`, cycles under noise are measured one by one instead of together, which takes a
+        thousandth of the time and is less accurate.
+        """
         limit = UNBOUNDED_BELT_SPEEDS * self._fastest_belt
-        self._meter.report_run_away(self._unbounded_speed > limit)
+        unbounded = self._unbounded_speed > limit
+        self._meter.report_run_away(unbounded)
+        if self.noisy and not unbounded:
+            return self._noisy_meter.measures(quick=quick)[0]
         return self._meter.measures()
 
     def _feed_segment(self, samples: SampleColumns, jittered: bool) -> list[Cycle]:
         stamp = samples.stamp
         time = (stamp - stamp[0] + float(self._elapsed)) * 1e-9
         self._elapsed += int(stamp[-1] - stamp[0])
+        told, cycles, cycle_ends = self.reading.noisy, list[Cycle](), list[float]()
+        if told is not False:
+            new = slice(0 if self._last is None else 1, None)
+            cycles = self._noisy_meter.feed(
+                time[new], samples.position[new], samples.velocity[new], samples.belt_velocity[new]
+            )
+            cycle_ends = self._noisy_meter.ends
+            if told and self._observer is None:
+                return cycles
         with np.errstate(over="ignore", invalid="ignore"):
             breakpoints = breakpoints_from_samples(
                 time,
@@ -122,7 +161,9 @@ class SampleMeter:
             )
         if self._last is not None:
             breakpoints = breakpoints[1:]  # the first sample was fed with the previous block
-        cycles = self._meter.feed(breakpoints, float(samples.belt_velocity[-1]), self._fastest_belt)
+        exact = self._meter.feed(breakpoints, float(samples.belt_velocity[-1]), self._fastest_belt)
+        if not self.noisy:
+            cycles, cycle_ends = exact, self._meter.ends
         if self._observer is not None:
             observed = (stamp - self.origin) / NANOSECONDS
             # Rounding may put a breakpoint after the last sample.
@@ -133,15 +174,15 @@ class SampleMeter:
                     replace(breakpoints, time=np.interp(breakpoints.time, time, observed)),
                     samples.belt_velocity[ends],
                     cycles,
-                    np.interp(self._meter.ends, time, observed).tolist(),
+                    (np.array(cycle_ends) + (observed[0] - time[0])).tolist(),
                     known,
                 )
             )
         return cycles
 
     def _present_stick_speed(self, samples: SampleColumns) -> float:
-        if self.stick_speed is not None:
-            return self.stick_speed
+        if self.reading.stick_speed is not None:
+            return self.reading.stick_speed
         slip = np.abs(samples.velocity - samples.belt_velocity)
         self._fastest_slip = max(self._fastest_slip, float(slip.max()))
         return STICK_SHARE * (self._fastest_belt or self._fastest_slip)
@@ -152,5 +193,16 @@ class SampleMeter:
         self._fastest_belt = float(belt_speed[-1])
         speed = np.abs(samples.velocity)
         fast = (speed > UNBOUNDED_BELT_SPEEDS * belt_speed) & (belt_speed > 0.0)
+        if self.noisy:
+            fast &= _lasting(fast, np.sign(samples.velocity))
         if fast.any():
             self._unbounded_speed = max(self._unbounded_speed, float(speed[fast].max()))
+
+
+def _lasting(fast: BoolArray, direction: FloatArray) -> BoolArray:
+    """Return which fast samples end several fast ones in one direction: impulses go back."""
+    lasting = fast.copy()
+    for lag in range(1, _SEVERAL):
+        lasting[lag:] &= fast[:-lag] & (direction[lag:] == direction[:-lag])
+        lasting[:lag] = False
+    return lasting

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import count
-from math import sqrt
 from typing import Any, Self
 
 import numpy as np
@@ -102,24 +101,6 @@ class Sensor:
         if "velocity" in known:
             known["velocity"] = MeasuredVelocity(known["velocity"])
         return cls(**known)
-
-    def velocity_error(self, period: float) -> float:
-        """Return how much the measured velocity differs from a constant one, at most.
-
-        Parameters
-        ----------
-        period : float
-            Sample period, s.
-
-        Returns
-        -------
-        float
-            Largest error, m/s, with noise of up to four standard deviations.
-        """
-        if not self.spans:
-            return _DEVIATIONS * self.velocity_noise
-        position = self.position_resolution + sqrt(2.0) * _DEVIATIONS * self.position_noise
-        return position / (self.spans * period)
 
     def refusal(self) -> str | None:
         """Return why the constants do not fit together, as a sentence, or None."""

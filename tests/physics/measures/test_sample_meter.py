@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.measures.reading import Reading
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.physics.motion.motion import Motion
@@ -411,7 +411,7 @@ def noisy(samples: SampleColumns, error: float) -> SampleColumns:
 def test_noisy_samples_stick_near_the_velocity_of_the_belt(starts: list[int]) -> None:
     """However they are cut into blocks."""
     samples = noisy(limit_cycle(), 3e-4)
-    exact, meter = SampleMeter(window=20), RunMeter(window=20, stick_speed=1e-3)
+    exact, meter = SampleMeter(window=20), RunMeter(window=20, reading=Reading(1e-3))
     exact.feed(samples)
     assert exact.measures().regime is Regime.PURE_SLIP
     for start, end in zip([0, *starts], [*starts, 7001], strict=True):
@@ -423,7 +423,7 @@ def test_noisy_samples_stick_near_the_velocity_of_the_belt(starts: list[int]) ->
     assert measures.amplitude == pytest.approx(expected.amplitude, rel=1e-4)
     assert measures.period == pytest.approx(expected.period, rel=1e-3)
     # The slide leaves the belt slowly and is near its velocity for some time.
-    without_noise = SampleMeter(window=20, stick_speed=1e-3)
+    without_noise = SampleMeter(window=20, reading=Reading(1e-3))
     without_noise.feed(limit_cycle())
     stick_fraction = without_noise.measures().stick_fraction
     assert stick_fraction is not None
@@ -434,15 +434,8 @@ def test_noisy_samples_stick_near_the_velocity_of_the_belt(starts: list[int]) ->
 def test_a_slide_that_moves_little_on_a_belt_at_rest_is_stuck() -> None:
     samples = noisy(still(stamps(100, 1000)), 1e-4)
     at_rest = replace(samples, belt_velocity=np.zeros(1000))
-    exact, meter = SampleMeter(window=20), SampleMeter(window=20, stick_speed=1e-3)
+    exact, meter = SampleMeter(window=20), SampleMeter(window=20, reading=Reading(1e-3))
     for each in (exact, meter):
         each.feed(at_rest)
     assert exact.measures().regime is Regime.PURE_SLIP
     assert meter.measures().regime is Regime.STUCK
-
-
-@pytest.mark.parametrize("stick_speed", [-1e-9, np.inf, np.nan])
-def test_a_stick_speed_that_is_none_is_refused(stick_speed: float) -> None:
-    for meter in (SampleMeter, RunMeter):
-        with pytest.raises(InvalidInputError, match=r"stick_speed = .* must be finite"):
-            meter(20, stick_speed=stick_speed)

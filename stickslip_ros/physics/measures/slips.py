@@ -1,0 +1,252 @@
+"""Slip by slip: drops of a position that sticks and slips, for cycles that are not alike."""
+
+from collections import deque
+from dataclasses import dataclass
+from math import isfinite, nan
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.measures.cycle_measures import Regime
+
+_MEDIAN = 5
+"""Number of samples of the median that suppresses impulses."""
+_STICKING = 2.5
+"""Time from a slip to the next, in slip times, from which a motion sticks; in a sine it is two."""
+_FEWEST = 8
+"""Number of samples for the fit of a stick."""
+_PART = 4096
+"""Number of samples that are searched at once."""
+_MOST_SAMPLES, _MOST_SLIPS = 2_000_000, 100_000
+"""Numbers of samples and of slips that are kept."""
+_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+
+class Slip(NamedTuple):
+    """One stick and the slip that ends it."""
+
+    time: float
+    """Start of the slip, a tenth of the drop, s."""
+    stick_time: float
+    """Duration of the stick before, s; NaN where it is not recorded as a whole."""
+    drop: float
+    """Displacement by which the slide goes back, m."""
+    slip_time: float
+    """Duration of the slip, s."""
+    stick_velocity: float
+    """Velocity during the first half of the stick, m/s, by a straight line."""
+    stick_velocity_error: float
+    """Its standard error, m/s."""
+
+
+@dataclass(frozen=True)
+class SlipThreshold:
+    """What counts as a slip of a slide that sticks and slips.
+
+    Parameters
+    ----------
+    drop : float
+        Displacement, m, by which the slide goes back by more.
+    within : float
+        Time, s, in which it does.
+
+    Raises
+    ------
+    InvalidInputError
+        If one of them is not above 0 and finite.
+
+    Examples
+    --------
+    A slip of more than 0.1 mm within 50 ms:
+
+    >>> from stickslip_ros.physics.measures.slips import SlipThreshold
+    >>> SlipThreshold(1e-4, within=0.05)
+    SlipThreshold(drop=0.0001, within=0.05)
+    """
+
+    drop: float
+    within: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name, value, unit in (("drop", self.drop, "m"), ("within", self.within, "s")):
+            if not 0.0 < value < float("inf"):
+                raise InvalidInputError(f"{name} = {value} is refused: must be above 0 ({unit})")
+
+
+class SlipMeter:
+    """Finds slips in positions, fed in blocks of any length; the belt moves forward.
+
+    A slip is a drop of more than a threshold within a time, of medians over five samples. It ends
+    at the lowest position before a rise by half the threshold, or before this time without a lower
+    one. Its duration is that from a tenth to nine tenths of the drop.
+
+    Parameters
+    ----------
+    threshold : SlipThreshold
+        What counts as a slip.
+    """
+
+    def __init__(self, threshold: SlipThreshold) -> None:
+        self.threshold = threshold
+        self._slips: deque[Slip] = deque(maxlen=_MOST_SLIPS)
+        self.count = 0
+        """Number of slips."""
+        self.interrupt()
+
+    def interrupt(self) -> None:
+        """Drop the current stick: the next sample does not continue the motion so far."""
+        self._time, self._position = np.empty(0), np.empty(0)
+        self._whole = False
+        self._begin = 0
+        self._ended = 0  # row at which the last slip ended
+        self._span = 0
+
+    def feed(self, time: FloatArray, position: FloatArray) -> list[Slip]:
+        """Add the samples that follow; return the slips that they complete.
+
+        Parameters
+        ----------
+        time, position : array, shape (n,)
+            Time, s, and displacement of the slide, m.
+        """
+        found: list[Slip] = []
+        for first in range(0, len(time), _PART):
+            self._time = np.append(self._time, time[first : first + _PART])
+            self._position = np.append(self._position, position[first : first + _PART])
+            if len(self._time) > 2 * _MEDIAN:
+                found += self._find()
+            if len(self._time) > _MOST_SAMPLES:
+                self.interrupt()
+        self._slips.extend(found)
+        self.count += len(found)
+        return found
+
+    def report(self, belt_speed: float) -> dict[str, Any]:
+        """Return distributions over the slips by name, ready for JSON; SI units.
+
+        Parameters
+        ----------
+        belt_speed : float
+            Belt speed, m/s, for the share of the sticks' velocity; 0 if it is not known.
+
+        Returns
+        -------
+        dict
+            `count`, threshold, `regime`, the distributions, and every slip in `each`.
+        """
+        slips = list(self._slips)
+        columns = {name: [slip[k] for slip in slips] for k, name in enumerate(Slip._fields)}
+        report: dict[str, Any] = {
+            "count": self.count,
+            "least_drop": self.threshold.drop,
+            "within": self.threshold.within,
+            "regime": None,
+            "belt_speed": belt_speed,
+        }
+        for name in ("stick_time", "drop", "slip_time", "stick_velocity"):
+            report[name] = _distribution(np.array(columns[name]))
+        if report["stick_time"] is not None:
+            longer = report["stick_time"]["median"] > _STICKING * report["slip_time"]["median"]
+            report["regime"] = Regime.STICK_SLIP if longer else Regime.PURE_SLIP
+        each = {
+            name: [value if isfinite(value) else None for value in values]
+            for name, values in columns.items()
+        }
+        return {**report, "each": each}
+
+    def _find(self) -> list[Slip]:
+        from scipy.ndimage import maximum_filter1d, median_filter  # takes long to import
+
+        time, drop = self._time, self.threshold.drop
+        # The last medians are not known yet.
+        smooth = median_filter(self._position, _MEDIAN, mode="nearest")[: -(_MEDIAN // 2)]
+        if self._span == 0:
+            step = float(time[_MEDIAN * 2] - time[0]) / (_MEDIAN * 2)
+            self._span = max(round(self.threshold.within / step), 1) if step > 0.0 else 1
+        span, found = self._span, list[Slip]()
+        before = maximum_filter1d(smooth, span + 1, origin=span // 2, mode="nearest")
+        while True:
+            begin = self._begin
+            highest = before[begin:].copy()
+            since = smooth[begin : begin + span]
+            highest[: len(since)] = np.maximum.accumulate(since)
+            low = smooth[begin:] < highest - drop
+            if not low.any():
+                break
+            start = begin + int(np.argmax(low))
+            fall = smooth[start:]
+            lowest = np.minimum.accumulate(fall)
+            last = np.maximum.accumulate(np.where(fall <= lowest, np.arange(len(fall)), 0))
+            over = (fall > lowest + drop / 2.0) | (np.arange(len(fall)) - last > span)
+            if not over.any():
+                break
+            bottom = start + int(last[int(np.argmax(over))])
+            top = max(start - span, begin)
+            top += int(np.argmax(smooth[top : start + 1]))
+            found += self._slip(smooth, top, bottom)
+            self._begin = bottom
+        # What is found must not depend on the blocks: the filters reach back.
+        kept = max(self._begin - span - _MEDIAN, 0)
+        if kept > 0:
+            self._time, self._position = time[kept:], self._position[kept:]
+            self._begin -= kept
+            self._ended -= kept
+        return found
+
+    def _slip(self, smooth: FloatArray, top: int, bottom: int) -> list[Slip]:
+        """Return the slip between two rows, unless the stick before it is not whole."""
+        tenth = (smooth[top] - smooth[bottom]) / 10.0
+        rows = smooth[top : bottom + 1]
+        start = top + int(np.flatnonzero(rows >= smooth[top] - tenth)[-1])
+        end = top + int(np.flatnonzero(rows <= smooth[bottom] + tenth)[0])
+        first, self._ended, whole, self._whole = self._ended, bottom, self._whole, True
+        stick_time = slope = error = nan
+        if whole and start - first >= _FEWEST:
+            stick_time = float(self._time[start] - self._time[first])
+            # Before a slip the contact creeps.
+            half = slice(first, (first + start) // 2 + 1)
+            time = self._time[half]
+            slope, error = _line(time - float(time.mean()), smooth[half])
+        return [
+            Slip(
+                time=float(self._time[start]),
+                stick_time=stick_time,
+                drop=float(smooth[top] - smooth[bottom]),
+                slip_time=float(self._time[end] - self._time[start]),
+                stick_velocity=slope,
+                stick_velocity_error=error,
+            )
+        ]
+
+
+def _line(time: FloatArray, position: FloatArray) -> tuple[float, float]:
+    """Return the slope of a line and its standard error; the mean of the times is zero.
+
+    Residuals that follow each other count as one, by their first autocorrelation.
+    """
+    square = float(time @ time)
+    value, slope = float(position.mean()), float(time @ position) / square
+    residual = position - value - slope * time
+    variance = float(residual @ residual) / max(len(time) - 2, 1)
+    if variance == 0.0:
+        return slope, 0.0
+    follow = float(residual[1:] @ residual[:-1]) / float(residual @ residual)
+    share = min(max(follow, 0.0), 0.999)
+    return slope, (variance / square * (1.0 + share) / (1.0 - share)) ** 0.5
+
+
+def _distribution(values: FloatArray) -> dict[str, float] | None:
+    values = values[np.isfinite(values)]
+    if len(values) == 0:
+        return None
+    quantiles = np.quantile(values, _QUANTILES).tolist()
+    named = dict(zip(("q05", "q25", "median", "q75", "q95"), quantiles, strict=True))
+    spread = float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
+    return {
+        "mean": float(np.mean(values)),
+        "standard_error": spread / len(values) ** 0.5,
+        "standard_deviation": spread,
+        **named,
+    }

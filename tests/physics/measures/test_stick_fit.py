@@ -1,0 +1,74 @@
+"""Stick edges from positions with noise, of motions with known edges."""
+
+from math import cos, sin
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from stickslip_ros.physics.measures.stick_fit import fit_stick
+
+FREQUENCY = 100.0
+BELT = 0.04
+
+
+def around_a_stick(stick_time: float, drop: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and displacements relative to the belt, without damping, as functions.
+
+    r'' + w^2 r = -w^2 v (t - t_departure) - drop, in closed form: before the landing it is
+    r'' + w^2 r = w^2 v s - drop backwards in time.
+    """
+    time = np.arange(-0.5 * stick_time - 0.010, 0.5 * stick_time + 0.010, 1e-4)
+    relative = np.zeros(len(time))
+    w = FREQUENCY
+    for row, instant in enumerate(time):
+        before, after = -0.5 * stick_time - instant, instant - 0.5 * stick_time
+        if before > 0.0:
+            # r(0) = r'(0) = 0 at the landing, forced by w^2 v (s + before) - drop.
+            relative[row] = (BELT * stick_time - drop / w**2) * (1.0 - cos(w * before)) + BELT * (
+                before - sin(w * before) / w
+            )
+        elif after > 0.0:
+            relative[row] = -BELT * (after - sin(w * after) / w) - drop / w**2 * (
+                1.0 - cos(w * after)
+            )
+    return time, relative
+
+
+@settings(max_examples=20)
+@given(st.floats(0.003, 0.04), st.floats(-0.002, 0.002), st.floats(0.0, 0.3))
+def test_edges_of_an_exact_motion_are_found(stick_time: float, shift: float, drop: float) -> None:
+    """Also where the friction drops at the departure, which is then of second order."""
+    time, relative = around_a_stick(stick_time, drop)
+    fit = fit_stick(time + shift, relative, BELT, FREQUENCY, stick_time + 0.001)
+    assert fit.landing == pytest.approx(shift - stick_time / 2.0, abs=5e-5)
+    assert fit.departure == pytest.approx(shift + stick_time / 2.0, abs=5e-5)
+    assert fit.offset == pytest.approx(0.0, abs=2e-8)
+
+
+@pytest.mark.parametrize("stick_time", [0.003, 0.010, 0.030])
+def test_under_noise_the_stick_time_is_within_its_error(stick_time: float) -> None:
+    """The errors of 40 seeds, over their standard error, have a deviation near one."""
+    time, relative = around_a_stick(stick_time)
+    random, errors = np.random.default_rng(1), []
+    for _ in range(40):
+        noise = 1e-7 * random.standard_normal(len(time))
+        fit = fit_stick(time, relative + noise, BELT, FREQUENCY, stick_time)
+        variance = fit.squares / (len(time) - fit.jacobian.shape[1])
+        covariance = np.linalg.inv(fit.jacobian.T @ fit.jacobian) * variance
+        errors.append((fit.stick_time - stick_time) / covariance[1, 1] ** 0.5)
+    assert 0.7 < np.std(errors) < 1.3
+    assert abs(np.mean(errors)) < 0.6
+
+
+def test_a_motion_that_stays_below_the_belt_has_a_gap() -> None:
+    """The harmonic x' = v - gap at its highest: fitted better without a stick than with one."""
+    gap, w = 1e-3, FREQUENCY
+    time = np.arange(-0.012, 0.012, 1e-4)
+    relative = (BELT - gap) / w * np.sin(w * time) - BELT * time
+    without = fit_stick(time, relative, BELT, FREQUENCY, 0.0, sticks=False)
+    with_stick = fit_stick(time, relative, BELT, FREQUENCY, 0.002)
+    assert without.gap == pytest.approx(gap, rel=0.05)
+    assert without.stick_time == 0.0
+    assert without.squares < with_stick.squares

@@ -1,0 +1,216 @@
+"""The measures under noise, from samples as a sensor tells them.
+
+benchmarks/measures_under_noise.json has 200 seeds for each case; here are ten.
+"""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from benchmarks import measures_under_noise as study
+from stickslip_ros.physics.measures import Measures, Regime
+from stickslip_ros.physics.measures.reading import EXACT, UNKNOWN, Reading
+from stickslip_ros.physics.measures.sample_meter import SampleMeter
+from stickslip_ros.samples import SampleColumns
+
+NOISY = Reading(noisy=True)
+COMMITTED = json.loads(
+    (Path(study.__file__).parent / "measures_under_noise.json").read_text(encoding="utf-8")
+)
+SEEDS = 10
+
+
+def samples(
+    belt_speed: float = 0.04, count: int = 2000, noise: float = 0.0, seed: int = 0
+) -> SampleColumns:
+    """Return samples of feed_drive without control; the velocity is by difference under noise."""
+    position, velocity, _ = study.motion(belt_speed)
+    position, velocity = position[:count].copy(), velocity[:count].copy()
+    if noise > 0.0:
+        position += noise * np.random.default_rng(seed).standard_normal(count)
+        velocity = np.diff(position, prepend=position[0]) / 1e-3
+    stamp, unknown = np.arange(count) * 1_000_000, np.full(count, np.nan)
+    return SampleColumns(stamp, position, velocity, unknown, unknown, np.full(count, belt_speed))
+
+
+def measured(columns: SampleColumns, reading: Reading = NOISY) -> Measures:
+    meter = SampleMeter(20, reading=reading)
+    meter.feed(columns)
+    return meter.measures()
+
+
+def test_what_the_study_has_found_is_as_good_as_it_is_to_be() -> None:
+    assert COMMITTED["seeds"] == 200
+    assert len(COMMITTED["cases"]) == len(study.CASES)
+    assert study.shortfalls(COMMITTED) == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("case", study.CASES, ids=str)
+def test_a_twentieth_of_the_study_agrees_with_it(case: study.Case) -> None:
+    """The shares of so few seeds say little: of ten intervals of 95 %, seven must cover."""
+    (row,) = study.study(SEEDS, workers=1, cases=[case])["cases"]
+    (whole,) = (
+        each
+        for each in COMMITTED["cases"]
+        if (each["belt_speed"], each["resolution"], each["velocity_noise"])
+        == (case.belt_speed, case.resolution, case.velocity_noise)
+    )
+    assert row["regime_right"] == row["steady"] == 1.0
+    assert row["changing"] == 0.0
+    for name in study.MEASURES:
+        assert row[name]["rms"] <= 2.5 * whole[name]["rms"] + 1e-9
+        if case.resolution:
+            assert row[name]["covered"] >= 0.7
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.integers(1, 1999), max_size=6).map(sorted))
+def test_blocks_of_any_length_give_the_same(starts: list[int]) -> None:
+    columns = samples(noise=1e-6)
+    meter = SampleMeter(20, reading=NOISY)
+    cycles = [
+        cycle
+        for start, end in zip([0, *starts], [*starts, 2000], strict=True)
+        for cycle in meter.feed(columns[start:end])
+    ]
+    whole = SampleMeter(20, reading=NOISY)
+    assert cycles == whole.feed(columns)
+    assert meter.measures() == whole.measures()
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.lists(st.integers(1, 5999), max_size=6).map(sorted))
+def test_blocks_of_any_length_give_the_same_where_the_motion_comes_to_rest(
+    starts: list[int],
+) -> None:
+    columns = samples(noise=1e-6, count=6000)
+    decay = np.exp(-np.arange(6000) / 800.0)
+    position = 4e-4 + decay * (columns.position - 4e-4)
+    position += 1e-6 * np.random.default_rng(4).standard_normal(6000)
+    columns = replace(columns, position=position)
+    meter, whole = SampleMeter(20, reading=NOISY), SampleMeter(20, reading=NOISY)
+    for start, end in zip([0, *starts], [*starts, 6000], strict=True):
+        meter.feed(columns[start:end])
+    whole.feed(columns)
+    assert meter.measures() == whole.measures()
+    assert whole.measures().regime is Regime.EQUILIBRIUM
+
+
+@pytest.mark.parametrize(("noise", "noisy"), [(0.0, False), (1e-8, True), (1e-6, True)])
+def test_noise_of_which_nothing_is_told_is_found(noise: float, noisy: bool) -> None:
+    meter = SampleMeter(20, reading=UNKNOWN)
+    meter.feed(samples(noise=noise))
+    assert meter.noisy is noisy
+    assert meter.position_noise == (pytest.approx(noise, rel=0.2) if noisy else None)
+    measures = meter.measures()
+    assert measures.regime is Regime.STICK_SLIP
+    assert measures.stick_fraction == pytest.approx(0.10006, abs=1e-3)
+    assert measures.period == pytest.approx(0.0639242, rel=1e-5)
+
+
+def test_a_noisy_velocity_is_noise() -> None:
+    """A 40,000th of the belt speed."""
+    columns = samples()
+    noise = 1e-6 * np.random.default_rng(1).standard_normal(len(columns))
+    columns = replace(columns, velocity=columns.velocity + noise)
+    measures = measured(columns, UNKNOWN)
+    assert measures.regime is Regime.STICK_SLIP
+    assert measures.stick_fraction == pytest.approx(0.10006, abs=1e-5)
+
+
+def test_exact_samples_of_which_nothing_is_told_are_measured_as_exact_ones() -> None:
+    assert measured(samples(), UNKNOWN) == measured(samples(), EXACT)
+
+
+@pytest.mark.parametrize("direction", [-1.0, 1.0])
+def test_a_belt_that_moves_backward_gives_the_same(direction: float) -> None:
+    columns = samples(noise=1e-6)
+    turned = replace(
+        columns,
+        position=direction * columns.position,
+        velocity=direction * columns.velocity,
+        belt_velocity=direction * columns.belt_velocity,
+    )
+    measures = measured(turned)
+    assert measures.regime is Regime.STICK_SLIP
+    assert measures.stick_fraction == pytest.approx(0.1001, abs=2e-3)
+    assert measures.midpoint == pytest.approx(direction * 326.3e-6, rel=1e-3)
+
+
+def test_lost_samples_and_impulses_change_little() -> None:
+    """A twentieth of the samples is lost, and every hundredth is far off."""
+    columns = samples(noise=1e-6, count=3000)
+    random = np.random.default_rng(5)
+    position = columns.position.copy()
+    position[50::100] += 3e-4 * random.choice([-1.0, 1.0], 30)
+    kept = np.sort(random.choice(3000, 2850, replace=False))
+    measures = measured(replace(columns, position=position)[kept])
+    assert measures.regime is Regime.STICK_SLIP
+    assert measures.steady
+    assert measures.stick_fraction == pytest.approx(0.1001, abs=3e-3)
+    assert measures.amplitude == pytest.approx(434.09e-6, rel=2e-3)
+    assert measures.period == pytest.approx(0.0639242, rel=1e-4)
+
+
+def test_a_jittered_clock_changes_nothing_if_the_stamps_are_right() -> None:
+    position, velocity, _ = study.motion(0.04)
+    random = np.random.default_rng(2)
+    at = np.arange(2000) * 1e-3 + 2e-4 * random.random(2000)
+    grid = np.arange(len(position)) * 1e-3
+    from scipy.interpolate import CubicHermiteSpline
+
+    told = CubicHermiteSpline(grid, position, velocity)(at) + 1e-6 * random.standard_normal(2000)
+    columns = replace(samples(noise=1e-6), stamp=np.rint(at * 1e9).astype(np.int64), position=told)
+    measures = measured(columns)
+    assert measures.regime is Regime.STICK_SLIP
+    assert measures.stick_fraction == pytest.approx(0.1001, abs=3e-3)
+    assert measures.period == pytest.approx(0.0639242, rel=1e-4)
+
+
+def test_a_slide_at_rest_shows_its_noise_as_nothing() -> None:
+    """The amplitude has no bias by the noise: it is less than a third of its deviation."""
+    rest = samples(noise=1e-6)
+    noise = np.random.default_rng(0).standard_normal(2000)
+    rest = replace(rest, position=4e-4 + 1e-6 * noise)
+    measures = measured(rest)
+    assert measures.regime is Regime.EQUILIBRIUM
+    assert measures.midpoint == pytest.approx(4e-4, abs=2e-7)
+    assert measures.amplitude == pytest.approx(0.0, abs=4e-7)
+    stuck = measured(replace(rest, belt_velocity=np.zeros(2000)))
+    assert stuck.regime is Regime.STUCK
+
+
+def test_the_cycles_before_a_gap_count_until_there_are_others() -> None:
+    columns = samples(noise=1e-6, count=2050)
+    stamp = columns.stamp.copy()
+    stamp[2000:] += 12_345_678_901
+    measures = measured(replace(columns, stamp=stamp))
+    assert measures.cycles == 20
+    assert measures.regime is Regime.STICK_SLIP
+
+
+def test_the_memory_is_bounded() -> None:
+    """A window has 1300 samples; twice as many are held at most, and a little."""
+    meter = SampleMeter(20, reading=NOISY)
+    columns, held = samples(noise=1e-6, count=8000), []
+    for repeat in range(10):
+        meter.feed(replace(columns, stamp=columns.stamp + repeat * 8_000_000_000))
+        held.append(meter.held)
+    assert max(held) < 4000
+
+
+def test_below_three_cycles_nothing_is_said_of_steadiness_and_errors() -> None:
+    measures = measured(samples(noise=1e-6, count=220))
+    assert 0 < measures.cycles < 3
+    assert measures.steady is None
+    assert measures.errors is None
+    assert measured(samples(count=220), EXACT).errors is None
+    exact = measured(samples(), EXACT).errors
+    assert exact is not None
+    assert exact["amplitude"] < 1e-9
