@@ -18,12 +18,13 @@ from typing import TYPE_CHECKING, Any  # what takes time comes second
 from stickslip_ros.deprecated_names import find_moved_modules
 
 if TYPE_CHECKING:
-    from stickslip_ros.api.recordings import RecordedRun, read_bag
+    from stickslip_ros.api.recordings import RecordedRun, read_bag, read_table
     from stickslip_ros.api.runs import Run, simulate
     from stickslip_ros.api.scenarios import scenario
     from stickslip_ros.api.studies import Basin, Sweep, basin, sweep
     from stickslip_ros.api.theory import Proposal, Stability, design, stability
     from stickslip_ros.errors import StickslipError
+    from stickslip_ros.physics.measures.slips import SlipThreshold
     from stickslip_ros.scenarios.files import Scenario
 
     __version__: str
@@ -36,6 +37,7 @@ __all__ = [
     "RecordedRun",
     "Run",
     "Scenario",
+    "SlipThreshold",
     "Stability",
     "StickslipError",
     "Sweep",
@@ -43,6 +45,7 @@ __all__ = [
     "basin",
     "design",
     "read_bag",
+    "read_table",
     "scenario",
     "simulate",
     "stability",
@@ -50,12 +53,13 @@ __all__ = [
 ]
 
 _HOMES = {
-    "api.recordings": ("RecordedRun", "read_bag"),
+    "api.recordings": ("RecordedRun", "read_bag", "read_table"),
     "api.runs": ("Run", "simulate"),
     "api.scenarios": ("scenario",),
     "api.studies": ("Basin", "Sweep", "basin", "sweep"),
     "api.theory": ("Proposal", "Stability", "design", "stability"),
     "errors": ("StickslipError",),
+    "physics.measures.slips": ("SlipThreshold",),
     "scenarios.files": ("Scenario",),
 }
 

@@ -1,6 +1,6 @@
-"""Recorded runs: the samples in a bag, and their measures."""
+"""Recorded runs: the samples in a bag or a table, and their measures."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,9 +10,11 @@ import numpy as np
 from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
 from stickslip_ros.api.frames import Quantity, data_frame, data_set
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.bags.report import report_of_bag
+from stickslip_ros.bags.report import report_of_bag, report_of_table
 from stickslip_ros.physics.loop.trajectory import QUANTITIES
 from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
+from stickslip_ros.physics.measures.observer import RunObserver
+from stickslip_ros.physics.measures.slips import SlipThreshold
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.measure_table import measure_table
 from stickslip_ros.plots.run_history import RunHistory
@@ -32,12 +34,16 @@ _COLUMNS = {name: Quantity(*labelled) for name, labelled in QUANTITIES.items()} 
 }
 
 
+Part = SampleColumns | ForceColumns
+"""Consecutive joint states or control forces."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class RecordedRun(Shown):
     """A recorded run, or a part of it; it prints as a table of its measures."""
 
     path: Path
-    """The bag."""
+    """The bag, or the table."""
     samples: SampleColumns
     """Joint states: stamps and the motion, as numpy arrays."""
     forces: ForceColumns
@@ -136,6 +142,8 @@ def read_bag(
     start: float = 0.0,
     end: float = float("inf"),
     namespace: str | None = None,
+    belt_speed: float | None = None,
+    slips: SlipThreshold | None = None,
 ) -> RecordedRun:
     """Read a recorded run, and measure it.
 
@@ -147,6 +155,10 @@ def read_bag(
         Part to read, s from the first sample.
     namespace : str, optional
         ROS namespace of the drive, such as `/feed_drive`, where a bag holds several.
+    belt_speed : float, optional
+        Belt speed, m/s, of a bag whose joint states have a single joint.
+    slips : SlipThreshold, optional
+        What counts as a slip; by default slips are not looked for.
 
     Returns
     -------
@@ -167,28 +179,114 @@ def read_bag(
     >>> recorded.measures.regime.value, f"{recorded.measures.amplitude:.2e}"
     ('stick_slip', '3.26e-04')
     """
-    bag = Path(path)
+
+    def report(observer: RunObserver, take: Callable[[Part], None]) -> dict[str, Any]:
+        return report_of_bag(
+            Path(path),
+            start=start,
+            end=end,
+            namespace=namespace,
+            belt_speed=belt_speed,
+            slips=slips,
+            observer=observer,
+            take=take,
+        )
+
+    return _recorded_run(Path(path), report, recorded_drive(Path(path), namespace))
+
+
+def read_table(
+    path: Path | str,
+    columns: Mapping[str, str] | None = None,
+    *,
+    start: float = 0.0,
+    end: float = float("inf"),
+    stick_speed: float | None = None,
+    slips: SlipThreshold | None = None,
+) -> RecordedRun:
+    """Read a run from a CSV or MAT file, and measure it.
+
+    Parameters
+    ----------
+    path : Path or str
+        CSV file with a line of names, or MAT file of version 7 or older.
+    columns : mapping, optional
+        Where the file has `time`, `position`, `velocity`, `force`, `belt_velocity` and
+        `friction_force`: names of columns, numbers, and products of them, in SI units. By default
+        it is a file of `stickslip simulate --out`.
+    start, end : float
+        Part to read, s from the first sample.
+    stick_speed : float, optional
+        Largest relative speed of a slide that sticks, m/s, for samples without noise. By default
+        the noise is found from the samples.
+    slips : SlipThreshold, optional
+        What counts as a slip; by default slips are not looked for.
+
+    Returns
+    -------
+    RecordedRun
+        Samples, forces and measures.
+
+    Raises
+    ------
+    BagError
+        If the file cannot be read.
+    InvalidInputError
+        If a column is not there, or the part is empty.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import stickslip_ros as ss
+    >>> log = ss.simulate("feed_drive", duration=1.0).to_pandas().reset_index()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     log.to_csv(f"{folder}/log.csv", index=False)
+    ...     run = ss.read_table(f"{folder}/log.csv", {"time": "time", "position": "position",
+    ...         "velocity": "velocity", "belt_velocity": "0.04"})
+    >>> run.measures.regime.value, round(1e6 * run.measures.amplitude)
+    ('stick_slip', 434)
+    """
+
+    def report(observer: RunObserver, take: Callable[[Part], None]) -> dict[str, Any]:
+        return report_of_table(
+            Path(path),
+            columns,
+            start=start,
+            end=end,
+            stick_speed=stick_speed,
+            slips=slips,
+            observer=observer,
+            take=take,
+        )
+
+    return _recorded_run(Path(path), report, None)
+
+
+def _recorded_run(
+    path: Path,
+    report: Callable[[RunObserver, Callable[[Part], None]], dict[str, Any]],
+    drive: Drive | None,
+) -> RecordedRun:
+    """Return the run that a report is made of."""
     history = RunHistory()
     samples: list[SampleColumns] = []
     forces: list[ForceColumns] = []
 
-    def take(part: SampleColumns | ForceColumns) -> None:
+    def take(part: Part) -> None:
         if isinstance(part, SampleColumns):
             samples.append(part)
         else:
             forces.append(part)
 
-    report = report_of_bag(
-        bag, start=start, end=end, namespace=namespace, observer=history, take=take
-    )
+    made = report(history, take)
     nothing = np.empty(0)
     stamps = np.empty(0, dtype=np.int64)
     return RecordedRun(
-        bag,
+        path,
         SampleColumns(stamps, *[nothing] * 5).followed_by(*samples),
         ForceColumns(stamps, nothing).followed_by(*forces),
-        report,
-        recorded_drive(bag, namespace),
+        made,
+        drive,
         history,
     )
 

@@ -341,10 +341,38 @@ def namespace_of(text: str) -> str:
 
 def seconds(text: str) -> float:
     """Parse a time in seconds: finite, zero or more."""
+    return _not_negative(text, "a time in seconds")
+
+
+def speed(text: str) -> float:
+    """Parse a speed in m/s: finite, zero or more."""
+    return _not_negative(text, "a speed in m/s")
+
+
+def length(text: str) -> float:
+    """Parse a length in m: finite, above zero."""
+    value = _not_negative(text, "a length in m")
+    if value == 0.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a length in m above 0")
+    return value
+
+
+def velocity(text: str) -> float:
+    """Parse a velocity in m/s: finite."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a velocity in m/s")
+    return value
+
+
+def _not_negative(text: str, what: str) -> float:
     try:
         value = float(text)
     except ValueError:
         value = float("nan")
     if not (isfinite(value) and value >= 0.0):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a time in seconds, 0 or more")
+        raise argparse.ArgumentTypeError(f"{text!r} is not {what}, 0 or more")
     return value

@@ -5,9 +5,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.arguments import add_json, add_plot, check_figure, seconds, write_figure
+from stickslip_ros.app.arguments import (
+    add_json,
+    add_plot,
+    check_figure,
+    length,
+    seconds,
+    speed,
+    velocity,
+    write_figure,
+)
 from stickslip_ros.app.optional_dependencies import interrupts_kept
-from stickslip_ros.app.output import print_figures, print_json
+from stickslip_ros.app.output import print_figures, print_json, print_table
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.plots.why_no_cycle import why_no_cycle
 from stickslip_ros.text import printable
@@ -28,7 +37,41 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         help="bag directory, or one .mcap file; also one that is being recorded, cut off or "
-        "damaged: the readable part is measured, and a sentence names what is missing",
+        "damaged: the readable part is measured, and a sentence names what is missing. Or a table, "
+        ".csv or .mat: one of `stickslip simulate --out`, or any other with --columns",
+    )
+    parser.add_argument(
+        "--columns",
+        metavar="QUANTITY=COLUMN,...",
+        help="where a table has time, position, velocity, force, belt_velocity and friction_force: "
+        "names of columns, numbers and products of them, in SI units, as in "
+        "time=t,position=x,force=vir*35.15,belt_velocity=0.04",
+    )
+    parser.add_argument(
+        "--stick-speed",
+        type=speed,
+        metavar="V",
+        help="largest relative speed of a slide that sticks, m/s (default: as the analyzer used; "
+        "for a table 0)",
+    )
+    parser.add_argument(
+        "--belt-speed",
+        type=velocity,
+        metavar="V",
+        help="belt speed, m/s, for a bag whose joint states have a single joint, whatever its name",
+    )
+    parser.add_argument(
+        "--slips",
+        type=length,
+        metavar="M",
+        help="also find slips: drops of the position by more than this, m, one by one",
+    )
+    parser.add_argument(
+        "--slip-time",
+        type=seconds,
+        default=0.1,
+        metavar="S",
+        help="longest time in which a slip drops by as much, s (default: 0.1)",
     )
     parser.add_argument(
         "--from",
@@ -62,8 +105,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     with interrupts_kept():
-        from stickslip_ros.bags.report import report_of_bag
+        from stickslip_ros.bags.report import report_of_bag, report_of_table
+        from stickslip_ros.bags.table_file import is_table
+        from stickslip_ros.physics.measures.slips import SlipThreshold
         from stickslip_ros.plots.run_history import RunHistory
+        from stickslip_ros.plots.slip_table import slip_table
         from stickslip_ros.plots.units import Units
         from stickslip_ros.studies.recorded_drive import recorded_drive
     plot: Path | None = arguments.plot
@@ -74,16 +120,28 @@ def run(arguments: argparse.Namespace) -> int:
             f"--plot {plot}: draws at most {_MOST_DRAWN} bags, and {len({*bags})} were given"
         )
     histories = {} if plot is None else {str(bag): RunHistory() for bag in bags}
-    reports = {
-        str(bag): report_of_bag(
+    columns = _columns(arguments.columns)
+    if columns is not None and not any(map(is_table, bags)):
+        raise InvalidInputError(f"--columns {arguments.columns}: a bag has no columns")
+    slips = None if arguments.slips is None else SlipThreshold(arguments.slips, arguments.slip_time)
+    reports: dict[str, dict[str, Any]] = {}
+    for bag in dict.fromkeys(bags):
+        part = {"start": arguments.start, "end": arguments.end}
+        history, stick_speed = histories.get(str(bag)), arguments.stick_speed
+        if is_table(bag):
+            reports[str(bag)] = report_of_table(
+                bag, columns, **part, stick_speed=stick_speed, slips=slips, observer=history
+            )
+            continue
+        reports[str(bag)] = report_of_bag(
             bag,
-            start=arguments.start,
-            end=arguments.end,
+            **part,
             namespace=arguments.namespace,
-            observer=histories.get(str(bag)),
+            stick_speed=stick_speed,
+            belt_speed=arguments.belt_speed,
+            slips=slips,
+            observer=history,
         )
-        for bag in dict.fromkeys(bags)
-    }
     if plot is not None:
         _draw(arguments, histories, reports)
     if arguments.json:
@@ -99,6 +157,8 @@ def run(arguments: argparse.Namespace) -> int:
         {bag if several else "": Units.for_drive(drive) for bag, drive in drives.items()},
     )
     for bag, report in reports.items():
+        if report["slips"] is not None:
+            print_table(*slip_table(report["slips"], Units.for_drive(drives[bag])))
         sentences = [*report["missing"], *report["notes"]]
         if report["samples"] > 0:
             reason = why_no_cycle(report["regime"], report["duration"], drives[bag])
@@ -106,6 +166,22 @@ def run(arguments: argparse.Namespace) -> int:
         for sentence in sentences:
             print(printable(f"{bag}: {sentence}") if several else sentence)
     return 0
+
+
+def _columns(text: str | None) -> dict[str, str] | None:
+    """Return the columns that the option names, by quantity."""
+    if text is None:
+        return None
+    found: dict[str, str] = {}
+    for part in text.split(","):
+        quantity, equals, column = (each.strip() for each in part.partition("="))
+        if not (quantity and equals and column) or quantity in found:
+            raise InvalidInputError(
+                f"--columns {text}: must be QUANTITY=COLUMN,..., each quantity once, as in "
+                "time=t,position=x"
+            )
+        found[quantity] = column
+    return found
 
 
 def _draw(

@@ -6,6 +6,7 @@ import tempfile
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
@@ -19,7 +20,12 @@ from stickslip_ros.bags.mcap_file import McapFile
 from stickslip_ros.bags.metadata import metadata_faults
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.cdr import Refused
-from stickslip_ros.messages.codec import joint_states_in, references_in, wrenches_in
+from stickslip_ros.messages.codec import (
+    joint_states_in,
+    references_in,
+    single_joint_states_in,
+    wrenches_in,
+)
 from stickslip_ros.messages.topics import (
     APPLIED_DISTURBANCE,
     APPLIED_FORCE,
@@ -32,6 +38,7 @@ from stickslip_ros.messages.topics import (
     Topic,
 )
 from stickslip_ros.samples import ForceColumns, ReferenceColumns, SampleColumns
+from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import printable
 
 _PACKED = ".mcap.zstd"
@@ -76,6 +83,9 @@ class Recording:
     namespace : str or None
         ROS namespace of the drive whose columns are read, such as `/feed_drive`; None if the bag
         holds only one drive.
+    belt_speed : float or None
+        Belt speed, m/s, for joint states of a single joint, the slide. By default joint states must
+        have the belt, too.
 
     Raises
     ------
@@ -94,8 +104,12 @@ class Recording:
     []
     """
 
-    def __init__(self, path: Path | str, namespace: str | None = None) -> None:
+    def __init__(
+        self, path: Path | str, namespace: str | None = None, *, belt_speed: float | None = None
+    ) -> None:
         self.path = Path(path)
+        self._belt_speed = belt_speed
+        self._single = _SingleJoint(0.0 if belt_speed is None else belt_speed)
         self._namespace = namespace
         self._unreadable: list[str] = []
         self._refused: Counter[str] = Counter()
@@ -140,7 +154,14 @@ class Recording:
     @cached_property
     def joint_states(self) -> SampleColumns:
         """All joint states; raises BagError as `blocks` does."""
-        return self._whole(JOINT_STATES, joint_states_in)
+        name = self._topic(JOINT_STATES)
+        if self._belt_speed is None or not name:
+            return self._whole(JOINT_STATES, joint_states_in)
+        self._single = _SingleJoint(self._belt_speed)
+        blocks = [self._states(name, block, ids) for block, ids in self._blocks(name)]
+        if not blocks:
+            return self._whole(JOINT_STATES, joint_states_in)
+        return blocks[0].followed_by(*blocks[1:])
 
     @cached_property
     def true_joint_states(self) -> SampleColumns:
@@ -209,11 +230,12 @@ class Recording:
             fails to read it.
         """
         states, forces, dropped = map(self._topic, (JOINT_STATES, CONTROL_FORCE, DROPPED_FORCE))
+        self._single = _SingleJoint(self._belt_speed or 0.0)
         gathered: list[RunBlock] = []
         count = 0
         for messages, channels in self._blocks(states, forces, dropped):
             block = RunBlock(
-                self._decoded(states, messages, channels, joint_states_in),
+                self._states(states, messages, channels),
                 self._decoded(forces, messages, channels, wrenches_in),
                 self._decoded(dropped, messages, channels, wrenches_in),
             )
@@ -365,6 +387,18 @@ class Recording:
             for block in file.blocks([number for ids in channels.values() for number in ids]):
                 yield block, channels
 
+    @property
+    def velocity_estimated(self) -> bool:
+        """Whether velocities that are not recorded were estimated from the positions so far."""
+        return self._single.estimated
+
+    def _states(
+        self, topic: str, block: MessageBlock, channels: dict[str, list[int]]
+    ) -> SampleColumns:
+        if self._belt_speed is None:
+            return self._decoded(topic, block, channels, joint_states_in)
+        return self._single.completed(self._decoded(topic, block, channels, single_joint_states_in))
+
     def _decoded(
         self,
         topic: str,
@@ -387,6 +421,36 @@ class Recording:
             nothing = np.empty(0, np.int64)
             blocks = [decode(b"", nothing, nothing)[0]]
         return blocks[0].followed_by(*blocks[1:])
+
+
+class _SingleJoint:
+    """Completes the samples of a joint whose belt has a known speed, block by block."""
+
+    def __init__(self, belt_speed: float) -> None:
+        self._belt_speed = belt_speed
+        self._last: SampleColumns | None = None
+        self.estimated = False
+
+    def completed(self, samples: SampleColumns) -> SampleColumns:
+        """Return the samples with the velocity of the belt, and velocities from the positions.
+
+        A velocity that is not recorded is the difference to the position before it.
+        """
+        if len(samples) == 0:
+            return samples
+        unknown = np.isnan(samples.velocity)
+        velocity, belt = samples.velocity.copy(), samples.belt_velocity.copy()
+        belt[np.isnan(belt)] = self._belt_speed
+        if unknown.any():
+            self.estimated = True
+            whole = samples if self._last is None else self._last.followed_by(samples)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                steps = np.diff(whole.position) / (np.diff(whole.stamp) / NANOSECONDS)
+            if self._last is None:
+                steps = np.append(steps[:1] if len(steps) else [0.0], steps)
+            velocity[unknown] = steps[unknown]
+        self._last = samples[-1:]
+        return replace(samples, velocity=velocity, belt_velocity=belt)
 
 
 def _joined_blocks(blocks: Sequence[RunBlock]) -> RunBlock:

@@ -1,24 +1,31 @@
 """Report the measures and counts of a recorded run."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from math import inf
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.bags.reader import Recording
+from stickslip_ros.bags.table_file import read_table
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
-from stickslip_ros.physics.measures.observer import RunObserver
+from stickslip_ros.physics.measures.observer import Conclusions, RunObserver
+from stickslip_ros.physics.measures.reading import Reading, reading_of
 from stickslip_ros.physics.measures.run_meter import RunMeter
-from stickslip_ros.physics.measures.stick_speed import automatic_stick_speed
+from stickslip_ros.physics.measures.slips import SlipMeter, SlipThreshold
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.text import quantity
 
 _DEFAULT_WINDOW = 20
 """Cycles to average over for a bag of another recorder."""
+_NOISES = 6.0
+"""Least drop of a slip, in standard deviations of the noise, that is not noise."""
 _LONGEST = 9e9
 """Longest time, s, that stamps can express."""
 
@@ -30,6 +37,9 @@ def report_of_bag(
     end: float = float("inf"),
     window: int | None = None,
     namespace: str | None = None,
+    stick_speed: float | None = None,
+    belt_speed: float | None = None,
+    slips: SlipThreshold | None = None,
     observer: RunObserver | None = None,
     take: Callable[[SampleColumns | ForceColumns], None] = lambda _: None,
 ) -> dict[str, Any]:
@@ -50,6 +60,12 @@ def report_of_bag(
         as many as the analyzer used.
     namespace : str or None
         ROS namespace of the drive; None if the bag holds only one drive.
+    stick_speed : float or None
+        Largest relative speed of a slide that sticks, m/s; None: as the analyzer used.
+    belt_speed : float or None
+        Belt speed, m/s, of a bag whose joint states have a single joint.
+    slips : SlipThreshold or None
+        What counts as a slip; None: slips are not looked for.
     observer : RunObserver or None
         Receives the samples and cycles of the whole part, with times as in `start` and `end`.
     take : callable, optional
@@ -79,16 +95,18 @@ def report_of_bag(
     """
     if not start < end:
         raise InvalidInputError(f"the part from {start} s to {end} s is empty")
-    with Recording(path, namespace) as recording:
+    with Recording(path, namespace, belt_speed=belt_speed) as recording:
         meter = RunMeter(
             window or _window_at_recording(recording),
             dropped_known=recording.dropped_known,
             observer=observer,
-            stick_speed=stick_speed_at_recording(recording),
+            reading=reading_at_recording(recording, stick_speed),
         )
-        run = _RunReader(meter, start, end, observer, take)
+        run = _RunReader(meter, start, end, observer, take, slips)
         # Measuring each chunk by itself would take twice as long.
         for block in recording.blocks(least=20_000):
+            if recording.velocity_estimated and meter.motion.reading.noisy is None:
+                meter.motion.reading = Reading(noisy=True)
             run.feed(*block)
         run.finish()
         missing = recording.missing
@@ -107,7 +125,69 @@ def report_of_bag(
         raise InvalidInputError(f"{path} holds no samples from {start:g} s on{before}")
     if not run.has_states:
         missing.append("the bag holds no joint states: the motion is unknown")
-    return {**run.meter.report(), "complete": not missing, "missing": missing}
+    return {**run.report(), "complete": not missing, "missing": missing}
+
+
+def report_of_table(
+    path: Path,
+    columns: Mapping[str, str] | None = None,
+    *,
+    start: float = 0.0,
+    end: float = float("inf"),
+    window: int = _DEFAULT_WINDOW,
+    stick_speed: float | None = None,
+    slips: SlipThreshold | None = None,
+    observer: RunObserver | None = None,
+    take: Callable[[SampleColumns | ForceColumns], None] = lambda _: None,
+) -> dict[str, Any]:
+    """Return measures and counts of a CSV or MAT file, as `report_of_bag` does.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    columns : mapping, optional
+        What its columns are, see `read_table`.
+    start, end : float
+        Part that is measured, s from the first sample.
+    window : int
+        Number of whole cycles at the end of the part over which the measures are averaged.
+    stick_speed : float or None
+        Largest relative speed of a slide that sticks, m/s, for samples without noise. By default
+        the noise is found from the samples.
+    slips : SlipThreshold or None
+        What counts as a slip; None: slips are not looked for.
+    observer : RunObserver or None
+        Receives the samples and cycles of the part.
+    take : callable, optional
+        Receives samples and forces.
+
+    Returns
+    -------
+    dict
+        As `report_of_bag`; the notes also say what the table does not have.
+
+    Raises
+    ------
+    BagError
+        If the file cannot be read.
+    InvalidInputError
+        If a column is not there, or the part is empty.
+    """
+    if not start < end:
+        raise InvalidInputError(f"the part from {start} s to {end} s is empty")
+    table = read_table(path, columns)
+    reading = table.reading if stick_speed is None else Reading(stick_speed)
+    meter = RunMeter(window, observer=observer, reading=reading)
+    run = _RunReader(meter, start, end, observer, take, slips)
+    run.feed(table.samples, table.forces, table.forces[:0])
+    run.finish()
+    if run.measured == 0:
+        before = "" if end == float("inf") else f" and before {end:g} s"
+        raise InvalidInputError(f"{path} holds no samples from {start:g} s on{before}")
+    report = run.report()
+    notes = [*table.notes, *report["notes"]]
+    return {**report, "notes": notes, "complete": True, "missing": []}
 
 
 class _RunReader:
@@ -120,8 +200,12 @@ class _RunReader:
         end: float,
         observer: RunObserver | None,
         take: Callable[[SampleColumns | ForceColumns], None],
+        slips: SlipThreshold | None,
     ) -> None:
         self.meter = meter
+        self._slips = None if slips is None else SlipMeter(slips)
+        self._last_stamp = -1
+        self._belt_speed = 0.0
         self._observer, self._take = observer, take
         self.first: int | None = None
         """Stamp from which the instants count, ns, once it is known."""
@@ -141,6 +225,7 @@ class _RunReader:
             part = states[self._part(states.stamp, first)]
             self.measured += len(part)
             self.meter.motion.feed(part)
+            self._find_slips(part)
             self._take(part)
             if self._observer is not None:
                 time = (part.stamp - first) / NANOSECONDS
@@ -156,6 +241,37 @@ class _RunReader:
         """Measure what is still pending: the last forces, or all if there is no joint state."""
         self._begin_without_states()
         self.meter.finish()
+
+    def report(self) -> dict[str, Any]:
+        """Return the measures and counts, and the slips if they were looked for."""
+        report, slips = self.meter.report(), None
+        notes = report["notes"]
+        if self._slips is not None:
+            slips = self._slips.report(self._belt_speed)
+            noise, least = report["position_noise"], self._slips.threshold.drop
+            if noise is not None and least < _NOISES * noise:
+                notes = [
+                    *notes,
+                    f"the least drop of a slip, {quantity(least, 'm')}, is within the noise of the "
+                    f"positions, {quantity(noise, 'm')}: some slips are noise",
+                ]
+        if self._observer is not None:
+            self._observer.take_conclusions(Conclusions(self.meter.motion.mean_cycle, slips))
+        return {**report, "notes": notes, "slips": slips}
+
+    def _find_slips(self, part: SampleColumns) -> None:
+        if self._slips is None or len(part) == 0:
+            return
+        part = part[part.believed]
+        if len(part) == 0:
+            return
+        self._belt_speed = float(part.belt_velocity[-1])
+        forward = np.diff(part.stamp, prepend=self._last_stamp) > 0
+        part = part[forward]
+        sign = -1.0 if self._belt_speed < 0.0 else 1.0
+        self._slips.feed((part.stamp - (self.first or 0)) / NANOSECONDS, sign * part.position)
+        if len(part):
+            self._last_stamp = int(part.stamp[-1])
 
     def _begin_without_states(self) -> None:
         stamps = [forces.stamp[0] for forces, _ in self._early if len(forces.stamp) > 0]
@@ -180,19 +296,21 @@ class _RunReader:
         return (since >= self._start) & (since < self._end)
 
 
-def stick_speed_at_recording(recording: Recording) -> float | None:
-    """Return the stick speed for the samples of a recording, see `SampleMeter`."""
+def reading_at_recording(recording: Recording, given: float | None = None) -> Reading:
+    """Return how the samples of a recording are to be read, with a stick speed that is `given`."""
+    if given is not None:
+        return Reading(given)
     analyzer = recording.metadata("stickslip_ros/analyzer") or {}
     plant = recording.metadata("stickslip_ros/plant") or {}
     with suppress(KeyError, ValueError):
         given = float(analyzer["stick_speed"])
         if 0.0 <= given < inf:
-            return given
+            return Reading(given)
     known: dict[str, Any] = {}
     for name, text in plant.items():
         with suppress(RecursionError, ValueError):
             known[name] = json.loads(text)
-    return automatic_stick_speed(known)
+    return reading_of(known)
 
 
 def _window_at_recording(recording: Recording) -> int:

@@ -200,6 +200,17 @@ def joint_states_in(data: bytes, begin: IntArray, end: IntArray) -> tuple[Sample
     return SampleColumns(stamp, *values), refused
 
 
+def single_joint_states_in(
+    data: bytes, begin: IntArray, end: IntArray
+) -> tuple[SampleColumns, Refused]:
+    """Decode joint states as `joint_states_in`, also those of a single joint, which is the slide.
+
+    A single joint may lack its velocity. What a message lacks is NaN.
+    """
+    stamp, values, refused = decode(data, begin, end, _single_joint_layout, 5)
+    return SampleColumns(stamp, *values), refused
+
+
 def wrench_columns(messages: Sequence[bytes]) -> tuple[ForceColumns, Refused]:
     """Decode serialized wrenches; also return what `unpack_wrench` would refuse."""
     return wrenches_in(*joined(messages))
@@ -235,7 +246,8 @@ def _joint_state_layout(data: bytes) -> Layout:
     missing = [joint for joint in (SLIDE, BELT) if joint not in names]
     if missing:
         raise MessageError(
-            f"a joint state names the joints {shown}; {' and '.join(missing)} must be among them"
+            f"a joint state names the joints {shown}; {' and '.join(missing)} must be among them, "
+            "or the belt speed must be given for a single joint"
         )
     if (positions, velocities, efforts or len(names)) != (len(names),) * 3:
         raise MessageError(
@@ -254,6 +266,24 @@ def _joint_state_layout(data: bytes) -> Layout:
             velocity + belt,
         ],
     )
+
+
+def _single_joint_layout(data: bytes) -> Layout:
+    message = Decoder(data, "joint state")
+    stamp = message.header_stamp()
+    names = _joints(message, "joint state")
+    if SLIDE in names and BELT in names:
+        return _joint_state_layout(data)
+    places = [message.doubles(message.count()) for _ in range(3)]
+    counts = [count for _, count in places]
+    if len(names) != 1 or counts[0] != 1 or not {*counts[1:]} <= {0, 1}:
+        raise MessageError(
+            f"a joint state of the joints {reprlib.repr(names)} has {counts[0]} positions, "
+            f"{counts[1]} velocities and {counts[2]} efforts; must be of {SLIDE} and {BELT}, or of "
+            "a single joint with one position, and one or no velocity and effort"
+        )
+    values = [place if count else None for place, count in places]
+    return Layout(message, stamp, [*values, None, None])
 
 
 def _reference_layout(data: bytes) -> Layout:

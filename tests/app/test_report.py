@@ -109,7 +109,7 @@ def test_a_picture_says_what_a_bag_lacks(command, tmp_path):
     assert command("report", tmp_path / "bag", "--plot", picture)[0] == 0
     shown = texts(picture)
     assert any(text.startswith("metadata.yaml is missing") for text in shown)
-    assert "the bag does not say what drive it was: no equilibrium, no friction law" in shown
+    assert "it is not recorded what drive it was: no equilibrium, no friction law" in shown
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,123 @@
+"""`stickslip report` of tables: our own CSV files, and those of others."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stickslip_ros as ss
+from tests.app.conftest import Run
+
+
+@pytest.fixture
+def log(stickslip: Run, tmp_path: Path) -> Path:
+    """A simulated run as a table."""
+    given = ("feed_drive", "--no-control", "--duration", "2", "--out", "log.csv")
+    done = stickslip("simulate", *given)
+    assert done.returncode == 0, done.stderr
+    return tmp_path / "log.csv"
+
+
+def test_our_own_table_is_measured_as_the_samples_of_a_run(stickslip: Run, log: Path) -> None:
+    done = stickslip("report", "log.csv", "--json")
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout)
+    run = ss.simulate(ss.scenario("feed_drive", expects_control=False), duration=2.0)
+    assert report["regime"] == "stick_slip"
+    assert report["amplitude"] == pytest.approx(run.measures.amplitude, rel=1e-4)
+    assert report["period"] == pytest.approx(run.measures.period, rel=1e-5)
+    assert (report["bag"], report["samples"], report["notes"]) == ("log.csv", 2001, [])
+
+
+def test_any_other_table_is_measured_with_its_columns(stickslip: Run, log: Path) -> None:
+    columns = "time=time,position=position,velocity=velocity,belt_velocity=0.04,force=velocity*-2"
+    done = stickslip("report", str(log), "--columns", columns, "--plot", "log.png", "--from", "1")
+    assert done.returncode == 0, done.stderr
+    assert "stick-slip" in done.stdout
+    assert "434.1" in done.stdout
+    recorded = ss.read_table(log, dict(part.split("=") for part in columns.split(",")))
+    assert recorded.measures.regime == "stick_slip"
+    assert recorded.forces.force == pytest.approx(-2.0 * recorded.samples.velocity)
+    assert len(recorded.to_pandas()) == 2001
+    assert recorded.plot() is not None
+
+
+def test_what_a_sensor_tells_is_measured(stickslip: Run, tmp_path: Path) -> None:
+    scenario = ss.scenario("feed_drive", expects_control=False, sensor_position_resolution=1e-4)
+    table = ss.simulate(scenario, duration=1.0).to_pandas().reset_index()
+    table.to_csv(tmp_path / "log.csv", index=False)
+    recorded = ss.read_table(tmp_path / "log.csv")
+    steps = recorded.samples.position / 1e-4
+    assert steps == pytest.approx(np.rint(steps), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("log.csv", "--columns", "time"), "must be QUANTITY=COLUMN"),
+        (("log.csv", "--columns", "time=time,time=t"), "each quantity once"),
+        (("log.csv", "--columns", "time=t,position=position"), "has no column 't'"),
+        (("log.csv", "--from", "9"), "holds no samples from 9 s on"),
+        (("log.csv", "--stick-speed", "-1"), "is not a speed in m/s, 0 or more"),
+        (("none.csv",), "No such file"),
+        (("bag", "--columns", "time=t,position=x"), "a bag has no columns"),
+    ],
+)
+def test_a_mistake_is_refused_in_one_line(
+    stickslip: Run, log: Path, arguments: tuple[str, ...], sentence: str
+) -> None:
+    done = stickslip("report", *arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert sentence in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_slips_are_told_one_by_one(stickslip: Run, tmp_path: Path) -> None:
+    """A tooth each second, 1 mm high."""
+    time = np.arange(20_000) * 1e-3
+    noise = 1e-6 * np.random.default_rng(1).standard_normal(20_000)
+    table = np.column_stack([time, 1e-3 * (time % 1.0) + noise])
+    np.savetxt(tmp_path / "saw.csv", table, delimiter=",", header="t,x", comments="")
+    given = ("saw.csv", "--columns", "time=t,position=x,belt_velocity=1e-3", "--slips", "1e-4")
+    done = stickslip("report", *given, "--plot", "saw.png")
+    assert done.returncode == 0, done.stderr
+    assert "19 slips of more than 100 µm: stick-slip" in done.stdout
+    assert "velocity while sticking" in done.stdout
+    assert (tmp_path / "saw.png").stat().st_size > 10_000
+    report = json.loads(stickslip("report", *given, "--json").stdout)
+    slips = report["slips"]
+    assert slips["count"] == len(slips["each"]["drop"]) == 19
+    assert slips["drop"]["mean"] == pytest.approx(1e-3, rel=0.01)
+    assert slips["stick_velocity"]["mean"] == pytest.approx(1e-3, rel=0.01)
+    assert slips["each"]["stick_time"][0] is None
+    assert report["position_noise"] == pytest.approx(1e-6, rel=0.1)
+
+
+def test_slips_within_the_noise_are_doubted(stickslip: Run, tmp_path: Path) -> None:
+    noise = 1e-5 * np.random.default_rng(1).standard_normal(3000)
+    table = np.column_stack([np.arange(3000) * 1e-3, noise])
+    np.savetxt(tmp_path / "noise.csv", table, delimiter=",", header="t,x", comments="")
+    done = stickslip(
+        "report", "noise.csv", "--columns", "time=t,position=x,belt_velocity=1", "--slips", "1e-5"
+    )
+    assert done.returncode == 0, done.stderr
+    assert "is within the noise of the positions" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "sentence"),
+    [
+        ("--slips", "0", "is not a length in m above 0"),
+        ("--slips", "far", "is not a length in m"),
+        ("--belt-speed", "inf", "is not a velocity in m/s"),
+        ("--slip-time", "0", "within = 0.0 is refused: must be above 0 (s)"),
+    ],
+)
+def test_options_that_are_nonsense_are_refused(
+    stickslip: Run, log: Path, option: str, value: str, sentence: str
+) -> None:
+    slips = () if option == "--slips" else ("--slips", "1e-4")
+    done = stickslip("report", str(log), *slips, option, value)
+    assert done.returncode == 2
+    assert sentence in done.stderr

@@ -1,0 +1,149 @@
+"""Tables of other machines as recordings: CSV and MAT files, and what is refused of them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from stickslip_ros.bags.report import report_of_table
+from stickslip_ros.bags.table_file import is_table, read_table
+from stickslip_ros.errors import BagError, InvalidInputError
+
+TIME = np.arange(2001) * 1e-3
+POSITION = 1e-4 * np.sin(20.0 * np.pi * TIME)
+VELOCITY = 2e-3 * np.pi * np.cos(20.0 * np.pi * TIME)
+COLUMNS = {"time": "t", "position": "x", "velocity": "v", "force": "u*2.5", "belt_velocity": "0.04"}
+
+
+def csv_of(path: Path, separator: str = ",", **columns: Any) -> Path:
+    lines = [separator.join(columns)]
+    lines += [separator.join(map(repr, row)) for row in zip(*columns.values(), strict=True)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def lists(**columns: Any) -> dict[str, list[float]]:
+    return {name: np.asarray(values).tolist() for name, values in columns.items()}
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_a_csv_file_is_read_to_the_last_digit(tmp_path: Path, separator: str) -> None:
+    table = lists(t=TIME + 5.0, x=POSITION, v=VELOCITY, u=POSITION * 1e6, unused=TIME)
+    recording = read_table(csv_of(tmp_path / "log.csv", separator, **table), COLUMNS)
+    samples, forces = recording.samples, recording.forces
+    assert samples.stamp.tolist() == [1_000_000 * number for number in range(2001)]
+    assert samples.position.tolist() == POSITION.tolist()
+    assert samples.velocity.tolist() == VELOCITY.tolist()
+    assert samples.belt_velocity.tolist() == [0.04] * 2001
+    assert forces.force.tolist() == (POSITION * 1e6 * 2.5).tolist()
+    assert recording.notes == ()
+
+
+def test_a_mat_file_gives_the_same(tmp_path: Path) -> None:
+    path = tmp_path / "log.mat"
+    table = {"t": TIME[:, None], "x": POSITION[None, :], "v": VELOCITY, "u": POSITION, "gain": 1e6}
+    savemat(path, {**table, "name": "a machine", "other": np.eye(3)})
+    recording = read_table(path, {**COLUMNS, "force": "u*gain*2.5"})
+    assert recording.samples.position.tolist() == POSITION.tolist()
+    assert recording.forces.force == pytest.approx(POSITION * 2.5e6, rel=1e-15)
+
+
+def test_a_report_of_a_table_has_the_measures(tmp_path: Path) -> None:
+    table = lists(t=TIME, x=POSITION, v=VELOCITY, u=np.ones(2001))
+    path = csv_of(tmp_path / "log.csv", **table)
+    report = report_of_table(path, COLUMNS)
+    assert report["amplitude"] == pytest.approx(1e-4, rel=1e-9)
+    assert report["period"] == pytest.approx(0.1, rel=1e-9)
+    assert report["regime"] == "pure_slip"
+    assert report["peak_force"] == 2.5
+    assert (report["complete"], report["missing"], report["notes"]) == (True, [], [])
+    part = report_of_table(path, COLUMNS, start=0.5, end=1.0)
+    assert (part["samples"], part["duration"]) == (500, pytest.approx(0.499))
+    slow = report_of_table(path, {**COLUMNS, "belt_velocity": "0.0"}, stick_speed=1e-3)
+    assert slow["stick_fraction"] > 0.05
+
+
+def test_a_velocity_that_is_missing_is_a_difference(tmp_path: Path) -> None:
+    path = csv_of(tmp_path / "log.csv", **lists(t=TIME, x=POSITION))
+    recording = read_table(path, {"time": "t", "position": "x"})
+    assert recording.samples.velocity[1:-1] == pytest.approx(VELOCITY[1:-1], abs=1e-5)
+    assert [note.partition(" is")[0] for note in recording.notes] == [
+        "the velocity",
+        "the belt velocity",
+    ]
+    report = report_of_table(path, {"time": "t", "position": "x"})
+    assert report["amplitude"] == pytest.approx(1e-4, rel=1e-3)
+    assert report["notes"] == list(recording.notes)
+
+
+def test_cells_and_times_that_are_no_numbers_are_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,x\n0,1\n,2\n0.2,\n0.3,nan\n0.4,5\n")
+    recording = read_table(path, {"time": "t", "position": "x"})
+    assert recording.samples.stamp.tolist() == [0, 200_000_000, 300_000_000, 400_000_000]
+    assert np.isnan(recording.samples.position).tolist() == [False, True, True, False]
+    assert recording.samples.believed.tolist()[1:3] == [False, False]
+
+
+def test_only_tables_are_tables() -> None:
+    assert is_table(Path("a/log.CSV"))
+    assert is_table(Path("log.mat"))
+    assert not is_table(Path("bags/reference"))
+    assert not is_table(Path("reference_0.mcap"))
+
+
+@pytest.mark.parametrize(
+    ("columns", "sentence"),
+    [
+        ({"time": "t", "position": "y"}, "has no column 'y'"),
+        ({"time": "t", "position": "x*"}, "has no column ''"),
+        ({"time": "t", "position": "x/2"}, "has no column 'x/2'"),
+        ({"time": "t"}, "no column is given for position"),
+        ({"time": "3", "position": "x"}, "time = 3 must be a column"),
+        ({"time": "t", "position": "x", "speed": "v"}, "column speed is refused"),
+        ({"time": "t*1e12", "position": "x"}, "differ by more than 9e+09 s"),
+        ({"time": "t*nan", "position": "x"}, "no time is a finite number"),
+        (None, "not those of `stickslip simulate --out`"),
+    ],
+)
+def test_columns_that_make_no_recording_are_refused(
+    tmp_path: Path, columns: dict[str, str] | None, sentence: str
+) -> None:
+    path = csv_of(tmp_path / "log.csv", **lists(t=TIME, x=POSITION, v=VELOCITY))
+    with pytest.raises(InvalidInputError) as refused:
+        read_table(path, columns)
+    assert sentence in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("log.csv", b""),
+        ("log.csv", b"t\n1\n"),
+        ("log.csv", b"t,t\n1,2\n"),
+        ("log.csv", b"t,x\n"),
+        ("log.csv", b"t,x\n1,2,3\n1,2,3\n"),
+        ("log.csv", b"t,x\n1,2\n1\n"),
+        ("log.csv", b"\xff\xfe\x00t,x"),
+        ("log.csv", b"t,x\n1,2\n\x00\xff,3\n"),
+        ("log.mat", b""),
+        ("log.mat", b"no mat file at all, but long enough for a heading" * 9),
+        ("log.mat", b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(400)),
+    ],
+)
+def test_a_file_that_is_no_table_is_refused(tmp_path: Path, name: str, content: bytes) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(BagError) as refused:
+        read_table(path, {"time": "t", "position": "x"})
+    assert str(path) in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    for name in ("none.csv", "none.mat"):
+        with pytest.raises(BagError, match="No such file"):
+            read_table(tmp_path / name)
