@@ -21,5 +21,5 @@ def recorded_run_figure(
     """
     notes = [*report["missing"], *report["notes"]]
     if drive is None:
-        notes.append("the bag does not say what drive it was: no equilibrium, no friction law")
+        notes.append("it is not recorded what drive it was: no equilibrium, no friction law")
     return run_figure(history, measures_of(report), drive, title=str(bag), notes=notes)

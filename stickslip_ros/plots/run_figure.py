@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.plots.conclusions import draw_conclusions
 from stickslip_ros.plots.decimation import intervals, peaks
 from stickslip_ros.plots.panes import (
     LEAST_SPAN,
@@ -77,11 +78,16 @@ def run_figure(
         drive = replace(drive, belt_speed=float(motion.belt_velocity[-1]))
     last = history.end(end_duration(motion, measures, drive))
     panels = _Panels(history, drive, last if len(last.time) > 1 else history.end(float("inf")))
-    figure = Figure(figsize=(12.0, 10.0))
+    concluded = history.conclusions
+    rows = 3 if concluded.mean_cycle is not None or concluded.slips is not None else 2
+    figure = Figure(figsize=(12.0, 10.0 if rows == 2 else 12.5))
     if history.left_out:
         notes = [*notes, f"not drawn: {history.left_out} samples without an increasing time"]
     set_title(figure, title, measures_text(measures, panels.units), *notes)
-    above, below = figure.add_gridspec(2, 1, height_ratios=(3.0, 1.9))
+    grid = figure.add_gridspec(rows, 1, height_ratios=(3.0, 1.9, 1.2)[:rows])
+    above, below = grid[0], grid[1]
+    if rows == 3:
+        draw_conclusions(figure, grid[2].subgridspec(1, 3), concluded, panels.units)
     panels.over_time(figure, above.subgridspec(3, 2, width_ratios=(2.0, 1.0)))
     left, middle, right = below.subgridspec(1, 3)
     panels.portrait(figure.add_subplot(left))

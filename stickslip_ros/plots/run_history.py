@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
-from stickslip_ros.physics.measures.observer import MeasuredMotion
+from stickslip_ros.physics.measures.observer import Conclusions, MeasuredMotion
 from stickslip_ros.physics.measures.sampling_grid import LONGEST_GAP
 from stickslip_ros.plots.decimation import Trace
 from stickslip_ros.samples import LARGEST
@@ -46,6 +46,8 @@ class RunHistory:
         """Force (N) over the time from which it acts or is requested."""
         self.dropped = Trace(1)
         """Force (N) that was requested and did not act, as far as known."""
+        self.conclusions = Conclusions(None, None)
+        """What was concluded from a record."""
         self._motion, self._cycles = Trace(4), Trace(2)
         self._first: list[DrawnMotion] = []
         self._first_rows = 0
@@ -74,6 +76,10 @@ class RunHistory:
         """End time (s) of each cycle, its amplitude (m) and its stick fraction."""
         time, amplitude, stick_fraction = self._cycles.columns()
         return time, amplitude, stick_fraction
+
+    def take_conclusions(self, conclusions: Conclusions) -> None:
+        """Keep what was concluded."""
+        self.conclusions = conclusions
 
     def take_motion(self, motion: MeasuredMotion) -> None:
         """Add the next part of the motion."""

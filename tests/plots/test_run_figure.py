@@ -12,10 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import stickslip_ros as ss
+from benchmarks.measures_under_noise import motion
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.physics.measures.cycle_measures import Cycle, CycleMeter, Measures
-from stickslip_ros.physics.measures.observer import MeasuredMotion
+from stickslip_ros.physics.measures.observer import Conclusions, MeasuredMotion
+from stickslip_ros.physics.measures.reading import Reading
 from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
@@ -443,3 +445,27 @@ def test_friction_with_a_memory_is_drawn_as_its_loop() -> None:
     assert 1000.0 * (table["velocity"] - 0.04).to_numpy() == pytest.approx(speed, abs=1e-9)
     assert (table["friction_force"] / 1000.0).to_numpy() == pytest.approx(coefficient, abs=1e-12)
     assert len(speed) > LAST_CYCLES * 60
+
+
+def test_what_was_concluded_of_a_noisy_record_is_shown() -> None:
+    """Raw samples, the fit, and the edges of the stick with their intervals."""
+    position, velocity, _ = motion(0.04)
+    noise = 1e-6 * np.random.default_rng(1).standard_normal(2000)
+    stamp, unknown = np.arange(2000) * 1_000_000, np.full(2000, np.nan)
+    samples = SampleColumns(
+        stamp, position[:2000] + noise, velocity[:2000], unknown, unknown, np.full(2000, 0.04)
+    )
+    history = RunHistory()
+    meter = SampleMeter(20, history, reading=Reading(noisy=True))
+    meter.feed(samples)
+    figure = run_figure(history, meter.measures(), None, title="")
+    rows = len(figure.axes)
+    history.take_conclusions(Conclusions(meter.mean_cycle, None))
+    figure = run_figure(history, meter.measures(), None, title="")
+    assert len(figure.axes) == rows + 2
+    (axes,) = (each for each in figure.axes if "mean cycle" in each.get_title())
+    labels = [text.get_text() for text in axes.texts]
+    assert any("landing ±" in label for label in labels)
+    assert any("departure ±" in label for label in labels)
+    raw, fitted = axes.lines[:2]
+    assert len(raw.get_xdata()) == len(fitted.get_xdata()) > 1200
