@@ -451,7 +451,8 @@ class NoisyCycleMeter:
         belt = float(np.median(part.belt))
         if float(np.ptp(part.belt)) > 1e-6 * abs(belt):
             return None
-        return fit_mean_cycle(part.time, part.position, belt, np.array(starts), self.noise)
+        with np.errstate(over="ignore", invalid="ignore"):  # squares of very large positions
+            return fit_mean_cycle(part.time, part.position, belt, np.array(starts), self.noise)
 
     def _trend(self, amplitudes: FloatArray) -> Trend | None:
         """Return the change of the amplitude over the window; None without one."""
@@ -497,7 +498,8 @@ def _stick_time(time: FloatArray, velocity: FloatArray, belt_speed: float, error
     # A slide that passes the belt and moves on does not stick.
     riding = np.flatnonzero(np.abs(velocity - belt_speed) < margin)
     highest = float(velocity.max())
-    if not belt_speed - margin / 2.0 <= highest <= _PASSING * belt_speed + 2.0 * error:
+    near = belt_speed - margin / 2.0 <= highest <= _PASSING * belt_speed + 2.0 * error
+    if not near or len(riding) == 0:
         return 0.0
     first, last = int(riding[0]), int(riding[-1])
 
