@@ -216,7 +216,8 @@ class ClosedLoop:
             for node in (nodes.plant, nodes.analyzer):
                 if node.active:
                     node.trigger_deactivate()
-        result = result_of(self._bag_of_run, self.scenario.analyzer.window, diagnostics)
+        window, reading = self.scenario.analyzer.window, self.scenario.reading
+        result = result_of(self._bag_of_run, window, reading, diagnostics)
         if result.lost_samples and self.scenario.plant.pace == "lockstep":
             raise RunError(f"the recording of the run failed: {result.lost_samples} samples lost")
         return result

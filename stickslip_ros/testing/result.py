@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags import Recording
-from stickslip_ros.bags.report import reading_at_recording
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.measures.cycle_measures import Measures
+from stickslip_ros.physics.measures.reading import Reading
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.samples import ForceColumns, SampleColumns
 
@@ -84,7 +84,9 @@ class RunResult:
         return (self.forces.stamp - self.states.stamp[0]) * 1e-9
 
 
-def result_of(bag: Path, window: int, diagnostics: dict[str, Diagnostics]) -> RunResult:
+def result_of(
+    bag: Path, window: int, reading: Reading, diagnostics: dict[str, Diagnostics]
+) -> RunResult:
     """Read a run and measure it over the last `window` cycles.
 
     Raises RunError if the recording is incomplete, BagError if it cannot be read.
@@ -94,7 +96,6 @@ def result_of(bag: Path, window: int, diagnostics: dict[str, Diagnostics]) -> Ru
         disturbances, dropped = recording.applied_disturbances, recording.dropped_forces
         if not recording.complete:
             raise RunError(f"the recording of the run failed: {'; '.join(recording.missing)}")
-        reading = reading_at_recording(recording)
     meter = RunMeter(window, reading=reading)
     meter.motion.feed(states)
     meter.feed_forces(forces, dropped)

@@ -1,16 +1,15 @@
 """Noise of a record, found from the record itself."""
 
-from itertools import pairwise
 from math import comb
 
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 
-_ORDERS = (6, 8, 10, 12)
+_ORDERS = (6, 8, 10, 12, 14)
 """Orders of the differences that suppress the motion and leave the noise."""
 _AGREEING = 1.4
-"""Ratio of the noise by two orders up to which both have found noise."""
+"""Ratio of the noise by one order to that by the next, up to which both have found noise."""
 _NORMAL_MEDIAN = 0.6745
 """Median magnitude of a normal variable of deviation 1."""
 _IMPULSE = 10.0
@@ -23,8 +22,8 @@ def white_noise(signal: FloatArray) -> float:
     """Return the standard deviation of the white noise of a signal sampled at equal steps.
 
     High differences suppress a smooth motion: at 60 samples per cycle the sixth leaves a millionth
-    of it. Their median is robust against stick edges and impulses. Where the differences of no two
-    orders agree they are of the motion itself, and the noise counts as zero.
+    of it. Their median is robust against stick edges and impulses. Where no three successive
+    orders agree, the differences are of the motion itself, and the noise counts as zero.
 
     Parameters
     ----------
@@ -44,10 +43,14 @@ def white_noise(signal: FloatArray) -> float:
         float(np.median(np.abs(np.diff(signal, order)))) / (comb(2 * order, order) ** 0.5)
         for order in _ORDERS
     ]
-    for lower, higher in pairwise(deviations):
-        if lower / _AGREEING < higher < _AGREEING * lower:
-            return higher / _NORMAL_MEDIAN
+    for low, middle, high in zip(deviations, deviations[1:], deviations[2:], strict=False):
+        if _agree(low, middle) and _agree(middle, high):
+            return middle / _NORMAL_MEDIAN
     return 0.0
+
+
+def _agree(lower: float, higher: float) -> bool:
+    return lower / _AGREEING < higher < _AGREEING * lower
 
 
 def impulses(signal: FloatArray, noise: float) -> BoolArray:

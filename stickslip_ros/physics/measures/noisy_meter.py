@@ -11,6 +11,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.physics.measures.cycle_fit import MeanCycle, fit_mean_cycle
 from stickslip_ros.physics.measures.cycle_measures import (
+    EQUILIBRIUM_SPEED,
     LEAST_CYCLES,
     STALE_PERIODS,
     Cycle,
@@ -40,7 +41,7 @@ _STEP = 32
 """Number of samples after which cycles are looked for."""
 _LOOKS = 512
 """Number of samples after which the noise is estimated anew."""
-_FIRST_LOOK = 64
+_FIRST_LOOK = 128
 """Number of samples after which the noise is estimated first."""
 _LOOKED_AT = 2048
 """Number of samples from which the noise is estimated."""
@@ -50,6 +51,8 @@ _MARGIN = 64
 """Number of samples that are kept before the window, for the fits at its start."""
 _ROUNDING = 1e-7
 """Noise below this share of the motion is rounding, or an imperfection of the estimate."""
+_PRECISION = 1e-12
+"""Noise below this share of the largest values is rounding of the numbers, not of a sensor."""
 _SLIPPING = 0.1
 """Share of the belt speed by which a slide at rest may seem to move."""
 
@@ -141,6 +144,7 @@ class NoisyCycleMeter:
         self.ends: list[float] = []
         """Time, s, at which each cycle ended that `feed` returned last."""
         self._count = 0
+        self._fastest_belt = 0.0
         self._held, self._before = _Held(), _Window(_NO_SAMPLES, (), ())
         self.interrupt()
 
@@ -178,6 +182,7 @@ class NoisyCycleMeter:
         self.ends = []
         completed: list[Cycle] = []
         new = _Samples(time, position, velocity, belt, position)
+        self._fastest_belt = max(self._fastest_belt, float(np.abs(belt).max(initial=0.0)))
         while len(new.time) > 0:
             due = _STEP - self._count % _STEP
             part, new = new.part(slice(due)), new.part(slice(due, None))
@@ -203,32 +208,32 @@ class NoisyCycleMeter:
             held, cycles, starts = self._before
         elif not cycles or self._resting():
             return self._rest(), None
-        mean = None if quick else self._fit(held, starts)
-        if mean is not None:
-            count = len(cycles)
-            regime = Regime.STICK_SLIP if mean.sticks else Regime.PURE_SLIP
-            trend = self._trend(mean.amplitudes)
-            return Measures(
-                **mean.cycle._asdict(),
-                cycles=count,
-                regime=regime,
-                steady=trend is None,
-                trend=trend,
-                errors=mean.errors._asdict(),
-            ), mean
-        means = Cycle(*np.mean(cycles, axis=0).tolist())
+        fit = None if quick else self._fit(held, starts)
+        if fit is not None:
+            mean, amplitudes, sticks = fit.cycle, fit.amplitudes, fit.sticks
+            errors = fit.errors._asdict()
+        else:
+            mean = Cycle(*np.mean(cycles, axis=0).tolist())
+            amplitudes = np.array([cycle.amplitude for cycle in cycles])
+            # Half of the cycles: a single one may seem to stick for a moment.
+            sticks = 2 * sum(cycle.stick_fraction > 0.0 for cycle in cycles) > len(cycles)
+            errors = errors_of_means(cycles)
         enough = len(cycles) >= LEAST_CYCLES
-        trend = self._trend(np.array([cycle.amplitude for cycle in cycles])) if enough else None
-        # Half of the cycles: a single one may seem to stick for a moment.
-        sticking = sum(cycle.stick_fraction > 0.0 for cycle in cycles)
-        return Measures(
-            **means._asdict(),
-            cycles=len(cycles),
-            regime=Regime.STICK_SLIP if 2 * sticking > len(cycles) else Regime.PURE_SLIP,
-            steady=trend is None if enough else None,
-            trend=trend,
-            errors=errors_of_means(cycles),
-        ), None
+        trend = self._trend(amplitudes) if enough else None
+        steady, count = trend is None if enough else None, len(cycles)
+        moving = float(held.belt[-1]) != 0.0
+        if moving and mean.velocity_amplitude < EQUILIBRIUM_SPEED * self._fastest_belt:
+            found = without_cycles(mean, Regime.EQUILIBRIUM, count, steady=steady, trend=trend)
+        else:
+            found = Measures(
+                **mean._asdict(),
+                cycles=count,
+                regime=Regime.STICK_SLIP if sticks else Regime.PURE_SLIP,
+                steady=steady,
+                trend=trend,
+                errors=errors,
+            )
+        return found, fit
 
     @property
     def _least(self) -> float:
@@ -257,10 +262,11 @@ class NoisyCycleMeter:
         recent = self._held.samples.part(slice(-_LOOKED_AT, None))
         noise = white_noise(recent.position)
         moved = float(np.ptp(recent.median)) if len(self._held) > 0 else 0.0
-        if noise > _ROUNDING * moved:
+        farthest = float(np.abs(recent.position).max(initial=0.0))
+        if noise > max(_ROUNDING * moved, _PRECISION * farthest):
             self.noise, self.noisy = noise, True
         fastest = float(np.abs(recent.velocity).max(initial=0.0))
-        if white_noise(recent.velocity) > _ROUNDING * fastest:
+        if white_noise(recent.velocity) > max(_ROUNDING * fastest, _PRECISION * self._fastest_belt):
             self.noisy = True
 
     def _advance(self) -> list[Cycle]:

@@ -128,6 +128,40 @@ def test_exact_samples_of_which_nothing_is_told_are_measured_as_exact_ones() -> 
     assert measured(samples(), UNKNOWN) == measured(samples(), EXACT)
 
 
+@pytest.mark.parametrize("decay", [2.0, 20.0, 60.0])  # 1/s
+@pytest.mark.parametrize("count", [200, 501, 3000])
+def test_rounding_of_numbers_in_a_motion_that_dies_out_is_no_noise(
+    decay: float, count: int
+) -> None:
+    """Down to the last digit of the resting position, as a controller leaves it."""
+    time = np.arange(count) * 1e-3
+    part = 1e-5 * np.exp(-decay * time)
+    position, velocity = 4e-4 + part * np.sin(100.0 * time), 100.0 * part * np.cos(100.0 * time)
+    unknown, belt = np.full(count, np.nan), np.full(count, 0.04)
+    stamp = np.arange(count) * 1_000_000
+    columns = SampleColumns(stamp, position, velocity, unknown, unknown, belt)
+    assert measured(columns, UNKNOWN) == measured(columns, EXACT)
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "regime"), [(0.5e-3, Regime.EQUILIBRIUM), (2e-3, Regime.PURE_SLIP)]
+)
+def test_a_vibration_of_a_thousandth_of_the_belt_speed_is_none(
+    amplitude: float, regime: Regime
+) -> None:
+    """The same limit as for exact samples."""
+    time = np.arange(4000) * 1e-3
+    noise = np.random.default_rng(0).standard_normal(4000)
+    position = amplitude * 0.04 / 100.0 * np.sin(100.0 * time) + 1e-9 * noise
+    unknown, belt = np.full(4000, np.nan), np.full(4000, 0.04)
+    stamp = np.arange(4000) * 1_000_000
+    velocity = np.gradient(position, time)
+    found = measured(SampleColumns(stamp, position, velocity, unknown, unknown, belt))
+    assert found.regime is regime
+    assert found.velocity_amplitude == pytest.approx(amplitude * 0.04, rel=0.02)
+    assert (found.period is None) == (regime is Regime.EQUILIBRIUM)
+
+
 @pytest.mark.parametrize("direction", [-1.0, 1.0])
 def test_a_belt_that_moves_backward_gives_the_same(direction: float) -> None:
     columns = samples(noise=1e-6)
