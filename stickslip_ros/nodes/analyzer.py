@@ -108,7 +108,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
         }
         self._listening = {
             topic: self.keep(self.create_polled_subscription(topic, qos_profile(topic)))
-            for topic in RECORDED_TOPICS
+            for topic in reversed(RECORDED_TOPICS)  # joint states last, see `missing_peers`
         }
         self._look_for_controllers()
         self._periodic = [

@@ -41,7 +41,7 @@ class ControllerNode(ManagedNode[ControllerParameters]):
 
     def connect(self) -> None:
         """Publish forces; subscribe to the newest joint state and reference only."""
-        self._force = self.advertise(CONTROL_FORCE)
+        self._force = self.read_last = self.advertise(CONTROL_FORCE)
         self.subscribe(JOINT_STATES, self._on_joint_state, depth=1)
         kind = self.parameters.as_reference().kind
         self._given = NO_REFERENCE

@@ -55,7 +55,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         self.elapsed = 0.0
         self._disturbance = 0.0
         self._lock = threading.Lock()
-        self._state = self.advertise(JOINT_STATES)
+        self._state = self.read_last = self.advertise(JOINT_STATES)
         self._truth = self._applied_force = None
         if self.parameters.publish_truth:
             self._truth = self.advertise(TRUE_JOINT_STATES)

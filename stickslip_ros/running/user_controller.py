@@ -9,6 +9,7 @@ from threading import Event, Thread
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.node import Node
+from rclpy.task import Future
 
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.base.child_process import how_it_ended, start_child
@@ -29,7 +30,7 @@ class ControllerThread:
         """Whether the node has failed and the failure was not reported yet."""
         self._failure: BaseException | None = None
         self._idle = Event()
-        self._closing = False
+        self._closing = Future()
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
         self._thread = Thread(target=self._run, name=node.get_name(), daemon=True)
@@ -68,10 +69,11 @@ class ControllerThread:
 
     def close(self) -> None:
         """End the thread and destroy the node; raises RunError if a callback does not return."""
-        self._closing = True
-        self._executor.shutdown(timeout_sec=0.0)
+        # Not by a shutdown of the executor: the thread would miss it just before it waits.
+        self._closing.set_result(None)
         if self._thread.ident is not None:
             self._thread.join(_END_TIMEOUT)
+        self._executor.shutdown(timeout_sec=0.0)
         if self._thread.is_alive():
             raise RunError(
                 f"the controller {self.node.get_name()} is still in a callback, {_END_TIMEOUT:g} s "
@@ -81,11 +83,11 @@ class ControllerThread:
 
     def _run(self) -> None:
         try:
-            self._executor.spin()
-            if not self._closing:
+            self._executor.spin_until_future_complete(self._closing)
+            if not self._closing.done():
                 raise RuntimeError("ROS was shut down while the loop was open")
         except BaseException as error:
-            if not self._closing:
+            if not self._closing.done():
                 self.unreported = True
                 self._failure = error
         finally:

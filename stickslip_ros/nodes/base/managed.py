@@ -16,7 +16,7 @@ from rclpy.task import Future
 from rclpy.timer import Timer
 
 from stickslip_ros.errors import BagError, InvalidInputError, StickslipError
-from stickslip_ros.messages.topics import DIAGNOSTICS, Topic
+from stickslip_ros.messages.topics import DIAGNOSTICS, RECORDED, Topic
 from stickslip_ros.nodes.base.dropped_messages import DroppedMessages
 from stickslip_ros.nodes.base.parameters import ParameterNode, ParametersT
 from stickslip_ros.nodes.base.polling import PollingNode
@@ -76,6 +76,8 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         self.dropped = DroppedMessages(self.get_logger())
         """Messages that the node has dropped since it was activated."""
         self._kept: list[Any] = []
+        self.read_last: Publisher | None = None
+        """Publisher whose topic recorders subscribe to last; None if they read only one."""
         self._last_refusal = ""
         self._waiting = False
         self._diagnostics = self.create_publisher(
@@ -335,15 +337,23 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
             self._autostart_timer = None
 
     def missing_peers(self) -> str:
-        """Return what is missing of the nodes in wait_for, or an empty string."""
+        """Return what is missing of the nodes in wait_for, or an empty string.
+
+        A node is found by any topic that it reads. Of a recorder, which reads several, the readers
+        become known in the order in which it subscribes: it is found by the last one.
+        """
         waiting_for = {name.rsplit("/", 1)[-1] for name in self.parameters.wait_for}
         if not waiting_for:
             return ""
         found = self.publishing_nodes()
+        recorders = {
+            writer.node_name for writer in self.get_publishers_info_by_topic(RECORDED.name)
+        }
         for end in self._kept:
             if isinstance(end, Publisher):
                 readers = matching_readers(self, end)
-                found |= {reader.node_name for reader in readers}
+                known = {reader.node_name for reader in readers}
+                found |= known if self.read_last in (None, end) else known - recorders
                 matched = end.get_subscription_count() >= len(readers)
             elif isinstance(end, Subscription):
                 matched = end.get_publisher_count() >= len(matching_writers(self, end))
