@@ -1,0 +1,1 @@
+"""Models from recordings: regression, trajectories that are fitted, intervals, choice of the law."""

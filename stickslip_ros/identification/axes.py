@@ -1,0 +1,132 @@
+"""Identification of axes that no spring holds: the forces of filtered records are fitted."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from math import nan, sqrt
+
+import numpy as np
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.identification.candidates import Candidate
+from stickslip_ros.identification.curves import (
+    CoulombCurve,
+    Curve,
+    ExponentialCurve,
+    FollowedCurve,
+    SaturatingCurve,
+    SteppedCurve,
+    StribeckCurve,
+)
+from stickslip_ros.identification.filtered import filtered
+from stickslip_ros.identification.models import DELAY
+from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
+
+RESOLVED = 0.9
+"""Share of the error to which a delay, a spring or a memory must lower it to be believed."""
+_DELAYS = np.arange(-1.0, 4.01, 0.25)
+"""Delays that are tried, periods."""
+_KNOTS = 9
+_DEFLECTIONS = (1e-5, 1e-4, 1e-3)
+"""Deflections that are tried first, shares of the range of the positions."""
+
+Progress = Callable[[str], None]
+_AXIS_LAWS = ("coulomb", "stribeck", "exponential", "table", "lugre")
+
+
+class AxisTask:
+    """Records of an axis without a spring, with what is known of it."""
+
+    def __init__(self, records: Sequence[Record], fixed: Mapping[str, float]) -> None:
+        if all(not record.held_force.any() for record in records):
+            raise InvalidInputError(
+                "no force acts in the recordings: without one an axis tells nothing of its mass "
+                "and its friction; name its column, as in --columns force=u"
+            )
+        self.records = records
+        own = {name: fixed[name] for name in LINEAR if name in fixed}
+        self.fixed = {**dict.fromkeys(LINEAR[1:], 0.0), **own}
+        self.free = [name for name in LINEAR if name not in self.fixed]
+        self.delay: float | None = fixed.get(DELAY)
+        self.rows = self._rows(self.delay)
+
+    def candidates(self, law: str, progress: Progress) -> list[Candidate]:
+        """Return the fits of the laws that compete, or of the one that is asked for."""
+        curves: list[Curve] = [CoulombCurve(), StribeckCurve(), ExponentialCurve()]
+        quantiles = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _KNOTS)).tolist()
+        tables = [SaturatingCurve(), SteppedCurve((0.0, *quantiles[1:]))]
+        found: list[Candidate] = []
+        for curve in curves:
+            if law in ("auto", curve.name):
+                progress(curve.name)
+                found.append(self._with_delay(curve))
+        if law in ("auto", "table", "lugre"):
+            progress("table")
+            best = min(map(self._with_delay, tables), key=lambda each: each.error)
+            found += [best] if law != "lugre" else []
+            if law != "table":
+                progress("lugre")
+                found.append(self._with_memory(best, asked=law == "lugre"))
+        return found
+
+    def _with_delay(self, curve: Curve) -> Candidate:
+        """Return a fit with a delay if the records ask for one."""
+        plain = self._candidate(self.rows, curve, nan if self.delay is None else self.delay)
+        if self.delay is not None:
+            return plain
+        fit, found = plain.fit, plain
+        period = self.records[0].period
+        for step in (0.25, 0.05):
+            assert isinstance(fit, Regression)
+            middle = 0.0 if found is plain else found.delay / period
+            reach = _DELAYS if found is plain else middle + step * np.arange(-5.0, 6.0)
+            errors = [_error_with(fit, self._rows(each * period)) for each in reach]
+            delay = float(reach[int(np.argmin(errors))]) * period
+            found = self._candidate(self._rows(delay), curve, delay)
+            fit = found.fit
+        return found if found.error < RESOLVED * plain.error else plain
+
+    def _with_memory(self, static: Candidate, *, asked: bool) -> Candidate:
+        """Return the fit whose friction follows the curve of another over a path."""
+        fit = static.fit
+        assert isinstance(fit, Regression)
+        span = max(float(np.ptp(record.position)) for record in self.records)
+        tried: dict[float, Regression] = {}
+
+        def error(deflection: float) -> float:
+            curve = FollowedCurve(fit.curve, deflection)
+            own = replace(fit, curve=curve).refitted()
+            tried[deflection] = own
+            return float(own.residual @ own.residual)
+
+        best = min((share * span for share in _DEFLECTIONS), key=error)
+        for factor in (0.2, 0.4, 2.0, 4.0):
+            error(factor * best)
+        nearest = min(tried.values(), key=lambda each: float(each.residual @ each.residual))
+        found = self._as_candidate(nearest, static.delay)
+        if asked or found.error < RESOLVED * static.error:
+            return found
+        remark = f"predicts better by less than {1.0 - RESOLVED:.0%}: not resolved by filtered rows"
+        return replace(found, remark=remark)
+
+    def _candidate(self, rows: Rows, curve: Curve, delay: float) -> Candidate:
+        return self._as_candidate(regress(rows, curve, self.free, self.fixed), delay)
+
+    def _as_candidate(self, fit: Regression, delay: float) -> Candidate:
+        scale = sqrt(float(np.mean(fit.rows.force**2)))
+        size = len(fit.values) + len(fit.shapes) + (fit.curve.deflection > 0.0)
+        return Candidate(fit.curve.name, size, fit.held_out, scale, fit, delay)
+
+    def _rows(self, delay: float | None) -> Rows:
+        return Rows.of([filtered(each, decimated=True, delay=delay) for each in self.records])
+
+
+def axis_laws() -> Sequence[str]:
+    """Return the names of the laws that can be identified for an axis without a spring."""
+    return _AXIS_LAWS
+
+
+def _error_with(fit: Regression, rows: Rows) -> float:
+    """Return the squared error of a curve with its shapes, fitted to rows with another delay."""
+    residual = replace(fit, rows=rows).refitted().residual
+    return float(residual @ residual)

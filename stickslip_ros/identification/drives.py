@@ -1,0 +1,234 @@
+"""Identification of drives on a spring: the simulated trajectory is fitted."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from math import pi, sqrt
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.identification.candidates import Candidate
+from stickslip_ros.identification.filtered import filtered
+from stickslip_ros.identification.models import DELAY, EXPONENTIAL, MEMORY_MODELS, STATIC_MODELS, Model
+from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.refinement import (
+    Refinement,
+    Trajectories,
+    refine,
+    segments_of,
+)
+from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
+from stickslip_ros.identification.trajectory import Predictor
+
+_SHORT, _LONG = 1.25, 5.0
+"""Length of the segments in natural periods: of the search, and of the fit."""
+_FIRST_STEPS, _STEPS, _FINALISTS = 4, 15, 2
+"""Steps of the search from each start, steps from the best ones, and their number."""
+_WHITE = 0.3
+"""Correlation of successive errors up to which they are noise: rounding leaves some."""
+_SHAPES = (0.1, 0.3, 0.8)
+"""Shapes from which the search starts, besides that of the regression: shares of the speeds."""
+_HOPELESS = 4.0
+"""Squared error, in squared errors of the best model, from which a model is not fitted further."""
+_STIFF = (10.0, 100.0)
+"""Stiffnesses of bristles from which the search starts, in stiffnesses of the spring."""
+_WORTH, _SURE = 0.05, 4.0
+"""Share of the residual, or standard errors, for which one more constant is fitted."""
+_KEPT = 3.0
+"""Standard errors by which such a constant must differ from zero."""
+OPTIONAL = ("damping", "bias_force", DELAY)
+"""Constants that are fitted only if the record asks for them."""
+
+Progress = Callable[[str], None]
+
+
+class DriveTask:
+    """Records of a drive on a spring, with what is known of it."""
+
+    def __init__(self, records: Sequence[Record], fixed: Mapping[str, float]) -> None:
+        self.records = records
+        self.normal_force = fixed.get("normal_force", 1.0)
+        self.fixed = {name: fixed[name] for name in (*LINEAR, DELAY) if name in fixed}
+        self.friction = {
+            name.removeprefix("friction."): value
+            for name, value in fixed.items()
+            if name.startswith("friction.")
+        }
+        self.free = [name for name in ("mass", "stiffness") if name not in self.fixed]
+        if all(not record.held_force.any() for record in records) and len(self.free) == 2:
+            raise InvalidInputError(
+                "no force acts in the recordings: they tell only ratios of mass, stiffness and "
+                "friction; fix one, as in --fix plant.mass=100"
+            )
+        parts = [
+            filtered(each, decimated=False, delay=self.fixed.get(DELAY, 0.0)) for each in records
+        ]
+        self.rows = Rows.of(parts)
+        self.predictors = [Predictor(record) for record in records]
+
+    @cached_property
+    def period(self) -> float:
+        """Natural period by the regression, s, within what the records can have."""
+        values = self._regression(EXPONENTIAL).constants
+        shortest = 20.0 * self.records[0].period
+        longest = max(record.duration for record in self.records) / _LONG
+        if values["mass"] <= 0.0 or values["stiffness"] <= 0.0:
+            return shortest
+        return max(min(2.0 * pi * sqrt(values["mass"] / values["stiffness"]), longest), shortest)
+
+    def searched(self, model: Model, *, thorough: bool = True) -> Refinement:
+        """Return a model fitted to short segments, from several starts."""
+        starts = [model.start(each) for each in self._regressions(model, thorough)]
+        if model.memory:
+            damping = 1e-3 * model.static_force(starts[0]) / float(self.rows.speeds[-1])
+            starts = [
+                {**each, "bristle_stiffness": factor * each["stiffness"]}
+                | {"bristle_damping": damping}
+                for each in starts
+                for factor in _STIFF
+            ]
+        return self._nearest(model, starts)
+
+    def _regressions(self, model: Model, thorough: bool) -> list[Regression]:
+        fits = [self._regression(model)]
+        if model.shape is not None and thorough:
+            top = float(self.rows.speeds[-1])
+            fits += [self._regression(model, shape * top) for shape in _SHAPES]
+        return fits
+
+    def _nearest(self, model: Model, starts: Sequence[Mapping[str, float]]) -> Refinement:
+        """Return the best search; errors that are noise end it."""
+        short = self._trajectories(model, _SHORT * self.period)
+        names = self._names(model)
+        tried: list[Refinement] = []
+        for values in starts:
+            tried.append(refine(short, names, self._known(values), most=_FIRST_STEPS))
+            if is_white(tried[-1]):
+                return tried[-1]
+        finished: list[Refinement] = []
+        for near in sorted(tried, key=_loss)[:_FINALISTS]:
+            fit = refine(short, names, near.values, near.starts, most=_STEPS)
+            if not is_white(fit):
+                other = refine(short, names, near.values, near.starts, most=_STEPS, interior=True)
+                fit = refine(short, names, other.values, other.starts, most=_STEPS)
+            if not is_white(fit):
+                fit = self._with_optional(fit)
+            finished.append(fit)
+            if is_white(fit):
+                break
+        return min(finished, key=_loss)
+
+    def _with_optional(self, fit: Refinement) -> Refinement:
+        """Return the fit with the constants that the records ask for."""
+        for name in OPTIONAL:
+            if name in self.fixed or name in fit.free:
+                continue
+            errors, share = fit.gain(name)
+            if abs(errors) < _SURE and share < _WORTH:
+                continue
+            more = refine(fit.task, [*fit.free, name], fit.values, fit.starts, most=_STEPS)
+            place = len(fit.free)
+            error = sqrt(max(more.covariance[place, place], 0.0))
+            if abs(more.values[name]) > _KEPT * error and _loss(more) < _loss(fit):
+                fit = more
+        return fit
+
+    def finished(self, near: Refinement) -> Candidate:
+        """Return a fit to long segments, with the constants that the records ask for."""
+        model = near.task.model
+        task = self._trajectories(model, _LONG * self.period)
+        fit = self._with_optional(refine(task, near.free, near.values, most=_STEPS))
+        return self._candidate(fit, _held_out(fit))
+
+    def unfinished(self, near: Refinement) -> Candidate:
+        """Return a fit to short segments that is out of the choice."""
+        return self._candidate(near, near.losses)
+
+    def _candidate(self, fit: Refinement, held_out: FloatArray) -> Candidate:
+        measured = fit.task.measured
+        scale = float(np.std(measured))
+        delay = fit.values.get(DELAY, 0.0)
+        return Candidate(fit.task.model.law, len(fit.free), held_out, scale, fit, delay)
+
+    def _regression(self, model: Model, shape: float | None = None) -> Regression:
+        fixed = {name: 0.0 for name in LINEAR if name not in self.free} | {
+            name: value for name, value in self.fixed.items() if name != DELAY
+        }
+        return regress(self.rows, model.curve, self.free, fixed, shape)
+
+    def _trajectories(self, model: Model, length: float) -> Trajectories:
+        segments, starts = segments_of(self.records, length)
+        return Trajectories(model, self.predictors, segments, starts, self.normal_force)
+
+    def _names(self, model: Model) -> list[str]:
+        return [*self.free, *(name for name in model.friction if name not in self.friction)]
+
+    def _known(self, values: Mapping[str, float]) -> dict[str, float]:
+        own = {name: value * self.normal_force for name, value in self.friction.items()}
+        own |= {name: self.friction[name] for name in _SPEEDS if name in self.friction}
+        return {DELAY: 0.0, **values, **own, **self.fixed}
+
+
+_SPEEDS = ("minimum_speed", "decay_speed")
+"""Constants of friction that are speeds and not forces."""
+
+
+def drive_candidates(task: DriveTask, law: str, progress: Progress) -> list[Candidate]:
+    """Return the fits of the laws that compete, or of the one that is asked for, fitted first.
+
+    Laws without a memory are searched first. Those with a memory follow if the errors of the best
+    one are more than noise. What predicts much worse in the search is not fitted further.
+    """
+    found: list[Refinement] = []
+    for model in STATIC_MODELS:
+        if law in ("auto", model.law):
+            progress(model.law)
+            found.append(task.searched(model, thorough=not any(map(is_white, found))))
+    if not any(map(is_white, found)):
+        for model in MEMORY_MODELS:
+            if law not in ("auto", model.law):
+                continue
+            progress(model.law)
+            found.append(task.searched(model))
+            if is_white(found[-1]):
+                break
+    if law != "auto":
+        return [task.finished(found[-1])]
+    least = min(map(_loss, found))
+    return [
+        task.finished(each) if _loss(each) <= _HOPELESS * least else task.unfinished(each)
+        for each in found
+    ]
+
+
+def laws_with_memory() -> list[str]:
+    """Return the names of the laws with a memory that can be identified."""
+    return [model.law for model in MEMORY_MODELS]
+
+
+def is_white(fit: Refinement) -> bool:
+    """Return whether the errors of a fit are noise, as far as their successive ones tell."""
+    return abs(fit.correlation) < _WHITE
+
+
+def _loss(fit: Refinement) -> float:
+    return float(fit.residual @ fit.residual)
+
+
+def _held_out(fit: Refinement) -> FloatArray:
+    """Return the mean square error in each segment, fitted to the other half of the segments."""
+    count = len(fit.task.segments)
+    losses = np.empty(count)
+    if count < 4:
+        return fit.losses
+    for half in (0, 1):
+        trained = np.arange(count) % 2 == half
+        others = refine(
+            fit.task.chosen(trained), fit.free, fit.values, fit.starts[trained], most=6
+        )
+        predicted = refine(
+            fit.task.chosen(~trained), (), others.values, fit.starts[~trained], most=6
+        )
+        losses[~trained] = predicted.losses
+    return losses

@@ -1,0 +1,157 @@
+"""What is identified: the constants of a drive with a friction law, and how they are searched."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Any
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.identification.curves import (
+    CoulombCurve,
+    Curve,
+    ExponentialCurve,
+    StribeckCurve,
+)
+from stickslip_ros.identification.regression import Regression
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import LAWS, CurveFollower, Exponential
+
+_TINY = 1e-9
+"""Smallest constant that must be above zero, as a share of its start."""
+DELAY = "force_delay"
+"""Name of the constant that is not one of the drive: the time until a force acts, s."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A friction law with the constants that are searched for a drive on a spring.
+
+    The search has coordinates of its own in which all bounds are simple: in place of the static
+    coefficient its `rise` above the smaller one. Friction is in newtons: the normal force only
+    scales it.
+    """
+
+    law: str
+    """Name of the friction law."""
+    curve: Curve
+    """Its curve in steady slip, for the regression."""
+    shape: str | None = None
+    """Constant that is the shape of the curve."""
+    smaller: str | None = None
+    """Constant that is smaller than the static coefficient."""
+    viscous: bool = False
+    """Whether the law has a viscous constant."""
+    memory: Sequence[str] = ()
+    """Constants of the memory of the law."""
+
+    @property
+    def friction(self) -> Sequence[str]:
+        """Coordinates of the friction."""
+        own = ["static"] if self.smaller is None else [self.smaller, "rise"]
+        if self.shape is not None:
+            own.append(self.shape)
+        if self.viscous:
+            own.append("viscous")
+        return [*own, *self.memory]
+
+    def start(self, fit: Regression) -> dict[str, float]:
+        """Return the coordinates that a regression gives."""
+        forces = fit.forces(len(fit.rows.directions) - 1).tolist()
+        values = dict(fit.constants)
+        if self.smaller is None:
+            static, rise = forces[0], 0.0
+        elif isinstance(self.curve, StribeckCurve):
+            static, rise = forces[0], forces[1]
+        else:
+            static, rise = forces[0] + forces[1], forces[1]
+        least = 1e-3 * max(static, 1e-9)
+        static = max(static, least)
+        if self.smaller is None:
+            values["static"] = static
+        else:
+            values["rise"] = min(max(rise, least), static - least)
+            values[self.smaller] = static - values["rise"]
+        if self.shape is not None:
+            values[self.shape] = float(fit.shapes[-1])
+        if self.viscous:
+            values["viscous"] = forces[-1]
+        return values
+
+    def static_force(self, values: Mapping[str, float]) -> float:
+        """Return the static friction, N."""
+        return values["static"] if self.smaller is None else values[self.smaller] + values["rise"]
+
+    def least(self, name: str, start: float) -> float:
+        """Return the smallest value of a coordinate."""
+        if name in ("bias_force", "viscous", DELAY):
+            return -inf
+        if name in ("rise", "damping", "bristle_damping", self.smaller):
+            return 0.0
+        return _TINY * abs(start)
+
+    def constants(self, values: Mapping[str, float], normal_force: float) -> dict[str, float]:
+        """Return the parameters of the plant by flat name that coordinates stand for.
+
+        Raises InvalidInputError for values that the law refuses.
+        """
+        found = {
+            name: value
+            for name, value in values.items()
+            if name not in self.friction and name != DELAY
+        }
+        static = self.static_force(values)
+        if self.smaller is not None:
+            found[f"friction.{self.smaller}"] = values[self.smaller] / normal_force
+        found["friction.static"] = static / normal_force
+        if self.shape is not None:
+            found[f"friction.{self.shape}"] = values[self.shape]
+        if self.viscous:
+            found["friction.viscous"] = values["viscous"] / normal_force
+        for name in self.memory:
+            found[f"friction.{name}"] = values[name] / normal_force
+        return found
+
+    def drive(
+        self, values: Mapping[str, float], normal_force: float, belt_speed: float = 0.0
+    ) -> Drive:
+        """Return the drive that coordinates stand for; raises InvalidInputError if there is none."""
+        constants = self.constants(values, normal_force)
+        own: dict[str, Any] = {
+            name.removeprefix("friction."): value
+            for name, value in constants.items()
+            if name.startswith("friction.")
+        }
+        law: Any = LAWS[self.law]
+        if not self.memory or not issubclass(law, CurveFollower):
+            friction = law(**own)
+        else:
+            memory = {name: own.pop(name) for name in self.memory}
+            friction = law(Exponential(**own), **memory)
+        refusal = friction.refusal()
+        if refusal is not None:
+            raise InvalidInputError(refusal)
+        return Drive(
+            mass=constants["mass"],
+            damping=constants["damping"],
+            stiffness=constants["stiffness"],
+            normal_force=normal_force,
+            belt_speed=belt_speed,
+            friction=friction,
+            bias_force=constants["bias_force"],
+        )
+
+
+COULOMB = Model("coulomb", CoulombCurve(), viscous=True)
+STRIBECK = Model("stribeck", StribeckCurve(), shape="minimum_speed", smaller="minimum")
+EXPONENTIAL = Model(
+    "exponential", ExponentialCurve(), shape="decay_speed", smaller="kinetic", viscous=True
+)
+MEMORY_MODELS = (
+    replace(COULOMB, law="dahl", viscous=False, memory=("bristle_stiffness",)),
+    replace(EXPONENTIAL, law="lugre", memory=("bristle_stiffness", "bristle_damping")),
+    replace(EXPONENTIAL, law="elasto_plastic", memory=("bristle_stiffness", "bristle_damping")),
+    replace(EXPONENTIAL, law="maxwell_slip", memory=("bristle_stiffness",)),
+)
+"""Models with a memory, the simpler ones first."""
+STATIC_MODELS = (COULOMB, STRIBECK, EXPONENTIAL)
+"""Models without a memory, the simpler ones first."""

@@ -1,0 +1,238 @@
+"""Regression of the equation of motion on filtered records."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.identification.curves import Curve, followed
+from stickslip_ros.identification.filtered import Filtered
+from stickslip_ros.identification.intervals import clustered_covariance
+
+BLOCKS = 24
+"""Number of blocks of time that are held out, and from whose scatter intervals are computed."""
+_SHARE = 0.05
+"""Least share of the rows of a direction that has a curve of its own."""
+LINEAR = ("mass", "damping", "stiffness", "bias_force")
+"""Constants of the equation beside those of friction."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Rows of the equation of motion of all records, arrays of shape (rows,)."""
+
+    parts: Sequence[Filtered]
+    columns: Mapping[str, FloatArray]
+    """What each of `LINEAR` is multiplied with."""
+    force: FloatArray
+    """Known forces, N."""
+    block: IntArray
+    """Number of the block of time."""
+    directions: Sequence[float]
+    """Signs of the relative speed that occur: 1, -1 or both."""
+
+    @classmethod
+    def of(cls, parts: Sequence[Filtered]) -> "Rows":
+        """Return the rows of filtered records."""
+
+        def joined(values: Callable[[Filtered], FloatArray]) -> FloatArray:
+            return np.concatenate([part.rows(values(part)) for part in parts])
+
+        force = joined(lambda part: part.force)
+        if len(force) < 4 * BLOCKS:
+            raise InvalidInputError(
+                f"the slide slips in {len(force)} rows of the recordings: identification needs "
+                f"at least {4 * BLOCKS}"
+            )
+        relative = joined(lambda part: part.relative_speed)
+        counts = {sign: np.count_nonzero(relative * sign > 0.0) for sign in (1.0, -1.0)}
+        return cls(
+            parts,
+            {
+                "mass": joined(lambda part: part.acceleration),
+                "damping": joined(lambda part: part.velocity),
+                "stiffness": joined(lambda part: part.position),
+                "bias_force": -np.ones(len(force)),
+            },
+            force,
+            np.arange(len(force)) * BLOCKS // len(force),
+            [sign for sign, count in counts.items() if count >= _SHARE * len(force)],
+        )
+
+    @cached_property
+    def speeds(self) -> FloatArray:
+        """Size of the relative speeds above zero, m/s, sorted."""
+        speeds = np.abs(np.concatenate([part.rows(part.relative_speed) for part in self.parts]))
+        return np.sort(speeds[speeds > 0.0])
+
+    def friction_terms(self, curve: Curve, shapes: FloatArray) -> FloatArray:
+        """Return sgn(v_r) times the terms of a curve for each direction, shape (rows, terms)."""
+        made: list[FloatArray] = []
+        for part in self.parts:
+            speed, columns = part.relative_speed, list[FloatArray]()
+            for number, sign in enumerate(self.directions):
+                shape = float(shapes[number]) if len(shapes) else 1.0
+                signs = np.sign(speed)
+                if len(self.directions) > 1:
+                    signs = np.where(speed * sign > 0.0, sign, 0.0)
+                columns.append(signs[:, None] * curve.terms(np.abs(speed), shape))
+            terms = np.hstack(columns)
+            if curve.deflection > 0.0:
+                path = np.abs(speed) * (part.time[1] - part.time[0]) / curve.deflection
+                terms = followed(terms, path)
+            made.append(part.rows(terms))
+        return np.vstack(made)
+
+
+@dataclass(frozen=True, eq=False)
+class Regression:
+    """The equation of motion with a friction curve in each direction, fitted to rows."""
+
+    rows: Rows
+    curve: Curve
+    free: Sequence[str]
+    """Constants of `LINEAR` that are fitted."""
+    fixed: Mapping[str, float]
+    """Values of the others."""
+    shapes: FloatArray
+    """Shape of the curve in each direction of the rows, m/s; empty without a shape."""
+    values: FloatArray
+    """Fitted constants: those of `free`, then the forces of the curve for each direction."""
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """Value of each of `LINEAR`."""
+        return {**self.fixed, **dict(zip(self.free, self.values.tolist(), strict=False))}
+
+    def forces(self, number: int) -> FloatArray:
+        """Return the forces of the curve in a direction of the rows, N."""
+        own = np.array_split(self.values[len(self.free) :], len(self.rows.directions))
+        return own[number]
+
+    def refitted(self) -> "Regression":
+        """Return the fit to its rows with the same shapes."""
+        return _solved(self.rows, self.curve, self.free, self.fixed, self.shapes)
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Known forces less those of the model, N, by row."""
+        return self._residual_with(self.shapes)
+
+    def _residual_with(self, shapes: FloatArray) -> FloatArray:
+        design, wanted = _system(self.rows, self.curve, self.free, self.fixed, shapes)
+        return wanted - design @ self.values
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance of `values` and `shapes`, from the scatter over the blocks of time."""
+        columns = [_system(self.rows, self.curve, self.free, self.fixed, self.shapes)[0]]
+        for number, shape in enumerate(self.shapes):
+            step = np.where(np.arange(len(self.shapes)) == number, 1e-4 * shape, 0.0)
+            change = self._residual_with(self.shapes - step)
+            change -= self._residual_with(self.shapes + step)
+            columns.append((change / (2e-4 * shape))[:, None])
+        return clustered_covariance(np.hstack(columns), self.residual, self.rows.block)
+
+    @cached_property
+    def held_out(self) -> FloatArray:
+        """Mean square of the residual in each block, N^2, fitted without it; shape (blocks,)."""
+        design, wanted = _system(self.rows, self.curve, self.free, self.fixed, self.shapes)
+        losses = np.empty(BLOCKS)
+        for block in range(BLOCKS):
+            held = self.rows.block == block
+            values = _values(design[~held], wanted[~held], self._least)
+            own = wanted[held] - design[held] @ values
+            losses[block] = np.mean(own * own)
+        return losses
+
+    @property
+    def _least(self) -> FloatArray:
+        return _least(self.rows, self.curve, self.free)
+
+
+def regress(
+    rows: Rows,
+    curve: Curve,
+    free: Sequence[str],
+    fixed: Mapping[str, float],
+    shape: float | None = None,
+) -> Regression:
+    """Fit the equation m a + c v + k x - bias + sgn(v_r) F(|v_r|) = u to rows.
+
+    Parameters
+    ----------
+    rows : Rows
+        Rows of the equation.
+    curve : Curve
+        Friction curve F, with forces of its own in each direction of the rows.
+    free : sequence of str
+        Constants of `LINEAR` that are fitted.
+    fixed : mapping
+        Values of the others.
+    shape : float, optional
+        Shape of the curve, m/s. By default it is fitted, in each direction.
+
+    Returns
+    -------
+    Regression
+        The best fit.
+    """
+    if not curve.shaped:
+        return _solved(rows, curve, free, fixed, np.empty(0))
+    if shape is not None:
+        return _solved(rows, curve, free, fixed, np.full(len(rows.directions), shape))
+    from scipy.optimize import least_squares
+
+    low, high = np.log(np.quantile(rows.speeds, [0.02, 0.98]) * [0.25, 4.0])
+
+    def residual(logarithms: FloatArray) -> FloatArray:
+        shapes = np.broadcast_to(np.exp(logarithms), len(rows.directions))
+        return _solved(rows, curve, free, fixed, shapes).residual
+
+    grid = np.linspace(low, high, 9)[1:-1]
+    best = grid[np.argmin([np.sum(residual(np.array([each])) ** 2) for each in grid])]
+    start = np.full(len(rows.directions), best)
+    found = least_squares(residual, start, bounds=(low, high), diff_step=1e-4, xtol=1e-6)
+    return _solved(rows, curve, free, fixed, np.exp(found.x))
+
+
+def _solved(
+    rows: Rows, curve: Curve, free: Sequence[str], fixed: Mapping[str, float], shapes: FloatArray
+) -> Regression:
+    """Return the fit with given shapes."""
+    values = _values(*_system(rows, curve, free, fixed, shapes), _least(rows, curve, free))
+    return Regression(rows, curve, free, fixed, shapes, values)
+
+
+def _least(rows: Rows, curve: Curve, free: Sequence[str]) -> FloatArray:
+    """Return the smallest value of each unknown."""
+    linear = [-np.inf if name == "bias_force" else 0.0 for name in free]
+    return np.array([*linear, *[*curve.least] * len(rows.directions)])
+
+
+def _values(design: FloatArray, wanted: FloatArray, least: FloatArray) -> FloatArray:
+    """Return the unknowns by least squares."""
+    from scipy.optimize import lsq_linear
+
+    scale = np.linalg.norm(design, axis=0)
+    scale[scale == 0.0] = 1.0
+    values = np.linalg.lstsq(design / scale, wanted, rcond=None)[0]
+    if (values < least).any():
+        values = lsq_linear(design / scale, wanted, (least, np.inf), method="bvls").x
+    return values / scale
+
+
+def _system(
+    rows: Rows,
+    curve: Curve,
+    free: Sequence[str],
+    fixed: Mapping[str, float],
+    shapes: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the matrix of the unknowns and what it is to give."""
+    wanted = rows.force - sum(value * rows.columns[name] for name, value in fixed.items())
+    linear = [rows.columns[name][:, None] for name in free]
+    return np.hstack([*linear, rows.friction_terms(curve, shapes)]), wanted

@@ -1,0 +1,108 @@
+"""The motion that a model predicts for a record: its forces and its belt in, positions out."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.identification.record import Record
+from stickslip_ros.physics.model.courses import Table
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.motion.motion import Motion
+
+_TOLERANCE = 1e-6
+"""Largest error of the belt velocity between corners, as a share of its largest value."""
+
+
+class Predictor:
+    """Simulates parts of a record, each from a state of its own."""
+
+    def __init__(self, record: Record) -> None:
+        self.record = record
+        self._force = record.held_force.tolist()
+        self._corners = _corners(record.belt_velocity)
+        self._motions: dict[type, Motion] = {}
+
+    def positions(
+        self,
+        drive: Drive,
+        start: int,
+        count: int,
+        position: float,
+        velocity: float,
+        delay: float = 0.0,
+        memory: Sequence[float] | None = None,
+    ) -> FloatArray:
+        """Return the positions at samples from `start` on.
+
+        Parameters
+        ----------
+        drive : Drive
+            The model; its belt is that of the record.
+        start, count : int
+            First sample, and number of samples.
+        position, velocity : float
+            State at the first sample, m and m/s.
+        delay : float, optional
+            Time from a sample until its force acts, s, between minus one and several periods.
+        memory : sequence of float, optional
+            Memory of the friction law at the first sample.
+
+        Returns
+        -------
+        array of shape (count,)
+            Positions, m; NaN from where the motion is unbounded.
+        """
+        drive = self.with_belt(drive, start, count)
+        motion = Motion(drive, position, velocity)
+        if memory is not None:
+            motion.restart(position, velocity, memory)
+        period, forces, last = self.record.period, self._force, len(self._force) - 1
+        whole, rest = divmod(delay / period, 1.0)
+        shift, rest = int(whole), rest * period
+        found = np.full(count, np.nan)
+        found[0] = position
+        first = min(max(start - 1 - shift, 0), last)
+        motion.force = forces[first]
+        advance = motion.advance
+        for number in range(1, count):
+            force = forces[min(max(start + number - 1 - shift, 0), last)]
+            if rest > 0.0:
+                advance(rest)
+            if force != motion.force:
+                motion.force = force
+            advance(period - rest)
+            if motion.unbounded:
+                break
+            found[number] = motion.position
+        return found
+
+    def with_belt(self, drive: Drive, start: int, count: int) -> Drive:
+        """Return the drive with the belt of a part of the record."""
+        belt, period = self.record.belt_velocity, self.record.period
+        end = min(start + count, len(belt)) - 1
+        inside = self._corners[(self._corners > start) & (self._corners < end)]
+        if len(self._corners) == 2 and belt[0] == belt[-1]:
+            return replace(drive, belt_speed=float(belt[start]))
+        places = np.array([start, *inside, end])
+        times = tuple(((places - start) * period).tolist())
+        return replace(drive, belt_speed=0.0, belt=Table(times, tuple(belt[places].tolist())))
+
+
+def _corners(values: FloatArray) -> FloatArray:
+    """Return the indices between which straight lines describe the values (Douglas, Peucker)."""
+    tolerance = _TOLERANCE * float(np.abs(values).max())
+    kept, open_ends = {0, len(values) - 1}, [(0, len(values) - 1)]
+    while open_ends:
+        low, high = open_ends.pop()
+        if high - low < 2:
+            continue
+        between = np.arange(low, high + 1)
+        line = np.interp(between, [low, high], [values[low], values[high]])
+        errors = np.abs(values[between] - line)
+        worst = int(np.argmax(errors))
+        if errors[worst] > tolerance:
+            kept.add(low + worst)
+            open_ends += [(low, low + worst), (low + worst, high)]
+    return np.array(sorted(kept))
