@@ -86,6 +86,66 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_columns(parser: argparse.ArgumentParser) -> None:
+    """Add --columns, which says what the columns of tables are."""
+    parser.add_argument(
+        "--columns",
+        metavar="QUANTITY=COLUMN,...",
+        help="where a table has time, position, velocity, force, belt_velocity, friction_force, "
+        "disturbance and reference: names of columns, numbers and products of them, in SI units, "
+        "as in time=t,position=x,force=vir*35.15,belt_velocity=0.04",
+    )
+
+
+def columns_of(text: str | None) -> dict[str, str] | None:
+    """Return the columns that --columns names, by quantity."""
+    if text is None:
+        return None
+    found: dict[str, str] = {}
+    for part in text.split(","):
+        quantity, equals, column = (each.strip() for each in part.partition("="))
+        if not (quantity and equals and column) or quantity in found:
+            raise InvalidInputError(
+                f"--columns {text}: must be QUANTITY=COLUMN,..., each quantity once, as in "
+                "time=t,position=x"
+            )
+        found[quantity] = column
+    return found
+
+
+def add_part(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say which part of a recording is used, and of which drive."""
+    parser.add_argument(
+        "--belt-speed",
+        type=velocity,
+        metavar="V",
+        help="belt speed, m/s, for a bag whose joint states have a single joint, whatever its name",
+    )
+    parser.add_argument(
+        "--from",
+        dest="start",
+        type=seconds,
+        default=0.0,
+        metavar="S",
+        help="start of the part that is used, s from the first sample of each recording "
+        "(default: 0)",
+    )
+    parser.add_argument(
+        "--to",
+        dest="end",
+        type=seconds,
+        default=float("inf"),
+        metavar="S",
+        help="end of the part that is used, s from the first sample of each recording "
+        "(default: the end)",
+    )
+    parser.add_argument(
+        "--namespace",
+        metavar="NS",
+        help="ROS namespace of the drive, if a bag holds several",
+    )
+
+
 def add_namespace(parser: argparse.ArgumentParser) -> None:
     """Add --namespace, of nodes that run."""
     parser.add_argument(

@@ -10,6 +10,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "basin": ("Simulate and study", "find the motion that each initial state leads to"),
     "report": ("Analyze", "measure a recorded run, or compare several"),
     "repair": ("Analyze", "write a sound bag from one that is cut off or damaged"),
+    "identify": ("Analyze", "fit a model with intervals to recordings of a machine"),
     "stability": ("Analyze", "compute equilibrium, Hopf speeds, limit cycles and critical gains"),
     "design": ("Design", "propose controller gains that suppress the vibration"),
     "list": ("Scenarios", "list the scenarios, friction laws and control laws"),
@@ -31,6 +32,8 @@ EXAMPLES: dict[str, str] = {
     "basin": "stickslip basin paper --position=-2:2:20 --velocity=-2:2:20 --plot basin.png",
     "report": "stickslip report bags/before bags/after --plot compared.png",
     "repair": "stickslip repair bags/killed bags/sound",
+    "identify": "stickslip identify log.mat --columns time=t,position=q,force=u*35.15 "
+    "--out identified.yaml",
     "stability": "stickslip stability feed_drive --plot map.png",
     "design": "stickslip design feed_drive --belt-speed 0.01:0.05 --out designed.yaml",
     "list": "stickslip list",

@@ -36,6 +36,8 @@ def _load(name: str) -> ModuleType:
             from stickslip_ros.app import sweep as command
         case "basin":
             from stickslip_ros.app import basin as command
+        case "identify":
+            from stickslip_ros.app import identify as command
         case "report":
             from stickslip_ros.app import report as command
         case "repair":

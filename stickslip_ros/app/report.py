@@ -6,13 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app.arguments import (
+    add_columns,
     add_json,
+    add_part,
     add_plot,
     check_figure,
+    columns_of,
     length,
     seconds,
     speed,
-    velocity,
     write_figure,
 )
 from stickslip_ros.app.optional_dependencies import interrupts_kept
@@ -40,25 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "damaged: the readable part is measured, and a sentence names what is missing. Or a table, "
         ".csv or .mat: one of `stickslip simulate --out`, or any other with --columns",
     )
-    parser.add_argument(
-        "--columns",
-        metavar="QUANTITY=COLUMN,...",
-        help="where a table has time, position, velocity, force, belt_velocity and friction_force: "
-        "names of columns, numbers and products of them, in SI units, as in "
-        "time=t,position=x,force=vir*35.15,belt_velocity=0.04",
-    )
+    add_columns(parser)
     parser.add_argument(
         "--stick-speed",
         type=speed,
         metavar="V",
         help="largest relative speed of a slide that sticks, m/s (default: as the analyzer used; "
         "for a table 0)",
-    )
-    parser.add_argument(
-        "--belt-speed",
-        type=velocity,
-        metavar="V",
-        help="belt speed, m/s, for a bag whose joint states have a single joint, whatever its name",
     )
     parser.add_argument(
         "--slips",
@@ -73,27 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="longest time in which a slip drops by as much, s (default: 0.1)",
     )
-    parser.add_argument(
-        "--from",
-        dest="start",
-        type=seconds,
-        default=0.0,
-        metavar="S",
-        help="start of the measured part, s from the first sample of each bag (default: 0)",
-    )
-    parser.add_argument(
-        "--to",
-        dest="end",
-        type=seconds,
-        default=float("inf"),
-        metavar="S",
-        help="end of the measured part, s from the first sample of each bag (default: the end)",
-    )
-    parser.add_argument(
-        "--namespace",
-        metavar="NS",
-        help="ROS namespace of the drive, if a bag holds several",
-    )
+    add_part(parser)
     add_plot(
         parser,
         "motion, force, cycles and friction law of a bag; of several bags motion and force side by "
@@ -120,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
             f"--plot {plot}: draws at most {_MOST_DRAWN} bags, and {len({*bags})} were given"
         )
     histories = {} if plot is None else {str(bag): RunHistory() for bag in bags}
-    columns = _columns(arguments.columns)
+    columns = columns_of(arguments.columns)
     if columns is not None and not any(map(is_table, bags)):
         raise InvalidInputError(f"--columns {arguments.columns}: a bag has no columns")
     slips = None if arguments.slips is None else SlipThreshold(arguments.slips, arguments.slip_time)
@@ -166,22 +136,6 @@ def run(arguments: argparse.Namespace) -> int:
         for sentence in sentences:
             print(printable(f"{bag}: {sentence}") if several else sentence)
     return 0
-
-
-def _columns(text: str | None) -> dict[str, str] | None:
-    """Return the columns that the option names, by quantity."""
-    if text is None:
-        return None
-    found: dict[str, str] = {}
-    for part in text.split(","):
-        quantity, equals, column = (each.strip() for each in part.partition("="))
-        if not (quantity and equals and column) or quantity in found:
-            raise InvalidInputError(
-                f"--columns {text}: must be QUANTITY=COLUMN,..., each quantity once, as in "
-                "time=t,position=x"
-            )
-        found[quantity] = column
-    return found
 
 
 def _draw(

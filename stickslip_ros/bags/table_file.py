@@ -18,7 +18,16 @@ from stickslip_ros.text import did_you_mean, shown
 TABLE_SUFFIXES = (".csv", ".mat")
 """Ends of the names of files that are tables."""
 
-QUANTITIES = ("time", "position", "velocity", "force", "belt_velocity", "friction_force")
+QUANTITIES = (
+    "time",
+    "position",
+    "velocity",
+    "force",
+    "belt_velocity",
+    "friction_force",
+    "disturbance",
+    "reference",
+)
 """What a table may have of a run; time and position it must have."""
 
 _OWN = {
@@ -93,6 +102,31 @@ def read_table(path: Path, columns: Mapping[str, str] | None = None) -> TableRec
     >>> recording.samples.position.tolist()
     [1e-06, 3e-06]
     """
+    return _recording(path, table_columns(path, columns))
+
+
+def table_columns(path: Path, columns: Mapping[str, str] | None = None) -> dict[str, FloatArray]:
+    """Return the quantities that a CSV or MAT file has, as arrays of shape (rows,).
+
+    Parameters
+    ----------
+    path : Path
+        The file; see `read_table`.
+    columns : mapping, optional
+        As for `read_table`.
+
+    Returns
+    -------
+    dict
+        Values by quantity, SI units, without the rows whose time is not finite.
+
+    Raises
+    ------
+    BagError
+        If the file cannot be read.
+    InvalidInputError
+        If a column is not there, or time or position is not given.
+    """
     table = _read_mat(path) if path.suffix.lower() == ".mat" else _read_csv(path)
     if columns is None:
         columns = _own_columns(path, table)
@@ -105,19 +139,17 @@ def read_table(path: Path, columns: Mapping[str, str] | None = None) -> TableRec
     lacking = [name for name in ("time", "position") if name not in columns]
     if lacking:
         raise InvalidInputError(f"{path}: no column is given for {' and '.join(lacking)}")
-    found = {name: _value(path, table, text) for name, text in columns.items()}
-    time = found["time"]
+    values = {name: _value(path, table, text) for name, text in columns.items()}
+    time = values["time"]
     if time.ndim == 0:
         raise InvalidInputError(f"{path}: time = {columns['time']} must be a column")
-    return _recording(path, {name: np.broadcast_to(v, time.shape) for name, v in found.items()})
-
-
-def _recording(path: Path, found: Mapping[str, FloatArray]) -> TableRecording:
-    time = found["time"]
     known = np.isfinite(time)
     if not known.any():
         raise InvalidInputError(f"{path}: no time is a finite number")
-    found = {name: values[known] for name, values in found.items()}
+    return {name: np.broadcast_to(each, time.shape)[known] for name, each in values.items()}
+
+
+def _recording(path: Path, found: Mapping[str, FloatArray]) -> TableRecording:
     time = found["time"] - found["time"][0]
     if np.abs(time).max() > _LONGEST:
         raise InvalidInputError(f"{path}: the times differ by more than {_LONGEST:g} s")

@@ -1,1 +1,1 @@
-"""Models from recordings: regression, trajectories that are fitted, intervals, choice of the law."""
+"""Models from recordings: regression, fit of trajectories, intervals, choice of the law."""

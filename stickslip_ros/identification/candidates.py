@@ -15,6 +15,10 @@ _SIGNIFICANT = 3.0
 """Standard errors by which a model must predict better to be preferred to a simpler one."""
 
 
+_WORTH = 0.01
+"""Share of the error by which it must be better besides."""
+
+
 @dataclass(frozen=True)
 class Estimate:
     """A fitted constant."""
@@ -59,11 +63,14 @@ class Candidate:
 def better_by(better: Candidate, worse: Candidate) -> float:
     """Return by how many standard errors one model predicts better than the other.
 
-    It compares the logarithms of the errors part by part: a single bad part decides nothing. Models
-    that were not compared on the same parts are told apart by their errors alone.
+    Less than one per cent counts as nothing. It compares the logarithms of the errors part by part:
+    a single bad part decides nothing. Models that were not compared on the same parts are told
+    apart by their errors alone.
     """
     if len(better.held_out) != len(worse.held_out):
         return copysign(inf, worse.error - better.error)
+    if worse.error < (1.0 + _WORTH) * better.error:
+        return 0.0
     tiny = np.finfo(float).tiny
     ratios = np.log(np.maximum(worse.held_out, tiny) / np.maximum(better.held_out, tiny))
     mean, count = float(np.mean(ratios)), len(ratios)
@@ -78,10 +85,6 @@ def choose(candidates: Sequence[Candidate]) -> tuple[Candidate, Mapping[str, boo
     standard errors, from its scatter over the parts.
     """
     best = min(candidates, key=lambda each: each.error)
-    as_good = [
-        each
-        for each in candidates
-        if each is best or better_by(best, each) < _SIGNIFICANT
-    ]
+    as_good = [each for each in candidates if each is best or better_by(best, each) < _SIGNIFICANT]
     chosen = min(as_good, key=lambda each: (each.size, each.error))
     return chosen, {each.law: each in as_good for each in candidates}

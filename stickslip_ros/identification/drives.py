@@ -10,7 +10,14 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.candidates import Candidate
 from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.models import DELAY, EXPONENTIAL, MEMORY_MODELS, STATIC_MODELS, Model
+from stickslip_ros.identification.models import (
+    DELAY,
+    EXPONENTIAL,
+    LUGRE,
+    MEMORY_MODELS,
+    STATIC_MODELS,
+    Model,
+)
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import (
     Refinement,
@@ -23,7 +30,7 @@ from stickslip_ros.identification.trajectory import Predictor
 
 _SHORT, _LONG = 1.25, 5.0
 """Length of the segments in natural periods: of the search, and of the fit."""
-_FIRST_STEPS, _STEPS, _FINALISTS = 4, 15, 2
+_FIRST_STEPS, _STEPS, _FINALISTS = 5, 20, 2
 """Steps of the search from each start, steps from the best ones, and their number."""
 _WHITE = 0.3
 """Correlation of successive errors up to which they are noise: rounding leaves some."""
@@ -33,6 +40,8 @@ _HOPELESS = 4.0
 """Squared error, in squared errors of the best model, from which a model is not fitted further."""
 _STIFF = (10.0, 100.0)
 """Stiffnesses of bristles from which the search starts, in stiffnesses of the spring."""
+_DAMPED = 0.03
+"""Damping of the bristles from which the search starts, as a share of the critical one."""
 _WORTH, _SURE = 0.05, 4.0
 """Share of the residual, or standard errors, for which one more constant is fitted."""
 _KEPT = 3.0
@@ -77,16 +86,19 @@ class DriveTask:
             return shortest
         return max(min(2.0 * pi * sqrt(values["mass"] / values["stiffness"]), longest), shortest)
 
-    def searched(self, model: Model, *, thorough: bool = True) -> Refinement:
-        """Return a model fitted to short segments, from several starts."""
+    def searched(
+        self, model: Model, *, thorough: bool = True, like: Refinement | None = None
+    ) -> Refinement:
+        """Return a model fitted to short segments, from several starts, or from a `like` one."""
+        if like is not None:
+            return self._nearest(model, [like.values])
         starts = [model.start(each) for each in self._regressions(model, thorough)]
         if model.memory:
-            damping = 1e-3 * model.static_force(starts[0]) / float(self.rows.speeds[-1])
             starts = [
-                {**each, "bristle_stiffness": factor * each["stiffness"]}
-                | {"bristle_damping": damping}
+                {**each, "bristle_stiffness": stiffness}
+                | {"bristle_damping": _DAMPED * sqrt(stiffness * each["mass"])}
                 for each in starts
-                for factor in _STIFF
+                for stiffness in (factor * each["stiffness"] for factor in _STIFF)
             ]
         return self._nearest(model, starts)
 
@@ -103,12 +115,14 @@ class DriveTask:
         names = self._names(model)
         tried: list[Refinement] = []
         for values in starts:
-            tried.append(refine(short, names, self._known(values), most=_FIRST_STEPS))
+            known, interior = self._known(values), bool(model.memory)
+            tried.append(refine(short, names, known, most=_FIRST_STEPS, interior=interior))
             if is_white(tried[-1]):
                 return tried[-1]
         finished: list[Refinement] = []
         for near in sorted(tried, key=_loss)[:_FINALISTS]:
-            fit = refine(short, names, near.values, near.starts, most=_STEPS)
+            # The search along the bounds is the faster one, and the one that gets stuck there.
+            fit = near if model.memory else refine(short, names, near.values, near.starts, most=10)
             if not is_white(fit):
                 other = refine(short, names, near.values, near.starts, most=_STEPS, interior=True)
                 fit = refine(short, names, other.values, other.starts, most=_STEPS)
@@ -138,7 +152,10 @@ class DriveTask:
         """Return a fit to long segments, with the constants that the records ask for."""
         model = near.task.model
         task = self._trajectories(model, _LONG * self.period)
-        fit = self._with_optional(refine(task, near.free, near.values, most=_STEPS))
+        # Measured starts are too rough for motions that grow over a segment.
+        begun = refine(task, (), near.values)
+        fit = refine(task, near.free, near.values, begun.starts, most=_STEPS)
+        fit = self._with_optional(fit)
         return self._candidate(fit, _held_out(fit))
 
     def unfinished(self, near: Refinement) -> Candidate:
@@ -186,13 +203,16 @@ def drive_candidates(task: DriveTask, law: str, progress: Progress) -> list[Cand
             progress(model.law)
             found.append(task.searched(model, thorough=not any(map(is_white, found))))
     if not any(map(is_white, found)):
+        bristles: Refinement | None = None
         for model in MEMORY_MODELS:
             if law not in ("auto", model.law):
                 continue
             progress(model.law)
-            found.append(task.searched(model))
+            found.append(task.searched(model, like=bristles))
             if is_white(found[-1]):
                 break
+            if model is LUGRE:
+                bristles = found[-1]
     if law != "auto":
         return [task.finished(found[-1])]
     least = min(map(_loss, found))
@@ -202,9 +222,9 @@ def drive_candidates(task: DriveTask, law: str, progress: Progress) -> list[Cand
     ]
 
 
-def laws_with_memory() -> list[str]:
-    """Return the names of the laws with a memory that can be identified."""
-    return [model.law for model in MEMORY_MODELS]
+def drive_laws() -> list[str]:
+    """Return the names of the laws that can be identified for a drive on a spring."""
+    return [model.law for model in (*STATIC_MODELS, *MEMORY_MODELS)]
 
 
 def is_white(fit: Refinement) -> bool:
@@ -224,11 +244,9 @@ def _held_out(fit: Refinement) -> FloatArray:
         return fit.losses
     for half in (0, 1):
         trained = np.arange(count) % 2 == half
-        others = refine(
-            fit.task.chosen(trained), fit.free, fit.values, fit.starts[trained], most=6
-        )
+        others = refine(fit.task.chosen(trained), fit.free, fit.values, fit.starts[trained], most=6)
         predicted = refine(
-            fit.task.chosen(~trained), (), others.values, fit.starts[~trained], most=6
+            fit.task.chosen(~trained), (), others.values, fit.starts[~trained], most=12
         )
         losses[~trained] = predicted.losses
     return losses

@@ -1,6 +1,7 @@
 """Records filtered for regression: position, velocity, acceleration and force, all alike."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -73,23 +74,31 @@ def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> 
     from scipy.signal import butter, filtfilt  # takes long to import
 
     rate = 1.0 / record.period
-    low_pass = butter(_ORDER, min(CUTOFF, 0.1 * rate) / (0.5 * rate))
+    low_pass: Any = butter(_ORDER, min(CUTOFF, 0.1 * rate) / (0.5 * rate))
 
     def smooth(values: FloatArray) -> FloatArray:
-        return filtfilt(*low_pass, values, padlen=_PAD)
+        return np.asarray(filtfilt(low_pass[0], low_pass[1], values, padlen=_PAD))
 
     position = smooth(record.position)
-    velocity = np.gradient(position, record.period)
-    acceleration = np.gradient(velocity, record.period)
+    velocity: FloatArray = np.asarray(np.gradient(position, record.period))
+    acceleration: FloatArray = np.asarray(np.gradient(velocity, record.period))
     relative = velocity - smooth(record.belt_velocity)
     held = record.held_force
     force = held if delay is None else _shifted(held, delay / record.period)
     if not decimated:
         force = smooth(force)  # all that enters the equation passes the same filter
-    time = record.period * np.arange(len(position))
-    columns = (time, position, velocity, acceleration, relative, force)
-    cut = [column[START:-END] for column in columns]
-    return Filtered(*cut, decimated, _slipping(cut[4], record.period))
+    time: FloatArray = record.period * np.arange(len(position), dtype=float)
+    inside = slice(START, -END)
+    return Filtered(
+        time[inside],
+        position[inside],
+        velocity[inside],
+        acceleration[inside],
+        relative[inside],
+        force[inside],
+        decimated,
+        _slipping(relative[inside], record.period),
+    )
 
 
 def _shifted(held: FloatArray, periods: float) -> FloatArray:

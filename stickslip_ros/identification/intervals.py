@@ -27,9 +27,7 @@ def white_covariance(jacobian: FloatArray, residual: FloatArray) -> FloatArray:
     return _inverse(jacobian) * (float(residual @ residual) / freedom)
 
 
-def clustered_covariance(
-    jacobian: FloatArray, residual: FloatArray, block: IntArray
-) -> FloatArray:
+def clustered_covariance(jacobian: FloatArray, residual: FloatArray, block: IntArray) -> FloatArray:
     """Return the covariance with errors that are coloured within blocks, independent between them.
 
     It is the sandwich estimator with the usual correction for few blocks (A. C. Cameron,

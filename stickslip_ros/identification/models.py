@@ -18,6 +18,8 @@ from stickslip_ros.physics.model.friction import LAWS, CurveFollower, Exponentia
 
 _TINY = 1e-9
 """Smallest constant that must be above zero, as a share of its start."""
+_STIFFEST = 3000.0
+"""Largest stiffness of the bristles, in stiffnesses of the spring."""
 DELAY = "force_delay"
 """Name of the constant that is not one of the drive: the time until a force acts, s."""
 
@@ -81,13 +83,30 @@ class Model:
         """Return the static friction, N."""
         return values["static"] if self.smaller is None else values[self.smaller] + values["rise"]
 
-    def least(self, name: str, start: float) -> float:
-        """Return the smallest value of a coordinate."""
+    def bounds(self, name: str, values: Mapping[str, float], fastest: float) -> tuple[float, float]:
+        """Return the smallest and the largest value of a coordinate in the search.
+
+        Parameters
+        ----------
+        name : str
+            Coordinate.
+        values : mapping
+            Coordinates at the start of the search.
+        fastest : float
+            Fastest speed relative to the belt in the records, m/s: what friction does at a
+            hundredth of it or far above it, they do not tell.
+        """
         if name in ("bias_force", "viscous", DELAY):
-            return -inf
-        if name in ("rise", "damping", "bristle_damping", self.smaller):
-            return 0.0
-        return _TINY * abs(start)
+            return -inf, inf
+        if name in ("rise", "damping", self.smaller):
+            return 0.0, inf
+        if name == self.shape:
+            return 0.01 * fastest, 10.0 * fastest
+        if name == "bristle_stiffness":
+            return values["stiffness"], _STIFFEST * values["stiffness"]
+        if name == "bristle_damping":
+            return 0.0, _STIFFEST * self.static_force(values) / fastest
+        return _TINY * abs(values[name]), inf
 
     def constants(self, values: Mapping[str, float], normal_force: float) -> dict[str, float]:
         """Return the parameters of the plant by flat name that coordinates stand for.
@@ -114,7 +133,7 @@ class Model:
     def drive(
         self, values: Mapping[str, float], normal_force: float, belt_speed: float = 0.0
     ) -> Drive:
-        """Return the drive that coordinates stand for; raises InvalidInputError if there is none."""
+        """Return the drive of coordinates; raises InvalidInputError if there is none."""
         constants = self.constants(values, normal_force)
         own: dict[str, Any] = {
             name.removeprefix("friction."): value
@@ -146,12 +165,13 @@ STRIBECK = Model("stribeck", StribeckCurve(), shape="minimum_speed", smaller="mi
 EXPONENTIAL = Model(
     "exponential", ExponentialCurve(), shape="decay_speed", smaller="kinetic", viscous=True
 )
+LUGRE = replace(EXPONENTIAL, law="lugre", memory=("bristle_stiffness", "bristle_damping"))
 MEMORY_MODELS = (
     replace(COULOMB, law="dahl", viscous=False, memory=("bristle_stiffness",)),
-    replace(EXPONENTIAL, law="lugre", memory=("bristle_stiffness", "bristle_damping")),
-    replace(EXPONENTIAL, law="elasto_plastic", memory=("bristle_stiffness", "bristle_damping")),
-    replace(EXPONENTIAL, law="maxwell_slip", memory=("bristle_stiffness",)),
+    LUGRE,
+    replace(LUGRE, law="elasto_plastic"),
+    replace(LUGRE, law="maxwell_slip", memory=("bristle_stiffness",)),
 )
-"""Models with a memory, the simpler ones first."""
+"""Models with a memory; those after LuGre are searched from what LuGre gives."""
 STATIC_MODELS = (COULOMB, STRIBECK, EXPONENTIAL)
 """Models without a memory, the simpler ones first."""

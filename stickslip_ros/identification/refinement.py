@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +21,8 @@ _ALONE = 1e-5
 """Least share of a derivative that is not one of the others, for a coordinate that can be told."""
 _COLOURED = 0.1
 """Correlation of successive errors above which they count as coloured."""
+_INSIDE = 1e-9
+"""Distance of the start of a search from its bounds, as a share of the value."""
 _UNBOUNDED = 10.0
 """Error of a motion that is not bounded, in spans of the record."""
 
@@ -65,9 +69,9 @@ class Trajectories:
             found = np.concatenate(
                 [
                     self.predictors[segment.record].positions(
-                        drive, segment.start, segment.count, *state, values.get(DELAY, 0.0)
+                        drive, segment.start, segment.count, x, v, values.get(DELAY, 0.0)
                     )
-                    for segment, state in zip(self.segments, starts.tolist(), strict=True)
+                    for segment, (x, v) in zip(self.segments, starts.tolist(), strict=True)
                 ]
             )
         except (InvalidInputError, RunError):
@@ -75,11 +79,19 @@ class Trajectories:
         middle = float(np.mean(self.measured))
         return np.where(np.isfinite(found), np.clip(found, middle - span, middle + span), span)
 
+    @property
+    def fastest(self) -> float:
+        """Fastest speed relative to the belt, m/s, by the starts of the segments."""
+        belts = [
+            self.predictors[segment.record].record.belt_velocity[segment.start]
+            for segment in self.segments
+        ]
+        return max(float(np.abs(self.starts[:, 1] - belts).max()), 1e-12)
+
     def typical(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return a size of each coordinate that may be zero, SI units."""
         force = self.model.static_force(values)
-        speed = max(float(np.abs(self.starts[:, 1]).max()), 1e-12)
-        rate, period = force / speed, self.predictors[0].record.period
+        rate, period = force / self.fastest, self.predictors[0].record.period
         forces = dict.fromkeys(("bias_force", "static", "rise", "minimum", "kinetic"), force)
         return {**forces, "damping": rate, "viscous": rate, DELAY: period, "bristle_damping": rate}
 
@@ -194,8 +206,10 @@ def refine(
     begin = task.starts if starts is None else starts
     first = np.array([*(values[name] for name in free), *begin.ravel()])
     count, span = len(free), float(np.ptp(task.measured))
-    least = np.full(len(first), -np.inf)
-    least[:count] = [task.model.least(name, values[name]) for name in free]
+    bounds = np.full((2, len(first)), np.inf) * [[-1.0], [1.0]]
+    if count:
+        each = [task.model.bounds(name, values, task.fastest) for name in free]
+        bounds[:, :count] = np.transpose(each)
     noise = 1e-3 * span
 
     def split(point: FloatArray) -> tuple[dict[str, float], FloatArray]:
@@ -209,11 +223,12 @@ def refine(
         given, states = split(point)
         return _derivatives(task, free, given, states, task.predicted(given, states)) / noise
 
-    found = least_squares(
+    solve: Any = least_squares  # its types know no function for jac
+    found = solve(
         residual,
-        np.maximum(first, least + 1e-12 * np.abs(first)),
+        np.clip(first, *(bounds + _INSIDE * np.abs(first) * [[1.0], [-1.0]])),
         derivatives,
-        bounds=(least, np.inf),
+        bounds=bounds,
         method="trf" if interior else "dogbox",
         x_scale="jac",
         ftol=1e-7,
@@ -278,8 +293,10 @@ def segments_of(records: Sequence[Record], length: float) -> tuple[list[Segment]
     for number, record in enumerate(records):
         total = len(record.position)
         window = 11
-        smooth = savgol_filter(record.position, window, 3)
-        speed = savgol_filter(record.position, window, 3, deriv=1, delta=record.period)
+        smooth: FloatArray = np.asarray(savgol_filter(record.position, window, 3))
+        speed: FloatArray = np.asarray(
+            savgol_filter(record.position, window, 3, deriv=1, delta=record.period)
+        )
         relative = np.abs(speed - record.belt_velocity)
         relative[[*range(window // 2)]] = -1.0
         count = max(round(total * record.period / length), 1)
@@ -290,7 +307,7 @@ def segments_of(records: Sequence[Record], length: float) -> tuple[list[Segment]
             around = np.arange(max(edge - reach, 0), min(edge + reach, total))
             places.append(int(around[np.argmax(relative[around])]))
         places.append(total)
-        for low, high in zip(places[:-1], places[1:], strict=True):
+        for low, high in pairwise(places):
             segments.append(Segment(number, low, high - low))
             starts.append(np.array([smooth[low], speed[low]]))
     return segments, np.array(starts)

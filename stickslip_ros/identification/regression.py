@@ -122,13 +122,13 @@ class Regression:
         return self._residual_with(self.shapes)
 
     def _residual_with(self, shapes: FloatArray) -> FloatArray:
-        design, wanted = _system(self.rows, self.curve, self.free, self.fixed, shapes)
+        design, wanted = system(self.rows, self.curve, self.free, self.fixed, shapes)
         return wanted - design @ self.values
 
     @cached_property
     def covariance(self) -> FloatArray:
         """Covariance of `values` and `shapes`, from the scatter over the blocks of time."""
-        columns = [_system(self.rows, self.curve, self.free, self.fixed, self.shapes)[0]]
+        columns = [system(self.rows, self.curve, self.free, self.fixed, self.shapes)[0]]
         for number, shape in enumerate(self.shapes):
             step = np.where(np.arange(len(self.shapes)) == number, 1e-4 * shape, 0.0)
             change = self._residual_with(self.shapes - step)
@@ -139,17 +139,18 @@ class Regression:
     @cached_property
     def held_out(self) -> FloatArray:
         """Mean square of the residual in each block, N^2, fitted without it; shape (blocks,)."""
-        design, wanted = _system(self.rows, self.curve, self.free, self.fixed, self.shapes)
+        design, wanted = system(self.rows, self.curve, self.free, self.fixed, self.shapes)
         losses = np.empty(BLOCKS)
         for block in range(BLOCKS):
             held = self.rows.block == block
-            values = _values(design[~held], wanted[~held], self._least)
+            values = solve(design[~held], wanted[~held], self.least)
             own = wanted[held] - design[held] @ values
             losses[block] = np.mean(own * own)
         return losses
 
     @property
-    def _least(self) -> FloatArray:
+    def least(self) -> FloatArray:
+        """Smallest value of each of `values`."""
         return _least(self.rows, self.curve, self.free)
 
 
@@ -203,7 +204,7 @@ def _solved(
     rows: Rows, curve: Curve, free: Sequence[str], fixed: Mapping[str, float], shapes: FloatArray
 ) -> Regression:
     """Return the fit with given shapes."""
-    values = _values(*_system(rows, curve, free, fixed, shapes), _least(rows, curve, free))
+    values = solve(*system(rows, curve, free, fixed, shapes), _least(rows, curve, free))
     return Regression(rows, curve, free, fixed, shapes, values)
 
 
@@ -213,7 +214,7 @@ def _least(rows: Rows, curve: Curve, free: Sequence[str]) -> FloatArray:
     return np.array([*linear, *[*curve.least] * len(rows.directions)])
 
 
-def _values(design: FloatArray, wanted: FloatArray, least: FloatArray) -> FloatArray:
+def solve(design: FloatArray, wanted: FloatArray, least: FloatArray) -> FloatArray:
     """Return the unknowns by least squares."""
     from scipy.optimize import lsq_linear
 
@@ -225,7 +226,7 @@ def _values(design: FloatArray, wanted: FloatArray, least: FloatArray) -> FloatA
     return values / scale
 
 
-def _system(
+def system(
     rows: Rows,
     curve: Curve,
     free: Sequence[str],

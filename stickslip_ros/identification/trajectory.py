@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isfinite
 
 import numpy as np
 
@@ -11,6 +12,10 @@ from stickslip_ros.physics.model.courses import Table
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.motion import Motion
 
+_FIRST = 20
+"""Samples from which the velocity at the start is found."""
+_FAR = 1e300
+"""Squared error of a motion that is not bounded, m^2."""
 _TOLERANCE = 1e-6
 """Largest error of the belt velocity between corners, as a share of its largest value."""
 
@@ -88,6 +93,49 @@ class Predictor:
         places = np.array([start, *inside, end])
         times = tuple(((places - start) * period).tolist())
         return replace(drive, belt_speed=0.0, belt=Table(times, tuple(belt[places].tolist())))
+
+
+def free_run(record: Record, drive: Drive, delay: float = 0.0) -> tuple[float, FloatArray]:
+    """Return the motion of a drive through a whole record, with its force and without feedback.
+
+    It starts at the measured position with the velocity that fits best.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    drive : Drive
+        The model.
+    delay : float, optional
+        Time from a sample until its force acts, s.
+
+    Returns
+    -------
+    tuple of float and array of shape (samples,)
+        Velocity at the start, m/s, and positions, m.
+    """
+    predictor = Predictor(record)
+    count, start = len(record.position), float(record.position[0])
+    first = record.position[:_FIRST]
+    slope = float(np.polyfit(np.arange(len(first)) * record.period, first, 1)[0])
+    # The range also makes up for the friction over the first stroke.
+    spread = 3.0 * abs(slope) + float(np.std(np.diff(first))) / record.period
+
+    def run(velocity: float) -> tuple[float, FloatArray]:
+        found = predictor.positions(drive, 0, count, start, velocity, delay)
+        loss = float(np.mean((found - record.position) ** 2))
+        return loss if isfinite(loss) else _FAR, found
+
+    # The squared error is nearly a parabola in the velocity at the start.
+    speeds = [slope - spread, slope, slope + spread]
+    runs = [run(speed) for speed in speeds]
+    low, middle, high = (loss for loss, _ in runs)
+    bend = low - 2.0 * middle + high
+    if spread > 0.0 and bend > 0.0 and max(low, high) < _FAR:
+        speeds.append(slope + 0.5 * spread * (low - high) / bend)
+        runs.append(run(speeds[-1]))
+    best = min(range(len(runs)), key=lambda number: runs[number][0])
+    return speeds[best], runs[best][1]
 
 
 def _corners(values: FloatArray) -> FloatArray:

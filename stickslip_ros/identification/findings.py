@@ -1,0 +1,403 @@
+"""What was identified: constants with intervals, the friction curve, and what it predicts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf, isfinite, isnan, sqrt
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.identification.axes import Points, axis_drive, table_of, table_speeds
+from stickslip_ros.identification.candidates import Candidate, Estimate
+from stickslip_ros.identification.filtered import START, filtered
+from stickslip_ros.identification.models import DELAY
+from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.refinement import Refinement
+from stickslip_ros.identification.regression import Regression
+from stickslip_ros.identification.servo import Servo, closed_loop
+from stickslip_ros.identification.trajectory import free_run
+from stickslip_ros.physics.model.drive import Drive
+
+_POINTS = 40
+"""Points of the curve of a law."""
+_RELATIVE_STEP = 1e-5
+_VAGUE = 0.5
+"""Standard error, as a share of the value, from which a constant counts as not told."""
+_CORRELATED = 0.95
+"""Correlation from which two constants are named together."""
+CHECKED = ("force_error", "free_run_error", "position_error", "closed_loop_force_error")
+"""What a model predicts of a recording."""
+
+
+@dataclass(frozen=True, eq=False)
+class Friction:
+    """A friction curve with its band, in one direction; arrays of shape (points,)."""
+
+    speed: FloatArray
+    """Speed |v_r|, m/s, within what was recorded."""
+    force: FloatArray
+    """Friction force, N."""
+    standard_error: FloatArray
+    """Standard error of the force, N."""
+
+
+@dataclass(frozen=True, eq=False)
+class ForceErrors:
+    """Measured and modelled forces on filtered rows, arrays of shape (rows,)."""
+
+    time: FloatArray
+    """Time from the first sample, s."""
+    position: FloatArray
+    """Displacement, m."""
+    relative_speed: FloatArray
+    """Velocity less that of the belt, m/s."""
+    friction: FloatArray
+    """Size of the measured friction with the sign of the slip: what the other forces leave, N."""
+    force_error: FloatArray
+    """Known force less that of the model, N."""
+    force: FloatArray
+    """Known force, N."""
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """The model that was chosen, and what the recordings tell of it."""
+
+    records: Sequence[Record]
+    """What it was fitted to."""
+    candidates: Sequence[Candidate]
+    """All laws that competed."""
+    chosen: Candidate
+    """The law that was chosen."""
+    as_good: Mapping[str, bool]
+    """Whether each law predicts held-out parts as well as the best one."""
+    normal_force: float
+    """Normal force that scales the friction, N."""
+    fixed: Mapping[str, float]
+    """Constants that were given."""
+    servo: Servo | None
+    """The position controller in the first record that has one."""
+
+    @property
+    def law(self) -> str:
+        """Friction law."""
+        return self.chosen.law
+
+    @property
+    def delay(self) -> float:
+        """Time from a sample until its force acts, s."""
+        return 0.0 if isnan(self.chosen.delay) else self.chosen.delay
+
+    @property
+    def has_spring(self) -> bool:
+        """Whether the model has a spring."""
+        return isinstance(self.chosen.fit, Refinement)
+
+    @cached_property
+    def fitted(self) -> Mapping[str, Estimate]:
+        """Constants by parameter of the plant, such as `friction.static`; SI units."""
+        names, values, covariance = self._constants
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        found = {
+            name: Estimate(float(value), float(error))
+            for name, value, error in zip(names, values, errors, strict=True)
+        }
+        return found
+
+    @cached_property
+    def correlations(self) -> Sequence[tuple[str, str, float]]:
+        """Pairs of constants whose errors go together, with their correlation."""
+        names, _, covariance = self._constants
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        found: list[tuple[str, str, float]] = []
+        for first, one in enumerate(names):
+            for second in range(first):
+                product = errors[first] * errors[second]
+                share = covariance[first, second] / product if product > 0.0 else 0.0
+                if isfinite(share) and abs(share) > _CORRELATED:
+                    found.append((names[second], one, float(share)))
+        return found
+
+    @cached_property
+    def _constants(self) -> tuple[list[str], FloatArray, FloatArray]:
+        """Names, values and covariance of the constants that are parameters of the plant."""
+        fit = self.chosen.fit
+        if isinstance(fit, Refinement):
+            return self._of_trajectory(fit)
+        names, take = [*fit.free], list(range(len(fit.free)))
+        count = len(fit.curve.least)
+        scale = [1.0] * len(names)
+        for number in range(len(fit.rows.directions)):
+            group = "friction." if number == 0 else "friction.reverse."
+            own = _names_of_terms(self.law)
+            place = len(fit.free) + number * count
+            for index, name in enumerate(own):
+                names.append(group + name)
+                take.append(place + index)
+                scale.append(1.0 / self.normal_force)
+        values, covariance = fit.values[take] * scale, fit.covariance[np.ix_(take, take)]
+        return names, values, covariance * np.outer(scale, scale)
+
+    def _of_trajectory(self, fit: Refinement) -> tuple[list[str], FloatArray, FloatArray]:
+        model = fit.task.model
+
+        def constants(values: Mapping[str, float]) -> dict[str, float]:
+            found = model.constants(values, self.normal_force)
+            return {**found, DELAY: values.get(DELAY, 0.0)}
+
+        base = constants(fit.values)
+        typical = fit.task.typical(fit.values)
+        columns: list[FloatArray] = []
+        for name in fit.free:
+            step = _RELATIVE_STEP * max(abs(fit.values[name]), typical.get(name, 0.0))
+            moved = constants({**fit.values, name: fit.values[name] + step})
+            columns.append(np.array([(moved[each] - base[each]) / step for each in base]))
+        linear = np.column_stack(columns)
+        told = np.abs(linear).sum(axis=1) > 0.0
+        names = [name for name, used in zip(base, told, strict=True) if used]
+        values = np.array([base[name] for name in names])
+        return names, values, linear[told] @ fit.covariance @ linear[told].T
+
+    @cached_property
+    def unidentified(self) -> Mapping[str, str]:
+        """What the recordings cannot tell, and what run would, by parameter of the plant."""
+        found: dict[str, str] = {}
+        if "normal_force" not in self.fixed:
+            found["normal_force"] = (
+                "only friction forces can be told: it is taken as 1 N, so that coefficients are in "
+                "N and viscous ones in N s/m; give it by --fix plant.normal_force=..."
+            )
+        slowest = self.slowest
+        if not self.has_spring:
+            found |= self._merged_on_an_axis()
+        else:
+            found |= self._merged_at_one_belt_speed()
+            if not self.stuck and self.law not in ("coulomb", "dahl"):
+                found["friction.static"] = (
+                    "the slide never stuck: it is the curve extended to rest; run below "
+                    f"{1e3 * slowest:.3g} mm/s"
+                )
+        for name, estimate in self.fitted.items():
+            if not estimate.standard_error < _VAGUE * abs(estimate.value) and name not in found:
+                found[name] = (
+                    f"{estimate.value:.4g} has a standard error of {estimate.standard_error:.2g}: "
+                    "the recordings do not tell it; a run with other speeds and forces may"
+                )
+        return found
+
+    def _merged_on_an_axis(self) -> dict[str, str]:
+        both = len(self._regression.rows.directions) > 1
+        found = {
+            "damping": "viscous damping and the viscous part of friction are one where the belt is "
+            "at rest: it is in the friction, and taken as 0",
+            "stiffness": "no spring is looked for on a belt at rest: it is taken as 0; give it by "
+            "--fix plant.stiffness=...",
+            "bias_force": "it merges with friction by direction, and is taken as 0"
+            if both
+            else "it merges with the static friction of a single direction, and is taken as 0; run "
+            "in both directions",
+            "friction.static": "the axis hardly ever stuck: it is the curve at its slowest steady "
+            f"speed extended to rest; run below {1e3 * self.slowest:.3g} mm/s",
+        }
+        return {name: why for name, why in found.items() if name not in self.fixed}
+
+    def _merged_at_one_belt_speed(self) -> dict[str, str]:
+        belts = np.concatenate([record.belt_velocity for record in self.records])
+        fit = self.chosen.fit
+        assert isinstance(fit, Refinement)
+        found: dict[str, str] = {}
+        single = float(np.ptp(belts)) <= 1e-3 * float(np.abs(belts).max())
+        for name in ("damping", "bias_force"):
+            if name in self.fixed or name in fit.free:
+                continue
+            if single and name == "damping":
+                found[name] = (
+                    "at one belt speed it merges with a linear part of friction, and is taken as "
+                    "0; run at several belt speeds"
+                )
+            elif name == "bias_force":
+                found[name] = (
+                    "in one direction it merges with the static friction, and is taken as 0; run "
+                    "in both directions"
+                )
+        return found
+
+    @property
+    def slowest(self) -> float:
+        """Slowest speed |v_r| that was recorded for long, m/s."""
+        speeds = np.concatenate(
+            [np.abs(filtered(record, decimated=False).relative_speed) for record in self.records]
+        )
+        least = 0.02 * float(speeds.max())
+        return float(np.quantile(speeds[speeds > least], 0.02))
+
+    @cached_property
+    def stuck(self) -> bool:
+        """Whether the model sticks in the recordings."""
+        for record in self.records:
+            columns = filtered(record, decimated=False)
+            moving = np.abs(columns.relative_speed) > 0.02 * np.abs(columns.relative_speed).max()
+            if np.mean(moving) < 0.98:
+                return True
+        return False
+
+    @property
+    def directions(self) -> Sequence[float]:
+        """Signs of the relative speed that have a curve of their own."""
+        fit = self.chosen.fit
+        if isinstance(fit, Regression):
+            return fit.rows.directions
+        belt = float(self.records[0].belt_velocity[0])
+        return [-1.0 if belt >= 0.0 else 1.0]
+
+    def friction(self, direction: int = 0) -> Friction:
+        """Return the friction curve over the recorded speeds, with its standard error.
+
+        Parameters
+        ----------
+        direction : int, optional
+            0 for the first direction of the recordings, 1 for the other one.
+
+        Returns
+        -------
+        Friction
+            The curve.
+        """
+        fit = self.chosen.fit
+        if isinstance(fit, Refinement):
+            top = max(
+                float(np.abs(filtered(record, decimated=False).relative_speed).max())
+                for record in self.records
+            )
+            speed = np.linspace(0.0, top, _POINTS)
+            model = fit.task.model
+
+            def force(values: Mapping[str, float]) -> FloatArray:
+                law = model.drive(values, 1.0).friction
+                return np.array([-float(law.coefficient(each, 1.0)) for each in speed.tolist()])
+
+            typical, base = fit.task.typical(fit.values), force(fit.values)
+            columns: list[FloatArray] = []
+            for name in fit.free:
+                step = _RELATIVE_STEP * max(abs(fit.values[name]), typical.get(name, 0.0))
+                columns.append((force({**fit.values, name: fit.values[name] + step}) - base) / step)
+            by = np.column_stack(columns)
+            return Friction(speed, base, _band(by, fit.covariance))
+        speed = table_speeds(fit)
+        shape = float(fit.shapes[direction]) if len(fit.shapes) else 1.0
+        terms = fit.curve.terms(speed, shape)
+        own = fit.forces(direction)
+        count, directions = len(own), len(fit.rows.directions)
+        by = np.zeros((len(speed), len(fit.covariance)))
+        place = len(fit.free) + direction * count
+        by[:, place : place + count] = terms
+        if len(fit.shapes):
+            step = _RELATIVE_STEP * shape
+            change = (fit.curve.terms(speed, shape + step) - terms) @ own / step
+            by[:, len(fit.free) + directions * count + direction] = change
+        return Friction(speed, terms @ own, _band(by, fit.covariance))
+
+    @property
+    def _regression(self) -> Regression:
+        assert isinstance(self.chosen.fit, Regression)
+        return self.chosen.fit
+
+    def tables(self) -> Sequence[Points]:
+        """Return points of speed (m/s) and coefficient, for each direction of the recordings."""
+        fit, force = self._regression, self.normal_force
+        return [table_of(fit, number, force) for number in range(len(fit.rows.directions))]
+
+    @cached_property
+    def drive(self) -> Drive:
+        """The drive, with the belt speed of the first sample."""
+        fit, belt = self.chosen.fit, float(self.records[0].belt_velocity[0])
+        if isinstance(fit, Refinement):
+            return fit.task.model.drive(fit.values, self.normal_force, belt)
+        return axis_drive(fit, self.normal_force, belt)
+
+    def errors(self, record: Record | None = None) -> ForceErrors:
+        """Return measured and modelled forces on the filtered rows of a record.
+
+        Parameters
+        ----------
+        record : Record, optional
+            By default the first one of those that were fitted.
+
+        Returns
+        -------
+        ForceErrors
+            The rows; of a drive on a spring those where it slips.
+        """
+        record = self.records[0] if record is None else record
+        delay = None if isnan(self.chosen.delay) else self.chosen.delay
+        fit, spring = self.chosen.fit, self.has_spring
+        columns = filtered(record, decimated=not spring, delay=delay)
+
+        def rows(values: FloatArray) -> FloatArray:
+            return columns.rows(values)
+
+        force, speed = rows(columns.force), rows(columns.relative_speed)
+        if isinstance(fit, Refinement):
+            values = fit.values
+            law = fit.task.model.drive(values, 1.0).friction
+            friction = np.array(
+                [float(law.coefficient(each, 1.0 if each > 0.0 else -1.0)) for each in speed]
+            )
+            model = values["mass"] * rows(columns.acceleration) - friction - values["bias_force"]
+            model += values["damping"] * rows(columns.velocity)
+            model += values["stiffness"] * rows(columns.position)
+            error = force - model
+        else:
+            other = type(fit.rows).of([columns])
+            own = replace(fit, rows=replace(other, directions=fit.rows.directions))
+            error = own.residual
+            terms = other if own.rows is other else own.rows
+            friction = -terms.friction_terms(fit.curve, fit.shapes) @ fit.values[len(fit.free) :]
+        return ForceErrors(
+            rows(columns.time), rows(columns.position), speed, error - friction, error, force
+        )
+
+    def force_error(self, record: Record) -> float | None:
+        """Return the rms of F - F_model over that of F, on filtered rows; None without a force."""
+        if not record.held_force.any():
+            return None
+        found = self.errors(record)
+        return float(np.sqrt(np.mean(found.force_error**2) / np.mean(found.force**2)))
+
+    def free_run(self, record: Record) -> FloatArray:
+        """Return the positions that the model runs through, with the recorded force, no feedback.
+
+        It starts at the measured position; the velocity at the start is the one that fits best.
+        """
+        return free_run(record, self.drive, self.delay)[1]
+
+    def check(self, record: Record) -> dict[str, float | None]:
+        """Return what the model predicts of a record, as `CHECKED` names it.
+
+        `free_run_error` is in m, the others are shares of the rms of what was recorded.
+        """
+        run = self.free_run(record) - record.position
+        error = float(np.sqrt(np.mean(run**2)))
+        found: dict[str, float | None] = dict.fromkeys(CHECKED)
+        found |= {
+            "force_error": self.force_error(record),
+            "free_run_error": error if isfinite(error) else inf,
+        }
+        if self.servo is not None and record.reference is not None and record.force is not None:
+            position, force = closed_loop(record, self.drive, self.servo, self.delay)
+            found["position_error"] = _relative(position[START:], record.position[START:])
+            found["closed_loop_force_error"] = _relative(force[START:], record.force[START:])
+        return found
+
+
+def _relative(found: FloatArray, measured: FloatArray) -> float:
+    return sqrt(float(np.mean((found - measured) ** 2)) / float(np.mean(measured**2)))
+
+
+def _band(by: FloatArray, covariance: FloatArray) -> FloatArray:
+    return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", by, covariance, by), 0.0))
+
+
+def _names_of_terms(law: str) -> Sequence[str]:
+    return ("static", "viscous") if law == "coulomb" else ()

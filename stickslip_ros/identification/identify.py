@@ -1,0 +1,126 @@
+"""From recordings to a model: which law, which constants, how sure."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.identification.axes import AxisTask, axis_laws
+from stickslip_ros.identification.candidates import choose
+from stickslip_ros.identification.drives import DriveTask, drive_candidates, drive_laws
+from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.models import DELAY
+from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.regression import LINEAR
+from stickslip_ros.identification.servo import servo_of
+from stickslip_ros.text import did_you_mean
+
+AUTO = "auto"
+"""Law that stands for the one that predicts held-out parts best."""
+_FRICTION = ("static", "minimum", "minimum_speed", "kinetic", "decay_speed", "viscous")
+FIXABLE = (*LINEAR, "normal_force", DELAY, *(f"friction.{name}" for name in _FRICTION))
+"""Constants that can be given, by parameter of the plant."""
+
+
+def laws() -> Sequence[str]:
+    """Return the names of the friction laws that can be identified, and `AUTO`."""
+    return (AUTO, *dict.fromkeys([*axis_laws(), *drive_laws()]))
+
+
+def fixed_of(texts: Sequence[str]) -> dict[str, float]:
+    """Return constants from texts `plant.PARAMETER=VALUE`, by parameter of the plant.
+
+    Raises InvalidInputError for a text that is none.
+    """
+    found: dict[str, float] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        try:
+            node, _, parameter = name.strip().partition(".")
+            if not equals or node != "plant" or parameter in found:
+                raise ValueError
+            found[parameter] = float(value)
+        except ValueError:
+            raise InvalidInputError(
+                f"--fix {text}: must be plant.PARAMETER=VALUE, each parameter once, as in "
+                "plant.mass=95"
+            ) from None
+    return found
+
+
+def identify(
+    records: Sequence[Record],
+    law: str = AUTO,
+    fixed: Mapping[str, float] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Findings:
+    """Identify a drive.
+
+    A belt that is at rest in all records means an axis that no spring holds, unless a stiffness is
+    given: then, and on a belt that moves, the slide is on a spring.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Records of one machine.
+    law : str, optional
+        Friction law, one of `laws`.
+    fixed : mapping, optional
+        Constants that are known, by parameter of the plant, of `FIXABLE`.
+    progress : callable, optional
+        Called with the name of each law before it is fitted.
+
+    Returns
+    -------
+    Findings
+        The model.
+
+    Raises
+    ------
+    InvalidInputError
+        If a name or a value is not allowed, or the records cannot tell a model.
+    """
+    fixed = {} if fixed is None else fixed
+    for name, value in fixed.items():
+        if name not in FIXABLE:
+            raise InvalidInputError(
+                f"plant.{name} is refused: {did_you_mean(name, FIXABLE, '')} must be one of "
+                f"{', '.join(FIXABLE)}"
+            )
+        least = -np.inf if name in ("bias_force", DELAY) else 0.0
+        if not (least <= value < np.inf) or (name in ("mass", "normal_force") and value == 0.0):
+            raise InvalidInputError(f"plant.{name} = {value} is refused: must be a positive number")
+    if law not in laws():
+        raise InvalidInputError(
+            f"law {law} is refused: {did_you_mean(law, laws(), '')} must be one of "
+            f"{', '.join(laws())}"
+        )
+    moving = any(record.belt_velocity.any() for record in records)
+    spring = fixed["stiffness"] > 0.0 if "stiffness" in fixed else moving
+    known = axis_laws() if not spring else drive_laws()
+    if law not in (AUTO, *known):
+        kind = "on a spring" if spring else "without a spring"
+        raise InvalidInputError(
+            f"law {law} is refused for a drive {kind}: must be one of {AUTO}, {', '.join(known)}"
+        )
+    axis = None
+    if spring:
+        candidates = drive_candidates(DriveTask(records, fixed), law, progress)
+    else:
+        axis = AxisTask(records, fixed)
+        candidates = axis.candidates(law, progress)
+    chosen, as_good = choose(
+        [each for each in candidates if law != AUTO or not each.remark] or candidates
+    )
+    if axis is not None:
+        chosen = axis.adjusted(chosen)
+    servos = [servo_of(record) for record in records]
+    return Findings(
+        records,
+        candidates,
+        chosen,
+        as_good,
+        fixed.get("normal_force", 1.0),
+        fixed,
+        next((servo for servo in servos if servo is not None), None),
+    )

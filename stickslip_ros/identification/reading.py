@@ -1,0 +1,135 @@
+"""Records from bags and tables."""
+
+import json
+from collections.abc import Mapping
+from contextlib import suppress
+from math import inf
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.bags.reader import Recording
+from stickslip_ros.bags.table_file import is_table, table_columns
+from stickslip_ros.errors import BagError, InvalidInputError
+from stickslip_ros.identification.models import DELAY
+from stickslip_ros.identification.record import Record, evenly_spaced
+from stickslip_ros.physics.model.actuator import Actuator
+from stickslip_ros.samples import ForceColumns
+from stickslip_ros.stamps import NANOSECONDS
+
+
+class ReadRecords(NamedTuple):
+    """The records of one recording, and what it tells of the drive."""
+
+    records: list[Record]
+    known: Mapping[str, float]
+    """Constants by parameter of the plant."""
+
+
+def read_records(
+    path: Path,
+    columns: Mapping[str, str] | None = None,
+    *,
+    start: float = 0.0,
+    end: float = inf,
+    namespace: str | None = None,
+    belt_speed: float | None = None,
+) -> ReadRecords:
+    """Return what a recording has for identification.
+
+    Parameters
+    ----------
+    path : Path
+        A bag, or a CSV or MAT file.
+    columns : mapping, optional
+        Columns of a table, as for `read_table`.
+    start, end : float, optional
+        Part to use, s from the first sample.
+    namespace : str, optional
+        ROS namespace of the drive, if a bag holds several.
+    belt_speed : float, optional
+        Belt speed, m/s, where the recording does not have it.
+
+    Returns
+    -------
+    ReadRecords
+        A record for each part without a longer gap.
+
+    Raises
+    ------
+    BagError
+        If the recording cannot be read.
+    InvalidInputError
+        If it lacks what identification needs.
+    """
+    if is_table(path):
+        stamp, found = _of_table(path, columns, belt_speed)
+        known: Mapping[str, float] = {}
+    else:
+        stamp, found, known = _of_bag(path, namespace, belt_speed)
+    since = (stamp - stamp[0]) / NANOSECONDS
+    part = (since >= start) & (since < end)
+    if not part.any():
+        raise InvalidInputError(f"{path} holds no samples from {start:g} s to {end:g} s")
+    own = {name: values[part] for name, values in found.items()}
+    return ReadRecords(evenly_spaced(str(path), stamp[part], own), known)
+
+
+def _of_table(
+    path: Path, columns: Mapping[str, str] | None, belt_speed: float | None
+) -> tuple[IntArray, dict[str, FloatArray]]:
+    found = table_columns(path, columns)
+    time = found.pop("time")
+    stamp = np.rint((time - time[0]) * NANOSECONDS).astype(np.int64)
+    belt = found.get("belt_velocity", np.full(len(time), 0.0))
+    if belt_speed is not None:
+        belt = np.full(len(time), belt_speed)
+    used = {name: found[name] for name in ("force", "disturbance", "reference") if name in found}
+    return stamp, {"position": found["position"], "belt_velocity": belt, **used}
+
+
+def _of_bag(
+    path: Path, namespace: str | None, belt_speed: float | None
+) -> tuple[IntArray, dict[str, FloatArray], dict[str, float]]:
+    with Recording(path, namespace, belt_speed=belt_speed) as recording:
+        states = recording.joint_states
+        states = states[states.believed]
+        if len(states) == 0:
+            raise BagError(f"the bag {path} holds no joint states: the motion is unknown")
+        forces, disturbances = recording.control_forces, recording.applied_disturbances
+        references = recording.references
+        texts = recording.metadata("stickslip_ros/plant") or {}
+    plant: dict[str, Any] = {}
+    for name, text in texts.items():
+        with suppress(ValueError, RecursionError):
+            plant[name] = json.loads(text)
+    stamp = states.stamp
+    found = {"position": states.position, "belt_velocity": states.belt_velocity}
+    if len(forces):
+        found["force"] = _held(forces, stamp, plant)
+    if len(disturbances):
+        found["disturbance"] = _since(stamp, disturbances.stamp, disturbances.force)
+    if len(references):
+        found["reference"] = _since(stamp, references.stamp, references.position)
+    delay = plant.get("force_delay", 0.0)
+    known = {DELAY: float(delay)} if isinstance(delay, int | float) and delay > 0.0 else {}
+    return stamp, found, known
+
+
+def _held(forces: ForceColumns, stamp: IntArray, plant: Mapping[str, Any]) -> FloatArray:
+    """Return the force that acts from each sample on: limited and rounded as by the actuator."""
+    held = _since(stamp, forces.stamp, forces.force)
+    given = {name: plant.get(f"actuator.{name}") for name in ("limit", "resolution")}
+    limiter = Actuator(
+        **{name: float(value) for name, value in given.items() if isinstance(value, int | float)}
+    ).limiter
+    return held if limiter is None else np.array([limiter(each) for each in held.tolist()])
+
+
+def _since(stamp: IntArray, since: IntArray, values: FloatArray) -> FloatArray:
+    """Return the newest value at each stamp; zero before the first one."""
+    order = np.argsort(since, kind="stable")
+    place = np.searchsorted(since[order], stamp, "right") - 1
+    return np.where(place >= 0, values[order][np.maximum(place, 0)], 0.0)

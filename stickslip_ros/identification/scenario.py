@@ -1,0 +1,107 @@
+"""A complete scenario of an identified drive."""
+
+from pathlib import Path
+from typing import Any
+
+from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.refinement import Refinement
+from stickslip_ros.physics.model.constants import constants_of
+from stickslip_ros.physics.model.friction import CurveFollower, Directional, FrictionLaw, Table
+from stickslip_ros.scenarios.files import Scenario, load_scenario
+from stickslip_ros.scenarios.template import commented_file
+
+_BASE = "feed_drive"
+
+
+def written_scenario(found: Findings, path: Path) -> list[Path]:
+    """Write a scenario with the identified drive, and the files of its friction curves.
+
+    An axis is held by the position controller of the recording, if it was found; a drive on a
+    spring has a washout controller without gains, for `stickslip design`.
+
+    Parameters
+    ----------
+    found : Findings
+        The model.
+    path : Path
+        Scenario file; must not exist. Curves are written beside it.
+
+    Returns
+    -------
+    list of Path
+        The files that were written.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be written or exists.
+    """
+    written: list[Path] = []
+    files: dict[str, str] = {}
+    laws = {"friction.": found.drive.friction}
+    if isinstance(found.drive.friction, Directional):
+        both = found.drive.friction
+        laws = {"friction.": both.forward, "friction.reverse.": both.reverse}
+    for group, law in laws.items():
+        curve = law.curve if isinstance(law, CurveFollower) else law
+        if not isinstance(curve, Table):
+            continue
+        direction = "backward" if "reverse" in group else "forward"
+        file = path.with_name(f"{path.stem}-{direction}.csv")
+        rows = "".join(f"{speed!r},{size!r}\n" for speed, size in curve.points)
+        with file.open("x", encoding="utf-8") as stream:
+            stream.write(rows)
+        written.append(file)
+        files[f"plant.{group}file"] = str(file.absolute())
+    scenario = _scenario(found, laws, files)
+    text = commented_file(scenario, _heading(found, path))
+    for file in written:
+        text = text.replace(str(file.absolute()), file.name)
+    with path.open("x", encoding="utf-8") as stream:
+        stream.write(text)
+    return [path, *written]
+
+
+def _scenario(found: Findings, laws: dict[str, FrictionLaw], files: dict[str, str]) -> Scenario:
+    drive, record, servo = found.drive, found.records[0], found.servo
+    values: dict[str, Any] = {
+        f"plant.{name}": getattr(drive, name)
+        for name in ("mass", "damping", "stiffness", "normal_force", "belt_speed", "bias_force")
+    }
+    values["plant.friction.law"] = laws["friction."].name
+    for group, law in laws.items():
+        values |= {f"plant.{group}{name}": value for name, value in _constants_of(law).items()}
+        if isinstance(law, CurveFollower) and group == "friction.":
+            values["plant.friction.curve"] = law.curve.name
+    values |= files
+    values["plant.rate"] = float(f"{1.0 / record.period:.9g}")
+    values["plant.force_delay"] = max(found.delay, 0.0)
+    values["plant.initial.position"] = float(record.position[0])
+    if isinstance(found.chosen.fit, Refinement):
+        values |= {"washout_controller.linear_gain": 0.0, "washout_controller.start_after": 0.0}
+        return load_scenario(_BASE).changed(values)
+    values["plant.duration"] = 10.0
+    if servo is None:
+        return load_scenario(_BASE).changed({**values, "plant.expects_control": False})
+    values["plant.sensor.velocity"] = "difference"
+    values["plant.sensor.difference_samples"] = servo.difference_samples
+    values["plant.actuator.limit"] = servo.limit
+    values["velocity_feedback_controller.position_gain"] = -servo.position_gain
+    values["velocity_feedback_controller.velocity_gain"] = -servo.velocity_gain
+    return load_scenario(_BASE, controller="velocity_feedback").changed(values)
+
+
+def _constants_of(law: FrictionLaw) -> dict[str, Any]:
+    """Return the constants of a law that are one number, those of the curve that it follows too."""
+    own = {name: getattr(law, name) for name in constants_of(type(law))}
+    if isinstance(law, CurveFollower):
+        own |= _constants_of(law.curve)
+    if isinstance(law, Table):
+        return {}
+    return {name: value for name, value in own.items() if isinstance(value, int | float)}
+
+
+def _heading(found: Findings, path: Path) -> str:
+    names = ", ".join(dict.fromkeys(record.name for record in found.records))
+    law = f"law {found.law}, held-out error {found.chosen.error:.2%}"
+    return f"{path.stem}: a drive identified from {names}; {law}.\nstickslip simulate {path.name}"

@@ -1,0 +1,109 @@
+"""The figure of an identification: the friction curve, and residuals by speed, position, time."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.identification.findings import Findings
+from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, set_title, styled
+from stickslip_ros.plots.units import SI
+
+_DOTS: Any = {"marker": ".", "ms": 2.0, "ls": "", "alpha": 0.4, "mew": 0.0, "rasterized": True}
+_CONFIDENCE = 1.96
+"""Half of a 95 % interval, in standard errors."""
+_NAMES = {1.0: "forward slip", -1.0: "backward slip"}
+
+
+@styled
+def identification_figure(found: Findings) -> Figure:
+    """Return the figure of what was found.
+
+    Parameters
+    ----------
+    found : Findings
+        The model.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Friction curve with its 95 % band and what was measured, residuals over speed, position and
+        time, and the free run beside the measured positions.
+    """
+    figure = Figure(figsize=(10.0, 9.0))
+    grid = figure.add_gridspec(3, 2)
+    errors = found.errors()
+    _friction(figure.add_subplot(grid[0, :]), found, errors)
+    for place, (values, name, unit) in enumerate(
+        (
+            (errors.relative_speed, "speed relative to the belt", "m/s"),
+            (errors.position, "displacement", "m"),
+        )
+    ):
+        _residuals(figure.add_subplot(grid[1, place]), values, errors.force_error, name, unit)
+    _residuals(figure.add_subplot(grid[2, 0]), errors.time, errors.force_error, "time", "s")
+    _free_run(figure.add_subplot(grid[2, 1]), found)
+    names = ", ".join(dict.fromkeys(record.name for record in found.records))
+    set_title(figure, f"{names}: law {found.law}, error held out {found.chosen.error:.3%}")
+    return figure
+
+
+def _friction(axes: Axes, found: Findings, errors: Any) -> None:
+    forces = errors.friction
+    scale, label = SI.axis("friction force", "N", forces)
+    speed_scale, speed_label = SI.axis(
+        "speed relative to the belt, size", "m/s", errors.relative_speed
+    )
+    for number, (direction, colour) in enumerate(
+        zip(found.directions, (BLUE, ORANGE), strict=False)
+    ):
+        own = errors.relative_speed * direction > 0.0
+        axes.plot(
+            np.abs(errors.relative_speed[own]) / speed_scale,
+            direction * forces[own] / scale,
+            color=colour,
+            **_DOTS,
+        )
+        curve = found.friction(number)
+        band = _CONFIDENCE * curve.standard_error
+        axes.plot(curve.speed / speed_scale, curve.force / scale, color=colour, lw=1.5)
+        axes.fill_between(
+            curve.speed / speed_scale,
+            (curve.force - band) / scale,
+            (curve.force + band) / scale,
+            color=colour,
+            alpha=0.3,
+            lw=0.0,
+            label=f"{_NAMES[direction]}, 95 % band",
+        )
+    axes.set_xlabel(speed_label)
+    axes.set_ylabel(label)
+    axes.set_xlim(left=0.0)
+    axes.set_title("friction: measured (dots) and fitted")
+    axes.legend(loc="lower right", fontsize="small")
+
+
+def _residuals(axes: Axes, over: FloatArray, residual: FloatArray, name: str, unit: str) -> None:
+    scale, label = SI.axis(name, unit, over)
+    force, force_label = SI.axis("force, measured less fitted", "N", residual)
+    axes.plot(over / scale, residual / force, color=BLUE, **_DOTS)
+    axes.axhline(0.0, color="black", lw=0.6)
+    axes.set_xlabel(label)
+    axes.set_ylabel(force_label)
+    axes.set_title(f"residuals over {name}")
+
+
+def _free_run(axes: Axes, found: Findings) -> None:
+    record = found.records[0]
+    time = record.period * np.arange(len(record.position))
+    run = found.free_run(record)
+    scale, label = SI.axis("displacement", "m", record.position)
+    axes.plot(time, record.position / scale, color=BLUE, label="measured")
+    axes.plot(time, run / scale, color=ORANGE, ls="--", label="simulated, no feedback")
+    axes.plot(time, (run - record.position) / scale, color=GREEN, ls=":", label="difference")
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel(label)
+    axes.set_title("run with the recorded force (in-sample)")
+    axes.legend(loc="upper right", fontsize="small")

@@ -1,0 +1,96 @@
+"""The tables of an identification: constants with intervals, laws that competed, predictions."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from stickslip_ros.identification.findings import Findings
+from stickslip_ros.plots.units import SI
+from stickslip_ros.scenarios.parameter_field import parameters_of
+from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.tables import TextTable
+
+_PREDICTIONS = {
+    "force_error": "force error",
+    "free_run_error": "free run, position error",
+    "position_error": "closed loop, position error",
+    "closed_loop_force_error": "closed loop, force error",
+}
+
+
+def identification_tables(
+    found: Findings, own: Mapping[str, Any], checks: Sequence[Mapping[str, Any]]
+) -> Iterator[TextTable | str]:
+    """Yield the tables of what was found.
+
+    `own` is what the model predicts of the first recording that it was fitted to, `checks` of
+    others.
+    """
+    units = {each.name: each.unit or "" for each in parameters_of(PlantParameters)}
+    rows = [
+        [
+            f"plant.{name}",
+            SI.text(each.value, units[name]),
+            SI.text(each.standard_error, units[name], largest=abs(each.value)),
+            " to ".join(SI.texts([*each.interval], units[name], digits=6)),
+        ]
+        for name, each in found.fitted.items()
+    ]
+    names = ", ".join(dict.fromkeys(record.name for record in found.records))
+    headings = ["parameter", "value", "standard error", "95 % interval"]
+    yield TextTable(f"{names}: law {found.law}", headings, rows)
+    if found.law in ("table", "lugre") and not found.has_spring:
+        yield _curve(found)
+    yield TextTable(
+        "laws",
+        ["law", "constants", "error held out", ""],
+        [
+            [each.law, str(each.size), f"{each.error:.3%}", _verdict(found, each.law, each.remark)]
+            for each in sorted(found.candidates, key=lambda each: each.error)
+        ],
+    )
+    shown = [("fitted to, in-sample", own), *((each["recording"], each) for each in checks)]
+    yield TextTable(
+        "predictions",
+        ["recording", *_PREDICTIONS.values()],
+        [[name, *_predicted(values)] for name, values in shown],
+    )
+    for first, second, share in found.correlations:
+        yield f"plant.{first} and plant.{second} are correlated, {share:.3f}"
+    for name, why in found.unidentified.items():
+        yield f"plant.{name} is not told: {why}"
+
+
+def _curve(found: Findings) -> TextTable:
+    rows: list[list[str]] = []
+    for number, direction in enumerate(found.directions):
+        curve = found.friction(number)
+        places = range(0, len(curve.speed), max(len(curve.speed) // 6, 1))
+        rows += [
+            [
+                "forward" if direction > 0.0 else "backward",
+                SI.text(float(curve.speed[place]), "m/s"),
+                SI.text(float(curve.force[place]), "N"),
+                SI.text(1.96 * float(curve.standard_error[place]), "N"),
+            ]
+            for place in places
+        ]
+    return TextTable("friction", ["slip", "speed", "force", "+- (95 %)"], rows)
+
+
+def _verdict(found: Findings, law: str, remark: str) -> str:
+    if remark:
+        return remark
+    if law == found.law:
+        return "chosen"
+    return "predicts as well, within the noise" if found.as_good.get(law) else ""
+
+
+def _predicted(values: Mapping[str, Any]) -> list[str]:
+    cells: list[str] = []
+    for name in _PREDICTIONS:
+        value = values[name]
+        if name == "free_run_error":
+            cells.append(SI.text(value, "m"))
+        else:
+            cells.append("-" if value is None else f"{100.0 * value:.4g} %")
+    return cells
