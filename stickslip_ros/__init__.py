@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any  # what takes time comes second
 from stickslip_ros.deprecated_names import find_moved_modules
 
 if TYPE_CHECKING:
+    from stickslip_ros.api.identification import Model, identify
     from stickslip_ros.api.recordings import RecordedRun, read_bag, read_table
     from stickslip_ros.api.runs import Run, simulate
     from stickslip_ros.api.scenarios import scenario
@@ -33,6 +34,7 @@ find_moved_modules()
 
 __all__ = [
     "Basin",
+    "Model",
     "Proposal",
     "RecordedRun",
     "Run",
@@ -44,6 +46,7 @@ __all__ = [
     "__version__",
     "basin",
     "design",
+    "identify",
     "read_bag",
     "read_table",
     "scenario",
@@ -53,6 +56,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "api.identification": ("Model", "identify"),
     "api.recordings": ("RecordedRun", "read_bag", "read_table"),
     "api.runs": ("Run", "simulate"),
     "api.scenarios": ("scenario",),

@@ -26,7 +26,6 @@ from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
     from stickslip_ros.identification.findings import Findings
-    from stickslip_ros.identification.record import Record
 
 _DESCRIPTION = """Fit a model to recordings of a drive: mass, stiffness, damping, and friction by a
 law or as a curve, with 95 % intervals. A belt that is at rest in all recordings means an axis
@@ -81,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     with interrupts_kept():
-        from stickslip_ros.identification.identify import fixed_of, identify
+        from stickslip_ros.identification.identify import fixed_of, identify_recordings
         from stickslip_ros.identification.reading import read_records
         from stickslip_ros.plots.identification_table import identification_tables
     columns = columns_of(arguments.columns)
@@ -97,21 +96,17 @@ def run(arguments: argparse.Namespace) -> int:
         "namespace": arguments.namespace,
         "belt_speed": arguments.belt_speed,
     }
-    records: list[Record] = []
-    known: dict[str, float] = {}
-    for path in dict.fromkeys(arguments.recordings):
-        read = read_records(path, columns, **options)
-        records += read.records
-        known |= read.known
     checked = {path: read_records(path, columns, **options) for path in arguments.check}
     with progress_bar("identifying", None) as progress:
-        found = identify(records, arguments.law, {**known, **fixed}, lambda _: progress(0.0))
+        found = identify_recordings(
+            arguments.recordings, arguments.law, fixed, columns, lambda _: progress(0.0), **options
+        )
         checks = [
             {"recording": str(path), **found.check(record)}
             for path, read in checked.items()
             for record in read.records
         ]
-        own = found.check(records[0])
+        own = found.check(found.records[0])
     if arguments.json:
         print_json({**as_dict(found, own, checks), "versions": versions()})
     else:
@@ -177,6 +172,7 @@ def as_dict(
             for each in found.candidates
         ],
         "curves": curves,
+        "notes": list(found.notes),
         "servo": None if found.servo is None else vars(found.servo),
         "force_delay": found.delay,
         "checks": list(checks),

@@ -30,7 +30,7 @@ from stickslip_ros.identification.regression import (
     solve,
     system,
 )
-from stickslip_ros.identification.trajectory import Predictor, free_run
+from stickslip_ros.identification.trajectory import Predictor, delayed, free_run
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import (
     Coulomb,
@@ -185,7 +185,8 @@ class _FreeRuns:
     """
 
     def __init__(self, fit: Regression, records: Sequence[Record], delay: float) -> None:
-        self._fit, self._delay = fit, delay
+        self._fit = fit
+        records = [delayed(record, delay) for record in records]
         self._predictors = [Predictor(record) for record in records]
         self._measured = np.concatenate([record.position for record in records])
         self._records = records
@@ -212,9 +213,7 @@ class _FreeRuns:
             self._predictors, point[-len(self._predictors) :].tolist(), strict=True
         ):
             measured = each.record.position
-            positions.append(
-                each.positions(drive, 0, len(measured), float(measured[0]), speed, self._delay)
-            )
+            positions.append(each.positions(drive, 0, len(measured), float(measured[0]), speed))
         errors = np.concatenate(positions) - self._measured
         errors = np.nan_to_num(errors, nan=_FAR / self._weights[1])
         return np.concatenate([own.residual * self._weights[0], errors * self._weights[1]])
@@ -279,7 +278,7 @@ class _FreeRuns:
 
     def _runs(self, fit: Regression) -> list[tuple[float, FloatArray]]:
         drive = axis_drive(fit, 1.0, 0.0)
-        return [free_run(record, drive, self._delay) for record in self._records]
+        return [free_run(record, drive) for record in self._records]
 
 
 def _slope(fit: Regression, low: float, high: float) -> float:

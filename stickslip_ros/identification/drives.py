@@ -36,6 +36,8 @@ _WHITE = 0.3
 """Correlation of successive errors up to which they are noise: rounding leaves some."""
 _SHAPES = (0.1, 0.3, 0.8)
 """Shapes from which the search starts, besides that of the regression: shares of the speeds."""
+POOR = 0.1
+"""Error, as a share of the motion, from which a model does not describe it."""
 _HOPELESS = 4.0
 """Squared error, in squared errors of the best model, from which a model is not fitted further."""
 _STIFF = (10.0, 100.0)
@@ -202,7 +204,9 @@ def drive_candidates(task: DriveTask, law: str, progress: Progress) -> list[Cand
         if law in ("auto", model.law):
             progress(model.law)
             found.append(task.searched(model, thorough=not any(map(is_white, found))))
-    if not any(map(is_white, found)):
+    # A memory changes the motion near sticking: it does not explain an input that is missing.
+    near = law != "auto" or min(map(_share, found)) < POOR
+    if near and not any(map(is_white, found)):
         bristles: Refinement | None = None
         for model in MEMORY_MODELS:
             if law not in ("auto", model.law):
@@ -230,6 +234,11 @@ def drive_laws() -> list[str]:
 def is_white(fit: Refinement) -> bool:
     """Return whether the errors of a fit are noise, as far as their successive ones tell."""
     return abs(fit.correlation) < _WHITE
+
+
+def _share(fit: Refinement) -> float:
+    """Return the rms error as a share of the rms motion."""
+    return sqrt(_loss(fit) / len(fit.residual)) / float(np.std(fit.task.measured))
 
 
 def _loss(fit: Refinement) -> float:

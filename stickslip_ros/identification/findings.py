@@ -1,7 +1,7 @@
 """What was identified: constants with intervals, the friction curve, and what it predicts."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, isfinite, isnan, sqrt
 
@@ -10,13 +10,14 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.axes import Points, axis_drive, table_of, table_speeds
 from stickslip_ros.identification.candidates import Candidate, Estimate
+from stickslip_ros.identification.drives import POOR
 from stickslip_ros.identification.filtered import START, filtered
 from stickslip_ros.identification.models import DELAY
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement
 from stickslip_ros.identification.regression import Regression
 from stickslip_ros.identification.servo import Servo, closed_loop
-from stickslip_ros.identification.trajectory import free_run
+from stickslip_ros.identification.trajectory import delayed, free_run
 from stickslip_ros.physics.model.drive import Drive
 
 _POINTS = 40
@@ -78,6 +79,10 @@ class Findings:
     """Constants that were given."""
     servo: Servo | None
     """The position controller in the first record that has one."""
+    _runs: dict[int, tuple[Record, FloatArray]] = field(
+        default_factory=dict[int, tuple[Record, FloatArray]], init=False, repr=False
+    )
+    """Free runs so far, each with its record, by the record's identity."""
 
     @property
     def law(self) -> str:
@@ -158,6 +163,17 @@ class Findings:
         names = [name for name, used in zip(base, told, strict=True) if used]
         values = np.array([base[name] for name in names])
         return names, values, linear[told] @ fit.covariance @ linear[told].T
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """Sentences on what makes the model doubtful."""
+        if self.chosen.error < POOR:
+            return []
+        return [
+            f"the model does not describe the recordings: its error is {self.chosen.error:.0%} of "
+            "what it predicts; an input may be missing (a disturbance, the velocity of the belt), "
+            "or have another sign or unit"
+        ]
 
     @cached_property
     def unidentified(self) -> Mapping[str, str]:
@@ -370,7 +386,14 @@ class Findings:
 
         It starts at the measured position; the velocity at the start is the one that fits best.
         """
-        return free_run(record, self.drive, self.delay)[1]
+        key = id(record)
+        if key not in self._runs:
+            if self.has_spring:
+                run = free_run(record, self.drive, self.delay)[1]
+            else:
+                run = free_run(delayed(record, self.delay), self.drive)[1]
+            self._runs[key] = record, run
+        return self._runs[key][1]
 
     def check(self, record: Record) -> dict[str, float | None]:
         """Return what the model predicts of a record, as `CHECKED` names it.

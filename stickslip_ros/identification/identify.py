@@ -1,6 +1,8 @@
 """From recordings to a model: which law, which constants, how sure."""
 
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from stickslip_ros.identification.candidates import choose
 from stickslip_ros.identification.drives import DriveTask, drive_candidates, drive_laws
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.models import DELAY
+from stickslip_ros.identification.reading import read_records
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import LINEAR
 from stickslip_ros.identification.servo import servo_of
@@ -27,8 +30,62 @@ def laws() -> Sequence[str]:
     return (AUTO, *dict.fromkeys([*axis_laws(), *drive_laws()]))
 
 
+def identify_recordings(
+    paths: Sequence[Path],
+    law: str,
+    fixed: Mapping[str, float],
+    columns: Mapping[str, str] | None = None,
+    progress: Callable[[str], None] = lambda _: None,
+    **options: Any,
+) -> Findings:
+    """Identify a drive from files.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Recordings of one machine.
+    law : str
+        Friction law, or `AUTO`.
+    fixed : mapping
+        Constants that are known, by NODE.PARAMETER.
+    columns : mapping, optional
+        Columns of tables.
+    progress : callable, optional
+        As for `identify`.
+    **options : Any
+        As for `read_records`.
+
+    Returns
+    -------
+    Findings
+        The model.
+
+    Raises
+    ------
+    BagError
+        If a recording cannot be read.
+    InvalidInputError
+        If an argument is not allowed, or the recordings cannot tell a model.
+    """
+    if not paths:
+        raise InvalidInputError("no recording is given: must be at least one")
+    own: dict[str, float] = {}
+    for target, value in fixed.items():
+        node, _, name = target.partition(".")
+        if node != "plant" or not name:
+            raise InvalidInputError(f"{target} is refused: must be plant.PARAMETER")
+        own[name] = float(value)
+    records: list[Record] = []
+    known: dict[str, float] = {}
+    for path in dict.fromkeys(paths):
+        read = read_records(path, columns, **options)
+        records += read.records
+        known |= read.known
+    return identify(records, law, {**known, **own}, progress)
+
+
 def fixed_of(texts: Sequence[str]) -> dict[str, float]:
-    """Return constants from texts `plant.PARAMETER=VALUE`, by parameter of the plant.
+    """Return constants from texts `plant.PARAMETER=VALUE`, by NODE.PARAMETER.
 
     Raises InvalidInputError for a text that is none.
     """
@@ -36,10 +93,9 @@ def fixed_of(texts: Sequence[str]) -> dict[str, float]:
     for text in texts:
         name, equals, value = text.partition("=")
         try:
-            node, _, parameter = name.strip().partition(".")
-            if not equals or node != "plant" or parameter in found:
+            if not equals or name.strip() in found:
                 raise ValueError
-            found[parameter] = float(value)
+            found[name.strip()] = float(value)
         except ValueError:
             raise InvalidInputError(
                 f"--fix {text}: must be plant.PARAMETER=VALUE, each parameter once, as in "

@@ -95,6 +95,18 @@ class Predictor:
         return replace(drive, belt_speed=0.0, belt=Table(times, tuple(belt[places].tolist())))
 
 
+def delayed(record: Record, delay: float) -> Record:
+    """Return a record whose force from sample to sample is the mean of what acts meanwhile.
+
+    Half as many steps then simulate a delay that is no whole number of periods, to a change of the
+    force within a period.
+    """
+    held, periods = record.held_force, delay / record.period
+    total = np.concatenate([[0.0], np.cumsum(held)])
+    edges = np.interp(np.arange(len(total)) - periods, np.arange(len(total)), total)
+    return replace(record, force=np.diff(edges), disturbance=None)
+
+
 def free_run(record: Record, drive: Drive, delay: float = 0.0) -> tuple[float, FloatArray]:
     """Return the motion of a drive through a whole record, with its force and without feedback.
 
@@ -126,16 +138,19 @@ def free_run(record: Record, drive: Drive, delay: float = 0.0) -> tuple[float, F
         loss = float(np.mean((found - record.position) ** 2))
         return loss if isfinite(loss) else _FAR, found
 
-    # The squared error is nearly a parabola in the velocity at the start.
-    speeds = [slope - spread, slope, slope + spread]
-    runs = [run(speed) for speed in speeds]
-    low, middle, high = (loss for loss, _ in runs)
-    bend = low - 2.0 * middle + high
-    if spread > 0.0 and bend > 0.0 and max(low, high) < _FAR:
-        speeds.append(slope + 0.5 * spread * (low - high) / bend)
-        runs.append(run(speeds[-1]))
-    best = min(range(len(runs)), key=lambda number: runs[number][0])
-    return speeds[best], runs[best][1]
+    tried = {slope: run(slope)}
+    best = slope
+    for reach in (spread, 0.2 * spread):
+        # The squared error is nearly a parabola in the velocity at the start.
+        for speed in (best - reach, best + reach):
+            tried[speed] = run(speed)
+        low, middle, high = (tried[best + sign * reach][0] for sign in (-1.0, 0.0, 1.0))
+        bend = low - 2.0 * middle + high
+        if reach > 0.0 and bend > 0.0 and max(low, high) < _FAR:
+            lowest = best + 0.5 * reach * (low - high) / bend
+            tried[lowest] = run(lowest)
+        best = min(tried, key=lambda speed: tried[speed][0])
+    return best, tried[best][1]
 
 
 def _corners(values: FloatArray) -> FloatArray:

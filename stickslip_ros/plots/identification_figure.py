@@ -81,6 +81,7 @@ def _friction(axes: Axes, found: Findings, errors: Any) -> None:
     axes.set_xlabel(speed_label)
     axes.set_ylabel(label)
     axes.set_xlim(left=0.0)
+    axes.set_ylim(bottom=0.0)
     axes.set_title("friction: measured (dots) and fitted")
     axes.legend(loc="lower right", fontsize="small")
 
@@ -106,4 +107,4 @@ def _free_run(axes: Axes, found: Findings) -> None:
     axes.set_xlabel("time (s)")
     axes.set_ylabel(label)
     axes.set_title("run with the recorded force (in-sample)")
-    axes.legend(loc="upper right", fontsize="small")
+    axes.legend(loc="lower center", fontsize="small", ncols=3)

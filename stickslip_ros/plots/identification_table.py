@@ -54,6 +54,7 @@ def identification_tables(
         ["recording", *_PREDICTIONS.values()],
         [[name, *_predicted(values)] for name, values in shown],
     )
+    yield from found.notes
     for first, second, share in found.correlations:
         yield f"plant.{first} and plant.{second} are correlated, {share:.3f}"
     for name, why in found.unidentified.items():

@@ -1,0 +1,184 @@
+"""Do the intervals of `stickslip identify` cover, and does it recover the law?
+
+Runs of a drive like feed_drive with an encoder of 1 um and a force that is rounded to 0.1 N. In
+`ramp` the belt speed rises from 20 to 60 mm/s under a washout controller, with taps of 60 to 200 N.
+`stick` is stick-slip at 20 mm/s without control; the mass is given, since without a force only
+ratios can be told. The start, the taps and with them all rounding differ from seed to seed.
+"""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.identify import identify
+from stickslip_ros.identification.record import Record
+from stickslip_ros.physics.model.courses import Table
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.friction import (
+    Coulomb,
+    Exponential,
+    FrictionLaw,
+    LuGre,
+    Stribeck,
+)
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.versions import versions
+
+NORMAL_FORCE = 1000.0
+_CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.02, viscous=0.5)
+LAWS: dict[str, FrictionLaw] = {
+    "stribeck": Stribeck(static=0.4, minimum=0.25, minimum_speed=0.05),
+    "exponential": _CURVE,
+    "coulomb": Coulomb(static=0.3, viscous=0.8),
+    "lugre": LuGre(_CURVE, bristle_stiffness=2e4, bristle_damping=1.0),
+}
+CASES = (
+    *product(LAWS, ("ramp",)),
+    ("stribeck", "stick"),
+    ("exponential", "stick"),
+    ("lugre", "stick"),
+)
+"""Law and kind of run. Coulomb friction does not vibrate by itself."""
+SEEDS = 100
+DURATION = 4.0
+RESOLUTION, FORCE_STEP, PERIOD = 1e-6, 0.1, 1e-3
+MASS, STIFFNESS = 100.0, 1e6
+
+
+def damping(law: str, kind: str) -> float:
+    """Return the damping, N s/m: where it merges with viscous friction there is none."""
+    return 200.0 if (law, kind) == ("stribeck", "ramp") else 0.0
+
+
+def record(law: str, kind: str, seed: int, duration: float = DURATION) -> Record:
+    """Return a run as a machine would log it."""
+    random = np.random.default_rng(seed)
+    count = round(duration / PERIOD)
+    belt = np.full(count, 0.02)
+    drive = Drive(
+        mass=MASS,
+        damping=damping(law, kind),
+        stiffness=STIFFNESS,
+        normal_force=NORMAL_FORCE,
+        belt_speed=0.02,
+        friction=LAWS[law],
+    )
+    taps, gain = np.zeros(count), 0.0
+    if kind == "ramp":
+        times = (0.0, 0.2 * duration, 0.8 * duration, duration)
+        speeds = (0.02, 0.02, 0.06, 0.06)
+        belt = np.interp(PERIOD * np.arange(count), times, speeds)
+        drive, gain = replace(drive, belt_speed=0.0, belt=Table(times, speeds)), -1500.0
+        place = 0
+        while place < count:
+            place += int(random.uniform(150, 350))
+            size = random.choice([-1.0, 1.0]) * random.uniform(60.0, 200.0)
+            taps[place : place + int(random.uniform(10, 30))] = round(size / FORCE_STEP)
+    taps *= FORCE_STEP
+    motion = Motion(drive, 2.6e-4 * random.uniform(0.5, 1.0), 0.0)
+    position, force = np.empty(count), np.zeros(count)
+    slow, last = 0.0, None
+    for number in range(count):
+        measured = round(motion.position / RESOLUTION) * RESOLUTION
+        position[number] = measured
+        velocity = 0.0 if last is None else (measured - last) / PERIOD
+        last = measured
+        force[number] = round(gain * (velocity - slow) / FORCE_STEP) * FORCE_STEP
+        slow += 20.0 * PERIOD * (velocity - slow)
+        motion.set_forces(float(force[number]), float(taps[number]))
+        motion.advance(PERIOD)
+    return Record(f"{law}, {kind}, seed {seed}", PERIOD, position, belt, force, taps)
+
+
+def truth(law: str, kind: str) -> dict[str, float]:
+    """Return the constants of a run by parameter of the plant."""
+    own = LAWS[law]
+    curve = own.curve if isinstance(own, LuGre) else own
+    found = {"mass": MASS, "stiffness": STIFFNESS, "damping": damping(law, kind)}
+    found |= {
+        f"friction.{name}": value for name, value in vars(curve).items() if name != "switches"
+    }
+    if isinstance(own, LuGre):
+        for name in ("bristle_stiffness", "bristle_damping"):
+            found[f"friction.{name}"] = getattr(own, name)
+    return found
+
+
+def tried(law: str, kind: str, seed: int) -> dict[str, Any]:
+    """Return the law that was found for a seed, and the errors of its constants."""
+    known = {"normal_force": NORMAL_FORCE}
+    if kind == "stick":
+        known["mass"] = MASS
+    found: Findings = identify([record(law, kind, seed)], fixed=known)
+    result: dict[str, Any] = {"law": found.law, "as_good": [*filter(found.as_good.get, LAWS)]}
+    if found.law == law:
+        true = truth(law, kind)
+        result["errors"] = {
+            name: [each.value - true[name], each.standard_error]
+            for name, each in found.fitted.items()
+            if name in true and name not in found.unidentified
+        }
+    return result
+
+
+def summary(law: str, kind: str, trials: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return shares and biases over the seeds of a case."""
+    errors: dict[str, list[tuple[float, float]]] = {}
+    for trial in trials:
+        for name, (error, standard) in trial.get("errors", {}).items():
+            errors.setdefault(name, []).append((error, standard))
+    constants = {
+        name: {
+            "seeds": len(pairs),
+            "covered": float(np.mean([abs(error) <= 1.96 * s for error, s in pairs])),
+            "bias": float(np.mean([error for error, _ in pairs])),
+            "scatter": float(np.std([error for error, _ in pairs])),
+            "standard_error": float(np.median([s for _, s in pairs])),
+        }
+        for name, pairs in errors.items()
+    }
+    right = float(np.mean([trial["law"] == law for trial in trials]))
+    return {"law": law, "kind": kind, "seeds": len(trials), "right": right, "constants": constants}
+
+
+def study(
+    seeds: int, workers: int | None = None, cases: Iterable[tuple[str, str]] = CASES
+) -> dict[str, Any]:
+    """Return the summaries of all cases."""
+    found: list[dict[str, Any]] = []
+    with ProcessPoolExecutor(workers) as pool:
+        for law, kind in cases:
+            own = list(pool.map(tried, [law] * seeds, [kind] * seeds, range(seeds)))
+            found.append(summary(law, kind, own))
+            print(json.dumps(found[-1]), file=sys.stderr, flush=True)
+    return {"cases": found, "versions": versions()}
+
+
+def main() -> None:
+    """Write the study as JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=SEEDS)
+    parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("--cases", nargs="*", metavar="LAW,KIND")
+    parser.add_argument("--out", type=Path)
+    arguments = parser.parse_args()
+    cases = [tuple(each.split(",")) for each in arguments.cases] if arguments.cases else CASES
+    text = json.dumps(study(arguments.seeds, arguments.workers, cases), indent=1) + "\n"
+    if arguments.out is None:
+        print(text, end="")
+    else:
+        arguments.out.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
