@@ -14,10 +14,10 @@ from stickslip_ros.identification.drives import POOR
 from stickslip_ros.identification.filtered import START, filtered
 from stickslip_ros.identification.models import DELAY
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.refinement import Refinement
+from stickslip_ros.identification.refinement import Refinement, refine, segments_of
 from stickslip_ros.identification.regression import Regression
 from stickslip_ros.identification.servo import Servo, closed_loop
-from stickslip_ros.identification.trajectory import delayed, free_run
+from stickslip_ros.identification.trajectory import Predictor, delayed, free_run
 from stickslip_ros.physics.model.drive import Drive
 
 _POINTS = 40
@@ -384,16 +384,21 @@ class Findings:
     def free_run(self, record: Record) -> FloatArray:
         """Return the positions that the model runs through, with the recorded force, no feedback.
 
-        It starts at the measured position; the velocity at the start is the one that fits best.
+        The velocity at the start is the one that fits best, of a drive on a spring the position
+        at the start, too.
         """
         key = id(record)
         if key not in self._runs:
-            if self.has_spring:
-                run = free_run(record, self.drive, self.delay)[1]
-            else:
-                run = free_run(delayed(record, self.delay), self.drive)[1]
-            self._runs[key] = record, run
+            self._runs[key] = record, self._free_run(record)
         return self._runs[key][1]
+
+    def _free_run(self, record: Record) -> FloatArray:
+        fit = self.chosen.fit
+        if isinstance(fit, Regression):
+            return free_run(delayed(record, self.delay), self.drive)[1]
+        segments, starts = segments_of([record], record.duration)
+        task = replace(fit.task, predictors=[Predictor(record)], segments=segments, starts=starts)
+        return refine(task, (), fit.values).residual + task.measured
 
     def check(self, record: Record) -> dict[str, float | None]:
         """Return what the model predicts of a record, as `CHECKED` names it.

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, sqrt
 from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
@@ -18,6 +18,8 @@ from stickslip_ros.physics.model.friction import LAWS, CurveFollower, Exponentia
 
 _TINY = 1e-9
 """Smallest constant that must be above zero, as a share of its start."""
+_WIDE = 30.0
+"""Factor by which the search may leave the mass and the stiffness that it starts from."""
 _STIFFEST = 3000.0
 """Largest stiffness of the bristles, in stiffnesses of the spring."""
 DELAY = "force_delay"
@@ -96,8 +98,16 @@ class Model:
             Fastest speed relative to the belt in the records, m/s: what friction does at a
             hundredth of it or far above it, they do not tell.
         """
-        if name in ("bias_force", "viscous", DELAY):
+        rate = self.static_force(values) / fastest
+        if name == "bias_force":
             return -inf, inf
+        if name == "viscous":
+            return -_WIDE * rate, _WIDE * rate
+        if name in ("mass", "stiffness"):
+            return values[name] / _WIDE, values[name] * _WIDE
+        if name == DELAY:
+            longest = sqrt(values["mass"] / values["stiffness"])
+            return -longest, longest
         if name in ("rise", "damping", self.smaller):
             return 0.0, inf
         if name == self.shape:
@@ -105,7 +115,7 @@ class Model:
         if name == "bristle_stiffness":
             return values["stiffness"], _STIFFEST * values["stiffness"]
         if name == "bristle_damping":
-            return 0.0, _STIFFEST * self.static_force(values) / fastest
+            return 0.0, _STIFFEST * rate
         return _TINY * abs(values[name]), inf
 
     def constants(self, values: Mapping[str, float], normal_force: float) -> dict[str, float]:

@@ -117,6 +117,7 @@ SHORT = ("--transient", "20", "--cycles", "3")
 BELT = ("--over", "plant.belt_speed=0.3:0.6:3")
 GRID = ("--position=-1:1:2", "--velocity=-1:1:2")
 RIG = ("feed_drive", "--belt-speed")
+KNOWN = ("--fix", "plant.mass=100", "--fix", "plant.damping=200")
 ENCODER = ("-p", "plant.sensor.position_resolution=1e-6")
 CALLS = [
     ("simulate", ("simulate", "paper", "--duration", "100")),
@@ -137,6 +138,7 @@ CALLS = [
     ("design", ("design", *RIG, "0.02:0.04", "-p", "plant.force_delay=0.02")),
     pytest.param("design", ("design", *RIG, "0.03"), marks=pytest.mark.long),
     ("design", ("design", *RIG, "0.03", *ENCODER)),
+    ("identify", ("identify", REFERENCE, "--law", "stribeck", *KNOWN)),
     ("repair", ("repair", REFERENCE, "sound")),
     ("list", ("list",)),
     ("show", ("show", "feed_drive", "-p", "plant.mass=2")),

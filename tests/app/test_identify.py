@@ -1,0 +1,104 @@
+"""`stickslip identify`: from a log to a model, a scenario and a figure."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stickslip_ros as ss
+from tests.app.conftest import Run
+from tests.identification.axis_record import record
+
+_COLUMNS = "time=t,position=x,force=u*2,reference=r"
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    """A log of an axis without a spring."""
+    own = record("saturating", duration=6.0)
+    assert own.force is not None
+    assert own.reference is not None
+    time = own.period * np.arange(len(own.position))
+    rows = np.column_stack([time, own.position, own.force / 2.0, own.reference])
+    path = tmp_path / "axis.csv"
+    np.savetxt(path, rows, delimiter=",", header="t,x,u,r", comments="")
+    return path
+
+
+def test_a_log_becomes_a_model_a_scenario_and_a_figure(
+    stickslip: Run, tmp_path: Path, log: Path
+) -> None:
+    given = ("--columns", _COLUMNS, "--law", "table", "--check", "axis.csv")
+    done = stickslip(
+        "identify", "axis.csv", *given, "--json", "--out", "found.yaml", "--plot", "found.png"
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["law"] == "table"
+    mass = found["parameters"]["plant.mass"]
+    low, high = mass["interval"]
+    assert low < mass["value"] < high
+    assert mass["value"] == pytest.approx(95.0, rel=0.05)
+    assert found["unidentified"].keys() >= {"plant.damping", "plant.bias_force"}
+    assert [each["law"] for each in found["candidates"]] == ["table"]
+    assert found["checks"][0]["recording"] == "axis.csv"
+    assert found["checks"][0]["force_error"] == pytest.approx(found["force_error"])
+    assert found["servo"]["difference_samples"] == 2
+    assert (tmp_path / "found.png").stat().st_size > 10_000
+    scenario = ss.scenario(tmp_path / "found.yaml")
+    assert scenario.plant.mass == mass["value"]
+    assert scenario.plant.friction.law == "table"
+    assert (tmp_path / "found-forward.csv").exists()
+    done = stickslip("simulate", "found.yaml", "--duration", "1")
+    assert done.returncode == 0, done.stderr
+    done = stickslip("identify", "axis.csv", *given, "--out", "found.yaml")
+    assert done.returncode == 2
+    assert "exists already" in done.stderr
+
+
+def test_the_tables_say_what_was_found(stickslip: Run, log: Path) -> None:
+    done = stickslip("identify", "axis.csv", "--columns", _COLUMNS, "--law", "coulomb")
+    assert done.returncode == 0, done.stderr
+    for words in (
+        "law coulomb",
+        "plant.mass",
+        "95 % interval",
+        "chosen",
+        "is not told",
+        "free run",
+    ):
+        assert words in done.stdout
+
+
+def test_a_bag_of_a_loop_is_identified(stickslip: Run) -> None:
+    bag = Path(__file__).parents[2] / "bags" / "reference"
+    known = ("--fix", "plant.mass=100", "--fix", "plant.damping=200")
+    known += ("--fix", "plant.normal_force=1000")
+    done = stickslip("identify", str(bag), "--law", "stribeck", *known, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)["parameters"]
+    assert found["plant.stiffness"]["value"] == pytest.approx(1e6, rel=1e-3)
+    assert found["plant.friction.static"]["value"] == pytest.approx(0.4, rel=1e-2)
+    assert found["plant.friction.minimum"]["value"] == pytest.approx(0.25, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("axis.csv",), "say what they are"),
+        (("none.csv",), "the file cannot be read"),
+        (("axis.csv", "--columns", "time=t,position=x"), "name its column"),
+        (("axis.csv", "--columns", _COLUMNS, "--law", "stribek"), "did you mean stribeck"),
+        (("axis.csv", "--columns", _COLUMNS, "--fix", "mass=3"), "must be plant.PARAMETER"),
+        (("axis.csv", "--columns", _COLUMNS, "--fix", "plant.mass"), "--fix plant.mass: must be"),
+        (("axis.csv", "--columns", _COLUMNS, "--to", "0.1"), "needs at least 500"),
+        (("axis.csv", "--columns", _COLUMNS, "--from", "99"), "holds no samples"),
+        (("axis.csv", "--columns", _COLUMNS, "--out", "a.txt"), "must end in .yaml"),
+    ],
+)
+def test_what_is_refused(stickslip: Run, log: Path, given: tuple[str, ...], message: str) -> None:
+    done = stickslip("identify", *given)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,101 @@
+"""Axes without a spring: constants, curves, the controller, predictions."""
+
+import numpy as np
+import pytest
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.identification.identify import identify
+from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.servo import servo_of
+from tests.identification.axis_record import COULOMB, SATURATING, SERVO, record
+
+
+def test_the_constants_of_coulomb_friction_by_direction() -> None:
+    found = identify([record("coulomb")], "coulomb", {"force_delay": 0.0})
+    forward, reverse = COULOMB.forward, COULOMB.reverse
+    true = {
+        "mass": 95.0,
+        "friction.static": forward.static,
+        "friction.viscous": forward.viscous,
+        "friction.reverse.static": reverse.static,
+        "friction.reverse.viscous": reverse.viscous,
+    }
+    assert found.fitted.keys() == true.keys()
+    for name, value in true.items():
+        assert found.fitted[name].value == pytest.approx(value, rel=0.02), name
+    assert found.force_error(found.records[0]) < 0.02
+    assert {"damping", "bias_force", "normal_force"} <= found.unidentified.keys()
+
+
+def test_the_normal_force_scales_the_coefficients_only() -> None:
+    plain = identify([record("coulomb")], "coulomb")
+    scaled = identify([record("coulomb")], "coulomb", {"normal_force": 50.0})
+    assert scaled.fitted["mass"] == plain.fitted["mass"]
+    ratio = plain.fitted["friction.static"].value / scaled.fitted["friction.static"].value
+    assert ratio == pytest.approx(50.0)
+    assert "normal_force" not in scaled.unidentified
+
+
+def test_a_known_mass_is_not_fitted() -> None:
+    found = identify([record("coulomb")], "coulomb", {"mass": 95.0})
+    assert "mass" not in found.fitted
+    assert found.drive.mass == 95.0
+
+
+def test_the_law_is_chosen_by_held_out_parts() -> None:
+    found = identify([record("saturating", duration=10.0)])
+    assert found.law == "table"
+    errors = {each.law: each.error for each in found.candidates}
+    assert errors["table"] < 0.7 * errors["coulomb"]
+    curve = found.friction(0)
+    true = -np.array([float(SATURATING.coefficient(w, 1.0)) for w in curve.speed.tolist()])
+    fast = curve.speed > 0.02
+    assert curve.force[fast] == pytest.approx(true[fast], rel=0.03)
+    assert (curve.standard_error > 0.0).all()
+    check = found.check(record("saturating", duration=6.0, seed=1))
+    assert check["position_error"] < 2e-4
+    assert check["closed_loop_force_error"] < 0.1
+    assert check["free_run_error"] < 0.02
+
+
+def test_coulomb_friction_needs_no_table() -> None:
+    found = identify([record("coulomb", duration=10.0)])
+    assert found.law == "coulomb"
+    assert found.as_good["exponential"]
+
+
+def test_the_controller_is_found_from_the_record() -> None:
+    found = servo_of(record("coulomb"))
+    assert found is not None
+    assert found.difference_samples == 2
+    assert found.position_gain == pytest.approx(SERVO.position_gain, rel=0.01)
+    assert found.velocity_gain == pytest.approx(SERVO.velocity_gain, rel=0.01)
+
+
+def test_a_force_of_another_origin_has_no_controller() -> None:
+    own = record("coulomb")
+    random = np.random.default_rng(0).normal(size=len(own.position))
+    assert servo_of(Record("axis", 1e-3, own.position, own.belt_velocity, random)) is None
+    other = Record("axis", 1e-3, own.position, own.belt_velocity, random, reference=own.reference)
+    assert servo_of(other) is None
+
+
+@pytest.mark.parametrize(
+    ("law", "fixed", "message"),
+    [
+        ("stribek", {}, "law stribek is refused: did you mean stribeck"),
+        ("dahl", {}, "law dahl is refused for a drive without a spring"),
+        ("auto", {"mass": -1.0}, "plant.mass = -1.0 is refused"),
+        ("auto", {"mas": 1.0}, "plant.mas is refused: did you mean mass"),
+    ],
+)
+def test_what_is_refused(law: str, fixed: dict[str, float], message: str) -> None:
+    with pytest.raises(InvalidInputError, match=message):
+        identify([record("coulomb")], law, fixed)
+
+
+def test_without_a_force_an_axis_tells_nothing() -> None:
+    own = record("coulomb")
+    still = Record("axis", 1e-3, own.position, own.belt_velocity)
+    with pytest.raises(InvalidInputError, match="no force acts in the recordings"):
+        identify([still])

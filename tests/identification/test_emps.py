@@ -1,0 +1,81 @@
+"""The ball-screw axis EMPS: published numbers, and those of docs/identification.md.
+
+A. Janot, M. Gautier, M. Brunot, Data set and reference models of EMPS, 2019.
+"""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.identify import identify
+from stickslip_ros.identification.reading import read_records
+from stickslip_ros.identification.record import Record
+
+_COLUMNS = {"time": "t", "position": "qm", "force": "vir*gtau", "reference": "qg"}
+_FILE = Path(
+    os.environ.get("STICKSLIP_DATA", Path(__file__).parents[3] / "shared" / "data"),
+    "emps/DATA_EMPS.mat",
+)
+_PAGE = Path(__file__).parents[2] / "docs" / "identification.md"
+
+
+@pytest.fixture(scope="module")
+def record() -> Record:
+    """The record."""
+    if not _FILE.exists():
+        pytest.skip(f"the recorded data are not here: {_FILE}")
+    (found,) = read_records(_FILE, _COLUMNS).records
+    return found
+
+
+@pytest.fixture(scope="module")
+def table(record: Record) -> Findings:
+    """The model that is chosen."""
+    return identify([record])
+
+
+def test_the_published_constants_by_direction(record: Record) -> None:
+    found = identify([record], "coulomb")
+    published = {
+        "mass": 95.1540,
+        "friction.static": 20.1440,
+        "friction.viscous": 166.7061,
+        "friction.reverse.static": 20.6277,
+        "friction.reverse.viscous": 240.4236,
+    }
+    for name, value in published.items():
+        assert found.fitted[name].value == pytest.approx(value, rel=1e-3), name
+    assert found.force_error(record) == pytest.approx(0.0306, abs=0.0003)
+
+
+def test_a_curve_is_chosen_that_predicts_better(record: Record, table: Findings) -> None:
+    assert table.law == "table"
+    assert table.chosen.error < 0.0265
+    assert not table.as_good["coulomb"]
+    check = table.check(record)
+    assert check["position_error"] < 6.5e-6
+    assert check["closed_loop_force_error"] < 0.03
+    assert check["free_run_error"] < 2.0e-3
+    for number in range(2):
+        force = table.friction(number).force
+        assert (force[1:] >= force[:-1]).all()
+    page = _PAGE.read_text(encoding="utf-8")
+    for text in (
+        f"{100.0 * table.chosen.error:.2f} %",
+        f"{1e3 * check['free_run_error']:.1f} mm",
+        f"{100.0 * check['position_error']:.4f} %",
+        f"{100.0 * check['closed_loop_force_error']:.1f} %",
+    ):
+        assert text in page
+
+
+def test_the_first_half_predicts_the_second(record: Record) -> None:
+    half = len(record.position) // 2
+    found = identify([record.part(0, half)])
+    own = found.check(record.part(0, half))
+    other = found.check(record.part(half, 2 * half))
+    assert found.law == "table"
+    assert other["force_error"] < 1.1 * own["force_error"]
+    assert other["position_error"] < 1.1 * own["position_error"]
