@@ -73,9 +73,9 @@ def test_laws_of_an_axis_are_refused_on_a_spring() -> None:
 
 @pytest.mark.long
 @pytest.mark.timeout(3600)
-def test_a_twentieth_of_the_study() -> None:
-    found = study.study(5, workers=2, cases=study.CASES[:3])
+def test_the_first_seeds_of_the_study() -> None:
+    found = study.study(2, workers=2, cases=study.CASES[:3])
     for case in found["cases"]:
         assert case["right"] == 1.0, case["law"]
         for name, each in case["constants"].items():
-            assert each["covered"] >= 0.6, (case["law"], name)
+            assert abs(each["bias"]) < 3.0 * each["standard_error"], (case["law"], name)

@@ -186,6 +186,8 @@ class HybridMotion:
                 continue
             if clocked:
                 instant.time = epoch + now
+            if watched:
+                self._reach_guard()
             following = None if guard == _DIVERGED else self._leads[guard](system, mode, instant)
             if has_parts and following is not None:
                 following = system.past(following, instant)
@@ -200,6 +202,9 @@ class HybridMotion:
     def _begin(self, now: float, end: float) -> float:
         """Take note of the start of a phase; return its latest end. Not called without detail."""
         return end
+
+    def _reach_guard(self) -> None:
+        """Take note of the state at a guard: the mode that follows may set a part of it."""
 
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
         """Take note of the end of a phase in `mode`, at a guard or not.

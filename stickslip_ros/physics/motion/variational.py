@@ -52,6 +52,7 @@ class SensitiveMotion(RecordedMotion):
         """Derivatives of the state (rows) by the state at the start (columns)."""
         self.landed = False
         """Whether the slide has stuck since the start."""
+        self._at_guard: FloatArray = np.empty(0)
         self._effort = self._begun = 0.0
         self._steps_before = 0
         super().__init__(replace(drive, actuator=IDEAL_ACTUATOR), 0.0, 0.0, gains)
@@ -133,9 +134,14 @@ class SensitiveMotion(RecordedMotion):
         self._begun, self._steps_before = now, self._steps_left
         return min(end, now + _LONGEST_SLIP) if self._mode.flow == SLIP else end
 
+    def _reach_guard(self) -> None:
+        self._at_guard = self.state
+
     def _pass(self, mode: Mode, guard: int | None, following: Mode | None, now: float) -> None:
         super()._pass(mode, guard, following, now)
-        before, gradients = self._rates(mode)
+        # A slide that begins to creep is put at the speed of creep, maybe beyond that of the belt.
+        at_guard = self.state if guard is None else self._at_guard
+        before, gradients = self._rates(mode, at_guard)
         self.transition = self._enslaving(mode) @ self._derivatives @ self.transition
         if not self._system.sticks:
             self._effort += _EFFORT_OF_A_STEP * (self._steps_before - self._steps_left)
@@ -158,10 +164,14 @@ class SensitiveMotion(RecordedMotion):
         assert self._flow is not None
         return self._flow.state[self.order :].reshape(self.order, self.order)
 
-    def _rates(self, mode: Mode) -> tuple[FloatArray, FloatArray]:
-        """Return the rates at the present state in a mode, and the gradients; see `FlowRates`."""
+    def _rates(self, mode: Mode, state: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+        """Return the rates in a mode, and the gradients, see `FlowRates`.
+
+        They are those at a `state`, by default the present one.
+        """
+        state = self.state if state is None else state
         parameters = parameter_values(self._system, mode, self._instant.inputs)
-        rates, gradients = flow_rates(self._system, mode.flow).at(self.state, parameters)
+        rates, gradients = flow_rates(self._system, mode.flow).at(state, parameters)
         return self._enslaving(mode, gradients) @ rates, gradients
 
     def _enslaving(self, mode: Mode, gradients: FloatArray | None = None) -> FloatArray:

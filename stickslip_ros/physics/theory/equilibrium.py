@@ -4,7 +4,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import RunError
-from stickslip_ros.physics.model.drive_system import MEMORY, SLIP, DriveSystem
+from stickslip_ros.physics.model.drive_system import MEMORY, SLIP, SPEED, DriveSystem
 from stickslip_ros.physics.motion.derivatives import flow_rates
 
 _ITERATIONS = 50
@@ -52,6 +52,8 @@ def equilibria(system: DriveSystem, parameters: FloatArray) -> FloatArray:
         except np.linalg.LinAlgError:
             break
         states += step
+        # X' is zero there. Rounding, which differs between processors, would give it a sign.
+        states[SPEED] = 0.0
         if np.all(np.abs(step) <= _CLOSE * np.maximum(1.0, np.abs(states).max(axis=0))):
             return states
     raise RunError(f"the friction law {law.name}: the equilibrium was not found")
