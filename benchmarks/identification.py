@@ -21,6 +21,7 @@ import numpy as np
 
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import identify
+from stickslip_ros.identification.intervals import QUANTILE
 from stickslip_ros.identification.record import Record
 from stickslip_ros.physics.model.courses import Table
 from stickslip_ros.physics.model.drive import Drive
@@ -140,7 +141,7 @@ def summary(law: str, kind: str, trials: Sequence[dict[str, Any]]) -> dict[str, 
     constants = {
         name: {
             "seeds": len(pairs),
-            "covered": float(np.mean([abs(error) <= 1.96 * s for error, s in pairs])),
+            "covered": float(np.mean([abs(error) <= QUANTILE * s for error, s in pairs])),
             "bias": float(np.mean([error for error, _ in pairs])),
             "scatter": float(np.std([error for error, _ in pairs])),
             "standard_error": float(np.median([s for _, s in pairs])),

@@ -11,6 +11,19 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 
+def rms(values: FloatArray) -> float:
+    """Return the root mean square.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from stickslip_ros.arrays import rms
+    >>> rms(np.array([3.0, -3.0]))
+    3.0
+    """
+    return float(np.sqrt(np.mean(values * values)))
+
+
 class Table:
     """Base class of dataclasses whose fields are arrays of equal length, the columns.
 

@@ -82,12 +82,14 @@ def run(arguments: argparse.Namespace) -> int:
     with interrupts_kept():
         from stickslip_ros.identification.identify import fixed_of, identify_recordings
         from stickslip_ros.identification.reading import read_records
+        from stickslip_ros.identification.scenario import curve_files
         from stickslip_ros.plots.identification_table import identification_tables
     columns = columns_of(arguments.columns)
     if arguments.out is not None:
         if arguments.out.suffix not in (".yaml", ".yml"):
             raise InvalidInputError(f"--out {arguments.out}: must end in .yaml or .yml")
-        check_new("--out", arguments.out)
+        for path in (arguments.out, *curve_files(arguments.out)):
+            check_new("--out", path)
     check_figure(arguments)
     fixed = fixed_of(arguments.fix)
     options: dict[str, Any] = {

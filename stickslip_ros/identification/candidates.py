@@ -13,8 +13,6 @@ from stickslip_ros.identification.regression import Regression
 
 _SIGNIFICANT = 3.0
 """Standard errors by which a model must predict better to be preferred to a simpler one."""
-
-
 _WORTH = 0.01
 """Share of the error by which it must be better besides."""
 

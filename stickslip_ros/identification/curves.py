@@ -20,8 +20,11 @@ class Curve(ABC):
     """Name of the friction law that has this curve."""
     deflection: float = 0.0
     """Path over which friction follows a change of direction or speed, m; 0: immediately."""
-    shaped: ClassVar[bool] = False
-    """Whether the curve has a shape."""
+
+    @property
+    def shaped(self) -> bool:
+        """Whether the curve has a shape."""
+        return False
 
     @abstractmethod
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
@@ -54,7 +57,11 @@ class StribeckCurve(Curve):
     """F = F_s - D (3 r - r^3)/2 with r = w/v_m, eq. 3 of the paper."""
 
     name: ClassVar[str] = "stribeck"
-    shaped: ClassVar[bool] = True
+
+    @property
+    def shaped(self) -> bool:
+        """It has: a speed."""
+        return True
 
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
         """Return 1 and the drop; see `Curve.terms`."""
@@ -72,7 +79,11 @@ class ExponentialCurve(Curve):
     """F = F_k + D exp(-w/v_s) + F_v w."""
 
     name: ClassVar[str] = "exponential"
-    shaped: ClassVar[bool] = True
+
+    @property
+    def shaped(self) -> bool:
+        """It has: a speed."""
+        return True
 
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
         """Return 1, the decay and w; see `Curve.terms`."""
@@ -89,7 +100,11 @@ class SaturatingCurve(Curve):
     """F = F_0 + R (1 - exp(-w/v_s)) + F_v w: friction that rises ever less, as of ball screws."""
 
     name: ClassVar[str] = "table"
-    shaped: ClassVar[bool] = True
+
+    @property
+    def shaped(self) -> bool:
+        """It has: a speed."""
+        return True
 
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
         """Return 1, the rise and w; see `Curve.terms`."""
@@ -134,7 +149,7 @@ class FollowedCurve(Curve):
     deflection: float = 0.0
 
     @property
-    def shaped(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def shaped(self) -> bool:
         """Whether the curve in steady slip has a shape."""
         return self.curve.shaped
 

@@ -48,10 +48,12 @@ _WORTH, _SURE = 0.05, 4.0
 """Share of the residual, or standard errors, for which one more constant is fitted."""
 _KEPT = 3.0
 """Standard errors by which such a constant must differ from zero."""
+DRIVE_LAWS = tuple(model.law for model in (*STATIC_MODELS, *MEMORY_MODELS))
+"""Laws that can be identified for a drive on a spring."""
+_SPEEDS = ("minimum_speed", "decay_speed")
+"""Constants of friction that are speeds and not forces."""
 OPTIONAL = ("damping", "bias_force", DELAY)
 """Constants that are fitted only if the record asks for them."""
-
-Progress = Callable[[str], None]
 
 
 class DriveTask:
@@ -79,14 +81,19 @@ class DriveTask:
         self.predictors = [Predictor(record) for record in records]
 
     @cached_property
+    def constants(self) -> Mapping[str, float]:
+        """Mass and stiffness by the regression; InvalidInputError where one is not above zero."""
+        fit = self._regression(EXPONENTIAL)
+        fit.require("mass", "stiffness")
+        return fit.constants
+
+    @cached_property
     def period(self) -> float:
         """Natural period by the regression, s, within what the records can have."""
-        values = self._regression(EXPONENTIAL).constants
+        natural = 2.0 * pi * sqrt(self.constants["mass"] / self.constants["stiffness"])
         shortest = 20.0 * self.records[0].period
         longest = max(record.duration for record in self.records) / _LONG
-        if values["mass"] <= 0.0 or values["stiffness"] <= 0.0:
-            return shortest
-        return max(min(2.0 * pi * sqrt(values["mass"] / values["stiffness"]), longest), shortest)
+        return max(min(natural, longest), shortest)
 
     def searched(
         self, model: Model, *, thorough: bool = True, like: Refinement | None = None
@@ -95,6 +102,12 @@ class DriveTask:
         if like is not None:
             return self._nearest(model, [like.values])
         starts = [model.start(each) for each in self._regressions(model, thorough)]
+        # A curve that does not suit the friction may leave none to them.
+        unfit = [{name for name in self.free if not each[name] > 0.0} for each in starts]
+        starts = [
+            {**each, **{name: self.constants[name] for name in names}}
+            for each, names in zip(starts, unfit, strict=True)
+        ]
         if model.memory:
             starts = [
                 {**each, "bristle_stiffness": stiffness}
@@ -189,11 +202,7 @@ class DriveTask:
         return {DELAY: 0.0, **values, **own, **self.fixed}
 
 
-_SPEEDS = ("minimum_speed", "decay_speed")
-"""Constants of friction that are speeds and not forces."""
-
-
-def drive_candidates(task: DriveTask, law: str, progress: Progress) -> list[Candidate]:
+def drive_candidates(task: DriveTask, law: str, progress: Callable[[str], None]) -> list[Candidate]:
     """Return the fits of the laws that compete, or of the one that is asked for, fitted first.
 
     Laws without a memory are searched first. Those with a memory follow if the errors of the best
@@ -224,11 +233,6 @@ def drive_candidates(task: DriveTask, law: str, progress: Progress) -> list[Cand
         task.finished(each) if _loss(each) <= _HOPELESS * least else task.unfinished(each)
         for each in found
     ]
-
-
-def drive_laws() -> list[str]:
-    """Return the names of the laws that can be identified for a drive on a spring."""
-    return [model.law for model in (*STATIC_MODELS, *MEMORY_MODELS)]
 
 
 def is_white(fit: Refinement) -> bool:

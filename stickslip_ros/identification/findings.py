@@ -1,18 +1,25 @@
 """What was identified: constants with intervals, the friction curve, and what it predicts."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf, isfinite, isnan, sqrt
+from math import inf, isfinite, isnan
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
-from stickslip_ros.identification.axes import Points, axis_drive, table_of, table_speeds
+from stickslip_ros.arrays import FloatArray, rms
+from stickslip_ros.identification.axis_drive import (
+    POINTS,
+    Points,
+    axis_drive,
+    law_of,
+    table_of,
+    table_speeds,
+)
 from stickslip_ros.identification.candidates import Candidate, Estimate
 from stickslip_ros.identification.drives import POOR
 from stickslip_ros.identification.filtered import START, filtered
-from stickslip_ros.identification.models import DELAY
+from stickslip_ros.identification.models import DELAY, numbers_of
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement, refine, segments_of
 from stickslip_ros.identification.regression import Regression
@@ -20,9 +27,9 @@ from stickslip_ros.identification.servo import Servo, closed_loop
 from stickslip_ros.identification.trajectory import Predictor, delayed, free_run
 from stickslip_ros.physics.model.drive import Drive
 
-_POINTS = 40
-"""Points of the curve of a law."""
 _RELATIVE_STEP = 1e-5
+_STILL = 0.02
+"""Share of the fastest speed below which a slide may stick."""
 _VAGUE = 0.5
 """Standard error, as a share of the value, from which a constant counts as not told."""
 _CORRELATED = 0.95
@@ -104,11 +111,10 @@ class Findings:
         """Constants by parameter of the plant, such as `friction.static`; SI units."""
         names, values, covariance = self._constants
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        found = {
+        return {
             name: Estimate(float(value), float(error))
             for name, value, error in zip(names, values, errors, strict=True)
         }
-        return found
 
     @cached_property
     def correlations(self) -> Sequence[tuple[str, str, float]]:
@@ -130,39 +136,32 @@ class Findings:
         fit = self.chosen.fit
         if isinstance(fit, Refinement):
             return self._of_trajectory(fit)
-        names, take = [*fit.free], list(range(len(fit.free)))
-        count = len(fit.curve.least)
-        scale = [1.0] * len(names)
-        for number in range(len(fit.rows.directions)):
-            group = "friction." if number == 0 else "friction.reverse."
-            own = _names_of_terms(self.law)
-            place = len(fit.free) + number * count
-            for index, name in enumerate(own):
-                names.append(group + name)
-                take.append(place + index)
-                scale.append(1.0 / self.normal_force)
-        values, covariance = fit.values[take] * scale, fit.covariance[np.ix_(take, take)]
-        return names, values, covariance * np.outer(scale, scale)
+        point = np.concatenate([fit.values, fit.shapes])
+
+        def constants(values: FloatArray) -> dict[str, float]:
+            moved = fit.at(values)
+            found = {name: moved.constants[name] for name in fit.free}
+            # Of LuGre a few deflections are tried: they have no error.
+            directions = 0 if fit.curve.deflection > 0.0 else len(fit.rows.directions)
+            for number in range(directions):
+                group = "friction." if number == 0 else "friction.reverse."
+                own = numbers_of(law_of(moved, number, self.normal_force))
+                found |= {group + name: value for name, value in own.items()}
+            return found
+
+        steps = _RELATIVE_STEP * np.maximum(np.abs(point), 1e-9)
+        return _propagated(constants, point, steps, fit.covariance)
 
     def _of_trajectory(self, fit: Refinement) -> tuple[list[str], FloatArray, FloatArray]:
-        model = fit.task.model
+        model, typical = fit.task.model, fit.task.typical(fit.values)
 
-        def constants(values: Mapping[str, float]) -> dict[str, float]:
-            found = model.constants(values, self.normal_force)
-            return {**found, DELAY: values.get(DELAY, 0.0)}
+        def constants(values: FloatArray) -> dict[str, float]:
+            moved = {**fit.values, **dict(zip(fit.free, values.tolist(), strict=True))}
+            return {**model.constants(moved, self.normal_force), DELAY: moved.get(DELAY, 0.0)}
 
-        base = constants(fit.values)
-        typical = fit.task.typical(fit.values)
-        columns: list[FloatArray] = []
-        for name in fit.free:
-            step = _RELATIVE_STEP * max(abs(fit.values[name]), typical.get(name, 0.0))
-            moved = constants({**fit.values, name: fit.values[name] + step})
-            columns.append(np.array([(moved[each] - base[each]) / step for each in base]))
-        linear = np.column_stack(columns)
-        told = np.abs(linear).sum(axis=1) > 0.0
-        names = [name for name, used in zip(base, told, strict=True) if used]
-        values = np.array([base[name] for name in names])
-        return names, values, linear[told] @ fit.covariance @ linear[told].T
+        point = np.array([fit.values[name] for name in fit.free])
+        sizes = [max(abs(fit.values[name]), typical.get(name, 0.0)) for name in fit.free]
+        return _propagated(constants, point, _RELATIVE_STEP * np.array(sizes), fit.covariance)
 
     @property
     def notes(self) -> Sequence[str]:
@@ -184,7 +183,6 @@ class Findings:
                 "only friction forces can be told: it is taken as 1 N, so that coefficients are in "
                 "N and viscous ones in N s/m; give it by --fix plant.normal_force=..."
             )
-        slowest = self.slowest
         if not self.has_spring:
             found |= self._merged_on_an_axis()
         else:
@@ -192,7 +190,7 @@ class Findings:
             if not self.stuck and self.law not in ("coulomb", "dahl"):
                 found["friction.static"] = (
                     "the slide never stuck: it is the curve extended to rest; run below "
-                    f"{1e3 * slowest:.3g} mm/s"
+                    f"{1e3 * self.slowest:.3g} mm/s"
                 )
         for name, estimate in self.fitted.items():
             if not estimate.standard_error < _VAGUE * abs(estimate.value) and name not in found:
@@ -216,6 +214,8 @@ class Findings:
             "friction.static": "the axis hardly ever stuck: it is the curve at its slowest steady "
             f"speed extended to rest; run below {1e3 * self.slowest:.3g} mm/s",
         }
+        if self.law == "coulomb":  # its static coefficient is that of slip
+            del found["friction.static"]
         return {name: why for name, why in found.items() if name not in self.fixed}
 
     def _merged_at_one_belt_speed(self) -> dict[str, str]:
@@ -239,24 +239,21 @@ class Findings:
                 )
         return found
 
+    @cached_property
+    def _speeds(self) -> Sequence[FloatArray]:
+        """Size of the relative speeds of each record, m/s."""
+        return [np.abs(filtered(each, decimated=False).relative_speed) for each in self.records]
+
     @property
     def slowest(self) -> float:
         """Slowest speed |v_r| that was recorded for long, m/s."""
-        speeds = np.concatenate(
-            [np.abs(filtered(record, decimated=False).relative_speed) for record in self.records]
-        )
-        least = 0.02 * float(speeds.max())
-        return float(np.quantile(speeds[speeds > least], 0.02))
+        speeds = np.concatenate(self._speeds)
+        return float(np.quantile(speeds[speeds > _STILL * float(speeds.max())], 0.02))
 
-    @cached_property
+    @property
     def stuck(self) -> bool:
-        """Whether the model sticks in the recordings."""
-        for record in self.records:
-            columns = filtered(record, decimated=False)
-            moving = np.abs(columns.relative_speed) > 0.02 * np.abs(columns.relative_speed).max()
-            if np.mean(moving) < 0.98:
-                return True
-        return False
+        """Whether the slide stuck in a record."""
+        return any(np.mean(each > _STILL * each.max()) < 0.98 for each in self._speeds)
 
     @property
     def directions(self) -> Sequence[float]:
@@ -282,11 +279,8 @@ class Findings:
         """
         fit = self.chosen.fit
         if isinstance(fit, Refinement):
-            top = max(
-                float(np.abs(filtered(record, decimated=False).relative_speed).max())
-                for record in self.records
-            )
-            speed = np.linspace(0.0, top, _POINTS)
+            top = max(float(each.max()) for each in self._speeds)
+            speed = np.linspace(0.0, top, POINTS)
             model = fit.task.model
 
             def force(values: Mapping[str, float]) -> FloatArray:
@@ -365,10 +359,8 @@ class Findings:
             model += values["stiffness"] * rows(columns.position)
             error = force - model
         else:
-            other = type(fit.rows).of([columns])
-            own = replace(fit, rows=replace(other, directions=fit.rows.directions))
-            error = own.residual
-            terms = other if own.rows is other else own.rows
+            terms = replace(type(fit.rows).of([columns]), directions=fit.rows.directions)
+            error = replace(fit, rows=terms).residual
             friction = -terms.friction_terms(fit.curve, fit.shapes) @ fit.values[len(fit.free) :]
         return ForceErrors(
             rows(columns.time), rows(columns.position), speed, error - friction, error, force
@@ -379,7 +371,7 @@ class Findings:
         if not record.held_force.any():
             return None
         found = self.errors(record)
-        return float(np.sqrt(np.mean(found.force_error**2) / np.mean(found.force**2)))
+        return rms(found.force_error) / rms(found.force)
 
     def free_run(self, record: Record) -> FloatArray:
         """Return the positions that the model runs through, with the recorded force, no feedback.
@@ -406,7 +398,7 @@ class Findings:
         `free_run_error` is in m, the others are shares of the rms of what was recorded.
         """
         run = self.free_run(record) - record.position
-        error = float(np.sqrt(np.mean(run**2)))
+        error = rms(run)
         found: dict[str, float | None] = dict.fromkeys(CHECKED)
         found |= {
             "force_error": self.force_error(record),
@@ -420,12 +412,27 @@ class Findings:
 
 
 def _relative(found: FloatArray, measured: FloatArray) -> float:
-    return sqrt(float(np.mean((found - measured) ** 2)) / float(np.mean(measured**2)))
+    return rms(found - measured) / rms(measured)
 
 
 def _band(by: FloatArray, covariance: FloatArray) -> FloatArray:
     return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", by, covariance, by), 0.0))
 
 
-def _names_of_terms(law: str) -> Sequence[str]:
-    return ("static", "viscous") if law == "coulomb" else ()
+def _propagated(
+    constants: Callable[[FloatArray], dict[str, float]],
+    point: FloatArray,
+    steps: FloatArray,
+    covariance: FloatArray,
+) -> tuple[list[str], FloatArray, FloatArray]:
+    """Return names, values and covariance of what depends on a point with a covariance."""
+    base = constants(point)
+    columns: list[list[float]] = []
+    for number, step in enumerate(steps.tolist()):
+        moved = constants(point + np.where(np.arange(len(point)) == number, step, 0.0))
+        columns.append([(moved[name] - base[name]) / step for name in base])
+    linear = np.transpose(columns)
+    told = np.abs(linear).sum(axis=1) > 0.0
+    names = [name for name, used in zip(base, told, strict=True) if used]
+    values = np.array([base[name] for name in names])
+    return names, values, linear[told] @ covariance @ linear[told].T

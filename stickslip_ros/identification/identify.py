@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.identification.axes import AxisTask, axis_laws
+from stickslip_ros.identification.axes import AXIS_LAWS, AxisTask
 from stickslip_ros.identification.candidates import choose
-from stickslip_ros.identification.drives import DriveTask, drive_candidates, drive_laws
+from stickslip_ros.identification.drives import DRIVE_LAWS, DriveTask, drive_candidates
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.models import DELAY
+from stickslip_ros.identification.models import DELAY, MEMORY_MODELS, STATIC_MODELS
 from stickslip_ros.identification.reading import read_records
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import LINEAR
@@ -20,14 +20,11 @@ from stickslip_ros.text import did_you_mean
 
 AUTO = "auto"
 """Law that stands for the one that predicts held-out parts best."""
+LAWS = (AUTO, *dict.fromkeys([*AXIS_LAWS, *DRIVE_LAWS]))
+"""Friction laws that can be identified, and `AUTO`."""
 _FRICTION = ("static", "minimum", "minimum_speed", "kinetic", "decay_speed", "viscous")
 FIXABLE = (*LINEAR, "normal_force", DELAY, *(f"friction.{name}" for name in _FRICTION))
 """Constants that can be given, by parameter of the plant."""
-
-
-def laws() -> Sequence[str]:
-    """Return the names of the friction laws that can be identified, and `AUTO`."""
-    return (AUTO, *dict.fromkeys([*axis_laws(), *drive_laws()]))
 
 
 def identify_recordings(
@@ -120,7 +117,7 @@ def identify(
     records : sequence of Record
         Records of one machine.
     law : str, optional
-        Friction law, one of `laws`.
+        Friction law, one of `LAWS`.
     fixed : mapping, optional
         Constants that are known, by parameter of the plant, of `FIXABLE`.
     progress : callable, optional
@@ -146,19 +143,19 @@ def identify(
         least = -np.inf if name in ("bias_force", DELAY) else 0.0
         if not (least <= value < np.inf) or (name in ("mass", "normal_force") and value == 0.0):
             raise InvalidInputError(f"plant.{name} = {value} is refused: must be a positive number")
-    if law not in laws():
+    if law not in LAWS:
         raise InvalidInputError(
-            f"law {law} is refused: {did_you_mean(law, laws(), '')} must be one of "
-            f"{', '.join(laws())}"
+            f"law {law} is refused: {did_you_mean(law, LAWS, '')} must be one of {', '.join(LAWS)}"
         )
     moving = any(record.belt_velocity.any() for record in records)
     spring = fixed["stiffness"] > 0.0 if "stiffness" in fixed else moving
-    known = axis_laws() if not spring else drive_laws()
+    known = AXIS_LAWS if not spring else DRIVE_LAWS
     if law not in (AUTO, *known):
         kind = "on a spring" if spring else "without a spring"
         raise InvalidInputError(
             f"law {law} is refused for a drive {kind}: must be one of {AUTO}, {', '.join(known)}"
         )
+    _check_friction(fixed, law, spring=spring)
     axis = None
     if spring:
         candidates = drive_candidates(DriveTask(records, fixed), law, progress)
@@ -180,3 +177,21 @@ def identify(
         fixed,
         next((servo for servo in servos if servo is not None), None),
     )
+
+
+def _check_friction(fixed: Mapping[str, float], law: str, *, spring: bool) -> None:
+    """Refuse constants of friction that the law in question does not search by themselves."""
+    known = {
+        f"friction.{name}"
+        for model in (*STATIC_MODELS, *MEMORY_MODELS)
+        if spring and model.law == law
+        for name in model.friction
+    }
+    for name in fixed:
+        if name.startswith("friction.") and name not in known:
+            allowed = ", ".join(f"plant.{each}" for each in FIXABLE if each in known)
+            raise InvalidInputError(
+                f"plant.{name} cannot be fixed with the law {law} "
+                f"{'on' if spring else 'without'} a spring: "
+                f"{f'of friction only {allowed}' if allowed else 'no constant of friction can'}"
+            )

@@ -13,8 +13,15 @@ from stickslip_ros.identification.curves import (
     StribeckCurve,
 )
 from stickslip_ros.identification.regression import Regression
+from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.friction import LAWS, CurveFollower, Exponential
+from stickslip_ros.physics.model.friction import (
+    LAWS,
+    CurveFollower,
+    Exponential,
+    FrictionLaw,
+    Table,
+)
 
 _TINY = 1e-9
 """Smallest constant that must be above zero, as a share of its start."""
@@ -168,6 +175,16 @@ class Model:
             friction=friction,
             bias_force=constants["bias_force"],
         )
+
+
+def numbers_of(law: FrictionLaw) -> dict[str, float]:
+    """Return the constants of a law that are one number, those of the curve that it follows too."""
+    if isinstance(law, Table):
+        return {}
+    own = {name: getattr(law, name) for name in constants_of(type(law))}
+    if isinstance(law, CurveFollower):
+        own |= numbers_of(law.curve)
+    return {name: value for name, value in own.items() if isinstance(value, int | float)}
 
 
 COULOMB = Model("coulomb", CoulombCurve(), viscous=True)

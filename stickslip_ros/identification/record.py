@@ -82,8 +82,8 @@ def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) ->
     stamp : array of shape (samples,)
         Stamps, ns.
     columns : dict
-        Columns of `Record` by name. Samples whose position or belt velocity is not finite count
-        as missing.
+        Columns of `Record` by name. Samples of which one is not finite count as missing; only the
+        reference may be.
 
     Returns
     -------
@@ -96,7 +96,9 @@ def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) ->
     InvalidInputError
         If no part is long enough.
     """
-    known = np.isfinite(columns["position"]) & np.isfinite(columns["belt_velocity"])
+    known = np.ones(len(stamp), bool)
+    for each in columns.keys() - {"reference"}:
+        known &= np.isfinite(columns[each])
     known &= np.diff(stamp, prepend=np.iinfo(np.int64).min // 2) > 0
     time = (stamp[known] - stamp[0]) / NANOSECONDS
     columns = {each: values[known] for each, values in columns.items()}

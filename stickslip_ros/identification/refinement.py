@@ -77,7 +77,8 @@ class Trajectories:
         except (InvalidInputError, RunError):
             found = np.full(len(self.measured), np.nan)
         middle = float(np.mean(self.measured))
-        return np.where(np.isfinite(found), np.clip(found, middle - span, middle + span), span)
+        low, high = middle - span, middle + span
+        return np.where(np.isfinite(found), np.clip(found, low, high), high)
 
     @property
     def fastest(self) -> float:

@@ -1,7 +1,7 @@
 """Regression of the equation of motion on filtered records."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -49,6 +49,8 @@ class Rows:
             )
         relative = joined(lambda part: part.relative_speed)
         counts = {sign: np.count_nonzero(relative * sign > 0.0) for sign in (1.0, -1.0)}
+        if not any(counts.values()):
+            raise InvalidInputError("the slide never slips in the recordings: they tell nothing")
         return cls(
             parts,
             {
@@ -111,6 +113,21 @@ class Regression:
         """Return the forces of the curve in a direction of the rows, N."""
         own = np.array_split(self.values[len(self.free) :], len(self.rows.directions))
         return own[number]
+
+    def at(self, point: FloatArray) -> "Regression":
+        """Return the same with the values and then the shapes of a point."""
+        count = len(self.values)
+        shapes = point[count : count + len(self.shapes)]
+        return replace(self, values=point[:count], shapes=shapes)
+
+    def require(self, *names: str) -> None:
+        """Raise InvalidInputError if one of these constants is not above zero."""
+        for name in names:
+            if not self.constants[name] > 0.0:
+                raise InvalidInputError(
+                    f"the {name} comes out as 0: the forces do not fit the motion; check their "
+                    "sign and unit, and whether one is missing"
+                )
 
     def refitted(self) -> "Regression":
         """Return the fit to its rows with the same shapes."""

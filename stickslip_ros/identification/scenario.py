@@ -4,13 +4,20 @@ from pathlib import Path
 from typing import Any
 
 from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.models import numbers_of
 from stickslip_ros.identification.refinement import Refinement
-from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.friction import CurveFollower, Directional, FrictionLaw, Table
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.template import commented_file
 
 _BASE = "feed_drive"
+_DIRECTIONS = ("forward", "backward")
+
+
+def curve_files(path: Path) -> tuple[Path, Path]:
+    """Return where the curves of a scenario file are written: for forward and backward slip."""
+    forward, backward = (path.with_name(f"{path.stem}-{each}.csv") for each in _DIRECTIONS)
+    return forward, backward
 
 
 def written_scenario(found: Findings, path: Path) -> list[Path]:
@@ -46,8 +53,7 @@ def written_scenario(found: Findings, path: Path) -> list[Path]:
         curve = law.curve if isinstance(law, CurveFollower) else law
         if not isinstance(curve, Table):
             continue
-        direction = "backward" if "reverse" in group else "forward"
-        file = path.with_name(f"{path.stem}-{direction}.csv")
+        file = curve_files(path)["reverse" in group]
         rows = "".join(f"{speed!r},{size!r}\n" for speed, size in curve.points)
         with file.open("x", encoding="utf-8") as stream:
             stream.write(rows)
@@ -70,7 +76,7 @@ def _scenario(found: Findings, laws: dict[str, FrictionLaw], files: dict[str, st
     }
     values["plant.friction.law"] = laws["friction."].name
     for group, law in laws.items():
-        values |= {f"plant.{group}{name}": value for name, value in _constants_of(law).items()}
+        values |= {f"plant.{group}{name}": value for name, value in numbers_of(law).items()}
         if isinstance(law, CurveFollower) and group == "friction.":
             values["plant.friction.curve"] = law.curve.name
     values |= files
@@ -89,16 +95,6 @@ def _scenario(found: Findings, laws: dict[str, FrictionLaw], files: dict[str, st
     values["velocity_feedback_controller.position_gain"] = -servo.position_gain
     values["velocity_feedback_controller.velocity_gain"] = -servo.velocity_gain
     return load_scenario(_BASE, controller="velocity_feedback").changed(values)
-
-
-def _constants_of(law: FrictionLaw) -> dict[str, Any]:
-    """Return the constants of a law that are one number, those of the curve that it follows too."""
-    own = {name: getattr(law, name) for name in constants_of(type(law))}
-    if isinstance(law, CurveFollower):
-        own |= _constants_of(law.curve)
-    if isinstance(law, Table):
-        return {}
-    return {name: value for name, value in own.items() if isinstance(value, int | float)}
 
 
 def _heading(found: Findings, path: Path) -> str:

@@ -47,7 +47,9 @@ def servo_of(record: Record) -> Servo | None:
     Servo or None
         Gains from linear least squares, for the difference that explains most.
     """
-    if record.reference is None or record.force is None:
+    if record.reference is None or record.force is None or not record.force.any():
+        return None
+    if not np.isfinite(record.reference).all():
         return None
     force, position, error = record.force, record.position, record.reference - record.position
     largest = float(np.abs(force).max())

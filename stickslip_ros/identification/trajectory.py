@@ -1,6 +1,5 @@
 """The motion that a model predicts for a record: its forces and its belt in, positions out."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite
 
@@ -27,7 +26,6 @@ class Predictor:
         self.record = record
         self._force = record.held_force.tolist()
         self._corners = _corners(record.belt_velocity)
-        self._motions: dict[type, Motion] = {}
 
     def positions(
         self,
@@ -37,7 +35,6 @@ class Predictor:
         position: float,
         velocity: float,
         delay: float = 0.0,
-        memory: Sequence[float] | None = None,
     ) -> FloatArray:
         """Return the positions at samples from `start` on.
 
@@ -51,8 +48,6 @@ class Predictor:
             State at the first sample, m and m/s.
         delay : float, optional
             Time from a sample until its force acts, s, between minus one and several periods.
-        memory : sequence of float, optional
-            Memory of the friction law at the first sample.
 
         Returns
         -------
@@ -61,8 +56,6 @@ class Predictor:
         """
         drive = self.with_belt(drive, start, count)
         motion = Motion(drive, position, velocity)
-        if memory is not None:
-            motion.restart(position, velocity, memory)
         period, forces, last = self.record.period, self._force, len(self._force) - 1
         whole, rest = divmod(delay / period, 1.0)
         shift, rest = int(whole), rest * period

@@ -8,12 +8,11 @@ from matplotlib.figure import Figure
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.intervals import QUANTILE
 from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, set_title, styled
 from stickslip_ros.plots.units import SI
 
 _DOTS: Any = {"marker": ".", "ms": 2.0, "ls": "", "alpha": 0.4, "mew": 0.0, "rasterized": True}
-_CONFIDENCE = 1.96
-"""Half of a 95 % interval, in standard errors."""
 _NAMES = {1.0: "forward slip", -1.0: "backward slip"}
 
 
@@ -67,7 +66,7 @@ def _friction(axes: Axes, found: Findings, errors: Any) -> None:
             **_DOTS,
         )
         curve = found.friction(number)
-        band = _CONFIDENCE * curve.standard_error
+        band = QUANTILE * curve.standard_error
         axes.plot(curve.speed / speed_scale, curve.force / scale, color=colour, lw=1.5)
         axes.fill_between(
             curve.speed / speed_scale,

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.intervals import QUANTILE
 from stickslip_ros.plots.units import SI
 from stickslip_ros.scenarios.parameter_field import parameters_of
 from stickslip_ros.scenarios.parameters import PlantParameters
@@ -71,7 +72,7 @@ def _curve(found: Findings) -> TextTable:
                 "forward" if direction > 0.0 else "backward",
                 SI.text(float(curve.speed[place]), "m/s"),
                 SI.text(float(curve.force[place]), "N"),
-                SI.text(1.96 * float(curve.standard_error[place]), "N"),
+                SI.text(QUANTILE * float(curve.standard_error[place]), "N"),
             ]
             for place in places
         ]

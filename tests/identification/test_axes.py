@@ -85,6 +85,7 @@ def test_a_force_of_another_origin_has_no_controller() -> None:
     [
         ("stribek", {}, "law stribek is refused: did you mean stribeck"),
         ("dahl", {}, "law dahl is refused for a drive without a spring"),
+        ("coulomb", {"friction.static": 3.0}, "plant.friction.static cannot be fixed"),
         ("auto", {"mass": -1.0}, "plant.mass = -1.0 is refused"),
         ("auto", {"mas": 1.0}, "plant.mas is refused: did you mean mass"),
     ],
@@ -99,3 +100,37 @@ def test_without_a_force_an_axis_tells_nothing() -> None:
     still = Record("axis", 1e-3, own.position, own.belt_velocity)
     with pytest.raises(InvalidInputError, match="no force acts in the recordings"):
         identify([still])
+
+
+def test_a_force_of_the_wrong_sign_is_refused() -> None:
+    own = record("coulomb")
+    assert own.force is not None
+    wrong = Record("axis", 1e-3, own.position, own.belt_velocity, -own.force)
+    with pytest.raises(InvalidInputError, match=r"the mass comes out as 0.* sign"):
+        identify([wrong], "coulomb")
+
+
+def test_a_slide_that_never_moves_is_refused() -> None:
+    own = record("coulomb")
+    still = Record("axis", 1e-3, np.zeros(len(own.position)), own.belt_velocity, own.force)
+    with pytest.raises(InvalidInputError, match="never slips"):
+        identify([still])
+
+
+def test_a_reference_with_gaps_has_no_controller() -> None:
+    own = record("coulomb")
+    gap = np.full(len(own.position), np.nan)
+    assert (
+        servo_of(Record("axis", 1e-3, own.position, own.belt_velocity, own.force, None, gap))
+        is None
+    )
+
+
+def test_the_constants_of_other_laws_of_an_axis() -> None:
+    found = identify([record("saturating")], "exponential", {"force_delay": 0.0})
+    names = ("static", "kinetic", "decay_speed", "viscous")
+    groups = ("friction.", "friction.reverse.")
+    assert found.fitted.keys() >= {f"{group}{name}" for group in groups for name in names}
+    law = found.drive.friction.forward
+    assert found.fitted["friction.static"].value == pytest.approx(law.static)
+    assert found.fitted["friction.viscous"].standard_error > 0.0

@@ -1,7 +1,9 @@
 """Drives on a spring: the constants of noisy runs come out within their intervals.
 
-benchmarks/identification.json has more seeds.
+docs/identification.md has a table of more seeds.
 """
+
+from dataclasses import replace
 
 import pytest
 
@@ -62,6 +64,25 @@ def test_a_missing_input_is_noted() -> None:
     own = study.record("coulomb", "ramp", 1, 2.0)
     lacking = Record(own.name, own.period, own.position, own.belt_velocity, own.force)
     assert "an input may be missing" in identify([lacking], "coulomb").notes[0]
+
+
+def test_a_force_of_the_wrong_sign_is_refused() -> None:
+    own = study.record("coulomb", "ramp", 1, 2.0)
+    assert own.force is not None
+    assert own.disturbance is not None
+    wrong = replace(own, force=-own.force, disturbance=-own.disturbance)
+    with pytest.raises(InvalidInputError, match=r"comes out as 0.* sign"):
+        identify([wrong], "stribeck")
+
+
+def test_a_constant_that_the_law_does_not_search_is_refused() -> None:
+    own = study.record("exponential", "stick", 1, 2.0)
+    with pytest.raises(InvalidInputError, match=r"only plant\.friction\.kinetic"):
+        identify([own], "exponential", {"mass": 100.0, "friction.static": 400.0})
+    with pytest.raises(InvalidInputError, match="with the law auto"):
+        identify([own], "auto", {"mass": 100.0, "friction.kinetic": 250.0})
+    found = identify([own], "exponential", {"mass": 100.0, "friction.kinetic": 250.0})
+    assert "friction.kinetic" not in found.fitted
 
 
 def test_laws_of_an_axis_are_refused_on_a_spring() -> None:

@@ -44,12 +44,14 @@ def test_a_gap_makes_two_records_and_single_losses_are_bridged() -> None:
     kept[900:1000] = False
     kept[300] = False
     columns = _columns(time)
-    columns["position"][500] = np.nan
+    columns["position"][500] = columns["force"][510] = np.nan
     own = {name: values[kept] for name, values in columns.items()}
     first, second = evenly_spaced("log", _stamps(time[kept]), own)
     assert (len(first.position), len(second.position)) == (900, 1000)
     assert first.position[300] == pytest.approx(np.sin(0.3), abs=1e-6)
     assert first.position[500] == pytest.approx(np.sin(0.5), abs=1e-6)
+    assert first.force is not None
+    assert first.force[510] == first.force[509]
 
 
 def test_too_few_samples_are_refused() -> None:

@@ -1,0 +1,165 @@
+"""The forces of an axis and its free runs, fitted together."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray, rms
+from stickslip_ros.identification.axis_drive import axis_drive
+from stickslip_ros.identification.filtered import DECIMATION
+from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.regression import Regression, solve, system
+from stickslip_ros.identification.trajectory import Predictor, delayed, free_run
+
+_FAR = 1e3
+"""Error of a free run that is not bounded, in units of that of the regression."""
+_STEPS = 3
+_FREE_WEIGHT = 1.4
+"""Weight of the free run beside that of the forces."""
+_STEP = 1e-4
+"""Step of differences, as a share of the value."""
+
+
+def adjusted(fit: Regression, records: Sequence[Record], delay: float) -> Regression:
+    """Return a regression whose forces fit, and whose free run through each record, too.
+
+    The sum of both mean squares is least, each in units of what the regression leaves.
+
+    Parameters
+    ----------
+    fit : Regression
+        The regression.
+    records : sequence of Record
+        What it was fitted to.
+    delay : float
+        Time from a sample until its force acts, s.
+
+    Returns
+    -------
+    Regression
+        With other values and shapes.
+    """
+    from scipy.optimize import least_squares
+
+    task = _FreeRuns(fit, records, delay)
+    start = task.linear()
+    least = np.array([*fit.least, *(0.05 * fit.shapes), *[-np.inf] * len(records)])
+    solved = least_squares(
+        task.residual,
+        np.maximum(start, least + 1e-9),
+        bounds=(least, np.inf),
+        x_scale=np.maximum(np.abs(start), 1e-3),
+        diff_step=_STEP,
+        max_nfev=_STEPS,
+    )
+    return fit.at(solved.x)
+
+
+class _FreeRuns:
+    """The forces of a regression and the free runs of its drive, as one residual.
+
+    A point has the values and the shapes of the regression, then the velocity at the start of each
+    record.
+    """
+
+    def __init__(self, fit: Regression, records: Sequence[Record], delay: float) -> None:
+        self._fit = fit
+        records = [delayed(record, delay) for record in records]
+        self._predictors = [Predictor(record) for record in records]
+        self._measured = np.concatenate([record.position for record in records])
+        self._records = records
+        left = np.concatenate([run for _, run in self._runs(fit)]) - self._measured
+        count = len(fit.residual)
+        self._weights = (
+            1.0 / (rms(fit.residual) * np.sqrt(count)),
+            _FREE_WEIGHT / (rms(left) * np.sqrt(len(left))),
+        )
+        # The same weight for a run that is sampled as the rows are.
+        self._row_weight = _FREE_WEIGHT / (rms(left) * np.sqrt(count))
+
+    def residual(self, point: FloatArray) -> FloatArray:
+        """Return the errors of the forces and of the simulated free runs, weighted."""
+        own = self._fit.at(point)
+        drive = axis_drive(own, 1.0, 0.0)
+        positions: list[FloatArray] = []
+        for each, speed in zip(
+            self._predictors, point[-len(self._predictors) :].tolist(), strict=True
+        ):
+            measured = each.record.position
+            positions.append(each.positions(drive, 0, len(measured), float(measured[0]), speed))
+        errors = np.concatenate(positions) - self._measured
+        errors = np.nan_to_num(errors, nan=_FAR / self._weights[1])
+        return np.concatenate([own.residual * self._weights[0], errors * self._weights[1]])
+
+    def linear(self) -> FloatArray:
+        """Return the point at which the residual is least if errors of force move the mass alone.
+
+        The position error of a free run is then the force error through mass and viscous friction,
+        which is linear in the unknowns.
+        """
+        from scipy.optimize import least_squares
+        from scipy.signal import lfilter
+
+        fit, parts = self._fit, self._fit.rows.parts
+        mass = fit.constants["mass"]
+        speed, typical = fit.rows.speeds, rms(fit.rows.speeds)
+        rate = max(_slope(fit, typical, float(speed[-1])) / mass, 1e-3)
+        lengths = [len(part.rows(part.time)) for part in parts]
+        steps = [float(part.time[1] - part.time[0]) * DECIMATION for part in parts]
+        place = np.split(np.arange(sum(lengths)), np.cumsum(lengths)[:-1])
+
+        def positions(columns: FloatArray) -> FloatArray:
+            made: list[FloatArray] = []
+            for rows, step in zip(place, steps, strict=True):
+                speeds = lfilter([step / mass], [1.0, -np.exp(-rate * step)], columns[rows], 0)
+                made.append(np.cumsum(speeds, axis=0) * step)
+            return np.concatenate(made)
+
+        by_speed = np.zeros((len(fit.residual), len(parts)))
+        for number, (rows, step) in enumerate(zip(place, steps, strict=True)):
+            by_speed[rows, number] = -np.expm1(-rate * step * np.arange(len(rows))) / rate
+
+        def solved(shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
+            design, wanted = system(fit.rows, fit.curve, fit.free, fit.fixed, shapes)
+            matrix = np.vstack(
+                [
+                    np.hstack([design * self._weights[0], np.zeros_like(by_speed)]),
+                    np.hstack([positions(design), by_speed]) * self._row_weight,
+                ]
+            )
+            target = np.concatenate(
+                [wanted * self._weights[0], positions(wanted) * self._row_weight]
+            )
+            least = np.array([*fit.least, *[-np.inf] * len(parts)])
+            values = solve(matrix, target, least)
+            return values, target - matrix @ values
+
+        def by_logarithms(logarithms: FloatArray) -> FloatArray:
+            return solved(np.exp(logarithms))[1]
+
+        shapes = fit.shapes
+        if len(shapes):
+            found = least_squares(
+                by_logarithms,
+                np.log(shapes),
+                diff_step=1e-3,
+                max_nfev=10,
+            )
+            shapes = np.exp(found.x)
+        values, _ = solved(shapes)
+        point = np.concatenate([values[: len(fit.values)], shapes])
+        return np.concatenate([point, [speed for speed, _ in self._runs(self._fit.at(point))]])
+
+    def _runs(self, fit: Regression) -> list[tuple[float, FloatArray]]:
+        drive = axis_drive(fit, 1.0, 0.0)
+        return [free_run(record, drive) for record in self._records]
+
+
+def _slope(fit: Regression, low: float, high: float) -> float:
+    """Return the mean slope of the friction curves between two speeds, N s/m."""
+    slopes: list[float] = []
+    for number in range(len(fit.rows.directions)):
+        shape = float(fit.shapes[number]) if len(fit.shapes) else 1.0
+        low_force, high_force = fit.curve.terms(np.array([low, high]), shape) @ fit.forces(number)
+        slopes.append(float(high_force - low_force) / (high - low))
+    return float(np.mean(slopes))
