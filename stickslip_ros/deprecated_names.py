@@ -127,6 +127,7 @@ class _MovedModules(Loader):
         vars(module)["__getattr__"] = moved_from(module.__name__)
         if module.__name__ == "stickslip_ros.scenario":
             module.__class__ = _CallableScenario
+            module.__doc__ = _CallableScenario.__doc__
 
 
 class _CallableScenario(ModuleType):

@@ -232,6 +232,10 @@ def test_a_cycle_that_creeps() -> None:
     assert by_differences(CREEPING, cycles[0]) == pytest.approx(multiplier, abs=1e-4)
 
 
+def test_the_equilibrium_of_a_creeping_slide_has_no_speed() -> None:
+    assert all(each.state[SPEED] == 0.0 for each in equilibria(CREEPING))
+
+
 def test_a_cycle_from_the_hopf_point_of_the_gain() -> None:
     critical = critical_gains(FEED, GAINS)
     assert critical is not None
