@@ -103,6 +103,8 @@ class HybridSystem(ABC):
     """Names of the states."""
     constants: Mapping[str, float]
     """Values of the constants by name."""
+    free_constants: tuple[str, ...] = ()
+    """Names of the constants by which a motion may have derivatives."""
     inputs: tuple[str, ...]
     """Names of values that are set from outside and held."""
     switches: tuple[str, ...]

@@ -8,6 +8,7 @@ from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.course import NoCourse
 from stickslip_ros.physics.model.creeping_drive import CreepingDrive
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive_in_units import DriveInUnits, FreeDriveSystem
 from stickslip_ros.physics.model.drive_system import (
     POSITION,
     SLIP,
@@ -157,6 +158,8 @@ def drive_system(drive: Drive, control: ContinuousControl | None = None) -> Driv
     DriveSystem
         System, dimensionless.
     """
+    if isinstance(drive, DriveInUnits):
+        return FreeDriveSystem(drive, control)
     law, courses = drive.friction, (drive.belt, drive.load)
     constant = all(isinstance(course, NoCourse) for course in courses)
     plain = constant and not law.states and not law.switches and not drive.actuator.states

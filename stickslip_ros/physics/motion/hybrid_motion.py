@@ -114,7 +114,7 @@ class HybridMotion:
     def _prepare(self, mode: Mode) -> _Prepared:
         """Load the constants into the integrator of a mode's flow, unless it has a closed form."""
         name, system, flow = mode.flow, self._system, None
-        if self._detail is Detail.DERIVATIVES or not system.has_closed_form(mode):
+        if self._detail.integrates_derivatives or not system.has_closed_form(mode):
             flow = self._loans.flow(system, name, self._detail)
             flow.load(self._constants)
         prepared = self._prepared[name] = flow, system.shared_flow(name).leads
