@@ -1,6 +1,7 @@
 """Identification of drives on a spring: the simulated trajectory is fitted."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from math import pi, sqrt
 
@@ -19,19 +20,17 @@ from stickslip_ros.identification.models import (
     Model,
 )
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.refinement import (
-    Refinement,
-    Trajectories,
-    refine,
-    segments_of,
-)
+from stickslip_ros.identification.refinement import Refinement, refine, restarted
 from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
+from stickslip_ros.identification.trajectories import Trajectories, segments_of
 from stickslip_ros.identification.trajectory import Predictor
 
 _SHORT, _LONG = 1.25, 5.0
 """Length of the segments in natural periods: of the search, and of the fit."""
-_FIRST_STEPS, _STEPS, _FINALISTS = 5, 20, 2
+_FIRST_STEPS, _STEPS, _FINALISTS = 5, 100, 2
 """Steps of the search from each start, steps from the best ones, and their number."""
+_RESTARTS = 3
+"""Number of times that wrong starts are looked for."""
 _WHITE = 0.3
 """Correlation of successive errors up to which they are noise: rounding leaves some."""
 _SHAPES = (0.1, 0.3, 0.8)
@@ -40,6 +39,8 @@ POOR = 0.1
 """Error, as a share of the motion, from which a model does not describe it."""
 _HOPELESS = 4.0
 """Squared error, in squared errors of the best model, from which a model is not fitted further."""
+_RISE = 0.3
+"""Rise of static friction from which the search starts, as a share of the kinetic one."""
 _STIFF = (10.0, 100.0)
 """Stiffnesses of bristles from which the search starts, in stiffnesses of the spring."""
 _DAMPED = 0.03
@@ -110,7 +111,7 @@ class DriveTask:
         ]
         if model.memory:
             starts = [
-                {**each, "bristle_stiffness": stiffness}
+                {**_falling(each), "bristle_stiffness": stiffness}
                 | {"bristle_damping": _DAMPED * sqrt(stiffness * each["mass"])}
                 for each in starts
                 for stiffness in (factor * each["stiffness"] for factor in _STIFF)
@@ -130,23 +131,27 @@ class DriveTask:
         names = self._names(model)
         tried: list[Refinement] = []
         for values in starts:
-            known, interior = self._known(values), bool(model.memory)
-            tried.append(refine(short, names, known, most=_FIRST_STEPS, interior=interior))
+            tried.append(refine(short, names, self._known(values), most=_FIRST_STEPS))
             if is_white(tried[-1]):
                 return tried[-1]
         finished: list[Refinement] = []
         for near in sorted(tried, key=_loss)[:_FINALISTS]:
-            # The search along the bounds is the faster one, and the one that gets stuck there.
-            fit = near if model.memory else refine(short, names, near.values, near.starts, most=10)
-            if not is_white(fit):
-                other = refine(short, names, near.values, near.starts, most=_STEPS, interior=True)
-                fit = refine(short, names, other.values, other.starts, most=_STEPS)
+            fit = self._settled(near)
             if not is_white(fit):
                 fit = self._with_optional(fit)
             finished.append(fit)
             if is_white(fit):
                 break
         return min(finished, key=_loss)
+
+    def _settled(self, near: Refinement) -> Refinement:
+        """Return the best fit near another one: segments with wrong starts try others."""
+        for _ in range(_RESTARTS):
+            starts = restarted(near).starts
+            near = refine(near.task, near.free, near.values, starts, most=_STEPS)
+            if not near.has_outliers:
+                break
+        return near
 
     def _with_optional(self, fit: Refinement) -> Refinement:
         """Return the fit with the constants that the records ask for."""
@@ -157,10 +162,17 @@ class DriveTask:
             if abs(errors) < _SURE and share < _WORTH:
                 continue
             more = refine(fit.task, [*fit.free, name], fit.values, fit.starts, most=_STEPS)
+            if _loss(more) >= _loss(fit):
+                continue
             place = len(fit.free)
             error = sqrt(max(more.covariance[place, place], 0.0))
-            if abs(more.values[name]) > _KEPT * error and _loss(more) < _loss(fit):
+            if abs(more.values[name]) > _KEPT * error:
                 fit = more
+                continue
+            # It was not needed, but may have led the others out of a local minimum.
+            without = {**more.values, name: fit.values[name]}
+            other = refine(fit.task, fit.free, without, more.starts, most=_STEPS)
+            fit = min(fit, other, key=_loss)
         return fit
 
     def finished(self, near: Refinement) -> Candidate:
@@ -169,7 +181,7 @@ class DriveTask:
         task = self._trajectories(model, _LONG * self.period)
         # Measured starts are too rough for motions that grow over a segment.
         begun = refine(task, (), near.values)
-        fit = refine(task, near.free, near.values, begun.starts, most=_STEPS)
+        fit = self._settled(replace(begun, free=near.free))
         fit = self._with_optional(fit)
         return self._candidate(fit, _held_out(fit))
 
@@ -233,6 +245,13 @@ def drive_candidates(task: DriveTask, law: str, progress: Callable[[str], None])
         task.finished(each) if _loss(each) <= _HOPELESS * least else task.unfinished(each)
         for each in found
     ]
+
+
+def _falling(values: Mapping[str, float]) -> Mapping[str, float]:
+    """Return coordinates with a static friction above that of slip, which bristles may hide."""
+    if "rise" not in values:
+        return values
+    return {**values, "rise": max(values["rise"], _RISE * values["kinetic"])}
 
 
 def is_white(fit: Refinement) -> bool:

@@ -21,9 +21,10 @@ from stickslip_ros.identification.drives import POOR
 from stickslip_ros.identification.filtered import START, filtered
 from stickslip_ros.identification.models import DELAY, numbers_of
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.refinement import Refinement, refine, segments_of
+from stickslip_ros.identification.refinement import Refinement, refine
 from stickslip_ros.identification.regression import Regression
 from stickslip_ros.identification.servo import Servo, closed_loop
+from stickslip_ros.identification.trajectories import segments_of
 from stickslip_ros.identification.trajectory import Predictor, delayed, free_run
 from stickslip_ros.physics.model.drive import Drive
 
@@ -376,8 +377,8 @@ class Findings:
     def free_run(self, record: Record) -> FloatArray:
         """Return the positions that the model runs through, with the recorded force, no feedback.
 
-        The velocity at the start is the one that fits best, of a drive on a spring the position
-        at the start, too.
+        The velocity at the start is the one that fits best. A drive on a spring starts where the
+        slide is fast relative to the belt, at the position that fits best, too; NaN before.
         """
         key = id(record)
         if key not in self._runs:
@@ -390,15 +391,16 @@ class Findings:
             return free_run(delayed(record, self.delay), self.drive)[1]
         segments, starts = segments_of([record], record.duration)
         task = replace(fit.task, predictors=[Predictor(record)], segments=segments, starts=starts)
-        return refine(task, (), fit.values).residual + task.measured
+        run = task.predicted(fit.values, refine(task, (), fit.values).starts)
+        return np.concatenate([np.full(len(record.position) - len(run), np.nan), run])
 
     def check(self, record: Record) -> dict[str, float | None]:
         """Return what the model predicts of a record, as `CHECKED` names it.
 
         `free_run_error` is in m, the others are shares of the rms of what was recorded.
         """
-        run = self.free_run(record) - record.position
-        error = rms(run)
+        away = self.free_run(record) - record.position
+        error = rms(away[~np.isnan(away)]) if self.has_spring else rms(away)
         found: dict[str, float | None] = dict.fromkeys(CHECKED)
         found |= {
             "force_error": self.force_error(record),

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf, sqrt
+from math import exp, inf, sqrt
 from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
@@ -29,6 +29,8 @@ _WIDE = 30.0
 """Factor by which the search may leave the mass and the stiffness that it starts from."""
 _STIFFEST = 3000.0
 """Largest stiffness of the bristles, in stiffnesses of the spring."""
+_EXPONENTIAL = ("kinetic", "rise", "decay_speed", "viscous")
+"""Coordinates of an exponential curve."""
 DELAY = "force_delay"
 """Name of the constant that is not one of the drive: the time until a force acts, s."""
 
@@ -85,7 +87,8 @@ class Model:
         if self.shape is not None:
             values[self.shape] = float(fit.shapes[-1])
         if self.viscous:
-            values["viscous"] = forces[-1]
+            # A law without viscous friction has other equations, not a derivative by it.
+            values["viscous"] = forces[-1] or _TINY * static
         return values
 
     def static_force(self, values: Mapping[str, float]) -> float:
@@ -124,6 +127,45 @@ class Model:
         if name == "bristle_damping":
             return 0.0, _STIFFEST * rate
         return _TINY * abs(values[name]), inf
+
+    def straightened(self, free: Sequence[str]) -> bool:
+        """Return whether the search has other coordinates, see `to_search`."""
+        return isinstance(self.curve, ExponentialCurve) and {*_EXPONENTIAL} <= {*free}
+
+    def to_search(self, values: Mapping[str, float], fastest: float) -> dict[str, float]:
+        """Return the coordinates in which the fit of an exponential curve is nearly linear.
+
+        Records that hardly tell the decay speed from viscous friction have a long curved valley of
+        good fits. It is straight where friction is given by forces: `kinetic` is replaced by that
+        at the fastest speed, `viscous` by that at rest, and `rise` by how far the force at a third
+        of the fastest speed is below the straight line between them.
+
+        Parameters
+        ----------
+        values : mapping
+            Coordinates.
+        fastest : float
+            Fastest speed relative to the belt, m/s.
+
+        Returns
+        -------
+        dict
+            Coordinates of the search by the names of those that they replace.
+        """
+        decay, middle = values["decay_speed"], fastest / 3.0
+        rest = values["kinetic"] + values["rise"]
+        sag = values["rise"] * _sag(decay, middle, fastest)
+        end = values["kinetic"] + values["rise"] * exp(-fastest / decay)
+        end += values["viscous"] * fastest
+        return {**values, "viscous": rest, "kinetic": end, "rise": sag}
+
+    def from_search(self, found: Mapping[str, float], fastest: float) -> dict[str, float]:
+        """Return the coordinates of `to_search`, which may be ones that the law refuses."""
+        decay, rest = found["decay_speed"], found["viscous"]
+        rise = found["rise"] / _sag(decay, fastest / 3.0, fastest)
+        kinetic = rest - rise
+        viscous = (found["kinetic"] - kinetic - rise * exp(-fastest / decay)) / fastest
+        return {**found, "viscous": viscous, "kinetic": kinetic, "rise": rise}
 
     def constants(self, values: Mapping[str, float], normal_force: float) -> dict[str, float]:
         """Return the parameters of the plant by flat name that coordinates stand for.
@@ -185,6 +227,12 @@ def numbers_of(law: FrictionLaw) -> dict[str, float]:
     if isinstance(law, CurveFollower):
         own |= numbers_of(law.curve)
     return {name: value for name, value in own.items() if isinstance(value, int | float)}
+
+
+def _sag(decay: float, middle: float, fastest: float) -> float:
+    """Return how far exp(-w/decay) is below its chord from rest to the fastest speed."""
+    chord = 1.0 + (exp(-fastest / decay) - 1.0) * middle / fastest
+    return chord - exp(-middle / decay)
 
 
 COULOMB = Model("coulomb", CoulombCurve(), viscous=True)

@@ -1,11 +1,12 @@
 """A recording as identification uses it: evenly spaced samples of the motion and its inputs."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -13,6 +14,12 @@ _FEWEST = 500
 """Fewest samples of a record."""
 _LONGEST_GAP = 3.5
 """Longest distance of samples, in periods, that is bridged."""
+_SLOW = 1.5
+"""Steps of the encoder between samples below which rounding errors of successive ones are alike."""
+_TURN = 10
+"""Largest number of samples of a turning point."""
+_FEW = 0.2
+"""Share of samples up to which turning points are left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +63,22 @@ class Record:
             if each is not None:
                 total = total + each
         return total
+
+    @cached_property
+    def weight(self) -> FloatArray:
+        """Weight of the error of each position.
+
+        The rounding error of an encoder stays the same while the position does, as at rest:
+        successive samples of the same position count as one. At the turning points of a periodic
+        motion it is the same in each cycle: they have no weight, if other samples are enough.
+        """
+        changes = np.flatnonzero(np.diff(self.position)) + 1
+        lengths = np.diff([0, *changes.tolist(), len(self.position)])
+        found = np.repeat(1.0 / np.sqrt(lengths), lengths)
+        turning = _turning(self.position)
+        if np.mean(turning) < _FEW:
+            found[turning] = 0.0
+        return found
 
     def part(self, start: int, end: int) -> Self:
         """Return the samples from `start` to before `end`."""
@@ -132,3 +155,19 @@ def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) ->
             f"{name} has no {_FEWEST} samples without a gap of more than {_LONGEST_GAP:.0f} periods"
         )
     return records
+
+
+def _turning(position: FloatArray) -> BoolArray:
+    """Return which samples are at a turning point, within a few steps of the encoder."""
+    steps = np.diff(position)
+    sizes = np.abs(steps)
+    found = np.zeros(len(position), bool)
+    if not sizes.any():
+        return found
+    slow = sizes < _SLOW * float(sizes[sizes > 0.0].min())
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]])))
+    for first, end in edges.reshape(-1, 2).tolist():
+        inside = 0 < first and end < len(steps)
+        if inside and end - first < _TURN and steps[first - 1] * steps[end] < 0.0:
+            found[first : end + 1] = True
+    return found

@@ -1,105 +1,52 @@
 """Fit of the simulated trajectory, through stick and slip, to the positions of records."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
-from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.identification.intervals import clustered_covariance, white_covariance
-from stickslip_ros.identification.models import DELAY, Model
-from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.trajectory import Predictor
+from stickslip_ros.arrays import BoolArray, FloatArray
+from stickslip_ros.identification.intervals import block_covariance
+from stickslip_ros.identification.trajectories import Trajectories
 
-_STEP = 1e-6
-"""Step of the differences, as a share of the value: the motion is exact to about 1e-13."""
 _ALONE = 1e-5
 """Least share of a derivative that is not one of the others, for a coordinate that can be told."""
-_COLOURED = 0.1
-"""Correlation of successive errors above which they count as coloured."""
 _INSIDE = 1e-9
 """Distance of the start of a search from its bounds, as a share of the value."""
-_UNBOUNDED = 10.0
-"""Error of a motion that is not bounded, in spans of the record."""
+_STEP = 1e-6
+"""Step of the differences of coordinates, as a share of the value."""
+_RANK = 1e-9
+"""Share of the largest singular value below which the start of a segment is not told."""
+_ROUGHLY, _SETTLED = 0.03, 1e-6
+"""Share of the squared error that better starts may still take: while constants change, then."""
+_SHORTEST = 1e-3
+"""Share of a step of a start at which it counts as the best one."""
+_START_STEPS = 8
+"""Largest number of steps of the starts for one set of constants."""
+_WORSE = 9.0
+"""Squared error of a segment, in that of the median one, from which its start is doubted."""
+_KICKS = (0.0, 0.5, -0.5, 2.0, -2.0)
+"""Changes of the velocity at such a start, in errors of position per period."""
 
 
-@dataclass(frozen=True)
-class Segment:
-    """Consecutive samples of a record that are predicted from a state of their own."""
+class _Errors(NamedTuple):
+    """Weighted errors of a fit with their derivatives."""
 
-    record: int
-    start: int
-    count: int
-
-
-@dataclass(frozen=True, eq=False)
-class Trajectories:
-    """A model with the segments of records that it is to predict."""
-
-    model: Model
-    predictors: Sequence[Predictor]
-    segments: Sequence[Segment]
     starts: FloatArray
-    """Measured state at the start of each segment, m and m/s; shape (segments, 2)."""
-    normal_force: float
-
-    @cached_property
-    def measured(self) -> FloatArray:
-        """Positions of all segments, m."""
-        return np.concatenate([self._own(segment) for segment in self.segments])
-
-    @cached_property
-    def block(self) -> IntArray:
-        """Number of the segment of each position."""
-        return np.repeat(np.arange(len(self.segments)), [each.count for each in self.segments])
-
-    def _own(self, segment: Segment) -> FloatArray:
-        position = self.predictors[segment.record].record.position
-        return position[segment.start : segment.start + segment.count]
-
-    def predicted(self, values: Mapping[str, float], starts: FloatArray) -> FloatArray:
-        """Return the positions of all segments, m; far away where there is no motion."""
-        span = _UNBOUNDED * float(np.ptp(self.measured))
-        try:
-            drive = self.model.drive(values, self.normal_force)
-            found = np.concatenate(
-                [
-                    self.predictors[segment.record].positions(
-                        drive, segment.start, segment.count, x, v, values.get(DELAY, 0.0)
-                    )
-                    for segment, (x, v) in zip(self.segments, starts.tolist(), strict=True)
-                ]
-            )
-        except (InvalidInputError, RunError):
-            found = np.full(len(self.measured), np.nan)
-        middle = float(np.mean(self.measured))
-        low, high = middle - span, middle + span
-        return np.where(np.isfinite(found), np.clip(found, low, high), high)
+    """State at the start of each segment; shape (segments, 2)."""
+    residual: FloatArray
+    """Predicted less measured positions, m."""
+    by_names: FloatArray
+    """Derivatives by coordinates; shape (rows, coordinates)."""
+    by_start: FloatArray
+    """Derivatives by the start of the own segment; shape (rows, 2)."""
 
     @property
-    def fastest(self) -> float:
-        """Fastest speed relative to the belt, m/s, by the starts of the segments."""
-        belts = [
-            self.predictors[segment.record].record.belt_velocity[segment.start]
-            for segment in self.segments
-        ]
-        return max(float(np.abs(self.starts[:, 1] - belts).max()), 1e-12)
-
-    def typical(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return a size of each coordinate that may be zero, SI units."""
-        force = self.model.static_force(values)
-        rate, period = force / self.fastest, self.predictors[0].record.period
-        forces = dict.fromkeys(("bias_force", "static", "rise", "minimum", "kinetic"), force)
-        return {**forces, "damping": rate, "viscous": rate, DELAY: period, "bristle_damping": rate}
-
-    def chosen(self, which: BoolArray) -> "Trajectories":
-        """Return the same with some of the segments."""
-        segments = [each for each, used in zip(self.segments, which, strict=True) if used]
-        return replace(self, segments=segments, starts=self.starts[which])
+    def loss(self) -> float:
+        """Sum of the squared errors, m^2."""
+        return float(self.residual @ self.residual)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,24 +61,23 @@ class Refinement:
     starts: FloatArray
     """Fitted state at the start of each segment, m and m/s; shape (segments, 2)."""
     residual: FloatArray
-    """Predicted less measured positions, m."""
+    """Predicted less measured positions, m, weighted."""
+    by_start: FloatArray
+    """Derivatives of the residual by the start of the own segment; shape (rows, 2)."""
+    derivatives: FloatArray
+    """Derivatives of the residual by `free`, at starts that follow them; shape (rows, free)."""
 
     @property
     def losses(self) -> FloatArray:
-        """Mean square of the residual in each segment, m^2."""
+        """Mean square of the weighted errors in each segment, m^2."""
+        block, weight = self.task.block, self.task.weight
         squares = self.residual * self.residual
-        block = self.task.block
-        return np.bincount(block, squares) / np.bincount(block)
+        return np.bincount(block, squares) / np.bincount(block, weight * weight)
 
-    @cached_property
-    def derivatives(self) -> FloatArray:
-        """Derivatives of the positions by `free`, then by the starts."""
-        return self.derivatives_by(self.free)
-
-    def derivatives_by(self, names: Sequence[str]) -> FloatArray:
-        """Return the derivatives of the positions by coordinates, then by the starts."""
-        base = self.residual + self.task.measured
-        return _derivatives(self.task, names, self.values, self.starts, base)
+    @property
+    def has_outliers(self) -> bool:
+        """Whether some segments fit much worse than others: their starts may be wrong."""
+        return bool((self.losses > _WORSE * np.median(self.losses)).any())
 
     @property
     def correlation(self) -> float:
@@ -143,13 +89,12 @@ class Refinement:
     @cached_property
     def covariance(self) -> FloatArray:
         """Covariance of `free`."""
-        return self.covariance_of(self.derivatives)[: len(self.free), : len(self.free)]
+        return block_covariance(self.derivatives, self.residual, self._lost)
 
-    def covariance_of(self, derivatives: FloatArray) -> FloatArray:
-        """Return the covariance of coordinates by whose derivatives it is fitted."""
-        if abs(self.correlation) < _COLOURED or len(self.task.segments) < 3:
-            return white_covariance(derivatives, self.residual)
-        return clustered_covariance(derivatives, self.residual, self.task.block)
+    @property
+    def _lost(self) -> int:
+        """Number of values at the starts that were fitted besides."""
+        return 2 * len(self.starts)
 
     def gain(self, name: str) -> tuple[float, float]:
         """Return what fitting one more coordinate would bring, to first order.
@@ -157,15 +102,18 @@ class Refinement:
         It is the number of standard errors by which the coordinate would move, and the share of the
         square of the residual that would go; 0 for what the record cannot tell.
         """
-        others, column = self.derivatives, self.derivatives_by([name])[:, 0]
+        column = self.task.sensitivities(self.values, self.starts, [name]).by_names
+        column = self.task.weight[:, None] * column
+        others = self.derivatives
         norms = np.linalg.norm(others, axis=0)
         basis = np.linalg.qr(others / np.where(norms > 0.0, norms, 1.0))[0]
-        alone = column - basis @ (basis.T @ column)
+        alone = _without_starts(self.task, self.by_start, column)[:, 0]
+        alone -= basis @ (basis.T @ alone)
         size = float(alone @ alone)
         if size <= (_ALONE * float(np.linalg.norm(column))) ** 2:
             return 0.0, 0.0
         rest = self.residual - basis @ (basis.T @ self.residual)
-        error = np.sqrt(self.covariance_of(np.column_stack([alone]))[0, 0])
+        error = np.sqrt(block_covariance(alone[:, None], rest, self._lost)[0, 0])
         along = float(alone @ rest)
         return -along / size / float(error), along * along / size / float(rest @ rest)
 
@@ -177,9 +125,12 @@ def refine(
     starts: FloatArray | None = None,
     *,
     most: int = 30,
-    interior: bool = False,
 ) -> Refinement:
     """Fit coordinates and the states at the starts of the segments.
+
+    The starts follow the coordinates (variable projection, G. H. Golub, V. Pereyra, The
+    differentiation of pseudo-inverses and nonlinear least squares problems whose variables
+    separate, SIAM Journal on Numerical Analysis 10(2), 1973).
 
     Parameters
     ----------
@@ -193,9 +144,6 @@ def refine(
         States at the start of the search. By default the measured ones.
     most : int, optional
         Largest number of steps.
-    interior : bool, optional
-        Whether the search stays off the bounds. By default it may walk along them, which takes
-        fewer steps, and may stay there for good.
 
     Returns
     -------
@@ -204,111 +152,212 @@ def refine(
     """
     from scipy.optimize import least_squares
 
-    begin = task.starts if starts is None else starts
-    first = np.array([*(values[name] for name in free), *begin.ravel()])
-    count, span = len(free), float(np.ptp(task.measured))
-    bounds = np.full((2, len(first)), np.inf) * [[-1.0], [1.0]]
-    if count:
-        each = [task.model.bounds(name, values, task.fastest) for name in free]
-        bounds[:, :count] = np.transpose(each)
-    noise = 1e-3 * span
-
-    def split(point: FloatArray) -> tuple[dict[str, float], FloatArray]:
-        given = dict(zip(free, point[:count].tolist(), strict=True))
-        return {**values, **given}, point[count:].reshape(-1, 2)
-
-    def residual(point: FloatArray) -> FloatArray:
-        return (task.predicted(*split(point)) - task.measured) / noise
-
-    def derivatives(point: FloatArray) -> FloatArray:
-        given, states = split(point)
-        return _derivatives(task, free, given, states, task.predicted(given, states)) / noise
-
-    solve: Any = least_squares  # its types know no function for jac
-    found = solve(
-        residual,
-        np.clip(first, *(bounds + _INSIDE * np.abs(first) * [[1.0], [-1.0]])),
-        derivatives,
-        bounds=bounds,
-        method="trf" if interior else "dogbox",
-        x_scale="jac",
-        ftol=1e-7,
-        xtol=1e-8,
-        gtol=1e-12,
-        max_nfev=most,
-    )
-    best, states = split(found.x)
-    return Refinement(task, free, best, states, found.fun * noise)
+    fit = _Projection(task, free, values, task.starts if starts is None else starts)
+    best = fit.first
+    if len(free):
+        bounds = fit.bounds()
+        inside = _INSIDE * np.abs(best) * np.array([[1.0], [-1.0]])
+        solve: Any = least_squares  # its types know no function for jac
+        best = solve(
+            fit.residual,
+            np.clip(best, *(bounds + inside)),
+            fit.derivatives,
+            bounds=bounds,
+            x_scale="jac",
+            ftol=1e-7,
+            xtol=1e-8,
+            gtol=1e-12,
+            max_nfev=most,
+        ).x
+    return fit.refinement(best, fit.finished(best))
 
 
-def _derivatives(
-    task: Trajectories,
-    names: Sequence[str],
-    values: Mapping[str, float],
-    starts: FloatArray,
-    base: FloatArray,
-) -> FloatArray:
-    """Return the derivatives of the positions by coordinates, then by each start.
-
-    They are differences from the positions `base`. The starts of all segments are moved at once: a
-    start has no part in other segments.
-    """
-    columns: list[FloatArray] = []
-    typical = task.typical(values)
-    for name in names:
-        step = _STEP * max(abs(values[name]), typical.get(name, 0.0))
-        moved = task.predicted({**values, name: values[name] + step}, starts)
-        columns.append((moved - base) / step)
-    block = task.block
-    by_start = np.zeros((len(block), 2 * len(starts)))
-    steps = _STEP * np.maximum(np.abs(task.starts).max(axis=0), 1e-9)
-    rows = np.arange(len(block))
-    for axis, step in enumerate(steps.tolist()):
-        shift = np.where(np.arange(2) == axis, step, 0.0)
-        by_start[rows, 2 * block + axis] = (task.predicted(values, starts + shift) - base) / step
-    return np.column_stack([*columns, by_start])
+def restarted(fit: Refinement) -> Refinement:
+    """Return a fit whose segments that fit much worse than others have tried other starts."""
+    if not fit.has_outliers:
+        return fit
+    own = _Projection(fit.task, fit.free, fit.values, fit.starts)
+    return own.refinement(own.first, own.kicked(own.first))
 
 
-def segments_of(records: Sequence[Record], length: float) -> tuple[list[Segment], FloatArray]:
-    """Return segments of records about as long as asked, and the measured state at their starts.
+class _Projection:
+    """The errors of a model at the best starts, as a function of its coordinates."""
 
-    They start where the slide is fastest relative to the belt: a slide that sticks has no velocity
-    of its own.
+    def __init__(
+        self,
+        task: Trajectories,
+        free: Sequence[str],
+        values: Mapping[str, float],
+        starts: FloatArray,
+    ) -> None:
+        self._task, self._free, self._values = task, free, values
+        self._scale = 1.0 / (1e-3 * float(np.ptp(task.measured)))
+        self._point: FloatArray | None = None
+        self._best: _Errors | None = None
+        self._last: tuple[bytes, _Errors] | None = None
+        self._starts = starts
+        self._straight = task.model.straightened(free)
+        to_search = task.model.to_search(values, task.fastest) if self._straight else values
+        self.first = np.array([to_search[name] for name in free])
+        """The point of the coordinates at the start of the search."""
 
-    Parameters
-    ----------
-    records : sequence of Record
-        The records.
-    length : float
-        Length of a segment, s.
-
-    Returns
-    -------
-    list of Segment, array of shape (segments, 2)
-        Segments that follow each other; position, m, and velocity, m/s.
-    """
-    from scipy.signal import savgol_filter
-
-    segments: list[Segment] = []
-    starts: list[FloatArray] = []
-    for number, record in enumerate(records):
-        total = len(record.position)
-        window = 11
-        smooth: FloatArray = np.asarray(savgol_filter(record.position, window, 3))
-        speed: FloatArray = np.asarray(
-            savgol_filter(record.position, window, 3, deriv=1, delta=record.period)
+    def refinement(self, point: FloatArray, found: _Errors) -> Refinement:
+        """Return the errors at a point as a fit."""
+        return Refinement(
+            self._task,
+            self._free,
+            self.values(point),
+            found.starts,
+            found.residual,
+            found.by_start,
+            _without_starts(self._task, found.by_start, found.by_names),
         )
-        relative = np.abs(speed - record.belt_velocity)
-        relative[[*range(window // 2)]] = -1.0
-        count = max(round(total * record.period / length), 1)
-        edges = np.linspace(0, total, count + 1).astype(int)
-        reach = max((edges[1] - edges[0]) // 5, 1)
-        places = [0]
-        for edge in edges[1:-1]:
-            around = np.arange(max(edge - reach, 0), min(edge + reach, total))
-            places.append(int(around[np.argmax(relative[around])]))
-        places.append(total)
-        for low, high in pairwise(places):
-            segments.append(Segment(number, low, high - low))
-            starts.append(np.array([smooth[low], speed[low]]))
-    return segments, np.array(starts)
+
+    def bounds(self) -> FloatArray:
+        """Return the smallest and the largest values of a point, shape (2, coordinates)."""
+        model, task = self._task.model, self._task
+        found = [model.bounds(name, self._values, task.fastest) for name in self._free]
+        if self._straight:
+            # The force at the fastest speed may be any; those of the law are checked by the model.
+            found[list(self._free).index("kinetic")] = (-np.inf, np.inf)
+            found[list(self._free).index("viscous")] = (0.0, np.inf)
+        return np.transpose(found)
+
+    def values(self, point: FloatArray) -> dict[str, float]:
+        """Return all coordinates at a point."""
+        found = {**self._values, **dict(zip(self._free, point.tolist(), strict=True))}
+        return self._task.model.from_search(found, self._task.fastest) if self._straight else found
+
+    def _of_search(self, point: FloatArray) -> FloatArray:
+        """Return the derivatives of the coordinates by those of the search."""
+        if not self._straight:
+            return np.eye(len(point))
+        base, columns = self.values(point), list[list[float]]()
+        for number in range(len(point)):
+            step = _STEP * max(abs(float(point[number])), 1e-12)
+            moved = point.copy()
+            moved[number] += step
+            other = self.values(moved)
+            columns.append([(other[each] - base[each]) / step for each in self._free])
+        return np.transpose(columns)
+
+    def residual(self, point: FloatArray) -> FloatArray:
+        """Return the errors at a point, at starts that are best to first order."""
+        found = self.at(point)
+        rest = _without_starts(self._task, found.by_start, found.residual[:, None])
+        return rest[:, 0] * self._scale
+
+    def derivatives(self, point: FloatArray) -> FloatArray:
+        """Return the derivatives of the errors at a point, at starts that follow it."""
+        found = self.at(point)
+        columns = _without_starts(self._task, found.by_start, found.by_names)
+        return columns @ self._of_search(point) * self._scale
+
+    def at(self, point: FloatArray) -> _Errors:
+        """Return the errors at a point, at starts that are nearly the best ones."""
+        key = point.tobytes()
+        if self._last is not None and self._last[0] == key:
+            return self._last[1]
+        if self._best is not None and self._point is not None and key == self._point.tobytes():
+            return self._best
+        found = self._settled(point)
+        self._last = key, found
+        if self._best is None or found.loss < self._best.loss:
+            self._best, self._point = found, point.copy()
+        return found
+
+    def _settled(self, point: FloatArray) -> _Errors:
+        starts = self._starts
+        if self._best is not None and self._point is not None:
+            change = self._best.by_names @ self._of_search(self._point) @ (point - self._point)
+            starts = self._best.starts - _steps(self._task, self._best.by_start, change)
+        found = self._errors(point, starts)
+        if self._best is not None and found.loss > 4.0 * self._best.loss:
+            kept = self._errors(point, self._best.starts)
+            found = min(found, kept, key=lambda each: each.loss)
+        return self._improved(point, found, _ROUGHLY)
+
+    def finished(self, point: FloatArray) -> _Errors:
+        """Return the errors at a point, at the best starts."""
+        return self._improved(point, self.at(point), _SETTLED)
+
+    def kicked(self, point: FloatArray) -> _Errors:
+        """Return the errors at a point, at the best starts that kicks of the measured ones give."""
+        found = self.finished(point)
+        rough = np.sqrt(np.median(self._losses(found.residual) / self._losses(self._task.weight)))
+        for kick in _KICKS:
+            starts = self._task.starts + [0.0, kick * rough / self._task.predictors[0].record.period]
+            other = self._improved(point, self._errors(point, starts), _SETTLED)
+            found, _ = self._better(found, other)
+        return found
+
+    def _better(self, one: _Errors, other: _Errors) -> tuple[_Errors, BoolArray]:
+        """Return the better one of two fits of each segment, and for which it is the other one."""
+        better = self._losses(other.residual) < self._losses(one.residual)
+        rows = better[self._task.block]
+        return _Errors(
+            np.where(better[:, None], other.starts, one.starts),
+            np.where(rows, other.residual, one.residual),
+            np.where(rows[:, None], other.by_names, one.by_names),
+            np.where(rows[:, None], other.by_start, one.by_start),
+        ), better
+
+    def _improved(self, point: FloatArray, found: _Errors, tolerance: float) -> _Errors:
+        """Return the errors at starts that are best up to a share of the squared error.
+
+        The start of a segment has no part in the others: each takes steps of its own length.
+        """
+        parts = self._task.parts
+        share = np.ones(len(parts))
+        for _ in range(_START_STEPS):
+            squares = self._losses(found.residual)
+            left = self._losses(
+                _without_starts(self._task, found.by_start, found.residual[:, None])[:, 0]
+            )
+            if float(np.sum((squares - left) * (share >= _SHORTEST))) <= tolerance * found.loss:
+                break
+            steps = share[:, None] * _steps(self._task, found.by_start, found.residual)
+            other = self._errors(point, found.starts - steps)
+            found, better = self._better(found, other)
+            share = np.where(better, np.minimum(2.0 * share, 1.0), 0.25 * share)
+        return found
+
+    def _losses(self, residual: FloatArray) -> FloatArray:
+        return np.bincount(self._task.block, residual * residual)
+
+    def _errors(self, point: FloatArray, starts: FloatArray) -> _Errors:
+        task, weight = self._task, self._task.weight
+        positions, by_names, by_start = task.sensitivities(self.values(point), starts, self._free)
+        return _Errors(
+            starts,
+            weight * (positions - task.measured),
+            weight[:, None] * by_names,
+            weight[:, None] * by_start,
+        )
+
+
+def _decomposed(by_start: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return an orthogonal basis of the columns, and their pseudo-inverse by that basis."""
+    norms = np.linalg.norm(by_start, axis=0)
+    norms[norms == 0.0] = 1.0
+    left, sizes, right = np.linalg.svd(by_start / norms, full_matrices=False)
+    kept = sizes > _RANK * max(float(sizes[0]), 1e-300)
+    return left[:, kept], (right[kept].T / sizes[kept]) / norms[:, None]
+
+
+def _without_starts(task: Trajectories, by_start: FloatArray, columns: FloatArray) -> FloatArray:
+    """Return the part of columns that no change of the starts explains."""
+    found = np.array(columns)
+    for part in task.parts:
+        basis, _ = _decomposed(by_start[part])
+        found[part] -= basis @ (basis.T @ found[part])
+    return found
+
+
+def _steps(task: Trajectories, by_start: FloatArray, column: FloatArray) -> FloatArray:
+    """Return the changes of the starts that explain a column best; shape (segments, 2)."""
+    found = np.zeros((len(task.parts), 2))
+    for number, part in enumerate(task.parts):
+        basis, inverse = _decomposed(by_start[part])
+        found[number] = inverse @ (basis.T @ column[part])
+    return found

@@ -10,10 +10,8 @@ from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.curves import Curve, followed
 from stickslip_ros.identification.filtered import Filtered
-from stickslip_ros.identification.intervals import clustered_covariance
+from stickslip_ros.identification.intervals import BLOCKS, block_covariance
 
-BLOCKS = 24
-"""Number of blocks of time that are held out, and from whose scatter intervals are computed."""
 _SHARE = 0.05
 """Least share of the rows of a direction that has a curve of its own."""
 LINEAR = ("mass", "damping", "stiffness", "bias_force")
@@ -151,7 +149,7 @@ class Regression:
             change = self._residual_with(self.shapes - step)
             change -= self._residual_with(self.shapes + step)
             columns.append((change / (2e-4 * shape))[:, None])
-        return clustered_covariance(np.hstack(columns), self.residual, self.rows.block)
+        return block_covariance(np.hstack(columns), self.residual)
 
     @cached_property
     def held_out(self) -> FloatArray:

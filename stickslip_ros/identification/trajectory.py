@@ -1,7 +1,9 @@
 """The motion that a model predicts for a record: its forces and its belt in, positions out."""
 
-from dataclasses import replace
-from math import isfinite
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import copysign, isfinite
+from typing import TypeVar
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from stickslip_ros.identification.record import Record
 from stickslip_ros.physics.model.courses import Table
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.motion import Motion
+from stickslip_ros.physics.motion.parametric_motion import ParametricMotion
 
 _FIRST = 20
 """Samples from which the velocity at the start is found."""
@@ -17,6 +20,23 @@ _FAR = 1e300
 """Squared error of a motion that is not bounded, m^2."""
 _TOLERANCE = 1e-6
 """Largest error of the belt velocity between corners, as a share of its largest value."""
+
+_Motion = TypeVar("_Motion", bound=Motion)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Consecutive samples of a record that are predicted from a state of their own."""
+
+    record: int
+    start: int
+    count: int
+
+
+def steady_memory(drive: Drive, velocity: float, belt_speed: float) -> Sequence[float]:
+    """Return the memory of the friction law in steady slip at these speeds, SI units."""
+    relative = velocity - belt_speed
+    return drive.friction.memory_at(relative, copysign(1.0, relative))
 
 
 class Predictor:
@@ -54,27 +74,92 @@ class Predictor:
         array of shape (count,)
             Positions, m; NaN from where the motion is unbounded.
         """
-        drive = self.with_belt(drive, start, count)
-        motion = Motion(drive, position, velocity)
+        motion = Motion(self.with_belt(drive, start, count), position, velocity)
+        found = np.full(count, np.nan)
+        found[0] = position
+        for number in self._samples(motion, start, count, delay):
+            found[number] = motion.position
+        return found
+
+    def followed(
+        self,
+        drive: Drive,
+        segments: Sequence[Segment],
+        starts: FloatArray,
+        delay: float = 0.0,
+    ) -> list[FloatArray]:
+        """Return the positions of segments, m, each from a state (position, velocity) of its own.
+
+        The memory of the friction law is that of steady slip at the start of a segment. Positions
+        are NaN from where the motion is unbounded.
+        """
+        found: list[FloatArray] = []
+        for segment, motion in self._motions(Motion, drive, segments, starts):
+            own = np.full(segment.count, np.nan)
+            own[0] = motion.position
+            for number in self._samples(motion, segment.start, segment.count, delay):
+                own[number] = motion.position
+            found.append(own)
+        return found
+
+    def sensitivities(
+        self,
+        drive: Drive,
+        segments: Sequence[Segment],
+        starts: FloatArray,
+        delay: float = 0.0,
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Return the positions of segments, as `followed`, and their dimensionless derivatives.
+
+        The latter have shape (samples, arguments): the state at the start of the segment, then the
+        free constants of the drive; see `ParametricMotion`.
+        """
+        found: list[tuple[FloatArray, FloatArray]] = []
+        for segment, motion in self._motions(ParametricMotion, drive, segments, starts):
+            own = np.full(segment.count, np.nan)
+            by = np.zeros((segment.count, len(motion.position_derivatives)))
+            own[0], by[0] = motion.position, motion.position_derivatives
+            for number in self._samples(motion, segment.start, segment.count, delay):
+                own[number], by[number] = motion.position, motion.position_derivatives
+            found.append((own, by))
+        return found
+
+    def _motions(
+        self, kind: type[_Motion], drive: Drive, segments: Sequence[Segment], starts: FloatArray
+    ) -> Iterator[tuple[Segment, _Motion]]:
+        """Yield each segment with a motion at its start, which the caller advances to its end."""
+        motion: _Motion | None = None
+        end = -1
+        for segment, (position, velocity) in zip(segments, starts.tolist(), strict=True):
+            if motion is None or motion.unbounded or segment.start != end:
+                left = len(self.record.position) - segment.start
+                motion = kind(self.with_belt(drive, segment.start, left), position, velocity)
+            memory = None
+            if drive.friction.states:
+                memory = steady_memory(drive, velocity, self.record.belt_velocity[segment.start])
+            motion.restart(position, velocity, memory)
+            end = segment.start + segment.count
+            yield segment, motion
+            # The clock of the belt goes on to the start of the next segment.
+            motion.advance(self.record.period)
+
+    def _samples(self, motion: Motion, start: int, count: int, delay: float) -> Iterator[int]:
+        """Yield the number of each sample but the first when the motion has reached it."""
         period, forces, last = self.record.period, self._force, len(self._force) - 1
         whole, rest = divmod(delay / period, 1.0)
         shift, rest = int(whole), rest * period
-        found = np.full(count, np.nan)
-        found[0] = position
-        first = min(max(start - 1 - shift, 0), last)
-        motion.force = forces[first]
-        advance = motion.advance
+        advance, held = motion.advance, forces[min(max(start - 1 - shift, 0), last)]
+        motion.force = held
         for number in range(1, count):
             force = forces[min(max(start + number - 1 - shift, 0), last)]
             if rest > 0.0:
                 advance(rest)
-            if force != motion.force:
-                motion.force = force
+            if force != held:
+                motion.force = held = force
             advance(period - rest)
             if motion.unbounded:
                 break
-            found[number] = motion.position
-        return found
+            yield number
 
     def with_belt(self, drive: Drive, start: int, count: int) -> Drive:
         """Return the drive with the belt of a part of the record."""

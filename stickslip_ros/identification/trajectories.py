@@ -1,0 +1,239 @@
+"""Segments of records, the positions that a model predicts for them, and their derivatives."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
+from stickslip_ros.errors import InvalidInputError, RunError
+from stickslip_ros.identification.models import DELAY, Model
+from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.trajectory import Predictor, Segment, steady_memory
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive_in_units import in_units_of
+from stickslip_ros.physics.model.drive_system import MEMORY
+from stickslip_ros.physics.model.plain_drive import drive_system
+
+_STEP = 1e-4
+"""Step, as a share of the value, of constants that are linear in the coordinates."""
+_DELAY_STEP = 1e-3
+"""Step of the delay, periods."""
+_UNBOUNDED = 10.0
+"""Error of a motion that is not bounded, in spans of the record."""
+
+
+class Sensitivities(NamedTuple):
+    """Positions of segments with their derivatives; arrays with a row for each sample."""
+
+    positions: FloatArray
+    """Positions, m."""
+    by_names: FloatArray
+    """Derivatives by coordinates, SI units; shape (samples, names)."""
+    by_start: FloatArray
+    """Derivatives by position and velocity at the start of the own segment; shape (samples, 2)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectories:
+    """A model with the segments of records that it is to predict."""
+
+    model: Model
+    predictors: Sequence[Predictor]
+    segments: Sequence[Segment]
+    starts: FloatArray
+    """Measured state at the start of each segment, m and m/s; shape (segments, 2)."""
+    normal_force: float
+
+    @cached_property
+    def measured(self) -> FloatArray:
+        """Positions of all segments, m."""
+        return self._joined(lambda record: record.position)
+
+    @cached_property
+    def weight(self) -> FloatArray:
+        """Weight of the error of each position, see `Record.weight`."""
+        return self._joined(lambda record: record.weight)
+
+    @cached_property
+    def parts(self) -> Sequence[slice]:
+        """Rows of each segment."""
+        ends = np.cumsum([0, *(each.count for each in self.segments)]).tolist()
+        return [slice(low, high) for low, high in pairwise(ends)]
+
+    @cached_property
+    def block(self) -> IntArray:
+        """Number of the segment of each position."""
+        return np.repeat(np.arange(len(self.segments)), [each.count for each in self.segments])
+
+    def _joined(self, values: Callable[[Record], FloatArray]) -> FloatArray:
+        columns = [values(each.record) for each in self.predictors]
+        return np.concatenate(
+            [columns[own.record][own.start : own.start + own.count] for own in self.segments]
+        )
+
+    def predicted(self, values: Mapping[str, float], starts: FloatArray) -> FloatArray:
+        """Return the positions of all segments, m; far away where there is no motion."""
+        delay = values.get(DELAY, 0.0)
+        try:
+            drive = self.model.drive(values, self.normal_force)
+            found = [
+                each
+                for predictor, segments, own in self._by_record(starts)
+                for each in predictor.followed(drive, segments, own, delay)
+            ]
+        except (InvalidInputError, RunError):
+            return self._bounded(np.full(len(self.measured), np.nan))
+        return self._bounded(np.concatenate(found))
+
+    def sensitivities(
+        self, values: Mapping[str, float], starts: FloatArray, names: Sequence[str]
+    ) -> Sensitivities:
+        """Return the positions of all segments, and their derivatives.
+
+        They are zero where there is no motion.
+        """
+        count = len(self.measured)
+        found = Sensitivities(np.full(count, np.nan), np.zeros((count, len(names))), np.zeros((count, 2)))
+        try:
+            self._follow(values, starts, names, found)
+        except (InvalidInputError, RunError):
+            found.positions[:] = np.nan
+        found = found._replace(positions=self._bounded(found.positions))
+        if DELAY in names:
+            step = _DELAY_STEP * self.predictors[0].record.period
+            moved = self.predicted({**values, DELAY: values[DELAY] + step}, starts)
+            found.by_names[:, list(names).index(DELAY)] = (moved - found.positions) / step
+        return found
+
+    def _follow(
+        self,
+        values: Mapping[str, float],
+        starts: FloatArray,
+        names: Sequence[str],
+        found: Sensitivities,
+    ) -> None:
+        drive = self.model.drive(values, self.normal_force)
+        typical, moved = self.typical(values), list[tuple[float, Drive]]()
+        constants = [name for name in names if name != DELAY]
+        columns = [number for number, name in enumerate(names) if name != DELAY]
+        for name in constants:
+            step = _STEP * max(abs(values[name]), typical.get(name, 0.0))
+            other = {**values, name: values[name] + step}
+            moved.append((step, self.model.drive(other, self.normal_force)))
+
+        def by_coordinates(function: Callable[[Drive], FloatArray]) -> FloatArray:
+            base = function(drive)
+            return np.column_stack([(function(other) - base) / step for step, other in moved])
+
+        def of_system(other: Drive) -> FloatArray:
+            system = drive_system(in_units_of(drive, other))
+            return np.array([system.constants[name] for name in system.free_constants])
+
+        of_constants = by_coordinates(of_system) if moved else None
+        parts = iter(self.parts)
+        for predictor, segments, own in self._by_record(starts):
+            delay, belt = values.get(DELAY, 0.0), predictor.record.belt_velocity
+            runs = predictor.sensitivities(drive, segments, own, delay)
+            for segment, (_, velocity), (positions, rows) in zip(segments, own, runs, strict=True):
+                part = next(parts)
+                found.positions[part] = positions
+                found.by_start[part] = rows[:, :2] * (1.0, drive.length_scale / drive.speed_scale)
+                if of_constants is None:
+                    continue
+                order = rows.shape[1] - len(of_constants)
+                columns_of = rows[:, order:] @ of_constants
+                if order > MEMORY:
+                    speeds = float(velocity), float(belt[segment.start])
+                    columns_of += rows[:, MEMORY:order] @ by_coordinates(
+                        lambda other, speeds=speeds: (
+                            np.array(steady_memory(other, *speeds)) / drive.length_scale
+                        )
+                    )
+                found.by_names[part, columns] = columns_of * drive.length_scale
+
+    def _by_record(
+        self, starts: FloatArray
+    ) -> Iterator[tuple[Predictor, Sequence[Segment], FloatArray]]:
+        """Yield each predictor with the segments of its record, which follow one another."""
+        numbers = np.array([segment.record for segment in self.segments])
+        for number, predictor in enumerate(self.predictors):
+            own = numbers == number
+            if own.any():
+                segments = [each for each in self.segments if each.record == number]
+                yield predictor, segments, starts[own]
+
+    def _bounded(self, positions: FloatArray) -> FloatArray:
+        middle, span = float(np.mean(self.measured)), _UNBOUNDED * float(np.ptp(self.measured))
+        low, high = middle - span, middle + span
+        return np.where(np.isfinite(positions), np.clip(positions, low, high), high)
+
+    @property
+    def fastest(self) -> float:
+        """Fastest speed relative to the belt, m/s, by the starts of the segments."""
+        belts = [
+            self.predictors[segment.record].record.belt_velocity[segment.start]
+            for segment in self.segments
+        ]
+        return max(float(np.abs(self.starts[:, 1] - belts).max()), 1e-12)
+
+    def typical(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return a size of each coordinate that may be zero, SI units."""
+        force = self.model.static_force(values)
+        rate, period = force / self.fastest, self.predictors[0].record.period
+        forces = dict.fromkeys(("bias_force", "static", "rise", "minimum", "kinetic"), force)
+        return {**forces, "damping": rate, "viscous": rate, DELAY: period, "bristle_damping": rate}
+
+    def chosen(self, which: BoolArray) -> "Trajectories":
+        """Return the same with some of the segments."""
+        segments = [each for each, used in zip(self.segments, which, strict=True) if used]
+        return replace(self, segments=segments, starts=self.starts[which])
+
+
+def segments_of(records: Sequence[Record], length: float) -> tuple[list[Segment], FloatArray]:
+    """Return segments of records about as long as asked, and the measured state at their starts.
+
+    They start where the slide is fastest relative to the belt: a slide that sticks has no velocity
+    of its own, and friction with a memory is that of steady slip there.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        The records.
+    length : float
+        Length of a segment, s.
+
+    Returns
+    -------
+    list of Segment, array of shape (segments, 2)
+        Segments that follow each other up to the end of each record; position, m, and velocity,
+        m/s.
+    """
+    from scipy.signal import savgol_filter
+
+    segments: list[Segment] = []
+    starts: list[FloatArray] = []
+    for number, record in enumerate(records):
+        total = len(record.position)
+        window = 11
+        smooth: FloatArray = np.asarray(savgol_filter(record.position, window, 3))
+        speed: FloatArray = np.asarray(
+            savgol_filter(record.position, window, 3, deriv=1, delta=record.period)
+        )
+        relative = np.abs(speed - record.belt_velocity)
+        relative[: window // 2] = -1.0  # its velocity is rough
+        count = max(round(total * record.period / length), 1)
+        edges = np.linspace(0, total, count + 1).astype(int)
+        reach = max((edges[1] - edges[0]) // 5, 1)
+        places: list[int] = []
+        for edge in edges[:-1]:
+            around = np.arange(max(edge - reach, 0), min(edge + reach, total))
+            places.append(int(around[np.argmax(relative[around])]))
+        places.append(total)
+        for low, high in pairwise(places):
+            segments.append(Segment(number, low, high - low))
+            starts.append(np.array([smooth[low], speed[low]]))
+    return segments, np.array(starts)
