@@ -29,8 +29,8 @@ _SHORT, _LONG = 1.25, 5.0
 """Length of the segments in natural periods: of the search, and of the fit."""
 _FIRST_STEPS, _STEPS, _FINALISTS = 5, 100, 2
 """Steps of the search from each start, steps from the best ones, and their number."""
-_RESTARTS = 3
-"""Number of times that wrong starts are looked for."""
+_BETTER = 0.8
+"""Squared error, in that before, to which other starts must lead to go on with them."""
 _WHITE = 0.3
 """Correlation of successive errors up to which they are noise: rounding leaves some."""
 _SHAPES = (0.1, 0.3, 0.8)
@@ -46,7 +46,7 @@ _STIFF = (10.0, 100.0)
 _DAMPED = 0.03
 """Damping of the bristles from which the search starts, as a share of the critical one."""
 _WORTH, _SURE = 0.05, 4.0
-"""Share of the residual, or standard errors, for which one more constant is fitted."""
+"""Share of the squared error, and standard errors, for which one more constant is searched."""
 _KEPT = 3.0
 """Standard errors by which such a constant must differ from zero."""
 DRIVE_LAWS = tuple(model.law for model in (*STATIC_MODELS, *MEMORY_MODELS))
@@ -138,7 +138,7 @@ class DriveTask:
         for near in sorted(tried, key=_loss)[:_FINALISTS]:
             fit = self._settled(near)
             if not is_white(fit):
-                fit = self._with_optional(fit)
+                fit = self._with_optional(fit, least_share=_WORTH)
             finished.append(fit)
             if is_white(fit):
                 break
@@ -146,20 +146,25 @@ class DriveTask:
 
     def _settled(self, near: Refinement) -> Refinement:
         """Return the best fit near another one: segments with wrong starts try others."""
-        for _ in range(_RESTARTS):
+        near = refine(near.task, near.free, near.values, near.starts, most=_STEPS)
+        while near.has_outliers:
             starts = restarted(near).starts
-            near = refine(near.task, near.free, near.values, starts, most=_STEPS)
-            if not near.has_outliers:
+            other = refine(near.task, near.free, near.values, starts, most=_STEPS)
+            if _loss(other) > _BETTER * _loss(near):
                 break
+            near = other
         return near
 
-    def _with_optional(self, fit: Refinement) -> Refinement:
-        """Return the fit with the constants that the records ask for."""
+    def _with_optional(self, fit: Refinement, *, least_share: float) -> Refinement:
+        """Return the fit with the constants that the records ask for.
+
+        They must take away a share of the squared error, and differ clearly from zero.
+        """
         for name in OPTIONAL:
             if name in self.fixed or name in fit.free:
                 continue
             errors, share = fit.gain(name)
-            if abs(errors) < _SURE and share < _WORTH:
+            if abs(errors) < _SURE or share < least_share:
                 continue
             more = refine(fit.task, [*fit.free, name], fit.values, fit.starts, most=_STEPS)
             if _loss(more) >= _loss(fit):
@@ -182,7 +187,7 @@ class DriveTask:
         # Measured starts are too rough for motions that grow over a segment.
         begun = refine(task, (), near.values)
         fit = self._settled(replace(begun, free=near.free))
-        fit = self._with_optional(fit)
+        fit = self._with_optional(fit, least_share=0.0)
         return self._candidate(fit, _held_out(fit))
 
     def unfinished(self, near: Refinement) -> Candidate:
