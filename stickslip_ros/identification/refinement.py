@@ -76,8 +76,10 @@ class Refinement:
 
     @property
     def has_outliers(self) -> bool:
-        """Whether some segments fit much worse than others: their starts may be wrong."""
-        return bool((self.losses > _WORSE * np.median(self.losses)).any())
+        """Whether most of the error is that of a few segments: their starts may be wrong."""
+        losses = self.losses
+        worse = losses > _WORSE * np.median(losses)
+        return float(losses[worse].sum()) > 0.5 * float(losses.sum())
 
     @property
     def correlation(self) -> float:
