@@ -8,15 +8,9 @@ from math import inf, isfinite, isnan
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
-from stickslip_ros.identification.axis_drive import (
-    POINTS,
-    Points,
-    axis_drive,
-    law_of,
-    table_of,
-    table_speeds,
-)
+from stickslip_ros.identification.axis_drive import Points, axis_drive, law_of, table_of
 from stickslip_ros.identification.candidates import Candidate, Estimate
+from stickslip_ros.identification.curve_bands import Friction, friction_of
 from stickslip_ros.identification.drives import POOR
 from stickslip_ros.identification.filtered import START, filtered
 from stickslip_ros.identification.models import DELAY, numbers_of
@@ -33,22 +27,12 @@ _STILL = 0.02
 """Share of the fastest speed below which a slide may stick."""
 _VAGUE = 0.5
 """Standard error, as a share of the value, from which a constant counts as not told."""
+_DIFFERENT = 0.05
+"""Difference of friction at any speed, as a share of the largest, by which two laws differ."""
 _CORRELATED = 0.95
 """Correlation from which two constants are named together."""
 CHECKED = ("force_error", "free_run_error", "position_error", "closed_loop_force_error")
 """What a model predicts of a recording."""
-
-
-@dataclass(frozen=True, eq=False)
-class Friction:
-    """A friction curve with its band, in one direction; arrays of shape (points,)."""
-
-    speed: FloatArray
-    """Speed |v_r|, m/s, within what was recorded."""
-    force: FloatArray
-    """Friction force, N."""
-    standard_error: FloatArray
-    """Standard error of the force, N."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,13 +151,20 @@ class Findings:
     @property
     def notes(self) -> Sequence[str]:
         """Sentences on what makes the model doubtful."""
-        if self.chosen.error < POOR:
-            return []
-        return [
-            f"the model does not describe the recordings: its error is {self.chosen.error:.0%} of "
-            "what it predicts; an input may be missing (a disturbance, the velocity of the belt), "
-            "or have another sign or unit"
-        ]
+        found: list[str] = []
+        if self.chosen.error >= POOR:
+            found.append(
+                f"the model does not describe the recordings: its error is {self.chosen.error:.0%} "
+                "of what it predicts; an input may be missing (a disturbance, the velocity of the "
+                "belt), or have another sign or unit"
+            )
+        fit = self.chosen.fit
+        if isinstance(fit, Refinement) and (repetition := fit.repetition) is not None:
+            found.append(
+                f"the errors repeat every {repetition} samples: the motion takes a whole number of "
+                "samples, so that rounding does not average out; the intervals may be too narrow"
+            )
+        return found
 
     @cached_property
     def unidentified(self) -> Mapping[str, str]:
@@ -193,12 +184,33 @@ class Findings:
                     "the slide never stuck: it is the curve extended to rest; run below "
                     f"{1e3 * self.slowest:.3g} mm/s"
                 )
+        if self._rivals:
+            found["friction.law"] = (
+                f"{_listed([self.law, *self._rivals])} predict held-out parts alike, but differ in "
+                "friction at speeds that were hardly recorded: the simplest is taken; run with "
+                f"relative speeds from rest to {1e3 * self._fastest:.3g} mm/s"
+            )
         for name, estimate in self.fitted.items():
             if not estimate.standard_error < _VAGUE * abs(estimate.value) and name not in found:
                 found[name] = (
                     f"{estimate.value:.4g} has a standard error of {estimate.standard_error:.2g}: "
                     "the recordings do not tell it; a run with other speeds and forces may"
                 )
+        return found
+
+    @cached_property
+    def _rivals(self) -> Sequence[str]:
+        """Laws that predict as well as the one that was chosen, and have another friction."""
+        found: list[str] = []
+        for each in self.candidates:
+            if each is self.chosen or not self.as_good.get(each.law) or each.remark:
+                continue
+            for number in range(len(self.directions)):
+                own, other = self.friction(number), friction_of(each.fit, number, self._fastest)
+                away = np.abs(np.interp(own.speed, other.speed, other.force) - own.force)
+                if float(away.max()) > _DIFFERENT * float(own.force.max()):
+                    found.append(each.law)
+                    break
         return found
 
     def _merged_on_an_axis(self) -> dict[str, str]:
@@ -278,36 +290,11 @@ class Findings:
         Friction
             The curve.
         """
-        fit = self.chosen.fit
-        if isinstance(fit, Refinement):
-            top = max(float(each.max()) for each in self._speeds)
-            speed = np.linspace(0.0, top, POINTS)
-            model = fit.task.model
+        return friction_of(self.chosen.fit, direction, self._fastest)
 
-            def force(values: Mapping[str, float]) -> FloatArray:
-                law = model.drive(values, 1.0).friction
-                return np.array([-float(law.coefficient(each, 1.0)) for each in speed.tolist()])
-
-            typical, base = fit.task.typical(fit.values), force(fit.values)
-            columns: list[FloatArray] = []
-            for name in fit.free:
-                step = _RELATIVE_STEP * max(abs(fit.values[name]), typical.get(name, 0.0))
-                columns.append((force({**fit.values, name: fit.values[name] + step}) - base) / step)
-            by = np.column_stack(columns)
-            return Friction(speed, base, _band(by, fit.covariance))
-        speed = table_speeds(fit)
-        shape = float(fit.shapes[direction]) if len(fit.shapes) else 1.0
-        terms = fit.curve.terms(speed, shape)
-        own = fit.forces(direction)
-        count, directions = len(own), len(fit.rows.directions)
-        by = np.zeros((len(speed), len(fit.covariance)))
-        place = len(fit.free) + direction * count
-        by[:, place : place + count] = terms
-        if len(fit.shapes):
-            step = _RELATIVE_STEP * shape
-            change = (fit.curve.terms(speed, shape + step) - terms) @ own / step
-            by[:, len(fit.free) + directions * count + direction] = change
-        return Friction(speed, terms @ own, _band(by, fit.covariance))
+    @property
+    def _fastest(self) -> float:
+        return max(float(each.max()) for each in self._speeds)
 
     @property
     def _regression(self) -> Regression:
@@ -417,8 +404,8 @@ def _relative(found: FloatArray, measured: FloatArray) -> float:
     return rms(found - measured) / rms(measured)
 
 
-def _band(by: FloatArray, covariance: FloatArray) -> FloatArray:
-    return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", by, covariance, by), 0.0))
+def _listed(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _propagated(

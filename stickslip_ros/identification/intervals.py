@@ -15,9 +15,9 @@ _RANK = 1e-13
 def block_covariance(jacobian: FloatArray, residual: FloatArray, lost: int = 0) -> FloatArray:
     """Return the covariance of a least-squares fit to a series whose errors may be coloured.
 
-    It is the jackknife over blocks of time, to first order (A. C. Cameron, D. L. Miller, A
-    practitioner's guide to cluster-robust inference, Journal of Human Resources 50(2), 2015): errors
-    may be correlated within a block. No variance is below that with independent errors.
+    It is the jackknife over blocks of time, to first order (A. C. Cameron, D. L. Miller,
+    A practitioner's guide to cluster-robust inference, Journal of Human Resources 50(2), 2015):
+    errors may be correlated within a block. No variance is below that with independent errors.
 
     Parameters
     ----------

@@ -6,8 +6,9 @@ from typing import Self
 
 import numpy as np
 
-from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
+from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.measures.noise import white_noise
 from stickslip_ros.stamps import NANOSECONDS
 
 _FEWEST = 500
@@ -15,11 +16,17 @@ _FEWEST = 500
 _LONGEST_GAP = 3.5
 """Longest distance of samples, in periods, that is bridged."""
 _SLOW = 1.5
-"""Steps of the encoder between samples below which rounding errors of successive ones are alike."""
-_TURN = 10
-"""Largest number of samples of a turning point."""
+"""Steps of the encoder between samples from which rounding errors are independent."""
+_TURNING = 0.1
+"""Change of the speed in a sample, steps of the encoder per sample, at a turning point."""
 _FEW = 0.2
 """Share of samples up to which turning points are left out."""
+_SMOOTHED = 11
+"""Samples over which a speed is found."""
+_REST = 20
+"""Successive samples of the same position from which the slide is at rest."""
+_DITHERED = 0.5
+"""Noise, in steps of the encoder, from which rounding errors are independent; rounding has 0.29."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,17 +75,40 @@ class Record:
     def weight(self) -> FloatArray:
         """Weight of the error of each position.
 
-        The rounding error of an encoder stays the same while the position does, as at rest:
-        successive samples of the same position count as one. At the turning points of a periodic
-        motion it is the same in each cycle: they have no weight, if other samples are enough.
+        Where the slide moves by less than about a step of the encoder between samples, the rounding
+        errors of successive samples are alike. Their weight is less, so that a step counts as one
+        sample, however many there are; and all samples at rest in the same position count as one.
+        At the turning points of a periodic motion the errors are the same in each cycle: they have
+        no weight, if other samples are enough. Of positions whose noise is larger than their steps
+        all count alike.
         """
-        changes = np.flatnonzero(np.diff(self.position)) + 1
-        lengths = np.diff([0, *changes.tolist(), len(self.position)])
-        found = np.repeat(1.0 / np.sqrt(lengths), lengths)
-        turning = _turning(self.position)
+        from scipy.signal import savgol_filter
+
+        position, step = self.position, self.resolution
+        if step == 0.0 or white_noise(position) > _DITHERED * step:
+            return np.ones(len(position))
+        speed, change = (
+            np.abs(np.asarray(savgol_filter(position, _SMOOTHED, 3, deriv=order))) / step
+            for order in (1, 2)
+        )
+        counts = 1.0 / np.clip(speed / _SLOW, 1e-3, 1.0)
+        changes = np.flatnonzero(np.diff(position)) + 1
+        lengths = np.diff([0, *changes.tolist(), len(position)])
+        resting = np.repeat(lengths >= _REST, lengths)
+        if resting.any():
+            _, place, times = np.unique(position[resting], return_inverse=True, return_counts=True)
+            counts[resting] = times[place]
+        turning = (speed < _SLOW) & (change > _TURNING)
         if np.mean(turning) < _FEW:
-            found[turning] = 0.0
-        return found
+            counts[turning] = np.inf
+        return 1.0 / np.sqrt(counts)
+
+    @property
+    def resolution(self) -> float:
+        """Smallest change of the position, m; 0 if it never changes."""
+        sizes = np.abs(np.diff(self.position))
+        moving = sizes[sizes > 0.0]
+        return float(moving.min()) if len(moving) else 0.0
 
     def part(self, start: int, end: int) -> Self:
         """Return the samples from `start` to before `end`."""
@@ -155,19 +185,3 @@ def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) ->
             f"{name} has no {_FEWEST} samples without a gap of more than {_LONGEST_GAP:.0f} periods"
         )
     return records
-
-
-def _turning(position: FloatArray) -> BoolArray:
-    """Return which samples are at a turning point, within a few steps of the encoder."""
-    steps = np.diff(position)
-    sizes = np.abs(steps)
-    found = np.zeros(len(position), bool)
-    if not sizes.any():
-        return found
-    slow = sizes < _SLOW * float(sizes[sizes > 0.0].min())
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]])))
-    for first, end in edges.reshape(-1, 2).tolist():
-        inside = 0 < first and end < len(steps)
-        if inside and end - first < _TURN and steps[first - 1] * steps[end] < 0.0:
-            found[first : end + 1] = True
-    return found

@@ -27,6 +27,8 @@ _START_STEPS = 8
 """Largest number of steps of the starts for one set of constants."""
 _WORSE = 9.0
 """Squared error of a segment, in that of the median one, from which its start is doubted."""
+_LEAST_CYCLE, _REPEATED = 20, 0.65
+"""Samples of a cycle at least, and correlation of errors from which cycles are alike."""
 _KICKS = (0.0, 0.5, -0.5, 2.0, -2.0)
 """Changes of the velocity at such a start, in errors of position per period."""
 
@@ -87,6 +89,18 @@ class Refinement:
         first, second = self.residual[:-1], self.residual[1:]
         power = float(self.residual @ self.residual)
         return float(first @ second) / power if power > 0.0 else 0.0
+
+    @property
+    def repetition(self) -> int | None:
+        """Number of samples after which the errors repeat; None if they do not."""
+        from scipy.signal import correlate
+
+        count = len(self.residual)
+        found = correlate(self.residual, self.residual, method="fft")[count - 1 :]
+        later = found[_LEAST_CYCLE : count // 4]
+        if len(later) == 0 or float(later.max()) < _REPEATED * float(found[0]):
+            return None
+        return int(np.argmax(later)) + _LEAST_CYCLE
 
     @cached_property
     def covariance(self) -> FloatArray:
@@ -286,9 +300,10 @@ class _Projection:
     def kicked(self, point: FloatArray) -> _Errors:
         """Return the errors at a point, at the best starts that kicks of the measured ones give."""
         found = self.finished(point)
-        rough = np.sqrt(np.median(self._losses(found.residual) / self._losses(self._task.weight)))
+        means = self._losses(found.residual) / self._losses(self._task.weight)
+        rough = np.sqrt(np.median(means)) / self._task.predictors[0].record.period
         for kick in _KICKS:
-            starts = self._task.starts + [0.0, kick * rough / self._task.predictors[0].record.period]
+            starts = self._task.starts + np.array([0.0, kick * rough])
             other = self._improved(point, self._errors(point, starts), _SETTLED)
             found, _ = self._better(found, other)
         return found
@@ -325,7 +340,7 @@ class _Projection:
         return found
 
     def _losses(self, residual: FloatArray) -> FloatArray:
-        return np.bincount(self._task.block, residual * residual)
+        return np.bincount(self._task.block, residual * residual).astype(float)
 
     def _errors(self, point: FloatArray, starts: FloatArray) -> _Errors:
         task, weight = self._task, self._task.weight

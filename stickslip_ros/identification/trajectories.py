@@ -97,7 +97,9 @@ class Trajectories:
         They are zero where there is no motion.
         """
         count = len(self.measured)
-        found = Sensitivities(np.full(count, np.nan), np.zeros((count, len(names))), np.zeros((count, 2)))
+        found = Sensitivities(
+            np.full(count, np.nan), np.zeros((count, len(names))), np.zeros((count, 2))
+        )
         try:
             self._follow(values, starts, names, found)
         except (InvalidInputError, RunError):

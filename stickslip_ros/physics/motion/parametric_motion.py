@@ -8,7 +8,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_in_units import FreeDriveSystem, in_units_of
+from stickslip_ros.physics.model.drive_in_units import in_units_of
 from stickslip_ros.physics.model.drive_system import POSITION
 from stickslip_ros.physics.model.hybrid import HybridSystem, Mode
 from stickslip_ros.physics.motion.compiled_flow import (
@@ -55,7 +55,6 @@ class ParametricMotion(Motion):
     """
 
     _first_detail = Detail.SENSITIVITIES
-    _system: FreeDriveSystem
 
     def __init__(self, drive: Drive, position: float, velocity: float) -> None:
         self._found: FloatArray = np.empty((0, 0))

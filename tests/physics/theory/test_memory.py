@@ -9,6 +9,7 @@ import pytest
 from stickslip_ros.physics.measures import CycleMeter
 from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive_system import POSITION, SLIP, SPEED
 from stickslip_ros.physics.model.friction import (
     Dahl,
     ElastoPlastic,
@@ -18,8 +19,12 @@ from stickslip_ros.physics.model.friction import (
     MaxwellSlip,
     RateState,
 )
+from stickslip_ros.physics.model.hybrid import Mode
+from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion import RecordedMotion
+from stickslip_ros.physics.motion.derivatives import parameter_values
 from stickslip_ros.physics.theory.critical_gains import critical_gains
+from stickslip_ros.physics.theory.equilibrium import equilibria
 from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycles, shoot
@@ -233,7 +238,12 @@ def test_a_cycle_that_creeps() -> None:
 
 
 def test_the_equilibrium_of_a_creeping_slide_has_no_speed() -> None:
-    assert all(each.state[SPEED] == 0.0 for each in equilibria(CREEPING))
+    system = drive_system(CREEPING)
+    mode = Mode(SLIP, (-1.0,))  # rounding of the speed, which differs by processor, has a sign
+    parameters = parameter_values(system, mode, [0.0] * len(system.inputs))
+    state = equilibria(system, parameters[:, np.newaxis])
+    assert state[SPEED, 0] == 0.0
+    assert state[POSITION, 0] != 0.0
 
 
 def test_a_cycle_from_the_hopf_point_of_the_gain() -> None:
