@@ -5,7 +5,7 @@ uses, and a force that is rounded to 0.1 N. In `ramp` the belt speed rises from 
 `taps` it is 30 mm/s; both have taps of 60 to 200 N. `stick` is stick-slip at 20 mm/s without
 control; the mass is given, since without a force only ratios can be told. `narrow` is a belt of
 60 mm/s with taps of 5 to 15 N: all relative speeds are alike, and the record cannot tell the law.
-The start, the taps and with them all rounding differ from seed to seed.
+The start, the taps, the belt speed (by 10 %) and all rounding differ from seed to seed.
 
 No cycle takes a whole number of samples and no coefficient a whole number of encoder steps:
 rounding errors that repeat in each cycle are no noise.
@@ -75,7 +75,7 @@ def record(law: str, kind: str, seed: int, duration: float = DURATION) -> Record
     """Return a run as a machine would log it."""
     random = np.random.default_rng(seed)
     count = round(duration / PERIOD)
-    first, last = BELTS[kind]
+    first, last = np.array(BELTS[kind]) * random.uniform(0.9, 1.1)
     times = (0.0, 0.2 * duration, 0.8 * duration, duration)
     speeds = (first, first, last, last)
     drive = Drive(
