@@ -168,7 +168,8 @@ def as_dict(
                 "law": each.law,
                 "constants": each.size,
                 "held_out_error": each.error,
-                "as_good": found.as_good.get(each.law, False),
+                "by_direction": each.by_direction,
+                "as_good": found.as_good.get(each.label, False),
                 "remark": each.remark,
             }
             for each in found.candidates

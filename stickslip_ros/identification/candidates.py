@@ -49,8 +49,15 @@ class Candidate:
     """The fit."""
     delay: float = 0.0
     """Time from a sample until its force acts, s; NaN if the samples' own forces are used."""
+    by_direction: bool = False
+    """Whether a law on a spring has constants of its own in each direction."""
     remark: str = ""
     """What the model was not allowed, or why it is out of the choice."""
+
+    @property
+    def label(self) -> str:
+        """Name of the law, and whether it is by direction."""
+        return f"{self.law} by direction" if self.by_direction else self.law
 
     @property
     def error(self) -> float:
@@ -77,7 +84,7 @@ def better_by(better: Candidate, worse: Candidate) -> float:
 
 
 def choose(candidates: Sequence[Candidate]) -> tuple[Candidate, Mapping[str, bool]]:
-    """Return the simplest model that predicts as well as any, and which others do, by law.
+    """Return the simplest model that predicts as well as any, and which others do, by label.
 
     A model is as good as the best one if the difference of their held-out errors is within three
     standard errors, from its scatter over the parts.
@@ -85,4 +92,4 @@ def choose(candidates: Sequence[Candidate]) -> tuple[Candidate, Mapping[str, boo
     best = min(candidates, key=lambda each: each.error)
     as_good = [each for each in candidates if each is best or better_by(best, each) < _SIGNIFICANT]
     chosen = min(as_good, key=lambda each: (each.size, each.error))
-    return chosen, {each.law: each in as_good for each in candidates}
+    return chosen, {each.label: each in as_good for each in candidates}

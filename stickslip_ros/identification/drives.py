@@ -10,15 +10,18 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.candidates import Candidate
+from stickslip_ros.identification.curves import Curve
 from stickslip_ros.identification.filtered import filtered
-from stickslip_ros.identification.models import (
-    DELAY,
+from stickslip_ros.identification.friction_models import (
     EXPONENTIAL,
     LUGRE,
     MEMORY_MODELS,
     STATIC_MODELS,
-    Model,
+    DirectionalModel,
+    FrictionModel,
+    TableModel,
 )
+from stickslip_ros.identification.models import DELAY, Model
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement, refine, restarted
 from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
@@ -49,8 +52,16 @@ _WORTH, _SURE = 0.05, 4.0
 """Share of the squared error, and standard errors, for which one more constant is searched."""
 _KEPT = 3.0
 """Standard errors by which such a constant must differ from zero."""
-DRIVE_LAWS = tuple(model.law for model in (*STATIC_MODELS, *MEMORY_MODELS))
+AUTO = "auto"
+"""Law that stands for the one that predicts held-out parts best."""
+DRIVE_LAWS = (
+    *(model.law for model in STATIC_MODELS),
+    TableModel.law,
+    *(model.law for model in MEMORY_MODELS),
+)
 """Laws that can be identified for a drive on a spring."""
+_POINTS = 8
+"""Number of points of friction without a law."""
 _SPEEDS = ("minimum_speed", "decay_speed")
 """Constants of friction that are speeds and not forces."""
 OPTIONAL = ("damping", "bias_force", DELAY)
@@ -84,7 +95,7 @@ class DriveTask:
     @cached_property
     def constants(self) -> Mapping[str, float]:
         """Mass and stiffness by the regression; InvalidInputError where one is not above zero."""
-        fit = self._regression(EXPONENTIAL)
+        fit = self._regression(EXPONENTIAL.curve)
         fit.require("mass", "stiffness")
         return fit.constants
 
@@ -97,19 +108,20 @@ class DriveTask:
         return max(min(natural, longest), shortest)
 
     def searched(
-        self, model: Model, *, thorough: bool = True, like: Refinement | None = None
+        self, friction: FrictionModel, *, thorough: bool = True, like: Refinement | None = None
     ) -> Refinement:
         """Return a model fitted to short segments, from several starts, or from a `like` one."""
+        model = Model(friction)
         if like is not None:
             return self._nearest(model, [like.values])
-        starts = [model.start(each) for each in self._regressions(model, thorough)]
+        starts = [model.start(each) for each in self._regressions(friction, thorough)]
         # A curve that does not suit the friction may leave none to them.
         unfit = [{name for name in self.free if not each[name] > 0.0} for each in starts]
         starts = [
             {**each, **{name: self.constants[name] for name in names}}
             for each, names in zip(starts, unfit, strict=True)
         ]
-        if model.memory:
+        if friction.memory:
             starts = [
                 {**_falling(each), "bristle_stiffness": stiffness}
                 | {"bristle_damping": _DAMPED * sqrt(stiffness * each["mass"])}
@@ -118,11 +130,22 @@ class DriveTask:
             ]
         return self._nearest(model, starts)
 
-    def _regressions(self, model: Model, thorough: bool) -> list[Regression]:
-        fits = [self._regression(model)]
-        if model.shape is not None and thorough:
+    @cached_property
+    def table(self) -> TableModel:
+        """Friction without a law, at the speeds that were recorded."""
+        speeds = np.quantile(self.rows.speeds, np.linspace(0.0, 1.0, _POINTS))[1:]
+        return TableModel((0.0, *speeds.tolist()))
+
+    @property
+    def both_directions(self) -> bool:
+        """Whether the slide slips in both directions."""
+        return len(self.rows.directions) > 1
+
+    def _regressions(self, friction: FrictionModel, thorough: bool) -> list[Regression]:
+        fits = [self._regression(friction.curve)]
+        if friction.curve.shaped and thorough:
             top = float(self.rows.speeds[-1])
-            fits += [self._regression(model, shape * top) for shape in _SHAPES]
+            fits += [self._regression(friction.curve, shape * top) for shape in _SHAPES]
         return fits
 
     def _nearest(self, model: Model, starts: Sequence[Mapping[str, float]]) -> Refinement:
@@ -195,23 +218,30 @@ class DriveTask:
         return self._candidate(near, near.losses)
 
     def _candidate(self, fit: Refinement, held_out: FloatArray) -> Candidate:
-        measured = fit.task.measured
-        scale = float(np.std(measured))
-        delay = fit.values.get(DELAY, 0.0)
-        return Candidate(fit.task.model.law, len(fit.free), held_out, scale, fit, delay)
+        friction, measured = fit.task.model.friction, fit.task.measured
+        return Candidate(
+            friction.law,
+            len(fit.free),
+            held_out,
+            float(np.std(measured)),
+            fit,
+            fit.values.get(DELAY, 0.0),
+            by_direction=isinstance(friction, DirectionalModel),
+        )
 
-    def _regression(self, model: Model, shape: float | None = None) -> Regression:
+    def _regression(self, curve: Curve, shape: float | None = None) -> Regression:
         fixed = {name: 0.0 for name in LINEAR if name not in self.free} | {
             name: value for name, value in self.fixed.items() if name != DELAY
         }
-        return regress(self.rows, model.curve, self.free, fixed, shape)
+        return regress(self.rows, curve, self.free, fixed, shape)
 
     def _trajectories(self, model: Model, length: float) -> Trajectories:
         segments, starts = segments_of(self.records, length)
         return Trajectories(model, self.predictors, segments, starts, self.normal_force)
 
     def _names(self, model: Model) -> list[str]:
-        return [*self.free, *(name for name in model.friction if name not in self.friction)]
+        own = model.friction.coordinates
+        return [*self.free, *(name for name in own if name not in self.friction)]
 
     def _known(self, values: Mapping[str, float]) -> dict[str, float]:
         own = {name: value * self.normal_force for name, value in self.friction.items()}
@@ -223,28 +253,37 @@ def drive_candidates(task: DriveTask, law: str, progress: Callable[[str], None])
     """Return the fits of the laws that compete, or of the one that is asked for, fitted first.
 
     Laws without a memory are searched first. Those with a memory follow if the errors of the best
-    one are more than noise. What predicts much worse in the search is not fitted further.
+    one are more than noise, and friction without a law if theirs are, too. What predicts much worse
+    in the search is not fitted further.
     """
     found: list[Refinement] = []
-    for model in STATIC_MODELS:
-        if law in ("auto", model.law):
-            progress(model.law)
-            found.append(task.searched(model, thorough=not any(map(is_white, found))))
+    for friction in STATIC_MODELS:
+        if law in (AUTO, friction.law):
+            progress(friction.law)
+            found.append(task.searched(friction, thorough=not any(map(is_white, found))))
+    if law == task.table.law:
+        progress(law)
+        found.append(task.searched(task.table))
+    if task.both_directions and found and not any(map(is_white, found)):
+        friction = min(found, key=_loss).task.model.friction
+        progress(f"{friction.law} by direction")
+        found.append(task.searched(DirectionalModel(friction)))
     # A memory changes the motion near sticking: it does not explain an input that is missing.
-    near = law != "auto" or min(map(_share, found)) < POOR
+    near = not found or (law == AUTO and min(map(_share, found)) < POOR)
     if near and not any(map(is_white, found)):
         bristles: Refinement | None = None
-        for model in MEMORY_MODELS:
-            if law not in ("auto", model.law):
+        for friction in MEMORY_MODELS:
+            if law not in (AUTO, friction.law):
                 continue
-            progress(model.law)
-            found.append(task.searched(model, like=bristles))
+            progress(friction.law)
+            found.append(task.searched(friction, like=bristles))
             if is_white(found[-1]):
                 break
-            if model is LUGRE:
+            if friction is LUGRE:
                 bristles = found[-1]
-    if law != "auto":
-        return [task.finished(found[-1])]
+    if law == AUTO and not any(map(is_white, found)):
+        progress(task.table.law)
+        found.append(task.searched(task.table))
     least = min(map(_loss, found))
     return [
         task.finished(each) if _loss(each) <= _HOPELESS * least else task.unfinished(each)

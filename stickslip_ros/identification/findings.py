@@ -64,7 +64,7 @@ class Findings:
     chosen: Candidate
     """The law that was chosen."""
     as_good: Mapping[str, bool]
-    """Whether each law predicts held-out parts as well as the best one."""
+    """Whether each candidate, by label, predicts held-out parts as well as the best one."""
     normal_force: float
     """Normal force that scales the friction, N."""
     fixed: Mapping[str, float]
@@ -186,9 +186,9 @@ class Findings:
                 )
         if self._rivals:
             found["friction.law"] = (
-                f"{_listed([self.law, *self._rivals])} predict held-out parts alike, but differ in "
-                "friction at speeds that were hardly recorded: the simplest is taken; run with "
-                f"relative speeds from rest to {1e3 * self._fastest:.3g} mm/s"
+                f"{_listed([self.chosen.label, *self._rivals])} predict held-out parts alike, but "
+                "differ in friction at speeds that were hardly recorded: the simplest is taken; "
+                f"run with relative speeds from rest to {1e3 * self._fastest:.3g} mm/s"
             )
         for name, estimate in self.fitted.items():
             if not estimate.standard_error < _VAGUE * abs(estimate.value) and name not in found:
@@ -203,13 +203,13 @@ class Findings:
         """Laws that predict as well as the one that was chosen, and have another friction."""
         found: list[str] = []
         for each in self.candidates:
-            if each is self.chosen or not self.as_good.get(each.law) or each.remark:
+            if each is self.chosen or not self.as_good.get(each.label) or each.remark:
                 continue
             for number in range(len(self.directions)):
                 own, other = self.friction(number), friction_of(each.fit, number, self._fastest)
                 away = np.abs(np.interp(own.speed, other.speed, other.force) - own.force)
                 if float(away.max()) > _DIFFERENT * float(own.force.max()):
-                    found.append(each.law)
+                    found.append(each.label)
                     break
         return found
 

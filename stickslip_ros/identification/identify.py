@@ -9,17 +9,16 @@ import numpy as np
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.axes import AXIS_LAWS, AxisTask
 from stickslip_ros.identification.candidates import choose
-from stickslip_ros.identification.drives import DRIVE_LAWS, DriveTask, drive_candidates
+from stickslip_ros.identification.drives import AUTO, DRIVE_LAWS, DriveTask, drive_candidates
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.models import DELAY, MEMORY_MODELS, STATIC_MODELS
+from stickslip_ros.identification.friction_models import MEMORY_MODELS, STATIC_MODELS
+from stickslip_ros.identification.models import DELAY
 from stickslip_ros.identification.reading import read_records
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import LINEAR
 from stickslip_ros.identification.servo import servo_of
 from stickslip_ros.text import did_you_mean
 
-AUTO = "auto"
-"""Law that stands for the one that predicts held-out parts best."""
 LAWS = (AUTO, *dict.fromkeys([*AXIS_LAWS, *DRIVE_LAWS]))
 """Friction laws that can be identified, and `AUTO`."""
 _FRICTION = ("static", "minimum", "minimum_speed", "kinetic", "decay_speed", "viscous")
@@ -185,7 +184,7 @@ def _check_friction(fixed: Mapping[str, float], law: str, *, spring: bool) -> No
         f"friction.{name}"
         for model in (*STATIC_MODELS, *MEMORY_MODELS)
         if spring and model.law == law
-        for name in model.friction
+        for name in model.coordinates
     }
     for name in fixed:
         if name.startswith("friction.") and name not in known:

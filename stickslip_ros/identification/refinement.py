@@ -212,8 +212,9 @@ class _Projection:
         self._best: _Errors | None = None
         self._last: tuple[bytes, _Errors] | None = None
         self._starts = starts
-        self._straight = task.model.straightened(free)
-        to_search = task.model.to_search(values, task.fastest) if self._straight else values
+        self._friction = task.model.friction
+        self._straight = self._friction.straightens(free)
+        to_search = self._friction.to_search(values, task.fastest) if self._straight else values
         self.first = np.array([to_search[name] for name in free])
         """The point of the coordinates at the start of the search."""
 
@@ -231,18 +232,16 @@ class _Projection:
 
     def bounds(self) -> FloatArray:
         """Return the smallest and the largest values of a point, shape (2, coordinates)."""
-        model, task = self._task.model, self._task
-        found = [model.bounds(name, self._values, task.fastest) for name in self._free]
-        if self._straight:
-            # The force at the fastest speed may be any; those of the law are checked by the model.
-            found[list(self._free).index("kinetic")] = (-np.inf, np.inf)
-            found[list(self._free).index("viscous")] = (0.0, np.inf)
+        task, found = self._task, list[tuple[float, float]]()
+        for name in self._free:
+            other = self._friction.free_bounds(name) if self._straight else None
+            found.append(other or task.model.bounds(name, self._values, task.fastest))
         return np.transpose(found)
 
     def values(self, point: FloatArray) -> dict[str, float]:
         """Return all coordinates at a point."""
         found = {**self._values, **dict(zip(self._free, point.tolist(), strict=True))}
-        return self._task.model.from_search(found, self._task.fastest) if self._straight else found
+        return self._friction.from_search(found, self._task.fastest) if self._straight else found
 
     def _of_search(self, point: FloatArray) -> FloatArray:
         """Return the derivatives of the coordinates by those of the search."""

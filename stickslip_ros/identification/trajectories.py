@@ -10,6 +10,7 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError, RunError
+from stickslip_ros.identification.friction_models import REVERSE
 from stickslip_ros.identification.models import DELAY, Model
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.trajectory import Predictor, Segment, steady_memory
@@ -20,8 +21,8 @@ from stickslip_ros.physics.model.plain_drive import drive_system
 
 _STEP = 1e-4
 """Step, as a share of the value, of constants that are linear in the coordinates."""
-_DELAY_STEP = 1e-3
-"""Step of the delay, periods."""
+_MOTION_STEP = 1e-5
+"""Step, as a share of the value, of what a motion has no derivatives by."""
 _UNBOUNDED = 10.0
 """Error of a motion that is not bounded, in spans of the record."""
 
@@ -105,10 +106,11 @@ class Trajectories:
         except (InvalidInputError, RunError):
             found.positions[:] = np.nan
         found = found._replace(positions=self._bounded(found.positions))
-        if DELAY in names:
-            step = _DELAY_STEP * self.predictors[0].record.period
-            moved = self.predicted({**values, DELAY: values[DELAY] + step}, starts)
-            found.by_names[:, list(names).index(DELAY)] = (moved - found.positions) / step
+        typical = self.typical(values)
+        for name in self.model.by_differences(names):
+            step = _MOTION_STEP * max(abs(values[name]), typical.get(name, 0.0))
+            moved = self.predicted({**values, name: values[name] + step}, starts)
+            found.by_names[:, list(names).index(name)] = (moved - found.positions) / step
         return found
 
     def _follow(
@@ -120,9 +122,9 @@ class Trajectories:
     ) -> None:
         drive = self.model.drive(values, self.normal_force)
         typical, moved = self.typical(values), list[tuple[float, Drive]]()
-        constants = [name for name in names if name != DELAY]
-        columns = [number for number, name in enumerate(names) if name != DELAY]
-        for name in constants:
+        others = self.model.by_differences(names)
+        columns = [number for number, name in enumerate(names) if name not in others]
+        for name in (names[number] for number in columns):
             step = _STEP * max(abs(values[name]), typical.get(name, 0.0))
             other = {**values, name: values[name] + step}
             moved.append((step, self.model.drive(other, self.normal_force)))
@@ -183,11 +185,19 @@ class Trajectories:
         return max(float(np.abs(self.starts[:, 1] - belts).max()), 1e-12)
 
     def typical(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return a size of each coordinate that may be zero, SI units."""
-        force = self.model.static_force(values)
-        rate, period = force / self.fastest, self.predictors[0].record.period
-        forces = dict.fromkeys(("bias_force", "static", "rise", "minimum", "kinetic"), force)
-        return {**forces, "damping": rate, "viscous": rate, DELAY: period, "bristle_damping": rate}
+        """Return a size of each coordinate, SI units, from which steps of differences are made."""
+        force, fastest = self.model.friction.static_force(values), self.fastest
+        found = {"bias_force": force, "damping": force / fastest}
+        found[DELAY] = 100.0 * self.predictors[0].record.period
+        for name in self.model.friction.coordinates:
+            kind = name.removeprefix(REVERSE)
+            if kind.endswith("_speed"):
+                found[name] = fastest
+            elif kind in ("viscous", "bristle_damping"):
+                found[name] = force / fastest
+            else:
+                found[name] = values["stiffness"] if kind == "bristle_stiffness" else force
+        return found
 
     def chosen(self, which: BoolArray) -> "Trajectories":
         """Return the same with some of the segments."""

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from stickslip_ros.identification.candidates import Candidate
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.intervals import QUANTILE
 from stickslip_ros.plots.units import SI
@@ -39,13 +40,13 @@ def identification_tables(
     names = ", ".join(dict.fromkeys(record.name for record in found.records))
     headings = ["parameter", "value", "standard error", "95 % interval"]
     yield TextTable(f"{names}: law {found.law}", headings, rows)
-    if found.law in ("table", "lugre") and not found.has_spring:
+    if found.law == "table" or (found.law == "lugre" and not found.has_spring):
         yield _curve(found)
     yield TextTable(
         "laws",
         ["law", "constants", "error held out", ""],
         [
-            [each.law, str(each.size), f"{each.error:.3%}", _verdict(found, each.law, each.remark)]
+            [each.label, str(each.size), f"{each.error:.3%}", _verdict(found, each)]
             for each in sorted(found.candidates, key=lambda each: each.error)
         ],
     )
@@ -79,12 +80,12 @@ def _curve(found: Findings) -> TextTable:
     return TextTable("friction", ["slip", "speed", "force", "+- (95 %)"], rows)
 
 
-def _verdict(found: Findings, law: str, remark: str) -> str:
-    if remark:
-        return remark
-    if law == found.law:
+def _verdict(found: Findings, candidate: Candidate) -> str:
+    if candidate.label == found.chosen.label:
         return "chosen"
-    return "predicts as well, within the noise" if found.as_good.get(law) else ""
+    if candidate.remark:
+        return candidate.remark
+    return "predicts as well, within the noise" if found.as_good.get(candidate.label) else ""
 
 
 def _predicted(values: Mapping[str, Any]) -> list[str]:

@@ -1,0 +1,79 @@
+"""The friction curve of a fit over the speed, with its band."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.identification.axis_drive import POINTS, table_speeds
+from stickslip_ros.identification.refinement import Refinement
+from stickslip_ros.identification.regression import Regression
+
+_STEP = 1e-5
+"""Step of differences, as a share of the value."""
+
+
+@dataclass(frozen=True, eq=False)
+class Friction:
+    """A friction curve with its band, in one direction; arrays of shape (points,)."""
+
+    speed: FloatArray
+    """Speed |v_r|, m/s, within what was recorded."""
+    force: FloatArray
+    """Friction force, N."""
+    standard_error: FloatArray
+    """Standard error of the force, N."""
+
+
+def friction_of(fit: Regression | Refinement, direction: int, fastest: float) -> Friction:
+    """Return the friction curve of a fit.
+
+    Parameters
+    ----------
+    fit : Regression or Refinement
+        The fit.
+    direction : int
+        0 for the first direction of the records, 1 for the other one.
+    fastest : float
+        Fastest recorded speed |v_r|, m/s.
+
+    Returns
+    -------
+    Friction
+        The curve, from rest to the fastest speed.
+    """
+    if isinstance(fit, Refinement):
+        return _of_trajectories(fit, fastest)
+    speed = table_speeds(fit)
+    shape = float(fit.shapes[direction]) if len(fit.shapes) else 1.0
+    terms = fit.curve.terms(speed, shape)
+    own = fit.forces(direction)
+    count, directions = len(own), len(fit.rows.directions)
+    by = np.zeros((len(speed), len(fit.covariance)))
+    place = len(fit.free) + direction * count
+    by[:, place : place + count] = terms
+    if len(fit.shapes):
+        step = _STEP * shape
+        change = (fit.curve.terms(speed, shape + step) - terms) @ own / step
+        by[:, len(fit.free) + directions * count + direction] = change
+    return Friction(speed, terms @ own, _band(by, fit.covariance))
+
+
+def _of_trajectories(fit: Refinement, fastest: float) -> Friction:
+    speed, model = np.linspace(0.0, fastest, POINTS), fit.task.model
+
+    def force(values: Mapping[str, float]) -> FloatArray:
+        law = model.drive(values, 1.0).friction
+        return np.array([-float(law.coefficient(each, 1.0)) for each in speed.tolist()])
+
+    typical, base = fit.task.typical(fit.values), force(fit.values)
+    columns: list[FloatArray] = []
+    for name in fit.free:
+        step = _STEP * max(abs(fit.values[name]), typical.get(name, 0.0))
+        columns.append((force({**fit.values, name: fit.values[name] + step}) - base) / step)
+    return Friction(speed, base, _band(np.column_stack(columns), fit.covariance))
+
+
+def _band(by: FloatArray, covariance: FloatArray) -> FloatArray:
+    return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", by, covariance, by), 0.0))

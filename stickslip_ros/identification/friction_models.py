@@ -1,0 +1,381 @@
+"""Friction laws as they are searched: coordinates in newtons whose bounds are simple."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from math import exp, inf
+from typing import Any
+
+import numpy as np
+
+from stickslip_ros.identification.curves import (
+    CoulombCurve,
+    Curve,
+    ExponentialCurve,
+    SteppedCurve,
+    StribeckCurve,
+)
+from stickslip_ros.identification.regression import Regression
+from stickslip_ros.physics.model.friction import (
+    LAWS,
+    Coulomb,
+    Directional,
+    Exponential,
+    FrictionLaw,
+    Stribeck,
+    Table,
+)
+
+Values = Mapping[str, float]
+"""Values of coordinates by name, SI units."""
+
+_TINY = 1e-9
+"""Smallest constant that must be above zero, as a share of the friction."""
+_WIDE = 30.0
+"""Viscous friction up to which is searched, in static friction at the fastest speed."""
+_STIFFEST = 3000.0
+"""Largest stiffness of the bristles, in stiffnesses of the spring."""
+_SLOWEST, _FASTEST = 0.01, 10.0
+"""Shapes of a curve that records may tell, in fastest speeds."""
+REVERSE = "reverse."
+"""Start of the names of coordinates of backward slip where both directions have their own."""
+
+
+class FrictionModel(ABC):
+    """A friction law with the coordinates that are searched.
+
+    The static coefficient has in its place its `rise` above the smaller one. Friction is in
+    newtons: the normal force only scales it.
+    """
+
+    law: str
+    """Name of the friction law."""
+    curve: Curve
+    """Its curve in steady slip, for the regression."""
+    coordinates: Sequence[str]
+    """Names of the coordinates."""
+    memory: Sequence[str] = ()
+    """Coordinates of the memory of the law."""
+    by_differences: Sequence[str] = ()
+    """Coordinates on which the motion depends other than by its equations."""
+
+    @abstractmethod
+    def start(self, fit: Regression, direction: int) -> dict[str, float]:
+        """Return the coordinates that a regression gives in a direction of its rows."""
+
+    @abstractmethod
+    def static_force(self, values: Values) -> float:
+        """Return the static friction, N."""
+
+    @abstractmethod
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        """Return the law of coordinates."""
+
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        """Return the smallest and the largest value of a coordinate in the search.
+
+        Parameters
+        ----------
+        name : str
+            Coordinate.
+        values : mapping
+            Coordinates at the start of the search.
+        fastest : float
+            Fastest speed relative to the belt in the records, m/s: what friction does at a
+            hundredth of it or far above it, they do not tell.
+        """
+        if name == "viscous":
+            rate = self.static_force(values) / fastest
+            return -_WIDE * rate, _WIDE * rate
+        if name.endswith("_speed"):
+            return _SLOWEST * fastest, _FASTEST * fastest
+        if name == "rise":
+            return 0.0, inf
+        return _TINY * self.static_force(values), inf
+
+    def to_search(self, values: Values, fastest: float) -> dict[str, float]:
+        """Return coordinates of the search, in which fits are nearly linear, by the same names."""
+        return dict(values)
+
+    def from_search(self, found: Values, fastest: float) -> dict[str, float]:
+        """Return the coordinates of `to_search`, which may be ones that the law refuses."""
+        return dict(found)
+
+    def free_bounds(self, name: str) -> tuple[float, float] | None:
+        """Return bounds of a coordinate of the search if they are others than `bounds`."""
+        return None
+
+    def straightens(self, free: Sequence[str]) -> bool:
+        """Return whether the search has other coordinates where these are free."""
+        return False
+
+
+class CoulombModel(FrictionModel):
+    """Coulomb and viscous friction."""
+
+    law = "coulomb"
+    curve: Curve = CoulombCurve()
+    coordinates: Sequence[str] = ("static", "viscous")
+
+    def start(self, fit: Regression, direction: int) -> dict[str, float]:
+        """Return static and viscous friction."""
+        static, viscous = fit.forces(direction).tolist()
+        static = max(static, _TINY)
+        # A law without viscous friction has other equations, not a derivative by it.
+        return {"static": static, "viscous": viscous or _TINY * static}
+
+    def static_force(self, values: Values) -> float:
+        """Return the static friction, N."""
+        return values["static"]
+
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        """Return the law of coordinates."""
+        return Coulomb(
+            static=values["static"] / normal_force, viscous=values["viscous"] / normal_force
+        )
+
+
+class StribeckModel(FrictionModel):
+    """The cubic law of the paper, eq. 3."""
+
+    law = "stribeck"
+    curve: Curve = StribeckCurve()
+    coordinates: Sequence[str] = ("minimum", "rise", "minimum_speed")
+
+    def start(self, fit: Regression, direction: int) -> dict[str, float]:
+        """Return the smallest friction, the rise to rest and the speed of the minimum."""
+        static, drop = fit.forces(direction).tolist()
+        smaller, rise = _split(static, drop)
+        return {"minimum": smaller, "rise": rise, "minimum_speed": float(fit.shapes[direction])}
+
+    def static_force(self, values: Values) -> float:
+        """Return the static friction, N."""
+        return values["minimum"] + values["rise"]
+
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        """Return the law of coordinates."""
+        return Stribeck(
+            static=self.static_force(values) / normal_force,
+            minimum=values["minimum"] / normal_force,
+            minimum_speed=values["minimum_speed"],
+        )
+
+
+class ExponentialModel(FrictionModel):
+    """The exponential law with viscous friction."""
+
+    law = "exponential"
+    curve: Curve = ExponentialCurve()
+    coordinates: Sequence[str] = ("kinetic", "rise", "decay_speed", "viscous")
+
+    def start(self, fit: Regression, direction: int) -> dict[str, float]:
+        """Return kinetic friction, the rise to rest, the decay speed and viscous friction."""
+        kinetic, drop, viscous = fit.forces(direction).tolist()
+        smaller, rise = _split(kinetic + drop, drop)
+        return {
+            "kinetic": smaller,
+            "rise": rise,
+            "decay_speed": float(fit.shapes[direction]),
+            "viscous": viscous or _TINY * smaller,
+        }
+
+    def static_force(self, values: Values) -> float:
+        """Return the static friction, N."""
+        return values["kinetic"] + values["rise"]
+
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        """Return the law of coordinates."""
+        return Exponential(
+            static=self.static_force(values) / normal_force,
+            kinetic=values["kinetic"] / normal_force,
+            decay_speed=values["decay_speed"],
+            viscous=values["viscous"] / normal_force,
+        )
+
+    def straightens(self, free: Sequence[str]) -> bool:
+        """Return whether all constants of the curve are free."""
+        return {*ExponentialModel.coordinates} <= {*free}
+
+    def to_search(self, values: Values, fastest: float) -> dict[str, float]:
+        """Return the coordinates in which the fit of an exponential curve is nearly linear.
+
+        Records that hardly tell the decay speed from viscous friction have a long curved valley of
+        good fits. It is straight where friction is given by forces: `kinetic` is replaced by that
+        at the fastest speed, `viscous` by that at rest, and `rise` by how far the force at a third
+        of the fastest speed is below the straight line between them.
+
+        Parameters
+        ----------
+        values : mapping
+            Coordinates.
+        fastest : float
+            Fastest speed relative to the belt, m/s.
+
+        Returns
+        -------
+        dict
+            Coordinates of the search by the names of those that they replace.
+        """
+        decay = values["decay_speed"]
+        sag = values["rise"] * _sag(decay, fastest / 3.0, fastest)
+        end = values["kinetic"] + values["rise"] * exp(-fastest / decay)
+        end += values["viscous"] * fastest
+        return {**values, "viscous": self.static_force(values), "kinetic": end, "rise": sag}
+
+    def from_search(self, found: Values, fastest: float) -> dict[str, float]:
+        """Return the coordinates of `to_search`, which may be ones that the law refuses."""
+        decay = found["decay_speed"]
+        rise = found["rise"] / _sag(decay, fastest / 3.0, fastest)
+        kinetic = found["viscous"] - rise
+        viscous = (found["kinetic"] - kinetic - rise * exp(-fastest / decay)) / fastest
+        return {**found, "viscous": viscous, "kinetic": kinetic, "rise": rise}
+
+    def free_bounds(self, name: str) -> tuple[float, float] | None:
+        """Return the bounds of the forces at the fastest speed and at rest."""
+        return {"kinetic": (-inf, inf), "viscous": (0.0, inf)}.get(name)
+
+
+class BristleModel(ExponentialModel):
+    """A law with a memory that follows an exponential curve, or a constant one as Dahl's does."""
+
+    def __init__(self, law: str, memory: Sequence[str], by_differences: Sequence[str] = ()) -> None:
+        self.law, self.memory, self.by_differences = law, memory, by_differences
+        self.coordinates = (*ExponentialModel.coordinates, *memory)
+
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        """Return the bounds of a coordinate; see `FrictionModel.bounds`."""
+        if name == "bristle_stiffness":
+            return values["stiffness"], _STIFFEST * values["stiffness"]
+        if name == "bristle_damping":
+            return 0.0, _STIFFEST * self.static_force(values) / fastest
+        return super().bounds(name, values, fastest)
+
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        """Return the law of coordinates."""
+        kind: Any = LAWS[self.law]
+        own = {name: values[name] / normal_force for name in self.memory}
+        return kind(super().friction(values, normal_force), **own)
+
+
+class DahlModel(CoulombModel):
+    """Dahl's law: Coulomb friction that bristles follow, without viscous friction."""
+
+    law = "dahl"
+    coordinates: Sequence[str] = ("static", "bristle_stiffness")
+    memory: Sequence[str] = ("bristle_stiffness",)
+
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        """Return the bounds of a coordinate; see `FrictionModel.bounds`."""
+        if name == "bristle_stiffness":
+            return values["stiffness"], _STIFFEST * values["stiffness"]
+        return super().bounds(name, values, fastest)
+
+    def start(self, fit: Regression, direction: int) -> dict[str, float]:
+        """Return the static friction."""
+        return {"static": super().start(fit, direction)["static"]}
+
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        """Return the law of coordinates."""
+        kind: Any = LAWS[self.law]
+        return kind(**{name: values[name] / normal_force for name in self.coordinates})
+
+
+class TableModel(FrictionModel):
+    """Friction without a law: forces at given speeds."""
+
+    law = "table"
+
+    def __init__(self, speeds: Sequence[float]) -> None:
+        """Take the speeds of the points, m/s, from 0."""
+        self.speeds = tuple(speeds)
+        self.curve = SteppedCurve(self.speeds)
+        self.coordinates = [f"force_{number}" for number in range(len(speeds))]
+        # The polynomials of the pieces are made from them.
+        self.by_differences = self.coordinates
+
+    def start(self, fit: Regression, direction: int) -> dict[str, float]:
+        """Return the forces at the points."""
+        forces = np.cumsum(fit.forces(direction))
+        forces = np.maximum(forces, 1e-3 * float(np.abs(forces).max()))
+        return dict(zip(self.coordinates, forces.tolist(), strict=True))
+
+    def static_force(self, values: Values) -> float:
+        """Return the force at rest, N."""
+        return values["force_0"]
+
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        """Return the law of coordinates."""
+        sizes = [values[name] / normal_force for name in self.coordinates]
+        return Table(tuple(zip(self.speeds, sizes, strict=True)))
+
+
+class DirectionalModel(FrictionModel):
+    """A law without a memory that has constants of its own in each direction of slip."""
+
+    def __init__(self, own: FrictionModel) -> None:
+        """Take the model of each direction."""
+        self.own, self.law, self.curve = own, own.law, own.curve
+        self.coordinates = _in_both(own.coordinates)
+        self.by_differences = _in_both(own.by_differences)
+
+    def start(self, fit: Regression, direction: int) -> dict[str, float]:
+        """Return the coordinates of both directions."""
+        both = [self.own.start(fit, each) for each in (0, 1)]
+        return {**both[0], **{REVERSE + name: value for name, value in both[1].items()}}
+
+    def static_force(self, values: Values) -> float:
+        """Return the larger static friction, N."""
+        return max(self.own.static_force(each) for each in _by_direction(values))
+
+    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
+        """Return the law of coordinates."""
+        return Directional(
+            *(self.own.friction(each, normal_force) for each in _by_direction(values))
+        )
+
+    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
+        """Return the bounds of a coordinate; see `FrictionModel.bounds`."""
+        forward, reverse = _by_direction(values)
+        of = reverse if name.startswith(REVERSE) else forward
+        return self.own.bounds(name.removeprefix(REVERSE), of, fastest)
+
+
+def _in_both(names: Sequence[str]) -> Sequence[str]:
+    return [*names, *(REVERSE + name for name in names)]
+
+
+def _by_direction(values: Values) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the coordinates of forward and of backward slip by the same names."""
+    reverse = {
+        name.removeprefix(REVERSE): value
+        for name, value in values.items()
+        if name.startswith(REVERSE)
+    }
+    return dict(values), {**values, **reverse}
+
+
+def _split(static: float, drop: float) -> tuple[float, float]:
+    """Return the smaller friction and the rise above it to rest, both above zero."""
+    least = 1e-3 * max(static, _TINY)
+    static = max(static, least)
+    rise = min(max(drop, least), static - least)
+    return static - rise, rise
+
+
+def _sag(decay: float, middle: float, fastest: float) -> float:
+    """Return how far exp(-w/decay) is below its chord from rest to the fastest speed."""
+    chord = 1.0 + (exp(-fastest / decay) - 1.0) * middle / fastest
+    return chord - exp(-middle / decay)
+
+
+COULOMB, STRIBECK, EXPONENTIAL = CoulombModel(), StribeckModel(), ExponentialModel()
+STATIC_MODELS: Sequence[FrictionModel] = (COULOMB, STRIBECK, EXPONENTIAL)
+"""Models of laws without a memory, the simpler ones first."""
+LUGRE = BristleModel("lugre", ("bristle_stiffness", "bristle_damping"))
+MEMORY_MODELS: Sequence[FrictionModel] = (
+    DahlModel(),
+    LUGRE,
+    # Its elastic limit is made from the smallest friction.
+    BristleModel("elasto_plastic", LUGRE.memory, ("kinetic",)),
+    BristleModel("maxwell_slip", ("bristle_stiffness",)),
+)
+"""Models with a memory; those after LuGre are searched from what LuGre gives."""
