@@ -15,6 +15,7 @@ import argparse
 import json
 import os
 import sys
+import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
@@ -126,12 +127,17 @@ def truth(law: str, kind: str) -> dict[str, float]:
 
 
 def tried(law: str, kind: str, seed: int) -> dict[str, Any]:
-    """Return the law that was found for a seed, and the errors of its constants."""
+    """Return the law that was found for a seed, whether it is told, and the errors."""
     known = {"normal_force": NORMAL_FORCE}
     if kind == "stick":
         known["mass"] = MASS
+    begun = time.process_time()
     found: Findings = identify([record(law, kind, seed)], fixed=known)
-    result: dict[str, Any] = {"law": found.law, "as_good": [*filter(found.as_good.get, LAWS)]}
+    result: dict[str, Any] = {
+        "law": found.law,
+        "told": "friction.law" not in found.unidentified,
+        "seconds": time.process_time() - begun,
+    }
     if found.law == law:
         true = truth(law, kind)
         result["errors"] = {
@@ -158,8 +164,15 @@ def summary(law: str, kind: str, trials: Sequence[dict[str, Any]]) -> dict[str, 
         }
         for name, pairs in errors.items()
     }
-    right = float(np.mean([trial["law"] == law for trial in trials]))
-    return {"law": law, "kind": kind, "seeds": len(trials), "right": right, "constants": constants}
+    return {
+        "law": law,
+        "kind": kind,
+        "seeds": len(trials),
+        "right": float(np.mean([trial["law"] == law for trial in trials])),
+        "told": float(np.mean([trial["told"] for trial in trials])),
+        "seconds": float(np.median([trial["seconds"] for trial in trials])),
+        "constants": constants,
+    }
 
 
 def study(

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from math import pi, sqrt
+from math import inf, pi, sqrt
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from stickslip_ros.identification.candidates import Candidate
 from stickslip_ros.identification.curves import Curve
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.friction_models import (
+    DAHL,
     EXPONENTIAL,
     LUGRE,
     MEMORY_MODELS,
@@ -44,6 +45,8 @@ _HOPELESS = 4.0
 """Squared error, in squared errors of the best model, from which a model is not fitted further."""
 _RISE = 0.3
 """Rise of static friction from which the search starts, as a share of the kinetic one."""
+_FAR = 100.0
+"""Squared error of a law after the first steps, in that of LuGre, from which it is given up."""
 _STIFF = (10.0, 100.0)
 """Stiffnesses of bristles from which the search starts, in stiffnesses of the spring."""
 _DAMPED = 0.03
@@ -110,10 +113,10 @@ class DriveTask:
     def searched(
         self, friction: FrictionModel, *, thorough: bool = True, like: Refinement | None = None
     ) -> Refinement:
-        """Return a model fitted to short segments, from several starts, or from a `like` one."""
+        """Return a model fitted to short segments, from several starts, or from a LuGre one."""
         model = Model(friction)
         if like is not None:
-            return self._nearest(model, [like.values])
+            return self._nearest(model, [friction.like(like.values)], _FAR * _loss(like))
         starts = [model.start(each) for each in self._regressions(friction, thorough)]
         # A curve that does not suit the friction may leave none to them.
         unfit = [{name for name in self.free if not each[name] > 0.0} for each in starts]
@@ -148,14 +151,16 @@ class DriveTask:
             fits += [self._regression(friction.curve, shape * top) for shape in _SHAPES]
         return fits
 
-    def _nearest(self, model: Model, starts: Sequence[Mapping[str, float]]) -> Refinement:
-        """Return the best search; errors that are noise end it."""
+    def _nearest(
+        self, model: Model, starts: Sequence[Mapping[str, float]], most: float = inf
+    ) -> Refinement:
+        """Return the best search; errors that are noise, or a larger loss than `most`, end it."""
         short = self._trajectories(model, _SHORT * self.period)
         names = self._names(model)
         tried: list[Refinement] = []
         for values in starts:
             tried.append(refine(short, names, self._known(values), most=_FIRST_STEPS))
-            if is_white(tried[-1]):
+            if is_white(tried[-1]) or _loss(tried[-1]) > most:
                 return tried[-1]
         finished: list[Refinement] = []
         for near in sorted(tried, key=_loss)[:_FINALISTS]:
@@ -276,9 +281,9 @@ def drive_candidates(task: DriveTask, law: str, progress: Callable[[str], None])
             if law not in (AUTO, friction.law):
                 continue
             progress(friction.law)
-            found.append(task.searched(friction, like=bristles))
-            if is_white(found[-1]):
+            if friction is not DAHL and any(map(is_white, found)):
                 break
+            found.append(task.searched(friction, like=bristles))
             if friction is LUGRE:
                 bristles = found[-1]
     if law == AUTO and not any(map(is_white, found)):

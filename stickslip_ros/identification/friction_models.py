@@ -92,6 +92,10 @@ class FrictionModel(ABC):
             return 0.0, inf
         return _TINY * self.static_force(values), inf
 
+    def like(self, values: Values) -> dict[str, float]:
+        """Return coordinates like those of a LuGre model."""
+        return dict(values)
+
     def to_search(self, values: Values, fastest: float) -> dict[str, float]:
         """Return coordinates of the search, in which fits are nearly linear, by the same names."""
         return dict(values)
@@ -273,6 +277,10 @@ class DahlModel(CoulombModel):
         """Return the static friction."""
         return {"static": super().start(fit, direction)["static"]}
 
+    def like(self, values: Values) -> dict[str, float]:
+        """Return the static friction that is the kinetic one of LuGre."""
+        return {**values, "static": values["kinetic"]}
+
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
         """Return the law of coordinates."""
         kind: Any = LAWS[self.law]
@@ -371,11 +379,12 @@ COULOMB, STRIBECK, EXPONENTIAL = CoulombModel(), StribeckModel(), ExponentialMod
 STATIC_MODELS: Sequence[FrictionModel] = (COULOMB, STRIBECK, EXPONENTIAL)
 """Models of laws without a memory, the simpler ones first."""
 LUGRE = BristleModel("lugre", ("bristle_stiffness", "bristle_damping"))
+DAHL = DahlModel()
 MEMORY_MODELS: Sequence[FrictionModel] = (
-    DahlModel(),
     LUGRE,
+    DAHL,
     # Its elastic limit is made from the smallest friction.
     BristleModel("elasto_plastic", LUGRE.memory, ("kinetic",)),
     BristleModel("maxwell_slip", ("bristle_stiffness",)),
 )
-"""Models with a memory; those after LuGre are searched from what LuGre gives."""
+"""Models with a memory. Those after LuGre are searched from what LuGre gives."""
