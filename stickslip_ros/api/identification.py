@@ -9,7 +9,7 @@ from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
 from stickslip_ros.identification.candidates import Estimate
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import AUTO, identify_recordings
-from stickslip_ros.identification.reading import read_records
+from stickslip_ros.identification.reading import read_all, read_records
 from stickslip_ros.identification.scenario import written_scenario
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.identification_table import identification_tables
@@ -161,15 +161,12 @@ def identify(
     >>> f"{model.drive.stiffness:.4g} N/m"
     '1e+06 N/m'
     """
-    return Model(
-        identify_recordings(
-            [Path(each) for each in recordings],
-            law,
-            {} if fixed is None else fixed,
-            columns,
-            start=start,
-            end=end,
-            namespace=namespace,
-            belt_speed=belt_speed,
-        )
+    read = read_all(
+        [Path(each) for each in recordings],
+        columns,
+        start=start,
+        end=end,
+        namespace=namespace,
+        belt_speed=belt_speed,
     )
+    return Model(identify_recordings([*read.values()], law, {} if fixed is None else fixed))

@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     with interrupts_kept():
         from stickslip_ros.identification.identify import fixed_of, identify_recordings
-        from stickslip_ros.identification.reading import read_records
+        from stickslip_ros.identification.reading import read_all
         from stickslip_ros.identification.scenario import curve_files
         from stickslip_ros.plots.identification_table import identification_tables
     columns = columns_of(arguments.columns)
@@ -98,15 +98,18 @@ def run(arguments: argparse.Namespace) -> int:
         "namespace": arguments.namespace,
         "belt_speed": arguments.belt_speed,
     }
-    checked = {path: read_records(path, columns, **options) for path in arguments.check}
+    read = read_all([*arguments.recordings, *arguments.check], columns, **options)
     with progress_bar("identifying", None) as progress:
         found = identify_recordings(
-            arguments.recordings, arguments.law, fixed, columns, lambda _: progress(0.0), **options
+            [read[path] for path in dict.fromkeys(arguments.recordings)],
+            arguments.law,
+            fixed,
+            lambda _: progress(0.0),
         )
         checks = [
             {"recording": str(path), **found.check(record)}
-            for path, read in checked.items()
-            for record in read.records
+            for path in dict.fromkeys(arguments.check)
+            for record in read[path].records
         ]
         own = found.check(found.records[0])
     if arguments.json:

@@ -127,7 +127,7 @@ def table_columns(path: Path, columns: Mapping[str, str] | None = None) -> dict[
     InvalidInputError
         If a column is not there, or time or position is not given.
     """
-    table = _read_mat(path) if path.suffix.lower() == ".mat" else _read_csv(path)
+    table = table_of(path)
     if columns is None:
         columns = _own_columns(path, table)
     unknown = [name for name in columns if name not in QUANTITIES]
@@ -147,6 +147,28 @@ def table_columns(path: Path, columns: Mapping[str, str] | None = None) -> dict[
     if not known.any():
         raise InvalidInputError(f"{path}: no time is a finite number")
     return {name: np.broadcast_to(each, time.shape)[known] for name, each in values.items()}
+
+
+def table_of(path: Path) -> dict[str, FloatArray]:
+    """Return the columns of a CSV or MAT file, and single numbers, by name; raises BagError."""
+    return _read_mat(path) if path.suffix.lower() == ".mat" else _read_csv(path)
+
+
+def has_columns(table: Mapping[str, FloatArray], text: str) -> bool:
+    """Return whether a table has all columns of a product such as `vir*35.15065`."""
+    return all(factor in table or _is_number(factor) for factor in _factors(text))
+
+
+def _factors(text: str) -> list[str]:
+    return [part.strip() for part in text.split("*")]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _recording(path: Path, found: Mapping[str, FloatArray]) -> TableRecording:
@@ -204,16 +226,15 @@ def _own_columns(path: Path, table: Mapping[str, FloatArray]) -> dict[str, str]:
 def _value(path: Path, table: Mapping[str, FloatArray], text: str) -> FloatArray:
     """Return a product of columns and numbers."""
     value: FloatArray = np.ones(())
-    for factor in (part.strip() for part in text.split("*")):
+    for factor in _factors(text):
         if factor in table:
             value = value * table[factor]
-            continue
-        try:
+        elif _is_number(factor):
             value = value * float(factor)
-        except ValueError:
+        else:
             known = f"has {', '.join(table)}"
             hint = did_you_mean(factor, table, known)
-            raise InvalidInputError(f"{path} has no column {shown(factor)}; {hint}") from None
+            raise InvalidInputError(f"{path} has no column {shown(factor)}; {hint}")
     return value
 
 

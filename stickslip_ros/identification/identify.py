@@ -1,8 +1,6 @@
 """From recordings to a model: which law, which constants, how sure."""
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +11,7 @@ from stickslip_ros.identification.drives import AUTO, DRIVE_LAWS, DriveTask, dri
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.friction_models import MEMORY_MODELS, STATIC_MODELS
 from stickslip_ros.identification.models import DELAY
-from stickslip_ros.identification.reading import read_records
+from stickslip_ros.identification.reading import ReadRecords
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import LINEAR
 from stickslip_ros.identification.servo import servo_of
@@ -27,29 +25,23 @@ FIXABLE = (*LINEAR, "normal_force", DELAY, *(f"friction.{name}" for name in _FRI
 
 
 def identify_recordings(
-    paths: Sequence[Path],
+    read: Sequence[ReadRecords],
     law: str,
     fixed: Mapping[str, float],
-    columns: Mapping[str, str] | None = None,
     progress: Callable[[str], None] = lambda _: None,
-    **options: Any,
 ) -> Findings:
-    """Identify a drive from files.
+    """Identify a drive from recordings.
 
     Parameters
     ----------
-    paths : sequence of Path
+    read : sequence of ReadRecords
         Recordings of one machine.
     law : str
         Friction law, or `AUTO`.
     fixed : mapping
         Constants that are known, by NODE.PARAMETER.
-    columns : mapping, optional
-        Columns of tables.
     progress : callable, optional
         As for `identify`.
-    **options : Any
-        As for `read_records`.
 
     Returns
     -------
@@ -58,26 +50,20 @@ def identify_recordings(
 
     Raises
     ------
-    BagError
-        If a recording cannot be read.
     InvalidInputError
         If an argument is not allowed, or the recordings cannot tell a model.
     """
-    if not paths:
+    if not read:
         raise InvalidInputError("no recording is given: must be at least one")
-    own: dict[str, float] = {}
+    known: dict[str, float] = {}
+    for each in read:
+        known |= each.known
     for target, value in fixed.items():
         node, _, name = target.partition(".")
         if node != "plant" or not name:
             raise InvalidInputError(f"{target} is refused: must be plant.PARAMETER")
-        own[name] = float(value)
-    records: list[Record] = []
-    known: dict[str, float] = {}
-    for path in dict.fromkeys(paths):
-        read = read_records(path, columns, **options)
-        records += read.records
-        known |= read.known
-    return identify(records, law, {**known, **own}, progress)
+        known[name] = float(value)
+    return identify([record for each in read for record in each.records], law, known, progress)
 
 
 def fixed_of(texts: Sequence[str]) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """Records from bags and tables."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from math import inf
 from pathlib import Path
@@ -11,13 +11,16 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.table_file import is_table, table_columns
+from stickslip_ros.bags.table_file import has_columns, is_table, table_columns, table_of
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.identification.models import DELAY
 from stickslip_ros.identification.record import Record, evenly_spaced
 from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.samples import ForceColumns
 from stickslip_ros.stamps import NANOSECONDS
+
+_OPTIONAL = ("velocity", "disturbance", "reference", "friction_force")
+"""Quantities that a table may lack if another one of the same machine has them."""
 
 
 class ReadRecords(NamedTuple):
@@ -26,6 +29,55 @@ class ReadRecords(NamedTuple):
     records: list[Record]
     known: Mapping[str, float]
     """Constants by parameter of the plant."""
+
+
+def read_all(
+    paths: Sequence[Path], columns: Mapping[str, str] | None = None, **options: Any
+) -> dict[Path, ReadRecords]:
+    """Return what several recordings of one machine have for identification.
+
+    What identification can do without, such as a disturbance, may be a column of some tables only:
+    it is left out where a table lacks it.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Recordings.
+    columns : mapping, optional
+        Columns of tables, as for `read_table`.
+    **options : Any
+        As for `read_records`.
+
+    Returns
+    -------
+    dict
+        Records by path.
+
+    Raises
+    ------
+    BagError
+        If a recording cannot be read.
+    InvalidInputError
+        If one lacks what identification needs.
+    """
+    tables = {path: table_of(path) for path in paths if is_table(path)}
+    lacking = {
+        path: {
+            quantity
+            for quantity, text in ({} if columns is None else columns).items()
+            if quantity in _OPTIONAL and not has_columns(table, text)
+        }
+        for path, table in tables.items()
+    }
+    nowhere = set[str].intersection(*lacking.values()) if lacking else set[str]()
+    found: dict[Path, ReadRecords] = {}
+    for path in dict.fromkeys(paths):
+        own = columns
+        if columns is not None and path in tables:
+            absent = lacking[path] - nowhere
+            own = {name: text for name, text in columns.items() if name not in absent}
+        found[path] = read_records(path, own, **options)
+    return found
 
 
 def read_records(

@@ -18,6 +18,10 @@ _EXPLAINED = 0.02
 _SATURATED = 5
 """Samples at the largest force from which on it counts as a limit."""
 _BELOW_LIMIT = 0.98
+_TRIMS, _OUTLIER, _USED = 3, 40.0, 0.7
+"""Fits without outliers, size of one in median errors, and least share of samples that are none."""
+_ADDED = 3.0
+"""Size of a force that was added to the command, in largest errors of the controller."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,27 @@ class Servo:
     """Number of samples of the difference."""
     limit: float
     """Largest force, N; infinite if the record does not reach it."""
+    error: float = 0.0
+    """Largest difference from the forces of its record, N, apart from forces added to them."""
+
+    def forces(self, record: Record) -> FloatArray:
+        """Return the forces by the measured positions, N, in which the record has a reference."""
+        assert record.reference is not None
+        speed = _differences(record, self.difference_samples)
+        wanted = self.position_gain * (record.reference - record.position)
+        return np.clip(wanted - self.velocity_gain * speed, -self.limit, self.limit)
+
+    def added(self, record: Record) -> FloatArray:
+        """Return what was added to the command of the controller, as taps are; N, zero elsewhere.
+
+        It is what the recorded force has beyond the controller's own, where it is clearly more than
+        the controller leaves unexplained; if it is so nearly always, another controller acted.
+        """
+        assert record.force is not None
+        rest = record.force - self.forces(record)
+        rest[: self.difference_samples] = 0.0
+        clear = np.abs(rest) > _ADDED * self.error
+        return np.where(clear & (np.mean(clear) < 1.0 - _USED), rest, 0.0)
 
 
 def servo_of(record: Record) -> Servo | None:
@@ -51,7 +76,7 @@ def servo_of(record: Record) -> Servo | None:
         return None
     if not np.isfinite(record.reference).all():
         return None
-    force, position, error = record.force, record.position, record.reference - record.position
+    force, error = record.force, record.reference - record.position
     largest = float(np.abs(force).max())
     at_limit = np.count_nonzero(np.abs(force) >= (1.0 - 1e-9) * largest)
     limit = largest if at_limit >= _SATURATED else inf
@@ -59,15 +84,29 @@ def servo_of(record: Record) -> Servo | None:
     free[:START] = False
     best: tuple[float, Servo] | None = None
     for span in range(1, _LONGEST_DIFFERENCE + 1):
-        speed = np.zeros_like(position)
-        speed[span:] = (position[span:] - position[:-span]) / (span * record.period)
-        terms = np.column_stack([error, -speed])[free]
-        gains, *_ = np.linalg.lstsq(terms, force[free], rcond=None)
-        left = force[free] - terms @ gains
-        share = float(np.sqrt(np.mean(left**2) / np.mean(force[free] ** 2)))
-        if best is None or share < best[0]:
-            best = share, Servo(float(gains[0]), float(gains[1]), span, limit)
+        terms = np.column_stack([error, -_differences(record, span)])
+        used, gains, left = free, np.zeros(2), np.zeros_like(force)
+        for _ in range(_TRIMS):
+            gains = np.linalg.lstsq(terms[used], force[used], rcond=None)[0]
+            left = np.abs(force - terms @ gains)
+            # Forces that were added to the command are none of the controller's.
+            used = free & (left <= _OUTLIER * float(np.median(left[free])))
+        left, scale = left[used], float(np.sqrt(np.mean(force[used] ** 2)))
+        share = float(np.sqrt(np.mean(left**2))) / scale
+        if np.count_nonzero(used) > _USED * np.count_nonzero(free) and (
+            best is None or share < best[0]
+        ):
+            servo = Servo(float(gains[0]), float(gains[1]), span, limit, float(left.max()))
+            best = share, servo
     return best[1] if best is not None and best[0] < _EXPLAINED else None
+
+
+def _differences(record: Record, span: int) -> FloatArray:
+    """Return the velocity as the difference of positions over some samples."""
+    position = record.position
+    speed = np.zeros_like(position)
+    speed[span:] = (position[span:] - position[:-span]) / (span * record.period)
+    return speed
 
 
 def closed_loop(
@@ -101,15 +140,17 @@ def closed_loop(
     loop = SampledLoop(motion, 1.0 / period, LOCKSTEP_START, force_delay=max(delay, 0.0))
     # Before the record the slide moves as at its start.
     positions = [float(position[0]) - velocity * period * number for number in range(span, 0, -1)]
-    disturbance = np.zeros(len(position)) if record.disturbance is None else record.disturbance
+    nothing = np.zeros(len(position))
+    disturbance = nothing if record.disturbance is None else record.disturbance
+    added = nothing if record.force is None else servo.added(record)
     forces: list[float] = []
     sample = loop.sample
-    references = zip(record.reference.tolist(), disturbance.tolist(), strict=True)
-    for number, (wanted, other) in enumerate(references):
+    inputs = zip(record.reference.tolist(), added.tolist(), disturbance.tolist(), strict=True)
+    for number, (wanted, more, other) in enumerate(inputs):
         positions.append(sample.position)
         speed = (positions[-1] - positions[-1 - span]) / (span * period)
         force = servo.position_gain * (wanted - sample.position) - servo.velocity_gain * speed
-        force = min(max(force, -servo.limit), servo.limit)
+        force = min(max(force, -servo.limit), servo.limit) + more
         forces.append(force)
         if number == len(position) - 1 or motion.unbounded:
             break
