@@ -63,6 +63,8 @@ DRIVE_LAWS = (
     *(model.law for model in MEMORY_MODELS),
 )
 """Laws that can be identified for a drive on a spring."""
+_MOST_SAMPLES = 15_000
+"""Samples of a drive that are fitted: minutes of work."""
 _POINTS = 8
 """Number of points of friction without a law."""
 _SPEEDS = ("minimum_speed", "decay_speed")
@@ -223,7 +225,7 @@ class DriveTask:
         return self._candidate(near, near.losses)
 
     def _candidate(self, fit: Refinement, held_out: FloatArray) -> Candidate:
-        friction, measured = fit.task.model.friction, fit.task.measured
+        friction, measured = fit.task.model.friction, fit.task.positions
         return Candidate(
             friction.law,
             len(fit.free),
@@ -242,7 +244,13 @@ class DriveTask:
 
     def _trajectories(self, model: Model, length: float) -> Trajectories:
         segments, starts = segments_of(self.records, length)
-        return Trajectories(model, self.predictors, segments, starts, self.normal_force)
+        task = Trajectories(model, self.predictors, segments, starts, self.normal_force)
+        return task.chosen(np.arange(len(segments)) % self.stride == 0)
+
+    @property
+    def stride(self) -> int:
+        """Of the segments of long records one of so many is used."""
+        return -(-sum(len(each.position) for each in self.records) // _MOST_SAMPLES)
 
     def _names(self, model: Model) -> list[str]:
         own = model.friction.coordinates
@@ -310,7 +318,7 @@ def is_white(fit: Refinement) -> bool:
 
 def _share(fit: Refinement) -> float:
     """Return the rms error as a share of the rms motion."""
-    return sqrt(_loss(fit) / len(fit.residual)) / float(np.std(fit.task.measured))
+    return sqrt(_loss(fit) / len(fit.residual)) / float(np.std(fit.task.positions))
 
 
 def _loss(fit: Refinement) -> float:

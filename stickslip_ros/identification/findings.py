@@ -27,6 +27,8 @@ _STILL = 0.02
 """Share of the fastest speed below which a slide may stick."""
 _VAGUE = 0.5
 """Standard error, as a share of the value, from which a constant counts as not told."""
+_USED = 0.6
+"""Share of the samples below which the fit says that it used some of them only."""
 _DIFFERENT = 0.05
 """Difference of friction at any speed, as a share of the largest, by which two laws differ."""
 _CORRELATED = 0.95
@@ -159,6 +161,13 @@ class Findings:
                 "belt), or have another sign or unit"
             )
         fit = self.chosen.fit
+        if isinstance(fit, Refinement):
+            used = len(fit.residual) / sum(len(each.position) for each in self.records)
+            if used < _USED:
+                found.append(
+                    f"{used:.0%} of the samples were used, in parts over the whole length: the "
+                    "recordings are long; choose a part by --from and --to"
+                )
         if isinstance(fit, Refinement) and (repetition := fit.repetition) is not None:
             found.append(
                 f"the errors repeat every {repetition} samples: the motion takes a whole number of "
@@ -378,7 +387,8 @@ class Findings:
             return free_run(delayed(record, self.delay), self.drive)[1]
         segments, starts = segments_of([record], record.duration)
         task = replace(fit.task, predictors=[Predictor(record)], segments=segments, starts=starts)
-        run = task.predicted(fit.values, refine(task, (), fit.values).starts)
+        count = segments[0].count
+        run = task.predicted(fit.values, refine(task, (), fit.values).starts)[:count]
         return np.concatenate([np.full(len(record.position) - len(run), np.nan), run])
 
     def check(self, record: Record) -> dict[str, float | None]:

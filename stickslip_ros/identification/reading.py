@@ -138,7 +138,8 @@ def _of_table(
     belt = found.get("belt_velocity", np.full(len(time), 0.0))
     if belt_speed is not None:
         belt = np.full(len(time), belt_speed)
-    used = {name: found[name] for name in ("force", "disturbance", "reference") if name in found}
+    optional = ("force", "disturbance", "reference", "velocity")
+    used = {name: found[name] for name in optional if name in found}
     return stamp, {"position": found["position"], "belt_velocity": belt, **used}
 
 
@@ -159,6 +160,7 @@ def _of_bag(
             plant[name] = json.loads(text)
     stamp = states.stamp
     found = {"position": states.position, "belt_velocity": states.belt_velocity}
+    found["velocity"] = states.velocity
     if len(forces):
         found["force"] = _held(forces, stamp, plant)
     if len(disturbances):

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import sqrt
 from typing import Self
 
 import numpy as np
@@ -21,6 +22,8 @@ _TURNING = 0.1
 """Change of the speed in a sample, steps of the encoder per sample, at a turning point."""
 _FEW = 0.2
 """Share of samples up to which turning points are left out."""
+_LONGEST_DIFFERENCE, _SAME = 8, 1e-6
+"""Samples over which a velocity may be a difference of positions; its error, in the largest one."""
 _SMOOTHED = 11
 """Samples over which a speed is found."""
 _REST = 20
@@ -56,6 +59,8 @@ class Record:
     """Further known force on the slide, N, held likewise; None: none is recorded."""
     reference: FloatArray | None = None
     """Displacement that a controller followed, m; None: none is recorded."""
+    velocity: FloatArray | None = None
+    """Measured velocity of the slide, m/s; None: none but differences of positions is recorded."""
 
     @property
     def duration(self) -> float:
@@ -103,6 +108,18 @@ class Record:
             counts[turning] = np.inf
         return 1.0 / np.sqrt(counts)
 
+    @cached_property
+    def velocity_weight(self) -> float:
+        """Weight of the error of a velocity beside that of a position, s; 0 without velocities.
+
+        It is the ratio of the noise of both. Positions without noise need no velocities.
+        """
+        if self.velocity is None:
+            return 0.0
+        noise = max(white_noise(self.position), self.resolution / sqrt(12.0))
+        of_velocity = white_noise(self.velocity)
+        return noise / of_velocity if of_velocity > 0.0 else 0.0
+
     @property
     def resolution(self) -> float:
         """Smallest change of the position, m; 0 if it never changes."""
@@ -114,7 +131,7 @@ class Record:
         """Return the samples from `start` to before `end`."""
         optional = {
             name: None if column is None else column[start:end]
-            for name in ("force", "disturbance", "reference")
+            for name in ("force", "disturbance", "reference", "velocity")
             for column in (getattr(self, name),)
         }
         return replace(
@@ -136,7 +153,7 @@ def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) ->
         Stamps, ns.
     columns : dict
         Columns of `Record` by name. Samples of which one is not finite count as missing; only the
-        reference may be.
+        reference may be. Velocities that are differences of the positions are left out.
 
     Returns
     -------
@@ -149,6 +166,10 @@ def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) ->
     InvalidInputError
         If no part is long enough.
     """
+    columns = dict(columns)
+    velocity = columns.get("velocity")
+    if velocity is not None and not np.isfinite(velocity).all():
+        del columns["velocity"]
     known = np.ones(len(stamp), bool)
     for each in columns.keys() - {"reference"}:
         known &= np.isfinite(columns[each])
@@ -179,9 +200,23 @@ def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) ->
                 found[each] = values[rows][np.maximum(last, 0)]
             else:
                 found[each] = np.interp(even, own, values[rows])
+        if "velocity" in found and _is_difference(found["velocity"], found["position"], period):
+            del found["velocity"]
         records.append(Record(name, period, **found))
     if not records:
         raise InvalidInputError(
             f"{name} has no {_FEWEST} samples without a gap of more than {_LONGEST_GAP:.0f} periods"
         )
     return records
+
+
+def _is_difference(velocity: FloatArray, position: FloatArray, period: float) -> bool:
+    """Return whether velocities are made from the positions, over some samples or centrally."""
+    allowed = _SAME * float(np.abs(velocity).max())
+    for span in range(1, _LONGEST_DIFFERENCE + 1):
+        differences = (position[span:] - position[:-span]) / (span * period)
+        for late in {span, span // 2}:
+            own = velocity[late : late + len(differences)]
+            if float(np.median(np.abs(own - differences))) <= allowed:
+                return True
+    return False

@@ -1,4 +1,4 @@
-"""Fit of the simulated trajectory, through stick and slip, to the positions of records."""
+"""Fit of the simulated trajectory, through stick and slip, to what records have measured."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class _Errors(NamedTuple):
     starts: FloatArray
     """State at the start of each segment; shape (segments, 2)."""
     residual: FloatArray
-    """Predicted less measured positions, m."""
+    """Predicted less measured outputs, m."""
     by_names: FloatArray
     """Derivatives by coordinates; shape (rows, coordinates)."""
     by_start: FloatArray
@@ -63,7 +63,7 @@ class Refinement:
     starts: FloatArray
     """Fitted state at the start of each segment, m and m/s; shape (segments, 2)."""
     residual: FloatArray
-    """Predicted less measured positions, m, weighted."""
+    """Predicted less measured outputs, weighted, m."""
     by_start: FloatArray
     """Derivatives of the residual by the start of the own segment; shape (rows, 2)."""
     derivatives: FloatArray
@@ -207,7 +207,7 @@ class _Projection:
         starts: FloatArray,
     ) -> None:
         self._task, self._free, self._values = task, free, values
-        self._scale = 1.0 / (1e-3 * float(np.ptp(task.measured)))
+        self._scale = 1.0 / (1e-3 * float(np.ptp(task.positions)))
         self._point: FloatArray | None = None
         self._best: _Errors | None = None
         self._last: tuple[bytes, _Errors] | None = None
@@ -343,10 +343,10 @@ class _Projection:
 
     def _errors(self, point: FloatArray, starts: FloatArray) -> _Errors:
         task, weight = self._task, self._task.weight
-        positions, by_names, by_start = task.sensitivities(self.values(point), starts, self._free)
+        outputs, by_names, by_start = task.sensitivities(self.values(point), starts, self._free)
         return _Errors(
             starts,
-            weight * (positions - task.measured),
+            weight * (outputs - task.measured),
             weight[:, None] * by_names,
             weight[:, None] * by_start,
         )

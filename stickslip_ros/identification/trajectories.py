@@ -28,14 +28,14 @@ _UNBOUNDED = 10.0
 
 
 class Sensitivities(NamedTuple):
-    """Positions of segments with their derivatives; arrays with a row for each sample."""
+    """Outputs of segments with their derivatives; arrays with a row for each output."""
 
-    positions: FloatArray
-    """Positions, m."""
+    outputs: FloatArray
+    """Positions, m, and velocities, m/s, see `Predictor.followed`."""
     by_names: FloatArray
-    """Derivatives by coordinates, SI units; shape (samples, names)."""
+    """Derivatives by coordinates, SI units; shape (rows, names)."""
     by_start: FloatArray
-    """Derivatives by position and velocity at the start of the own segment; shape (samples, 2)."""
+    """Derivatives by position and velocity at the start of the own segment; shape (rows, 2)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,33 +51,53 @@ class Trajectories:
 
     @cached_property
     def measured(self) -> FloatArray:
-        """Positions of all segments, m."""
-        return self._joined(lambda record: record.position)
+        """Outputs of all segments: positions, m, and then velocities, m/s, of each."""
+        return self._joined(lambda record: (record.position, record.velocity))
 
     @cached_property
     def weight(self) -> FloatArray:
-        """Weight of the error of each position, see `Record.weight`."""
-        return self._joined(lambda record: record.weight)
+        """Weight of the error of each output; that of velocities in s."""
+        return self._joined(
+            lambda record: (
+                record.weight,
+                np.full(len(record.position), record.velocity_weight),
+            )
+        )
+
+    @cached_property
+    def positions(self) -> FloatArray:
+        """Measured positions of all segments, m."""
+        return self._joined(lambda record: (record.position,))
 
     @cached_property
     def parts(self) -> Sequence[slice]:
         """Rows of each segment."""
-        ends = np.cumsum([0, *(each.count for each in self.segments)]).tolist()
+        ends = np.cumsum([0, *self._counts]).tolist()
         return [slice(low, high) for low, high in pairwise(ends)]
 
     @cached_property
     def block(self) -> IntArray:
-        """Number of the segment of each position."""
-        return np.repeat(np.arange(len(self.segments)), [each.count for each in self.segments])
+        """Number of the segment of each row."""
+        return np.repeat(np.arange(len(self.segments)), self._counts)
 
-    def _joined(self, values: Callable[[Record], FloatArray]) -> FloatArray:
-        columns = [values(each.record) for each in self.predictors]
+    @property
+    def _counts(self) -> Sequence[int]:
+        outputs = [each.outputs for each in self.predictors]
+        return [each.count * outputs[each.record] for each in self.segments]
+
+    def _joined(self, values: Callable[[Record], tuple[FloatArray | None, ...]]) -> FloatArray:
+        columns = [values(each.record)[: each.outputs] for each in self.predictors]
         return np.concatenate(
-            [columns[own.record][own.start : own.start + own.count] for own in self.segments]
+            [
+                column[own.start : own.start + own.count]
+                for own in self.segments
+                for column in columns[own.record]
+                if column is not None
+            ]
         )
 
     def predicted(self, values: Mapping[str, float], starts: FloatArray) -> FloatArray:
-        """Return the positions of all segments, m; far away where there is no motion."""
+        """Return the outputs of all segments; far away where there is no motion."""
         delay = values.get(DELAY, 0.0)
         try:
             drive = self.model.drive(values, self.normal_force)
@@ -93,10 +113,7 @@ class Trajectories:
     def sensitivities(
         self, values: Mapping[str, float], starts: FloatArray, names: Sequence[str]
     ) -> Sensitivities:
-        """Return the positions of all segments, and their derivatives.
-
-        They are zero where there is no motion.
-        """
+        """Return the outputs of all segments, and their derivatives: zero without a motion."""
         count = len(self.measured)
         found = Sensitivities(
             np.full(count, np.nan), np.zeros((count, len(names))), np.zeros((count, 2))
@@ -104,13 +121,13 @@ class Trajectories:
         try:
             self._follow(values, starts, names, found)
         except (InvalidInputError, RunError):
-            found.positions[:] = np.nan
-        found = found._replace(positions=self._bounded(found.positions))
+            found.outputs[:] = np.nan
+        found = found._replace(outputs=self._bounded(found.outputs))
         typical = self.typical(values)
         for name in self.model.by_differences(names):
             step = _MOTION_STEP * max(abs(values[name]), typical.get(name, 0.0))
             moved = self.predicted({**values, name: values[name] + step}, starts)
-            found.by_names[:, list(names).index(name)] = (moved - found.positions) / step
+            found.by_names[:, list(names).index(name)] = (moved - found.outputs) / step
         return found
 
     def _follow(
@@ -142,10 +159,11 @@ class Trajectories:
         for predictor, segments, own in self._by_record(starts):
             delay, belt = values.get(DELAY, 0.0), predictor.record.belt_velocity
             runs = predictor.sensitivities(drive, segments, own, delay)
-            for segment, (_, velocity), (positions, rows) in zip(segments, own, runs, strict=True):
+            units = 1.0 / drive.length_scale, 1.0 / drive.speed_scale
+            for segment, (_, velocity), (outputs, rows) in zip(segments, own, runs, strict=True):
                 part = next(parts)
-                found.positions[part] = positions
-                found.by_start[part] = rows[:, :2] * (1.0, drive.length_scale / drive.speed_scale)
+                found.outputs[part] = outputs
+                found.by_start[part] = rows[:, :2] * units
                 if of_constants is None:
                     continue
                 order = rows.shape[1] - len(of_constants)
@@ -157,7 +175,7 @@ class Trajectories:
                             np.array(steady_memory(other, *speeds)) / drive.length_scale
                         )
                     )
-                found.by_names[part, columns] = columns_of * drive.length_scale
+                found.by_names[part, columns] = columns_of
 
     def _by_record(
         self, starts: FloatArray
@@ -170,10 +188,10 @@ class Trajectories:
                 segments = [each for each in self.segments if each.record == number]
                 yield predictor, segments, starts[own]
 
-    def _bounded(self, positions: FloatArray) -> FloatArray:
-        middle, span = float(np.mean(self.measured)), _UNBOUNDED * float(np.ptp(self.measured))
-        low, high = middle - span, middle + span
-        return np.where(np.isfinite(positions), np.clip(positions, low, high), high)
+    def _bounded(self, outputs: FloatArray) -> FloatArray:
+        span = _UNBOUNDED * float(np.ptp(self.measured))
+        low, high = self.measured - span, self.measured + span
+        return np.where(np.isfinite(outputs), np.clip(outputs, low, high), high)
 
     @property
     def fastest(self) -> float:
@@ -245,6 +263,8 @@ def segments_of(records: Sequence[Record], length: float) -> tuple[list[Segment]
             around = np.arange(max(edge - reach, 0), min(edge + reach, total))
             places.append(int(around[np.argmax(relative[around])]))
         places.append(total)
+        if record.velocity_weight > 0.0 and record.velocity is not None:
+            speed = record.velocity
         for low, high in pairwise(places):
             segments.append(Segment(number, low, high - low))
             starts.append(np.array([smooth[low], speed[low]]))

@@ -11,6 +11,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.record import Record
 from stickslip_ros.physics.model.courses import Table
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive_system import SPEED
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.motion.parametric_motion import ParametricMotion
 
@@ -88,19 +89,27 @@ class Predictor:
         starts: FloatArray,
         delay: float = 0.0,
     ) -> list[FloatArray]:
-        """Return the positions of segments, m, each from a state (position, velocity) of its own.
+        """Return the outputs of segments, each from a state (position, velocity) of its own.
 
-        The memory of the friction law is that of steady slip at the start of a segment. Positions
-        are NaN from where the motion is unbounded.
+        Outputs are the positions, m, and then the velocities, m/s, if the record has some with a
+        weight. The memory of the friction law is that of steady slip at the start of a segment.
+        Outputs are NaN from where the motion is unbounded.
         """
         found: list[FloatArray] = []
         for segment, motion in self._motions(Motion, drive, segments, starts):
-            own = np.full(segment.count, np.nan)
-            own[0] = motion.position
+            own = np.full((self.outputs, segment.count), np.nan)
+            own[:, 0] = (motion.position, motion.velocity)[: self.outputs]
             for number in self._samples(motion, segment.start, segment.count, delay):
-                own[number] = motion.position
-            found.append(own)
+                own[0, number] = motion.position
+                if self.outputs > 1:
+                    own[1, number] = motion.velocity
+            found.append(own.ravel())
         return found
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs: positions, or positions and velocities."""
+        return 1 if self.record.velocity_weight == 0.0 else 2
 
     def sensitivities(
         self,
@@ -109,19 +118,25 @@ class Predictor:
         starts: FloatArray,
         delay: float = 0.0,
     ) -> list[tuple[FloatArray, FloatArray]]:
-        """Return the positions of segments, as `followed`, and their dimensionless derivatives.
+        """Return the outputs of segments, as `followed`, and their derivatives.
 
-        The latter have shape (samples, arguments): the state at the start of the segment, then the
-        free constants of the drive; see `ParametricMotion`.
+        The latter have shape (rows, arguments): the state at the start of the segment, then the
+        free constants of the drive, all dimensionless as in `ParametricMotion`; the outputs are in
+        SI units.
         """
         found: list[tuple[FloatArray, FloatArray]] = []
         for segment, motion in self._motions(ParametricMotion, drive, segments, starts):
-            own = np.full(segment.count, np.nan)
-            by = np.zeros((segment.count, len(motion.position_derivatives)))
-            own[0], by[0] = motion.position, motion.position_derivatives
+            own = np.full((self.outputs, segment.count), np.nan)
+            by = np.zeros((self.outputs, segment.count, motion.derivatives.shape[1]))
+            own[:, 0] = (motion.position, motion.velocity)[: self.outputs]
+            by[:, 0] = motion.derivatives[: self.outputs]
             for number in self._samples(motion, segment.start, segment.count, delay):
-                own[number], by[number] = motion.position, motion.position_derivatives
-            found.append((own, by))
+                own[0, number], by[0, number] = motion.position, motion.position_derivatives
+                if self.outputs > 1:
+                    own[1, number], by[1, number] = motion.velocity, motion.derivatives[SPEED]
+            units = np.array([drive.length_scale, drive.speed_scale])[: self.outputs]
+            by *= units[:, np.newaxis, np.newaxis]
+            found.append((own.ravel(), by.reshape(-1, by.shape[2])))
         return found
 
     def _motions(
