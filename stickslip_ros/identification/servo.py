@@ -18,9 +18,10 @@ _EXPLAINED = 0.02
 _SATURATED = 5
 """Samples at the largest force from which on it counts as a limit."""
 _BELOW_LIMIT = 0.98
-_TRIMS, _OUTLIER, _USED = 3, 40.0, 0.7
-"""Fits without outliers, size of one in median errors, and least share of samples that are none."""
-_ADDED = 3.0
+_TRIMS, _OUTLIER, _USED = 10, 4.0, 0.7
+"""Fits without outliers; share of samples that are none, at least, and size of one in errors that
+are as large as so many."""
+_ADDED = 10.0
 """Size of a force that was added to the command, in largest errors of the controller."""
 
 
@@ -90,7 +91,7 @@ def servo_of(record: Record) -> Servo | None:
             gains = np.linalg.lstsq(terms[used], force[used], rcond=None)[0]
             left = np.abs(force - terms @ gains)
             # Forces that were added to the command are none of the controller's.
-            used = free & (left <= _OUTLIER * float(np.median(left[free])))
+            used = free & (left <= _OUTLIER * float(np.quantile(left[free], _USED)))
         left, scale = left[used], float(np.sqrt(np.mean(force[used] ** 2)))
         share = float(np.sqrt(np.mean(left**2))) / scale
         if np.count_nonzero(used) > _USED * np.count_nonzero(free) and (

@@ -102,3 +102,17 @@ def test_what_is_refused(stickslip: Run, log: Path, given: tuple[str, ...], mess
     assert done.returncode == 2
     assert message in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_column_that_only_a_checked_table_has(stickslip: Run, tmp_path: Path, log: Path) -> None:
+    rows = np.loadtxt(log, delimiter=",", skiprows=1)
+    with_taps = np.column_stack([rows, np.zeros(len(rows))])
+    heading = "t,x,u,r,taps"
+    np.savetxt(tmp_path / "taps.csv", with_taps, delimiter=",", header=heading, comments="")
+    given = ("--columns", f"{_COLUMNS},disturbance=taps", "--law", "coulomb", "--json")
+    done = stickslip("identify", "axis.csv", "--check", "taps.csv", *given)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["checks"][0]["force_error"] > 0.0
+    done = stickslip("identify", "axis.csv", *given)
+    assert done.returncode == 2
+    assert "has no column 'taps'" in done.stderr

@@ -1,13 +1,15 @@
 """Axes without a spring: constants, curves, the controller, predictions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.servo import servo_of
-from tests.identification.axis_record import COULOMB, SATURATING, SERVO, record
+from stickslip_ros.identification.servo import closed_loop, servo_of
+from tests.identification.axis_record import COULOMB, SATURATING, SERVO, axis, record
 
 
 def test_the_constants_of_coulomb_friction_by_direction() -> None:
@@ -134,3 +136,39 @@ def test_the_constants_of_other_laws_of_an_axis() -> None:
     law = found.drive.friction.forward
     assert found.fitted["friction.static"].value == pytest.approx(law.static)
     assert found.fitted["friction.viscous"].standard_error > 0.0
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_pulses_of_a_checked_record(known: bool) -> None:
+    """They are a known disturbance, or were added to the command of the controller."""
+    fitted = identify([record("coulomb")], "coulomb")
+    pulses = np.zeros(len(record("coulomb").position))
+    for number in range(400, len(pulses), 700):
+        pulses[number : number + 40] = (-1.0) ** number * 30.0
+    own = replace(record("coulomb", seed=3), force=None, disturbance=pulses)
+    position, force = closed_loop(own, axis(COULOMB), SERVO, 0.0)
+    measured = np.rint(position / 5e-8) * 5e-8
+    tapped = replace(
+        own,
+        position=measured,
+        force=force if known else force + pulses,
+        disturbance=pulses if known else None,
+    )
+    check = fitted.check(tapped)
+    assert check["force_error"] < 0.02
+    assert check["position_error"] < 1e-4
+    assert check["closed_loop_force_error"] < 0.03
+
+
+def test_a_controller_is_found_beside_forces_that_are_added_to_it() -> None:
+    own = record("coulomb")
+    assert own.force is not None
+    force = own.force.copy()
+    for number in range(400, len(force), 700):
+        force[number : number + 40] += 20.0
+    found = servo_of(replace(own, force=force))
+    assert found is not None
+    assert found.position_gain == pytest.approx(SERVO.position_gain, rel=0.01)
+    added = found.added(replace(own, force=force))
+    assert added[410:430] == pytest.approx(20.0, abs=1.0)
+    assert np.count_nonzero(added) < 0.08 * len(added)

@@ -69,3 +69,39 @@ def test_a_part_has_all_columns() -> None:
     assert part.position.tolist() == [2.0, 3.0, 4.0]
     assert part.held_force.tolist() == [1.0, 1.0, 1.0]
     assert part.force is None
+
+
+def test_the_weight_of_positions_that_an_encoder_does_not_tell_apart() -> None:
+    time = 1e-3 * np.arange(2000)
+    swing = 3e-4 * np.sin(100.0 * time)
+    swing[800:1400] = 4.4e-6  # at rest
+    record = Record("log", 1e-3, np.rint(swing / 1e-6) * 1e-6, np.zeros(2000))
+    speed = np.abs(np.gradient(swing, 1e-3))
+    fast = speed > 2e-3
+    assert np.mean(record.weight[fast] == 1.0) > 0.97
+    assert np.sum(record.weight[820:1380] ** 2) == pytest.approx(1.0, rel=0.1)
+    turning = (speed < 5e-4) & (np.abs(swing) > 2.9e-4)
+    assert (record.weight[turning][1:-1] == 0.0).all()
+
+
+def test_positions_with_noise_of_more_than_a_step_all_count() -> None:
+    random = np.random.default_rng(1)
+    noisy = np.rint(1e-6 * random.normal(size=1000) / 1e-6) * 1e-6
+    assert (Record("log", 1e-3, noisy, np.zeros(1000)).weight == 1.0).all()
+
+
+@pytest.mark.parametrize("span", [1, 2, 5])
+def test_velocities_that_are_differences_are_no_measurements(span: int) -> None:
+    time = 1e-3 * np.arange(800)
+    columns = _columns(time)
+    velocity = np.zeros(800)
+    velocity[span:] = (columns["position"][span:] - columns["position"][:-span]) / (span * 1e-3)
+    (record,) = evenly_spaced("log", _stamps(time), {**columns, "velocity": velocity})
+    assert record.velocity is None
+    noisy = np.cos(time) + 1e-3 * np.random.default_rng(1).normal(size=800)
+    (record,) = evenly_spaced("log", _stamps(time), {**columns, "velocity": noisy})
+    assert record.velocity is not None
+    gap = np.where(np.arange(800) == 5, np.nan, noisy)
+    (record,) = evenly_spaced("log", _stamps(time), {**columns, "velocity": gap})
+    assert record.velocity is None
+    assert len(record.position) == 800

@@ -9,7 +9,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_in_units import in_units_of
-from stickslip_ros.physics.model.drive_system import POSITION
+from stickslip_ros.physics.model.drive_system import POSITION, SPEED, STICK
 from stickslip_ros.physics.model.hybrid import HybridSystem, Mode
 from stickslip_ros.physics.motion.compiled_flow import (
     CompiledFlow,
@@ -74,6 +74,8 @@ class ParametricMotion(Motion):
     def _begin_again(self) -> None:
         order, count = len(self._system.states), len(self._system.free_constants)
         self._found, self._holder = np.eye(order, order + count), None
+        if self._mode.flow == STICK:  # it has the speed of the belt
+            self._found[SPEED] = 0.0
 
     @property
     def derivatives(self) -> FloatArray:

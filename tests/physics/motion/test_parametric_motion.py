@@ -1,0 +1,127 @@
+"""Derivatives of a motion by its start and by constants, through stick and slip.
+
+The references are differences of the motion itself, which is exact to about 1e-13.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.courses import Table
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.drive_in_units import in_units_of
+from stickslip_ros.physics.model.friction import (
+    Coulomb,
+    Dahl,
+    Directional,
+    Exponential,
+    FrictionLaw,
+    LuGre,
+    MaxwellSlip,
+    Stribeck,
+)
+from stickslip_ros.physics.model.plain_drive import drive_system
+from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.motion.parametric_motion import ParametricMotion
+
+CURVE = Exponential(static=0.4, kinetic=0.25, decay_speed=0.02, viscous=0.5)
+LAWS: dict[str, FrictionLaw] = {
+    "stribeck": Stribeck(static=0.4, minimum=0.25, minimum_speed=0.05),
+    "coulomb": Coulomb(static=0.3, viscous=0.8),
+    "exponential": CURVE,
+    "directional": Directional(Coulomb(static=0.3, viscous=0.8), Coulomb(static=0.2, viscous=0.5)),
+    "dahl": Dahl(static=0.3, bristle_stiffness=1e4),
+    "lugre": LuGre(CURVE, bristle_stiffness=2e4, bristle_damping=1.0),
+    "maxwell_slip": MaxwellSlip(CURVE, bristle_stiffness=2e4),
+}
+START = (1e-4, -0.01)
+PERIOD = 1e-3
+FORCES = np.repeat(60.0 * np.random.default_rng(0).normal(size=30), 10).tolist()
+BELT = Table((0.0, 0.1, 0.2, 0.3), (0.02, 0.02, -0.03, 0.06))
+
+
+def drive_of(law: str, *, moves: bool) -> Drive:
+    """Return a drive that sticks and slips, on a belt of constant speed or one that reverses."""
+    drive = Drive(100.0, 100.0, 1e6, 1000.0, 0.02, LAWS[law], bias_force=3.0)
+    return replace(drive, belt_speed=0.0, belt=BELT) if moves else drive
+
+
+def positions(drive: Drive, start: tuple[float, float] = START) -> FloatArray:
+    """Return the positions of the slide after each period."""
+    return followed(Motion(drive, *start), lambda motion: motion.position)
+
+
+def followed(motion: Any, read: Callable[[Any], Any]) -> FloatArray:
+    """Return what is read of a motion after each period."""
+    found: list[Any] = []
+    for force in FORCES:
+        motion.force = force
+        motion.advance(PERIOD)
+        found.append(read(motion))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("moves", [False, True])
+@pytest.mark.parametrize("law", LAWS)
+def test_derivatives_are_those_of_differences(law: str, moves: bool) -> None:
+    drive = drive_of(law, moves=moves)
+    motion = ParametricMotion(drive, *START)
+    rows = followed(motion, lambda own: own.position_derivatives.copy())
+    system = drive_system(in_units_of(drive, drive))
+    order, names = len(system.states), system.free_constants
+    for number, name in enumerate(names):
+        size = 1e-6 * max(abs(system.constants[name]), 1e-3)
+        found = (positions(moved(drive, name, size)) - positions(moved(drive, name, -size))) / (
+            2.0 * size * drive.length_scale
+        )
+        own = rows[:, order + number]
+        assert np.abs(own - found).max() <= 1e-5 * np.abs(own).max(), name
+    step = 1e-9
+    for axis, scale in enumerate((drive.length_scale, drive.speed_scale)):
+        above, below = list(START), list(START)
+        above[axis] += step
+        below[axis] -= step
+        found = positions(drive, (above[0], above[1])) - positions(drive, (below[0], below[1]))
+        found *= scale / drive.length_scale / (2.0 * step)
+        assert np.abs(rows[:, axis] - found).max() < 1e-4 * np.abs(rows[:, axis]).max()
+
+
+def moved(drive: Drive, name: str, change: float) -> Drive:
+    """Return the drive with a constant that is changed by some of its units."""
+    units = {
+        "mass": drive.mass,
+        "stiffness": drive.stiffness,
+        "damping": drive.normal_force / drive.speed_scale,
+        "bias_force": drive.normal_force,
+    }
+    if name in units:
+        return replace(drive, **{name: getattr(drive, name) + change * units[name]})
+    return replace(drive, friction=moved_law(drive, drive.friction, name.split(".")[1:], change))
+
+
+def moved_law(drive: Drive, law: Any, path: list[str], change: float) -> Any:
+    """Return a law with a constant that is changed by some of its units."""
+    if len(path) > 1:
+        return replace(law, **{path[0]: moved_law(drive, getattr(law, path[0]), path[1:], change)})
+    scaled = replace(law, **{path[0]: 1.0}).scaled(drive.speed_scale, drive.length_scale)
+    unit = 1.0 / getattr(scaled, path[0])
+    return replace(law, **{path[0]: getattr(law, path[0]) + change * unit})
+
+
+def test_a_slide_that_sticks_keeps_its_distance_and_forgets_its_speed() -> None:
+    drive = drive_of("stribeck", moves=False)
+    motion = ParametricMotion(drive, 0.0, 0.02)
+    motion.advance(PERIOD)
+    assert motion.sticking
+    assert motion.derivatives[0].tolist() == [1.0, 0.0] + [0.0] * (motion.derivatives.shape[1] - 2)
+
+
+def test_the_motion_is_that_without_derivatives() -> None:
+    for law in LAWS:
+        drive = drive_of(law, moves=True)
+        own = followed(ParametricMotion(drive, *START), lambda motion: motion.position)
+        assert np.abs(own - positions(drive)).max() < 1e-12 * np.ptp(own), law
