@@ -31,9 +31,9 @@ PUBLISHED = {
     "plant.friction.reverse.viscous": 240.4236,
     "plant.friction.static": 20.1440,
     "plant.friction.reverse.static": 20.6277,
+    "force_error": 0.03058,
 }
-"""The published fit by direction, its force error without an artefact at the end."""
-PUBLISHED_ERRORS = {"force_error": 0.03058}
+"""The published fit by direction; its force error without an artefact at the end."""
 PUBLISHED_SYMMETRIC = {"position_error": 1.3752e-4, "closed_loop_force_error": 0.05848}
 _MAIN = "from stickslip_ros.app.main import main; main()"
 _KEPT = (
@@ -54,10 +54,21 @@ def by_command(*options: str) -> dict[str, Any]:
     columns = ",".join(f"{name}={column}" for name, column in COLUMNS.items())
     begun = time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-c", _MAIN, "identify", RECORD, "--columns", columns, "--json", *options],
+        [
+            sys.executable,
+            "-c",
+            _MAIN,
+            "identify",
+            RECORD.name,
+            "--columns",
+            columns,
+            "--json",
+            *options,
+        ],
         check=True,
         capture_output=True,
         text=True,
+        cwd=RECORD.parent,  # the figure has the name of the record
     )
     seconds = time.perf_counter() - begun
     found = json.loads(done.stdout)
@@ -80,6 +91,8 @@ def study(*options: str) -> dict[str, Any]:
         "lugre": by_command("--law", "lugre"),
         "chosen": by_command(*options),
         "halves": halves(),
+        "published": PUBLISHED,
+        "published_symmetric": PUBLISHED_SYMMETRIC,
         "versions": versions(),
     }
 
@@ -90,7 +103,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path)
     parser.add_argument("--plot", type=Path)
     arguments = parser.parse_args()
-    options = [] if arguments.plot is None else ["--plot", str(arguments.plot)]
+    options = [] if arguments.plot is None else ["--plot", str(arguments.plot.absolute())]
     text = json.dumps(study(*options), indent=1) + "\n"
     if arguments.out is None:
         print(text, end="")

@@ -46,7 +46,7 @@ MASS, NORMAL_FORCE = 0.0307, 0.0307 * 9.81
 LEAST_DROP = 6e-3
 """Drop of the spring's force that counts as a slip, N: above the noise of all records."""
 RATE = 2000.0
-_SETTLED, _SAMPLED = 40.0, 20.0
+_SETTLED, _SAMPLED = 15.0, 8.0
 """Time before, and of, the samples of a simulated motion, in periods that were measured."""
 _MISSED = 3.0
 """Error, in factors of e, of a motion without slips."""
@@ -77,7 +77,7 @@ LAWS: dict[str, Law] = {
         {"rise": (3e-3, 0.1), "speed": (1e-4, 0.1)},
     ),
     "exponential": Law(
-        _exponential, {"rise": (3e-3, 0.1), "speed": (1e-5, 0.03), "viscous": (1e-3, 30.0)}
+        _exponential, {"rise": (3e-3, 0.1), "speed": (1e-4, 0.03), "viscous": (1e-3, 30.0)}
     ),
     "lugre": Law(
         lambda rise, speed, viscous, stiffness, damping: LuGre(
@@ -85,7 +85,7 @@ LAWS: dict[str, Law] = {
         ),
         {
             "rise": (3e-3, 0.1),
-            "speed": (1e-5, 0.03),
+            "speed": (1e-4, 0.03),
             "viscous": (1e-3, 30.0),
             "stiffness": (3e3, 1e5),
             "damping": (0.1, 100.0),

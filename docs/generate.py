@@ -21,7 +21,14 @@ from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters, 
 from stickslip_ros.studies.stability import stability
 
 HERE = Path(__file__).parent
-PAGES = ("parameters.md", "topics.md", "theory.md", "controllers.md", "command-line.md")
+PAGES = (
+    "parameters.md",
+    "topics.md",
+    "theory.md",
+    "controllers.md",
+    "command-line.md",
+    "identification.md",
+)
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -208,12 +215,160 @@ def _newtons(force: float | None) -> str:
     return "" if force is None else f"{force:.1f}"
 
 
+STUDIES = HERE.parent / "benchmarks"
+
+
+def axis() -> Iterator[str]:
+    """Yield what the command finds on a ball-screw axis, beside what is published."""
+    found = json.loads((STUDIES / "ball_screw_axis.json").read_text(encoding="utf-8"))
+    coulomb, chosen, bristles = found["coulomb"], found["chosen"], found["lugre"]
+    published, symmetric = found["published"], found["published_symmetric"]
+
+    def constant(model: dict[str, Any], name: str, digits: int) -> str:
+        if name not in model["parameters"]:
+            return "a curve"
+        each = model["parameters"][name]
+        low, high = each["interval"]
+        return f"{each['value']:.{digits}f} ± {(high - low) / 2.0:.{digits}f}"
+
+    rows = [
+        [
+            name,
+            f"{published[key]:.{digits}f}",
+            *(constant(each, key, digits) for each in (coulomb, chosen, bristles)),
+        ]
+        for name, key, digits in (
+            ("mass, kg", "plant.mass", 2),
+            ("viscous friction forward, N s/m", "plant.friction.viscous", 1),
+            ("viscous friction backward, N s/m", "plant.friction.reverse.viscous", 1),
+            ("Coulomb friction forward, N", "plant.friction.static", 2),
+            ("Coulomb friction backward, N", "plant.friction.reverse.static", 2),
+        )
+    ]
+
+    def held_out(model: dict[str, Any]) -> str:
+        (own,) = (each for each in model["candidates"] if each["law"] == model["law"])
+        return f"{100.0 * own['held_out_error']:.2f} %"
+
+    three = (coulomb, chosen, bristles)
+    for name, key, known, text in (
+        ("force error", "force_error", published["force_error"], "{:.2%}"),
+        (
+            "closed loop: position",
+            "position_error",
+            symmetric["position_error"],
+            "{:.5%}",
+        ),
+        (
+            "closed loop: force",
+            "closed_loop_force_error",
+            symmetric["closed_loop_force_error"],
+            "{:.2%}",
+        ),
+    ):
+        note = " (symmetric fit)" if key in symmetric else ""
+        own = [text.format(each[key]).replace("%", " %") for each in three]
+        rows.append([name, text.format(known).replace("%", " %") + note, *own])
+        if key == "force_error":
+            rows.append(["force error, held out", "", *map(held_out, three)])
+    runs = [f"{1e3 * each['free_run_error']:.2f} mm" for each in three]
+    rows.append(["24.8 s with the recorded force and no feedback, in-sample", "", *runs])
+    yield table(
+        [
+            "",
+            "published, by direction",
+            "`--law coulomb`",
+            f"chosen: `{chosen['law']}`",
+            "`--law lugre`",
+        ],
+        rows,
+    )
+    halves = found["halves"]
+    yield table(
+        ["fitted to the first half", "force error", "closed loop: position", "closed loop: force"],
+        [
+            [
+                f"{half} half",
+                f"{100.0 * each['force_error']:.2f} %",
+                f"{100.0 * each['position_error']:.5f} %",
+                f"{100.0 * each['closed_loop_force_error']:.2f} %",
+            ]
+            for half, each in (("first", halves["fitted"]), ("second", halves["predicted"]))
+        ],
+    )
+
+
+def coverage() -> Iterator[str]:
+    """Yield how often intervals cover, by the study of noisy runs."""
+    found = json.loads((STUDIES / "identification.json").read_text(encoding="utf-8"))
+    rows: list[list[str]] = []
+    for case in found["cases"]:
+        own = case["constants"].values() if case["kind"] != "narrow" else ()
+        covered = sorted(100.0 * each["covered"] for each in own)
+        bias = max((abs(each["bias"]) / each["standard_error"] for each in own), default=None)
+        spread = f"{covered[0]:.0f} to {covered[-1]:.0f} %" if covered else ""
+        mean = f" ({sum(covered) / len(covered):.0f} %)" if covered else ""
+        rows.append(
+            [
+                case["law"],
+                case["kind"],
+                str(case["seeds"]),
+                f"{100.0 * case['right']:.0f} %",
+                f"{100.0 * (1.0 - case['told']):.0f} %",
+                spread + mean,
+                "" if bias is None else f"{bias:.2f}",
+                f"{case['seconds']:.1f}",
+            ]
+        )
+    yield table(
+        [
+            "law",
+            "run",
+            "seeds",
+            "law recovered",
+            "“cannot tell”",
+            "intervals of 95 % that cover: least to most covered constant (mean)",
+            "largest bias, in standard errors",
+            "seconds a run",
+        ],
+        rows,
+    )
+
+
+def paper_on_paper() -> Iterator[str]:
+    """Yield what laws that were fitted to two records predict of others."""
+    found = json.loads((STUDIES / "paper_on_paper.json").read_text(encoding="utf-8"))
+    records: dict[tuple[int, int], dict[str, dict[str, Any]]] = {}
+    for row in found["rows"]:
+        records.setdefault((row["stiffness"], row["speed"]), {})[row["law"]] = row
+
+    def cell(row: dict[str, Any]) -> str:
+        regime = Regime.label(row["regime"])
+        if row["period"] is None:
+            return regime
+        return f"{regime}, {row['period']:.3g} s, {1e3 * row['drop']:.1f} mN"
+
+    laws = [name for name in next(iter(records.values())) if name != "measured"]
+    rows = [
+        [
+            f"{stiffness} N/m, {speed} µm/s",
+            "fitted" if [stiffness, speed] in found["fitted"] else "predicted",
+            *(cell(own[name]) for name in ("measured", *laws)),
+        ]
+        for (stiffness, speed), own in records.items()
+    ]
+    yield table(["record", "", "measured", *(f"`{name}`" for name in laws)], rows)
+
+
 BLOCKS: dict[str, Callable[[], Iterator[str]]] = {
     "parameters": parameters,
     "commands": commands,
     "topics": topics,
     "numbers": numbers,
     "comparison": comparison,
+    "axis": axis,
+    "coverage": coverage,
+    "paper_on_paper": paper_on_paper,
 }
 
 

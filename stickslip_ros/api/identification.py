@@ -69,7 +69,8 @@ class Model(Shown):
         -------
         dict
             `force_error`, `position_error` and `closed_loop_force_error` as shares of the rms of
-            what was recorded, `free_run_error` in m; None for what cannot be predicted.
+            what was recorded, `free_run_error` and `segment_error` in m; None for what cannot be
+            predicted.
         """
         records = read_records(Path(recording), columns, start=start, end=end).records
         return self.findings.check(records[0])

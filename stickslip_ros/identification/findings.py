@@ -15,10 +15,10 @@ from stickslip_ros.identification.drives import POOR
 from stickslip_ros.identification.filtered import START, filtered
 from stickslip_ros.identification.models import DELAY, numbers_of
 from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.refinement import Refinement, refine
+from stickslip_ros.identification.refinement import Refinement, refine, restarted
 from stickslip_ros.identification.regression import Regression
 from stickslip_ros.identification.servo import Servo, closed_loop
-from stickslip_ros.identification.trajectories import segments_of
+from stickslip_ros.identification.trajectories import Trajectories, segments_of
 from stickslip_ros.identification.trajectory import Predictor, delayed, free_run
 from stickslip_ros.physics.model.drive import Drive
 
@@ -33,7 +33,13 @@ _DIFFERENT = 0.05
 """Difference of friction at any speed, as a share of the largest, by which two laws differ."""
 _CORRELATED = 0.95
 """Correlation from which two constants are named together."""
-CHECKED = ("force_error", "free_run_error", "position_error", "closed_loop_force_error")
+CHECKED = (
+    "force_error",
+    "free_run_error",
+    "segment_error",
+    "position_error",
+    "closed_loop_force_error",
+)
 """What a model predicts of a recording."""
 
 
@@ -385,16 +391,30 @@ class Findings:
         fit = self.chosen.fit
         if isinstance(fit, Regression):
             return free_run(delayed(record, self.delay), self.drive)[1]
-        segments, starts = segments_of([record], record.duration)
-        task = replace(fit.task, predictors=[Predictor(record)], segments=segments, starts=starts)
-        count = segments[0].count
+        task = _divided(fit.task, record, record.duration)
+        count = task.segments[0].count
         run = task.predicted(fit.values, refine(task, (), fit.values).starts)[:count]
         return np.concatenate([np.full(len(record.position) - len(run), np.nan), run])
+
+    def segment_error(self, record: Record) -> float | None:
+        """Return the rms position error in segments like those of the fit, m; None for an axis.
+
+        Each segment starts from the state that fits best.
+        """
+        fit = self.chosen.fit
+        if isinstance(fit, Regression):
+            return None
+        counts = [segment.count for segment in fit.task.segments]
+        task = _divided(fit.task, record, float(np.median(counts)) * self.records[0].period)
+        task = replace(task, predictors=[Predictor(replace(record, velocity=None))])
+        starts = restarted(refine(task, (), fit.values)).starts
+        return rms(task.predicted(fit.values, starts) - task.positions)
 
     def check(self, record: Record) -> dict[str, float | None]:
         """Return what the model predicts of a record, as `CHECKED` names it.
 
-        `free_run_error` is in m, the others are shares of the rms of what was recorded.
+        `free_run_error` and `segment_error` are in m, the others are shares of the rms of what was
+        recorded.
         """
         away = self.free_run(record) - record.position
         error = rms(away[~np.isnan(away)]) if self.has_spring else rms(away)
@@ -402,12 +422,19 @@ class Findings:
         found |= {
             "force_error": self.force_error(record),
             "free_run_error": error if isfinite(error) else inf,
+            "segment_error": self.segment_error(record),
         }
         if self.servo is not None and record.reference is not None and record.force is not None:
             position, force = closed_loop(record, self.drive, self.servo, self.delay)
             found["position_error"] = _relative(position[START:], record.position[START:])
             found["closed_loop_force_error"] = _relative(force[START:], record.force[START:])
         return found
+
+
+def _divided(task: Trajectories, record: Record, length: float) -> Trajectories:
+    """Return the task of predicting a record in segments of a length, s."""
+    segments, starts = segments_of([record], length)
+    return replace(task, predictors=[Predictor(record)], segments=segments, starts=starts)
 
 
 def _relative(found: FloatArray, measured: FloatArray) -> float:

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from math import inf
+from math import exp, inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -173,13 +173,26 @@ def _of_bag(
 
 
 def _held(forces: ForceColumns, stamp: IntArray, plant: Mapping[str, Any]) -> FloatArray:
-    """Return the force that acts from each sample on: limited and rounded as by the actuator."""
+    """Return the force that acts from each sample on: limited, rounded and late as by the actuator.
+
+    Of a force that lags it is the mean until the next sample.
+    """
     held = _since(stamp, forces.stamp, forces.force)
     given = {name: plant.get(f"actuator.{name}") for name in ("limit", "resolution")}
     limiter = Actuator(
         **{name: float(value) for name, value in given.items() if isinstance(value, int | float)}
     ).limiter
-    return held if limiter is None else np.array([limiter(each) for each in held.tolist()])
+    if limiter is not None:
+        held = np.array([limiter(each) for each in held.tolist()])
+    time_constant = plant.get("actuator.time_constant", 0.0)
+    if not isinstance(time_constant, int | float) or not time_constant > 0.0 or len(stamp) < 2:
+        return held
+    periods = float(np.median(np.diff(stamp))) / NANOSECONDS / time_constant
+    kept, force, mean = exp(-periods), 0.0, np.empty(len(held))
+    for number, command in enumerate(held.tolist()):
+        mean[number] = command + (force - command) * (1.0 - kept) / periods
+        force = command + (force - command) * kept
+    return mean
 
 
 def _since(stamp: IntArray, since: IntArray, values: FloatArray) -> FloatArray:

@@ -1,5 +1,6 @@
 """The figure of an identification: the friction curve, and residuals by speed, position, time."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,7 @@ def identification_figure(found: Findings) -> Figure:
         _residuals(figure.add_subplot(grid[1, place]), values, errors.force_error, name, unit)
     _residuals(figure.add_subplot(grid[2, 0]), errors.time, errors.force_error, "time", "s")
     _free_run(figure.add_subplot(grid[2, 1]), found)
-    names = ", ".join(dict.fromkeys(record.name for record in found.records))
+    names = ", ".join(dict.fromkeys(Path(record.name).name for record in found.records))
     set_title(figure, f"{names}: law {found.law}, error held out {found.chosen.error:.3%}")
     return figure
 

@@ -14,6 +14,7 @@ from stickslip_ros.tables import TextTable
 _PREDICTIONS = {
     "force_error": "force error",
     "free_run_error": "free run, position error",
+    "segment_error": "in segments, position error",
     "position_error": "closed loop, position error",
     "closed_loop_force_error": "closed loop, force error",
 }
@@ -92,7 +93,7 @@ def _predicted(values: Mapping[str, Any]) -> list[str]:
     cells: list[str] = []
     for name in _PREDICTIONS:
         value = values[name]
-        if name == "free_run_error":
+        if name in ("free_run_error", "segment_error") and value is not None:
             cells.append(SI.text(value, "m"))
         else:
             cells.append("-" if value is None else f"{100.0 * value:.4g} %")

@@ -18,7 +18,14 @@ from tests.nodes.conftest import domain, graph  # noqa: F401 - fixtures used her
 from tests.nodes.graph import Graph
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = ("parameters.md", "topics.md", "theory.md", "controllers.md", "command-line.md")
+PAGES = (
+    "parameters.md",
+    "topics.md",
+    "theory.md",
+    "controllers.md",
+    "command-line.md",
+    "identification.md",
+)
 EVERY_NODE = ("plant", "washout_controller", "analyzer")
 # Of the table, those that a run in which nothing goes wrong has none of.
 RARE = {"dropped: …", "failure"}
