@@ -24,9 +24,8 @@ def _rows(law: str) -> list[Mapping[str, Any]]:
 
 def _compare(row: Mapping[str, Any], found: study.Features) -> None:
     for name, value in asdict(found).items():
-        assert row[name] == (value if isinstance(value, str) else pytest.approx(value, rel=1e-3)), (
-            name
-        )
+        expected = pytest.approx(row[name], rel=1e-3) if isinstance(value, float) else row[name]
+        assert value == expected, name
 
 
 @pytest.mark.skipif(not study.DATA.exists(), reason="the recorded data are not here")
