@@ -1,7 +1,7 @@
 """Format text for messages, tables and figures."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import SequenceMatcher
 from typing import Any
 
@@ -72,6 +72,12 @@ def did_you_mean(name: str, known: Iterable[str], otherwise: str | None = None) 
     if close:
         return f"did you mean {' or '.join(close[:_MOST])}?"
     return f"known are {', '.join(names)}" if otherwise is None else otherwise
+
+
+def must_be_one_of(name: str, allowed: Sequence[str]) -> str:
+    """Return the end of a message that refuses a name: those that are close, and all allowed."""
+    hint = did_you_mean(name, allowed, "")
+    return f"{hint} must be one of {', '.join(allowed)}".lstrip()
 
 
 def _words(name: str) -> set[str]:

@@ -8,12 +8,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.physics.measures.reading import UNKNOWN, Reading
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
-from stickslip_ros.text import did_you_mean, shown
+from stickslip_ros.text import did_you_mean, must_be_one_of, shown
 
 TABLE_SUFFIXES = (".csv", ".mat")
 """Ends of the names of files that are tables."""
@@ -102,16 +102,20 @@ def read_table(path: Path, columns: Mapping[str, str] | None = None) -> TableRec
     >>> recording.samples.position.tolist()
     [1e-06, 3e-06]
     """
-    return _recording(path, table_columns(path, columns))
+    return _recording(path, quantities_of(path, table_of(path), columns))
 
 
-def table_columns(path: Path, columns: Mapping[str, str] | None = None) -> dict[str, FloatArray]:
-    """Return the quantities that a CSV or MAT file has, as arrays of shape (rows,).
+def quantities_of(
+    path: Path, table: Mapping[str, FloatArray], columns: Mapping[str, str] | None = None
+) -> dict[str, FloatArray]:
+    """Return the quantities that a table has, as arrays of shape (rows,).
 
     Parameters
     ----------
     path : Path
-        The file; see `read_table`.
+        The file that the table was read from.
+    table : mapping
+        Its columns, see `table_of`.
     columns : mapping, optional
         As for `read_table`.
 
@@ -122,20 +126,14 @@ def table_columns(path: Path, columns: Mapping[str, str] | None = None) -> dict[
 
     Raises
     ------
-    BagError
-        If the file cannot be read.
     InvalidInputError
         If a column is not there, or time or position is not given.
     """
-    table = table_of(path)
     if columns is None:
-        columns = _own_columns(path, table)
-    unknown = [name for name in columns if name not in QUANTITIES]
-    if unknown:
-        raise InvalidInputError(
-            f"column {unknown[0]} is refused: {did_you_mean(unknown[0], QUANTITIES, '')}must be "
-            f"one of {', '.join(QUANTITIES)}"
-        )
+        columns = own_columns(path, table)
+    for name in columns:
+        if name not in QUANTITIES:
+            raise InvalidInputError(f"column {name} is refused: {must_be_one_of(name, QUANTITIES)}")
     lacking = [name for name in ("time", "position") if name not in columns]
     if lacking:
         raise InvalidInputError(f"{path}: no column is given for {' and '.join(lacking)}")
@@ -171,11 +169,17 @@ def _is_number(text: str) -> bool:
     return True
 
 
+def stamps_of(path: Path, time: FloatArray) -> IntArray:
+    """Return times, s, as stamps, ns, from the first one; InvalidInputError if they are too far."""
+    since = time - time[0]
+    if np.abs(since).max() > _LONGEST:
+        raise InvalidInputError(f"{path}: the times differ by more than {_LONGEST:g} s")
+    return np.rint(since * NANOSECONDS).astype(np.int64)
+
+
 def _recording(path: Path, found: Mapping[str, FloatArray]) -> TableRecording:
     time = found["time"] - found["time"][0]
-    if np.abs(time).max() > _LONGEST:
-        raise InvalidInputError(f"{path}: the times differ by more than {_LONGEST:g} s")
-    stamp = np.rint(time * NANOSECONDS).astype(np.int64)
+    stamp = stamps_of(path, time)
     notes: list[str] = []
     position = found["position"]
     if "velocity" not in found:
@@ -210,7 +214,11 @@ def _differences(time: FloatArray, position: FloatArray) -> FloatArray:
         return (position[after] - position[before]) / (time[after] - time[before])
 
 
-def _own_columns(path: Path, table: Mapping[str, FloatArray]) -> dict[str, str]:
+def own_columns(path: Path, table: Mapping[str, FloatArray]) -> dict[str, str]:
+    """Return the columns by quantity of a table that `stickslip simulate --out` has written.
+
+    Raises InvalidInputError for another one.
+    """
     own = {
         quantity: next((name for name in names if name in table), "")
         for quantity, names in _OWN.items()
@@ -241,11 +249,17 @@ def _value(path: Path, table: Mapping[str, FloatArray], text: str) -> FloatArray
 def _read_csv(path: Path) -> dict[str, FloatArray]:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            heading = file.readline()
+            heading, rest = file.readline(), file.readline()
+        if not heading:
+            raise BagError(f"{path}: the file is empty")
+        if not rest:
+            raise BagError(f"{path}: the file has no rows")
         separator = max(",;\t", key=heading.count)
         names = [name.strip() for name in next(csv.reader([heading], delimiter=separator), [])]
         if len(names) < 2 or len({*names}) < len(names):
-            raise BagError(f"{path}: the first line must have the names of the columns, all unlike")
+            raise BagError(
+                f"{path}: the first line must have the names of the columns, all different"
+            )
         options: Any = {"delimiter": separator, "encoding": "utf-8-sig", "comments": None}
         try:
             rows = np.loadtxt(path, skiprows=1, ndmin=2, **options)
@@ -255,8 +269,6 @@ def _read_csv(path: Path) -> dict[str, FloatArray]:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error).strip().partition("\n")[0]
         raise BagError(f"{path}: the file cannot be read: {reason}") from None
-    if rows.size == 0:
-        raise BagError(f"{path}: the file has no rows")
     if rows.shape[1] != len(names):
         raise BagError(f"{path} has {rows.shape[1]} columns and {len(names)} names for them")
     return dict(zip(names, rows.T.copy(), strict=True))

@@ -41,9 +41,11 @@ class AxisTask:
 
     def __init__(self, records: Sequence[Record], fixed: Mapping[str, float]) -> None:
         if all(not record.held_force.any() for record in records):
+            given = any(record.force is not None for record in records)
+            hint = "" if given else "; name its column, as in --columns force=u"
             raise InvalidInputError(
-                "no force acts in the recordings: without one an axis tells nothing of its mass "
-                "and its friction; name its column, as in --columns force=u"
+                f"{'the recorded force is always 0' if given else 'no force is recorded'}: without "
+                f"a force an axis tells nothing of its mass and its friction{hint}"
             )
         self.records = records
         own = {name: fixed[name] for name in LINEAR if name in fixed}

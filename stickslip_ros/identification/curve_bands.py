@@ -7,6 +7,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.axis_drive import POINTS, table_speeds
+from stickslip_ros.identification.intervals import carried
 from stickslip_ros.identification.refinement import Refinement
 from stickslip_ros.identification.regression import Regression
 
@@ -26,15 +27,15 @@ class Friction:
     """Standard error of the force, N."""
 
 
-def friction_of(fit: Regression | Refinement, direction: int, fastest: float) -> Friction:
+def friction_of(fit: Regression | Refinement, sign: float, fastest: float) -> Friction:
     """Return the friction curve of a fit.
 
     Parameters
     ----------
     fit : Regression or Refinement
         The fit.
-    direction : int
-        0 for the first direction of the records, 1 for the other one.
+    sign : float
+        Direction of the slip, 1 or -1; of an axis one that its rows have.
     fastest : float
         Fastest recorded speed |v_r|, m/s.
 
@@ -44,7 +45,8 @@ def friction_of(fit: Regression | Refinement, direction: int, fastest: float) ->
         The curve, from rest to the fastest speed.
     """
     if isinstance(fit, Refinement):
-        return _of_trajectories(fit, fastest)
+        return _of_trajectories(fit, sign, fastest)
+    direction = [*fit.rows.directions].index(sign)
     speed = table_speeds(fit)
     shape = float(fit.shapes[direction]) if len(fit.shapes) else 1.0
     terms = fit.curve.terms(speed, shape)
@@ -60,20 +62,21 @@ def friction_of(fit: Regression | Refinement, direction: int, fastest: float) ->
     return Friction(speed, terms @ own, _band(by, fit.covariance))
 
 
-def _of_trajectories(fit: Refinement, fastest: float) -> Friction:
+def _of_trajectories(fit: Refinement, sign: float, fastest: float) -> Friction:
     speed, model = np.linspace(0.0, fastest, POINTS), fit.task.model
 
     def force(values: Mapping[str, float]) -> FloatArray:
         law = model.drive(values, 1.0).friction
-        return np.array([-float(law.coefficient(each, 1.0)) for each in speed.tolist()])
+        slip = (sign * speed).tolist()
+        return np.array([-sign * float(law.coefficient(each, sign)) for each in slip])
 
     typical, base = fit.task.typical(fit.values), force(fit.values)
-    columns: list[FloatArray] = []
-    for name in fit.free:
+    by = np.zeros((len(speed), len(fit.free)))
+    for number, name in enumerate(fit.free):
         step = _STEP * max(abs(fit.values[name]), typical.get(name, 0.0))
-        columns.append((force({**fit.values, name: fit.values[name] + step}) - base) / step)
-    return Friction(speed, base, _band(np.column_stack(columns), fit.covariance))
+        by[:, number] = (force({**fit.values, name: fit.values[name] + step}) - base) / step
+    return Friction(speed, base, _band(by, fit.covariance))
 
 
 def _band(by: FloatArray, covariance: FloatArray) -> FloatArray:
-    return np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", by, covariance, by), 0.0))
+    return np.sqrt(np.maximum(np.diag(carried(by, covariance)), 0.0))

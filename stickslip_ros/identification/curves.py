@@ -26,6 +26,11 @@ class Curve(ABC):
         """Whether the curve has a shape."""
         return False
 
+    @property
+    def least_shape(self) -> float:
+        """Smallest shape that records tell, in their slowest speeds."""
+        return 0.25
+
     @abstractmethod
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
         """Return the terms, rows of shape (rows, terms); `speed` is |v_r| and `shape` in m/s."""
@@ -60,7 +65,7 @@ class StribeckCurve(Curve):
 
     @property
     def shaped(self) -> bool:
-        """It has: a speed."""
+        """True: its shape is a speed."""
         return True
 
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
@@ -82,7 +87,7 @@ class ExponentialCurve(Curve):
 
     @property
     def shaped(self) -> bool:
-        """It has: a speed."""
+        """True: its shape is a speed."""
         return True
 
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
@@ -103,8 +108,13 @@ class SaturatingCurve(Curve):
 
     @property
     def shaped(self) -> bool:
-        """It has: a speed."""
+        """True: its shape is a speed."""
         return True
+
+    @property
+    def least_shape(self) -> float:
+        """1: a rise far below the slowest speed is one with the force at rest."""
+        return 1.0
 
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
         """Return 1, the rise and w; see `Curve.terms`."""
@@ -152,6 +162,11 @@ class FollowedCurve(Curve):
     def shaped(self) -> bool:
         """Whether the curve in steady slip has a shape."""
         return self.curve.shaped
+
+    @property
+    def least_shape(self) -> float:
+        """That of the curve."""
+        return self.curve.least_shape
 
     def terms(self, speed: FloatArray, shape: float) -> FloatArray:
         """Return those of the curve; see `Curve.terms`."""

@@ -41,7 +41,10 @@ class Filtered:
     decimated: bool
     """Whether rows are decimated; otherwise they are those where the slide clearly slips."""
     slipping: BoolArray
-    """Whether the slide clearly slips, in one direction, for the length of the filter."""
+    """Whether the slide clearly slips, in one direction, for half of the length of the filter on
+    both sides: such rows are to start a search."""
+    settled: BoolArray
+    """The same for twice its length: the filter has forgotten where the slide stuck."""
 
     def rows(self, values: FloatArray) -> FloatArray:
         """Return the rows of the regression that columns of shape (samples, ...) give."""
@@ -74,7 +77,8 @@ def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> 
     from scipy.signal import butter, filtfilt  # takes long to import
 
     rate = 1.0 / record.period
-    low_pass: Any = butter(_ORDER, min(CUTOFF, 0.1 * rate) / (0.5 * rate))
+    cutoff = min(CUTOFF, 0.1 * rate)
+    low_pass: Any = butter(_ORDER, cutoff / (0.5 * rate))
 
     def smooth(values: FloatArray) -> FloatArray:
         return np.asarray(filtfilt(low_pass[0], low_pass[1], values, padlen=_PAD))
@@ -97,7 +101,8 @@ def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> 
         relative[inside],
         force[inside],
         decimated,
-        _slipping(relative[inside], record.period),
+        _slipping(relative[inside], 0.5 * rate / cutoff),
+        _slipping(relative[inside], 2.0 * rate / cutoff),
     )
 
 
@@ -109,11 +114,11 @@ def _shifted(held: FloatArray, periods: float) -> FloatArray:
     return np.interp(at + 0.5, places, edges) - np.interp(at - 0.5, places, edges)
 
 
-def _slipping(relative: FloatArray, period: float) -> BoolArray:
-    """Return where the speed stays away from zero for the length of the filter."""
+def _slipping(relative: FloatArray, reach: float) -> BoolArray:
+    """Return where the speed stays away from zero for a number of samples on both sides."""
     from scipy.ndimage import minimum_filter1d
 
-    width = 2 * max(round(0.5 / (CUTOFF * period)), 1) + 1
+    width = 2 * max(round(reach), 1) + 1
     least = 0.02 * float(np.abs(relative).max())
     sides = [minimum_filter1d(sign * relative, width) > least for sign in (1.0, -1.0)]
     return sides[0] | sides[1]

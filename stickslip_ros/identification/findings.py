@@ -3,20 +3,21 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf, isfinite, isnan
+from math import inf, isfinite, isinf, isnan
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
-from stickslip_ros.identification.axis_drive import Points, axis_drive, law_of, table_of
+from stickslip_ros.identification.axis_drive import axis_drive, law_of
 from stickslip_ros.identification.candidates import Candidate, Estimate
 from stickslip_ros.identification.curve_bands import Friction, friction_of
 from stickslip_ros.identification.drives import POOR
-from stickslip_ros.identification.filtered import START, filtered
+from stickslip_ros.identification.filtered import START, Filtered, filtered
+from stickslip_ros.identification.intervals import carried
 from stickslip_ros.identification.models import DELAY, numbers_of
-from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.record import FEWEST, Record
 from stickslip_ros.identification.refinement import Refinement, refine, restarted
-from stickslip_ros.identification.regression import Regression
+from stickslip_ros.identification.regression import Regression, directions_of
 from stickslip_ros.identification.servo import Servo, closed_loop
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
 from stickslip_ros.identification.trajectory import Predictor, delayed, free_run
@@ -29,10 +30,15 @@ _VAGUE = 0.5
 """Standard error, as a share of the value, from which a constant counts as not told."""
 _USED = 0.6
 """Share of the samples below which the fit says that it used some of them only."""
+_FEW_MISSING = 1e-3
+"""Share of missing samples up to which nothing is said."""
+_SPEEDS_OF_MACHINES = 1e-6, 20.0
+"""Fastest speeds that a machine may have, m/s; others are in another unit."""
 _DIFFERENT = 0.05
 """Difference of friction at any speed, as a share of the largest, by which two laws differ."""
 _CORRELATED = 0.95
 """Correlation from which two constants are named together."""
+_BY_DIRECTION = "it merges with friction by direction, and is taken as 0"
 CHECKED = (
     "force_error",
     "free_run_error",
@@ -166,9 +172,11 @@ class Findings:
                 "of what it predicts; an input may be missing (a disturbance, the velocity of the "
                 "belt), or have another sign or unit"
             )
+        found += self._notes_on_samples
         fit = self.chosen.fit
         if isinstance(fit, Refinement):
-            used = len(fit.residual) / sum(len(each.position) for each in self.records)
+            samples = sum(segment.count for segment in fit.task.segments)
+            used = samples / sum(len(each.position) for each in self.records)
             if used < _USED:
                 found.append(
                     f"{used:.0%} of the samples were used, in parts over the whole length: the "
@@ -178,6 +186,31 @@ class Findings:
             found.append(
                 f"the errors repeat every {repetition} samples: the motion takes a whole number of "
                 "samples, so that rounding does not average out; the intervals may be too narrow"
+            )
+        return found
+
+    @property
+    def _notes_on_samples(self) -> Sequence[str]:
+        found: list[str] = []
+        for name in dict.fromkeys(record.name for record in self.records):
+            own = [record for record in self.records if record.name == name]
+            missing = float(np.mean(np.concatenate([record.lost for record in own])))
+            if missing > _FEW_MISSING:
+                used = ", and not fitted" if self.has_spring else ""
+                found.append(
+                    f"{100.0 * missing:.2g} % of the samples of {name} are missing: they are "
+                    f"interpolated{used}"
+                )
+            if own[0].left_out > 0.0:
+                found.append(
+                    f"{100.0 * own[0].left_out:.2g} % of the samples of {name} are left out: they "
+                    f"are in parts of less than {FEWEST} samples between gaps"
+                )
+        fastest = self._fastest
+        if not _SPEEDS_OF_MACHINES[0] <= fastest <= _SPEEDS_OF_MACHINES[1]:
+            found.append(
+                f"the slide is as fast as {fastest:.3g} m/s: check the units of time, position and "
+                "belt velocity"
             )
         return found
 
@@ -206,11 +239,14 @@ class Findings:
                 f"run with relative speeds from rest to {1e3 * self._fastest:.3g} mm/s"
             )
         for name, estimate in self.fitted.items():
-            if not estimate.standard_error < _VAGUE * abs(estimate.value) and name not in found:
-                found[name] = (
-                    f"{estimate.value:.4g} has a standard error of {estimate.standard_error:.2g}: "
-                    "the recordings do not tell it; a run with other speeds and forces may"
-                )
+            if estimate.standard_error < _VAGUE * abs(estimate.value) or name in found:
+                continue
+            sure = f"{estimate.value:.4g} has a standard error of {estimate.standard_error:.2g}"
+            if isinf(estimate.standard_error):
+                sure = f"{estimate.value:.4g} is one of many values that fit alike"
+            found[name] = (
+                f"{sure}: the recordings do not tell it; a run with other speeds and forces may"
+            )
         return found
 
     @cached_property
@@ -218,10 +254,12 @@ class Findings:
         """Laws that predict as well as the one that was chosen, and have another friction."""
         found: list[str] = []
         for each in self.candidates:
-            if each is self.chosen or not self.as_good.get(each.label) or each.remark:
+            # The one that was chosen may have been fitted further since.
+            same = each.label == self.chosen.label
+            if same or not self.as_good.get(each.label) or each.remark:
                 continue
-            for number in range(len(self.directions)):
-                own, other = self.friction(number), friction_of(each.fit, number, self._fastest)
+            for number, sign in enumerate(self.directions):
+                own, other = self.friction(number), friction_of(each.fit, sign, self._fastest)
                 away = np.abs(np.interp(own.speed, other.speed, other.force) - own.force)
                 if float(away.max()) > _DIFFERENT * float(own.force.max()):
                     found.append(each.label)
@@ -235,7 +273,7 @@ class Findings:
             "at rest: it is in the friction, and taken as 0",
             "stiffness": "no spring is looked for on a belt at rest: it is taken as 0; give it by "
             "--fix plant.stiffness=...",
-            "bias_force": "it merges with friction by direction, and is taken as 0"
+            "bias_force": _BY_DIRECTION
             if both
             else "it merges with the static friction of a single direction, and is taken as 0; run "
             "in both directions",
@@ -260,17 +298,24 @@ class Findings:
                     "at one belt speed it merges with a linear part of friction, and is taken as "
                     "0; run at several belt speeds"
                 )
-            elif name == "bias_force":
+            elif name == "bias_force" and len(self._slips) == 1:
                 found[name] = (
                     "in one direction it merges with the static friction, and is taken as 0; run "
                     "in both directions"
                 )
+            elif name == "bias_force" and self.chosen.by_direction:
+                found[name] = _BY_DIRECTION
         return found
 
     @cached_property
+    def _filtered(self) -> Sequence[Filtered]:
+        """Filtered columns of each record, without a delay."""
+        return [filtered(each, decimated=False) for each in self.records]
+
+    @property
     def _speeds(self) -> Sequence[FloatArray]:
         """Size of the relative speeds of each record, m/s."""
-        return [np.abs(filtered(each, decimated=False).relative_speed) for each in self.records]
+        return [np.abs(each.relative_speed) for each in self._filtered]
 
     @property
     def slowest(self) -> float:
@@ -283,14 +328,18 @@ class Findings:
         """Whether the slide stuck in a record."""
         return any(np.mean(each > _STILL * each.max()) < 0.98 for each in self._speeds)
 
-    @property
+    @cached_property
     def directions(self) -> Sequence[float]:
         """Signs of the relative speed that have a curve of their own."""
         fit = self.chosen.fit
-        if isinstance(fit, Regression):
-            return fit.rows.directions
-        belt = float(self.records[0].belt_velocity[0])
-        return [-1.0 if belt >= 0.0 else 1.0]
+        return fit.rows.directions if isinstance(fit, Regression) else self._slips
+
+    @cached_property
+    def _slips(self) -> Sequence[float]:
+        """Signs of the relative speed that were recorded: 1, -1 or both."""
+        return directions_of(
+            np.concatenate([each.relative_speed[each.slipping] for each in self._filtered])
+        )
 
     def friction(self, direction: int = 0) -> Friction:
         """Return the friction curve over the recorded speeds, with its standard error.
@@ -298,14 +347,14 @@ class Findings:
         Parameters
         ----------
         direction : int, optional
-            0 for the first direction of the recordings, 1 for the other one.
+            Number of the direction in `directions`.
 
         Returns
         -------
         Friction
             The curve.
         """
-        return friction_of(self.chosen.fit, direction, self._fastest)
+        return friction_of(self.chosen.fit, self.directions[direction], self._fastest)
 
     @property
     def _fastest(self) -> float:
@@ -316,15 +365,10 @@ class Findings:
         assert isinstance(self.chosen.fit, Regression)
         return self.chosen.fit
 
-    def tables(self) -> Sequence[Points]:
-        """Return points of speed (m/s) and coefficient, for each direction of the recordings."""
-        fit, force = self._regression, self.normal_force
-        return [table_of(fit, number, force) for number in range(len(fit.rows.directions))]
-
     @cached_property
     def drive(self) -> Drive:
-        """The drive, with the belt speed of the first sample."""
-        fit, belt = self.chosen.fit, float(self.records[0].belt_velocity[0])
+        """The drive, with the usual belt speed of the first record: the median where it moves."""
+        fit, belt = self.chosen.fit, _usual(self.records[0].belt_velocity)
         if isinstance(fit, Refinement):
             return fit.task.model.drive(fit.values, self.normal_force, belt)
         return axis_drive(fit, self.normal_force, belt)
@@ -348,7 +392,7 @@ class Findings:
         columns = filtered(record, decimated=not spring, delay=delay)
 
         def rows(values: FloatArray) -> FloatArray:
-            return columns.rows(values)
+            return values[columns.settled] if spring else columns.rows(values)
 
         force, speed = rows(columns.force), rows(columns.relative_speed)
         if isinstance(fit, Refinement):
@@ -374,7 +418,7 @@ class Findings:
         if not record.held_force.any():
             return None
         found = self.errors(record)
-        return rms(found.force_error) / rms(found.force)
+        return rms(found.force_error) / rms(found.force) if len(found.force) else None
 
     def free_run(self, record: Record) -> FloatArray:
         """Return the positions that the model runs through, with the recorded force, no feedback.
@@ -408,7 +452,9 @@ class Findings:
         task = _divided(fit.task, record, float(np.median(counts)) * self.records[0].period)
         task = replace(task, predictors=[Predictor(replace(record, velocity=None))])
         starts = restarted(refine(task, (), fit.values)).starts
-        return rms(task.predicted(fit.values, starts) - task.positions)
+        away = task.predicted(fit.values, starts) - task.positions
+        own = [~record.lost[each.start : each.start + each.count] for each in task.segments]
+        return rms(away[np.concatenate(own)])
 
     def check(self, record: Record) -> dict[str, float | None]:
         """Return what the model predicts of a record, as `CHECKED` names it.
@@ -416,7 +462,7 @@ class Findings:
         `free_run_error` and `segment_error` are in m, the others are shares of the rms of what was
         recorded.
         """
-        away = self.free_run(record) - record.position
+        away = (self.free_run(record) - record.position)[~record.lost]
         error = rms(away[~np.isnan(away)]) if self.has_spring else rms(away)
         found: dict[str, float | None] = dict.fromkeys(CHECKED)
         found |= {
@@ -429,6 +475,16 @@ class Findings:
             found["position_error"] = _relative(position[START:], record.position[START:])
             found["closed_loop_force_error"] = _relative(force[START:], record.force[START:])
         return found
+
+
+def _usual(belt: FloatArray) -> float:
+    """Return the median speed of a belt where it moves, in its more frequent direction."""
+    size = np.abs(belt)
+    moving = belt[size > _STILL * float(size.max())]
+    if not len(moving):
+        return 0.0
+    sign = 1.0 if np.mean(moving > 0.0) >= 0.5 else -1.0
+    return float(np.median(moving[moving * sign > 0.0]))
 
 
 def _divided(task: Trajectories, record: Record, length: float) -> Trajectories:
@@ -452,13 +508,15 @@ def _propagated(
     covariance: FloatArray,
 ) -> tuple[list[str], FloatArray, FloatArray]:
     """Return names, values and covariance of what depends on a point with a covariance."""
+    if not len(point):
+        return [], np.empty(0), np.empty((0, 0))
     base = constants(point)
     columns: list[list[float]] = []
     for number, step in enumerate(steps.tolist()):
         moved = constants(point + np.where(np.arange(len(point)) == number, step, 0.0))
         columns.append([(moved[name] - base[name]) / step for name in base])
     linear = np.transpose(columns)
-    told = np.abs(linear).sum(axis=1) > 0.0
-    names = [name for name, used in zip(base, told, strict=True) if used]
+    fitted = np.abs(linear).sum(axis=1) > 0.0
+    names = [name for name, used in zip(base, fitted, strict=True) if used]
     values = np.array([base[name] for name in names])
-    return names, values, linear[told] @ covariance @ linear[told].T
+    return names, values, carried(linear[fitted], covariance)

@@ -43,7 +43,8 @@ def adjusted(fit: Regression, records: Sequence[Record], delay: float) -> Regres
 
     task = _FreeRuns(fit, records, delay)
     start = task.linear()
-    least = np.array([*fit.least, *(0.05 * fit.shapes), *[-np.inf] * len(records)])
+    slowest = np.full(len(fit.shapes), fit.rows.least_shape(fit.curve))
+    least = np.array([*fit.least, *slowest, *[-np.inf] * len(records)])
     solved = least_squares(
         task.residual,
         np.maximum(start, least + 1e-9),
@@ -139,9 +140,11 @@ class _FreeRuns:
 
         shapes = fit.shapes
         if len(shapes):
+            lowest = np.log(fit.rows.least_shape(fit.curve))
             found = least_squares(
                 by_logarithms,
-                np.log(shapes),
+                np.maximum(np.log(shapes), lowest),
+                bounds=(lowest, np.inf),
                 diff_step=1e-3,
                 max_nfev=10,
             )

@@ -1,8 +1,7 @@
 """From recordings to a model: which law, which constants, how sure."""
 
 from collections.abc import Callable, Mapping, Sequence
-
-import numpy as np
+from math import inf, isfinite
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.axes import AXIS_LAWS, AxisTask
@@ -15,13 +14,17 @@ from stickslip_ros.identification.reading import ReadRecords
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import LINEAR
 from stickslip_ros.identification.servo import servo_of
-from stickslip_ros.text import did_you_mean
+from stickslip_ros.text import must_be_one_of
 
 LAWS = (AUTO, *dict.fromkeys([*AXIS_LAWS, *DRIVE_LAWS]))
 """Friction laws that can be identified, and `AUTO`."""
 _FRICTION = ("static", "minimum", "minimum_speed", "kinetic", "decay_speed", "viscous")
 FIXABLE = (*LINEAR, "normal_force", DELAY, *(f"friction.{name}" for name in _FRICTION))
 """Constants that can be given, by parameter of the plant."""
+_DELAYS = -1.0, 20.0
+"""Delays that can be given, sample periods."""
+_SAME_PERIOD = 0.01
+"""Share by which sample periods of recordings that are fitted together may differ."""
 
 
 def identify_recordings(
@@ -61,7 +64,7 @@ def identify_recordings(
     for target, value in fixed.items():
         node, _, name = target.partition(".")
         if node != "plant" or not name:
-            raise InvalidInputError(f"{target} is refused: must be plant.PARAMETER")
+            raise InvalidInputError(f"{target} is refused: {_allowed(target)}")
         known[name] = float(value)
     return identify([record for each in read for record in each.records], law, known, progress)
 
@@ -121,17 +124,11 @@ def identify(
     fixed = {} if fixed is None else fixed
     for name, value in fixed.items():
         if name not in FIXABLE:
-            raise InvalidInputError(
-                f"plant.{name} is refused: {did_you_mean(name, FIXABLE, '')} must be one of "
-                f"{', '.join(FIXABLE)}"
-            )
-        least = -np.inf if name in ("bias_force", DELAY) else 0.0
-        if not (least <= value < np.inf) or (name in ("mass", "normal_force") and value == 0.0):
-            raise InvalidInputError(f"plant.{name} = {value} is refused: must be a positive number")
+            raise InvalidInputError(f"plant.{name} is refused: {_allowed(f'plant.{name}')}")
+        _check_value(name, value, records[0].period)
     if law not in LAWS:
-        raise InvalidInputError(
-            f"law {law} is refused: {did_you_mean(law, LAWS, '')} must be one of {', '.join(LAWS)}"
-        )
+        raise InvalidInputError(f"law {law} is refused: {must_be_one_of(law, LAWS)}")
+    _check_records(records)
     moving = any(record.belt_velocity.any() for record in records)
     spring = fixed["stiffness"] > 0.0 if "stiffness" in fixed else moving
     known = AXIS_LAWS if not spring else DRIVE_LAWS
@@ -164,6 +161,39 @@ def identify(
     )
 
 
+def _allowed(name: str) -> str:
+    """Return the end of a message that refuses a constant."""
+    return must_be_one_of(name, [f"plant.{each}" for each in FIXABLE])
+
+
+def _check_value(name: str, value: float, period: float) -> None:
+    """Refuse a constant that no drive has."""
+    if name == DELAY:
+        low, high = (periods * period for periods in _DELAYS)
+        allowed = f"from {low:.4g} s to {high:.4g} s, {_DELAYS[0]:g} to {_DELAYS[1]:g} periods"
+        right = low <= value <= high
+    elif name == "bias_force":
+        right, allowed = isfinite(value), "a finite number"
+    elif name in ("mass", "normal_force"):
+        right, allowed = 0.0 < value < inf, "a number above 0"
+    else:
+        right, allowed = 0.0 <= value < inf, "a number of 0 or more"
+    if not right:
+        raise InvalidInputError(f"plant.{name} = {value} is refused: must be {allowed}")
+
+
+def _check_records(records: Sequence[Record]) -> None:
+    """Refuse records that tell nothing, or have different sample periods."""
+    first = records[0]
+    for record in records:
+        record.require_motion()
+        if abs(record.period - first.period) > _SAME_PERIOD * first.period:
+            raise InvalidInputError(
+                f"{first.name} has a sample period of {first.period:.4g} s and {record.name} one "
+                f"of {record.period:.4g} s: recordings that are fitted together must have the same"
+            )
+
+
 def _check_friction(fixed: Mapping[str, float], law: str, *, spring: bool) -> None:
     """Refuse constants of friction that the law in question does not search by themselves."""
     known = {
@@ -177,6 +207,6 @@ def _check_friction(fixed: Mapping[str, float], law: str, *, spring: bool) -> No
             allowed = ", ".join(f"plant.{each}" for each in FIXABLE if each in known)
             raise InvalidInputError(
                 f"plant.{name} cannot be fixed with the law {law} "
-                f"{'on' if spring else 'without'} a spring: "
-                f"{f'of friction only {allowed}' if allowed else 'no constant of friction can'}"
+                f"{'on' if spring else 'without'} a spring: of friction "
+                f"{f'only {allowed}' if allowed else 'no constant'} can be fixed there"
             )

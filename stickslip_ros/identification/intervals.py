@@ -2,14 +2,17 @@
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray
+from stickslip_ros.arrays import BoolArray, FloatArray
 
 BLOCKS = 24
 """Number of blocks of time from whose scatter covariances are computed."""
 QUANTILE = 2.07
-"""Half of a 95 % interval, in standard errors: Student's t of one degree of freedom per block."""
+"""Half of a 95 % interval, in standard errors: Student's t with BLOCKS - 1 = 23 degrees of
+freedom."""
 _RANK = 1e-13
 """Share of the largest eigenvalue below which rows do not tell a combination of parameters."""
+_PART = 1e-6
+"""Part in such a combination from which a parameter is not told; less is rounding error."""
 
 
 def block_covariance(jacobian: FloatArray, residual: FloatArray, lost: int = 0) -> FloatArray:
@@ -31,12 +34,14 @@ def block_covariance(jacobian: FloatArray, residual: FloatArray, lost: int = 0) 
     Returns
     -------
     array of shape (parameters, parameters)
-        Covariance; of what the rows do not tell, huge variance.
+        Covariance. The variance of what the rows do not tell is infinite, its covariances are 0;
+        see `carried`.
     """
     scale = np.linalg.norm(jacobian, axis=0)
     scale[scale == 0.0] = 1.0
     scaled = jacobian / scale
     product = scaled.T @ scaled
+    untold = _untold(product)
     changes: list[FloatArray] = []
     for rows in np.array_split(np.arange(len(residual)), BLOCKS):
         own = scaled[rows]
@@ -50,4 +55,40 @@ def block_covariance(jacobian: FloatArray, residual: FloatArray, lost: int = 0) 
     tiny = np.finfo(float).tiny
     ratios = np.maximum(np.diag(white), tiny) / np.maximum(np.diag(found), tiny)
     larger = np.sqrt(np.maximum(ratios, 1.0))
-    return found * np.outer(larger / scale, larger / scale)
+    found = found * np.outer(larger / scale, larger / scale)
+    found[untold, :] = found[:, untold] = 0.0
+    found[untold, untold] = np.inf
+    return found
+
+
+def _untold(product: FloatArray) -> BoolArray:
+    """Return which parameters have a part in a combination that rows do not tell."""
+    if not len(product):
+        return np.zeros(0, bool)
+    sizes, axes = np.linalg.eigh(product)
+    lost = sizes <= _RANK * max(float(sizes[-1]), np.finfo(float).tiny)
+    return np.any(np.abs(axes[:, lost]) > _PART, axis=1)
+
+
+def carried(linear: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the covariance of what depends linearly on values with a covariance.
+
+    Parameters
+    ----------
+    linear : array of shape (results, values)
+        Derivatives of the results.
+    covariance : array of shape (values, values)
+        Covariance, with infinite variances of values that are not told.
+
+    Returns
+    -------
+    array of shape (results, results)
+        Covariance. The variance of what depends on such a value is infinite.
+    """
+    told = np.isfinite(np.diag(covariance))
+    own = linear[:, told]
+    found = own @ covariance[np.ix_(told, told)] @ own.T
+    untold = (linear[:, ~told] != 0.0).any(axis=1)
+    found[untold, :] = found[:, untold] = 0.0
+    found[untold, untold] = np.inf
+    return found

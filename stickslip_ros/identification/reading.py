@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from math import exp, inf
+from math import exp, inf, isfinite, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,16 +11,28 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.table_file import has_columns, is_table, table_columns, table_of
+from stickslip_ros.bags.table_file import (
+    has_columns,
+    is_table,
+    own_columns,
+    quantities_of,
+    stamps_of,
+    table_of,
+)
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.identification.models import DELAY
-from stickslip_ros.identification.record import Record, evenly_spaced
+from stickslip_ros.identification.record import FEWEST, Record, evenly_spaced
 from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.samples import ForceColumns
 from stickslip_ros.stamps import NANOSECONDS
 
-_OPTIONAL = ("velocity", "disturbance", "reference", "friction_force")
+_OPTIONAL = ("velocity", "disturbance", "reference")
 """Quantities that a table may lack if another one of the same machine has them."""
+_MAY_LACK_VALUES = ("velocity", "reference")
+"""Quantities without which samples are used."""
+
+Table = Mapping[str, FloatArray]
+"""Columns of a table by name."""
 
 
 class ReadRecords(NamedTuple):
@@ -76,7 +88,7 @@ def read_all(
         if columns is not None and path in tables:
             absent = lacking[path] - nowhere
             own = {name: text for name, text in columns.items() if name not in absent}
-        found[path] = read_records(path, own, **options)
+        found[path] = _read(path, tables.get(path), own, **options)
     return found
 
 
@@ -116,31 +128,56 @@ def read_records(
     InvalidInputError
         If it lacks what identification needs.
     """
-    if is_table(path):
-        stamp, found = _of_table(path, columns, belt_speed)
+    table = table_of(path) if is_table(path) else None
+    return _read(
+        path, table, columns, start=start, end=end, namespace=namespace, belt_speed=belt_speed
+    )
+
+
+def _read(
+    path: Path,
+    table: Table | None,
+    columns: Mapping[str, str] | None,
+    *,
+    start: float = 0.0,
+    end: float = inf,
+    namespace: str | None = None,
+    belt_speed: float | None = None,
+) -> ReadRecords:
+    if table is not None:
+        stamp, found = _of_table(path, table, columns, belt_speed)
         known: Mapping[str, float] = {}
     else:
         stamp, found, known = _of_bag(path, namespace, belt_speed)
     since = (stamp - stamp[0]) / NANOSECONDS
     part = (since >= start) & (since < end)
     if not part.any():
-        raise InvalidInputError(f"{path} holds no samples from {start:g} s to {end:g} s")
+        part_of = f"from {start:g} s" + (f" to {end:g} s" if isfinite(end) else " on")
+        raise InvalidInputError(f"{path} holds no samples {part_of}: it lasts {since.max():.4g} s")
     own = {name: values[part] for name, values in found.items()}
     return ReadRecords(evenly_spaced(str(path), stamp[part], own), known)
 
 
 def _of_table(
-    path: Path, columns: Mapping[str, str] | None, belt_speed: float | None
+    path: Path, table: Table, columns: Mapping[str, str] | None, belt_speed: float | None
 ) -> tuple[IntArray, dict[str, FloatArray]]:
-    found = table_columns(path, columns)
+    columns = own_columns(path, table) if columns is None else columns
+    found = quantities_of(path, table, columns)
     time = found.pop("time")
-    stamp = np.rint((time - time[0]) * NANOSECONDS).astype(np.int64)
     belt = found.get("belt_velocity", np.full(len(time), 0.0))
     if belt_speed is not None:
         belt = np.full(len(time), belt_speed)
     optional = ("force", "disturbance", "reference", "velocity")
     used = {name: found[name] for name in optional if name in found}
-    return stamp, {"position": found["position"], "belt_velocity": belt, **used}
+    used |= {"position": found["position"], "belt_velocity": belt}
+    for name, values in used.items():
+        count = np.count_nonzero(np.isfinite(values))
+        if name not in _MAY_LACK_VALUES and count < FEWEST <= len(values):
+            raise InvalidInputError(
+                f"{path}: {name.replace('_', ' ')} (column {columns[name]}) has {count} finite "
+                f"numbers in {len(values)} rows: identification needs at least {FEWEST}"
+            )
+    return stamps_of(path, time), used
 
 
 def _of_bag(
@@ -164,9 +201,9 @@ def _of_bag(
     if len(forces):
         found["force"] = _held(forces, stamp, plant)
     if len(disturbances):
-        found["disturbance"] = _since(stamp, disturbances.stamp, disturbances.force)
+        found["disturbance"] = _since(stamp, disturbances.stamp, disturbances.force, before=0.0)
     if len(references):
-        found["reference"] = _since(stamp, references.stamp, references.position)
+        found["reference"] = _since(stamp, references.stamp, references.position, before=nan)
     delay = plant.get("force_delay", 0.0)
     known = {DELAY: float(delay)} if isinstance(delay, int | float) and delay > 0.0 else {}
     return stamp, found, known
@@ -177,7 +214,7 @@ def _held(forces: ForceColumns, stamp: IntArray, plant: Mapping[str, Any]) -> Fl
 
     Of a force that lags it is the mean until the next sample.
     """
-    held = _since(stamp, forces.stamp, forces.force)
+    held = _since(stamp, forces.stamp, forces.force, before=0.0)
     given = {name: plant.get(f"actuator.{name}") for name in ("limit", "resolution")}
     limiter = Actuator(
         **{name: float(value) for name, value in given.items() if isinstance(value, int | float)}
@@ -195,8 +232,8 @@ def _held(forces: ForceColumns, stamp: IntArray, plant: Mapping[str, Any]) -> Fl
     return mean
 
 
-def _since(stamp: IntArray, since: IntArray, values: FloatArray) -> FloatArray:
-    """Return the newest value at each stamp; zero before the first one."""
+def _since(stamp: IntArray, since: IntArray, values: FloatArray, *, before: float) -> FloatArray:
+    """Return the newest value at each stamp, and another one before the first."""
     order = np.argsort(since, kind="stable")
     place = np.searchsorted(since[order], stamp, "right") - 1
-    return np.where(place >= 0, values[order][np.maximum(place, 0)], 0.0)
+    return np.where(place >= 0, values[order][np.maximum(place, 0)], before)

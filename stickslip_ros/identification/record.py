@@ -7,12 +7,12 @@ from typing import Self
 
 import numpy as np
 
-from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.noise import white_noise
 from stickslip_ros.stamps import NANOSECONDS
 
-_FEWEST = 500
+FEWEST = 500
 """Fewest samples of a record."""
 _LONGEST_GAP = 3.5
 """Longest distance of samples, in periods, that is bridged."""
@@ -28,6 +28,13 @@ _SMOOTHED = 11
 """Samples over which a speed is found."""
 _REST = 20
 """Successive samples of the same position from which the slide is at rest."""
+_FEWEST_VALUES = 10
+"""Fewest different positions of a slide that moves."""
+_NEAR = 0.75
+"""Distance of a sample, in periods, from which it counts as missing."""
+_UNEVEN, _USUAL = 0.25, 0.6
+"""Largest difference of a time step from the period, as a share of it; share of the steps, at
+least, that are so near."""
 _DITHERED = 0.5
 """Noise, in steps of the encoder, from which rounding errors are independent; rounding has 0.29."""
 
@@ -61,6 +68,10 @@ class Record:
     """Displacement that a controller followed, m; None: none is recorded."""
     velocity: FloatArray | None = None
     """Measured velocity of the slide, m/s; None: none but differences of positions is recorded."""
+    missing: BoolArray | None = None
+    """Where no sample is near, so that the motion is interpolated; None: nowhere."""
+    left_out: float = 0.0
+    """Share of the samples of the recording in parts that are too short for a record."""
 
     @property
     def duration(self) -> float:
@@ -76,9 +87,25 @@ class Record:
                 total = total + each
         return total
 
+    @property
+    def lost(self) -> BoolArray:
+        """Where no sample is near."""
+        return np.zeros(len(self.position), bool) if self.missing is None else self.missing
+
+    def require_motion(self) -> None:
+        """Raise InvalidInputError if the position hardly ever changes."""
+        count = len(np.unique(self.position))
+        if count < _FEWEST_VALUES:
+            values = "1 value" if count == 1 else f"{count} different values"
+            raise InvalidInputError(
+                f"{self.name}: the position has {values} in {len(self.position)} samples: "
+                f"identification needs at least {_FEWEST_VALUES} different ones; choose a part in "
+                "which the slide moves"
+            )
+
     @cached_property
     def weight(self) -> FloatArray:
-        """Weight of the error of each position.
+        """Weight of the error of each position; positions that are interpolated have none.
 
         Where the slide moves by less than about a step of the encoder between samples, the rounding
         errors of successive samples are alike. Their weight is less, so that a step counts as one
@@ -87,6 +114,10 @@ class Record:
         no weight, if other samples are enough. Of positions whose noise is larger than their steps
         all count alike.
         """
+        return np.where(self.lost, 0.0, self._weight_by_rounding)
+
+    @property
+    def _weight_by_rounding(self) -> FloatArray:
         from scipy.signal import savgol_filter
 
         position, step = self.position, self.resolution
@@ -131,7 +162,7 @@ class Record:
         """Return the samples from `start` to before `end`."""
         optional = {
             name: None if column is None else column[start:end]
-            for name in ("force", "disturbance", "reference", "velocity")
+            for name in ("force", "disturbance", "reference", "velocity", "missing")
             for column in (getattr(self, name),)
         }
         return replace(
@@ -153,7 +184,8 @@ def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) ->
         Stamps, ns.
     columns : dict
         Columns of `Record` by name. Samples of which one is not finite count as missing; only the
-        reference may be. Velocities that are differences of the positions are left out.
+        reference may be. Velocities are left out if they are differences of the positions, or if
+        less than half of them are finite.
 
     Returns
     -------
@@ -164,36 +196,40 @@ def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) ->
     Raises
     ------
     InvalidInputError
-        If no part is long enough.
+        If no part is long enough, or the clock is not even up to gaps and jitter.
     """
     columns = dict(columns)
     velocity = columns.get("velocity")
-    if velocity is not None and not np.isfinite(velocity).all():
+    if velocity is not None and np.mean(np.isfinite(velocity)) < 0.5:
         del columns["velocity"]
+    _check_clock(name, stamp)
     known = np.ones(len(stamp), bool)
     for each in columns.keys() - {"reference"}:
         known &= np.isfinite(columns[each])
     known &= np.diff(stamp, prepend=np.iinfo(np.int64).min // 2) > 0
     time = (stamp[known] - stamp[0]) / NANOSECONDS
     columns = {each: values[known] for each, values in columns.items()}
-    if len(time) < _FEWEST:
+    if len(time) < FEWEST:
         raise InvalidInputError(
-            f"{name} has {len(time)} samples: identification needs at least {_FEWEST}"
+            f"{name} has {len(time)} samples: identification needs at least {FEWEST}"
         )
-    period = float(np.median(np.diff(time)))
-    # Stamps are whole nanoseconds; the mean of the usual steps is the period.
     steps = np.diff(time)
-    period = float(np.mean(steps[np.abs(steps - period) < 0.25 * period]))
+    # Where every other sample is missing, half of the steps are double.
+    usual = float(np.quantile(steps, 0.5, method="lower"))
+    # Stamps are whole nanoseconds; the mean of the usual steps is the period.
+    period = float(np.mean(steps[np.abs(steps - usual) <= _UNEVEN * usual]))
     breaks = np.flatnonzero(steps > _LONGEST_GAP * period) + 1
     records: list[Record] = []
-    for rows in np.split(np.arange(len(time)), breaks):
-        if len(rows) < _FEWEST:
-            continue
+    parts = np.split(np.arange(len(time)), breaks)
+    long_enough = [rows for rows in parts if len(rows) >= FEWEST]
+    left_out = 1.0 - sum(map(len, long_enough)) / len(time)
+    for rows in long_enough:
         own = time[rows]
         even = own[0] + period * np.arange(round((own[-1] - own[0]) / period) + 1)
         found: dict[str, FloatArray] = {}
+        as_measured = len(own) == len(even) and np.abs(own - even).max() < 1e-3 * period
         for each, values in columns.items():
-            if np.abs(own - even[: len(own)]).max() < 1e-3 * period and len(own) == len(even):
+            if as_measured:
                 found[each] = values[rows]
             elif each in ("force", "disturbance"):
                 last = np.searchsorted(own, even + 0.25 * period, "right") - 1
@@ -202,12 +238,36 @@ def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) ->
                 found[each] = np.interp(even, own, values[rows])
         if "velocity" in found and _is_difference(found["velocity"], found["position"], period):
             del found["velocity"]
-        records.append(Record(name, period, **found))
+        far = _distances(even, own) > _NEAR * period
+        records.append(
+            Record(name, period, **found, missing=far if far.any() else None, left_out=left_out)
+        )
     if not records:
         raise InvalidInputError(
-            f"{name} has no {_FEWEST} samples without a gap of more than {_LONGEST_GAP:.0f} periods"
+            f"{name} has no {FEWEST} samples without a gap of more than {_LONGEST_GAP:g} periods"
         )
     return records
+
+
+def _check_clock(name: str, stamp: IntArray) -> None:
+    """Refuse times that jump back, or whose steps are of no usual size."""
+    steps = np.diff(stamp) / NANOSECONDS
+    if not len(steps):
+        return
+    forward = steps[steps > 0.0]
+    usual = float(np.median(forward)) if len(forward) else 0.0
+    near = np.abs(forward - usual) <= _UNEVEN * usual
+    if float(steps.min()) < 0.0 or not len(forward) or float(np.mean(near)) < _USUAL:
+        raise InvalidInputError(
+            f"{name}: the time steps are from {steps.min():.4g} s to {steps.max():.4g} s: they "
+            "must be even up to gaps"
+        )
+
+
+def _distances(times: FloatArray, samples: FloatArray) -> FloatArray:
+    """Return the distance of each time from the nearest sample; both increase."""
+    after = np.clip(np.searchsorted(samples, times), 1, len(samples) - 1)
+    return np.minimum(np.abs(samples[after] - times), np.abs(times - samples[after - 1]))
 
 
 def _is_difference(velocity: FloatArray, position: FloatArray, period: float) -> bool:

@@ -29,6 +29,8 @@ _WORSE = 9.0
 """Squared error of a segment, in that of the median one, from which its start is doubted."""
 _LEAST_CYCLE, _REPEATED = 20, 0.65
 """Samples of a cycle at least, and correlation of errors from which cycles are alike."""
+_UNLIKE = 0.3
+"""Correlation below which it falls in between."""
 _KICKS = (0.0, 0.5, -0.5, 2.0, -2.0)
 """Changes of the velocity at such a start, in errors of position per period."""
 
@@ -92,15 +94,8 @@ class Refinement:
 
     @property
     def repetition(self) -> int | None:
-        """Number of samples after which the errors repeat; None if they do not."""
-        from scipy.signal import correlate
-
-        count = len(self.residual)
-        found = correlate(self.residual, self.residual, method="fft")[count - 1 :]
-        later = found[_LEAST_CYCLE : count // 4]
-        if len(later) == 0 or float(later.max()) < _REPEATED * float(found[0]):
-            return None
-        return int(np.argmax(later)) + _LEAST_CYCLE
+        """Number of samples after which the errors of position repeat; None if they do not."""
+        return repetition_of(self.residual[self.task.of_positions])
 
     @cached_property
     def covariance(self) -> FloatArray:
@@ -132,6 +127,30 @@ class Refinement:
         error = np.sqrt(block_covariance(alone[:, None], rest, self._lost)[0, 0])
         along = float(alone @ rest)
         return -along / size / float(error), along * along / size / float(rest @ rest)
+
+
+def repetition_of(errors: FloatArray) -> int | None:
+    """Return the number of samples after which errors repeat; None if they do not.
+
+    Errors that are coloured only are alike over few samples, and less and less: their correlation
+    falls, and does not rise again.
+    """
+    from scipy.signal import correlate
+
+    count = len(errors)
+    found = correlate(errors, errors, method="fft")[count - 1 :][: count // 4]
+    if not len(found) or not found[0] > 0.0:
+        return None
+    shares = found / found[0]
+    unlike = np.flatnonzero(shares < _UNLIKE)
+    if not len(unlike):
+        return None
+    start = max(_LEAST_CYCLE, int(unlike[0]))
+    later = shares[start:]
+    peaks = np.flatnonzero((later[1:-1] >= later[:-2]) & (later[1:-1] >= later[2:])) + 1
+    if not len(peaks) or float(later[peaks].max()) < _REPEATED:
+        return None
+    return int(peaks[np.argmax(later[peaks])]) + start
 
 
 def refine(

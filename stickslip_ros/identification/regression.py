@@ -14,6 +14,8 @@ from stickslip_ros.identification.intervals import BLOCKS, block_covariance
 
 _SHARE = 0.05
 """Least share of the rows of a direction that has a curve of its own."""
+_FASTEST_SHAPE = 4.0
+"""Largest shape of a curve that is sought, in fastest speeds."""
 LINEAR = ("mass", "damping", "stiffness", "bias_force")
 """Constants of the equation beside those of friction."""
 
@@ -46,8 +48,8 @@ class Rows:
                 f"at least {4 * BLOCKS}"
             )
         relative = joined(lambda part: part.relative_speed)
-        counts = {sign: np.count_nonzero(relative * sign > 0.0) for sign in (1.0, -1.0)}
-        if not any(counts.values()):
+        directions = directions_of(relative)
+        if not directions:
             raise InvalidInputError("the slide never slips in the recordings: they tell nothing")
         return cls(
             parts,
@@ -59,7 +61,7 @@ class Rows:
             },
             force,
             np.arange(len(force)) * BLOCKS // len(force),
-            [sign for sign, count in counts.items() if count >= _SHARE * len(force)],
+            directions,
         )
 
     @cached_property
@@ -67,6 +69,10 @@ class Rows:
         """Size of the relative speeds above zero, m/s, sorted."""
         speeds = np.abs(np.concatenate([part.rows(part.relative_speed) for part in self.parts]))
         return np.sort(speeds[speeds > 0.0])
+
+    def least_shape(self, curve: Curve) -> float:
+        """Return the smallest shape of a curve that the rows tell, m/s."""
+        return curve.least_shape * float(np.quantile(self.speeds, 0.02))
 
     def friction_terms(self, curve: Curve, shapes: FloatArray) -> FloatArray:
         """Return sgn(v_r) times the terms of a curve for each direction, shape (rows, terms)."""
@@ -85,6 +91,12 @@ class Rows:
                 terms = followed(terms, path)
             made.append(part.rows(terms))
         return np.vstack(made)
+
+
+def directions_of(relative: FloatArray) -> Sequence[float]:
+    """Return the signs of relative speeds that are not rare: 1, -1 or both; none at rest."""
+    counts = {sign: np.count_nonzero(relative * sign > 0.0) for sign in (1.0, -1.0)}
+    return [sign for sign, count in counts.items() if count > _SHARE * len(relative)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +214,8 @@ def regress(
         return _solved(rows, curve, free, fixed, np.full(len(rows.directions), shape))
     from scipy.optimize import least_squares
 
-    low, high = np.log(np.quantile(rows.speeds, [0.02, 0.98]) * [0.25, 4.0])
+    high = float(np.log(_FASTEST_SHAPE * np.quantile(rows.speeds, 0.98)))
+    low = float(np.log(rows.least_shape(curve)))
 
     def residual(logarithms: FloatArray) -> FloatArray:
         shapes = np.broadcast_to(np.exp(logarithms), len(rows.directions))

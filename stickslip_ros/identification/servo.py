@@ -8,6 +8,7 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.filtered import START
 from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.trajectory import Predictor
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.motion import Motion
@@ -122,7 +123,7 @@ def closed_loop(
     record : Record
         Reference, and the first samples.
     drive : Drive
-        The model.
+        The model; its belt is that of the record.
     servo : Servo
         The controller.
     delay : float
@@ -137,7 +138,8 @@ def closed_loop(
     span, period = servo.difference_samples, record.period
     position = record.position
     velocity = float(position[span] - position[0]) / (span * period)
-    motion = Motion(drive, float(position[0]), velocity)
+    belt = Predictor(record).with_belt(drive, 0, len(position))
+    motion = Motion(belt, float(position[0]), velocity)
     loop = SampledLoop(motion, 1.0 / period, LOCKSTEP_START, force_delay=max(delay, 0.0))
     # Before the record the slide moves as at its start.
     positions = [float(position[0]) - velocity * period * number for number in range(span, 0, -1)]

@@ -60,7 +60,7 @@ class Trajectories:
         return self._joined(
             lambda record: (
                 record.weight,
-                np.full(len(record.position), record.velocity_weight),
+                np.where(record.lost, 0.0, record.velocity_weight),
             )
         )
 
@@ -79,6 +79,16 @@ class Trajectories:
     def block(self) -> IntArray:
         """Number of the segment of each row."""
         return np.repeat(np.arange(len(self.segments)), self._counts)
+
+    @cached_property
+    def of_positions(self) -> BoolArray:
+        """Which rows are those of positions."""
+        return self._joined(
+            lambda record: (
+                np.ones(len(record.position)),
+                np.zeros(len(record.position)),
+            )
+        ).astype(bool)
 
     @property
     def _counts(self) -> Sequence[int]:

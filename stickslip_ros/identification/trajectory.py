@@ -19,6 +19,9 @@ _FIRST = 20
 """Samples from which the velocity at the start is found."""
 _FAR = 1e300
 """Squared error of a motion that is not bounded, m^2."""
+_REACHES, _NEARER, _NEARLY = 14, 0.25, 0.05
+"""Reaches within which the velocity at the start is sought, at most; ratio of one to the one
+before; share of the squared error by which both ends of the last one may be worse."""
 _TOLERANCE = 1e-6
 """Largest error of the belt velocity between corners, as a share of its largest value."""
 
@@ -232,9 +235,9 @@ def free_run(record: Record, drive: Drive, delay: float = 0.0) -> tuple[float, F
         return loss if isfinite(loss) else _FAR, found
 
     tried = {slope: run(slope)}
-    best = slope
-    for reach in (spread, 0.2 * spread):
-        # The squared error is nearly a parabola in the velocity at the start.
+    best, reach = slope, spread
+    for _ in range(_REACHES):
+        # The squared error is a parabola in the velocity at the start, if the reach is small.
         for speed in (best - reach, best + reach):
             tried[speed] = run(speed)
         low, middle, high = (tried[best + sign * reach][0] for sign in (-1.0, 0.0, 1.0))
@@ -243,6 +246,9 @@ def free_run(record: Record, drive: Drive, delay: float = 0.0) -> tuple[float, F
             lowest = best + 0.5 * reach * (low - high) / bend
             tried[lowest] = run(lowest)
         best = min(tried, key=lambda speed: tried[speed][0])
+        if max(low, high) <= (1.0 + _NEARLY) * tried[best][0]:
+            break
+        reach *= _NEARER
     return best, tried[best][1]
 
 

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.identification.curves import SaturatingCurve
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.regression import Regression, regress
 from stickslip_ros.identification.servo import closed_loop, servo_of
 from tests.identification.axis_record import COULOMB, SATURATING, SERVO, axis, record
 
@@ -88,8 +90,13 @@ def test_a_force_of_another_origin_has_no_controller() -> None:
         ("stribek", {}, "law stribek is refused: did you mean stribeck"),
         ("dahl", {}, "law dahl is refused for a drive without a spring"),
         ("coulomb", {"friction.static": 3.0}, "plant.friction.static cannot be fixed"),
-        ("auto", {"mass": -1.0}, "plant.mass = -1.0 is refused"),
-        ("auto", {"mas": 1.0}, "plant.mas is refused: did you mean mass"),
+        ("auto", {"mass": -1.0}, "plant.mass = -1.0 is refused: must be a number above 0"),
+        ("auto", {"damping": -1.0}, "plant.damping = -1.0 is refused: must be a number of 0 or"),
+        ("auto", {"bias_force": np.inf}, "plant.bias_force = inf is refused: must be a finite"),
+        ("auto", {"force_delay": 1.0}, r"must be from -0.001 s to 0.02 s, -1 to 20 periods"),
+        ("auto", {"force_delay": -0.5}, "plant.force_delay = -0.5 is refused"),
+        ("auto", {"mas": 1.0}, r"plant.mas is refused: did you mean plant.mass\? must be one of"),
+        ("auto", {"xyz": 1.0}, "plant.xyz is refused: must be one of plant.mass, "),
     ],
 )
 def test_what_is_refused(law: str, fixed: dict[str, float], message: str) -> None:
@@ -100,8 +107,16 @@ def test_what_is_refused(law: str, fixed: dict[str, float], message: str) -> Non
 def test_without_a_force_an_axis_tells_nothing() -> None:
     own = record("coulomb")
     still = Record("axis", 1e-3, own.position, own.belt_velocity)
-    with pytest.raises(InvalidInputError, match="no force acts in the recordings"):
+    with pytest.raises(InvalidInputError, match=r"no force is recorded.* name its column"):
         identify([still])
+
+
+def test_a_force_that_is_always_0_is_refused() -> None:
+    own = record("coulomb")
+    without = replace(own, force=np.zeros(len(own.position)))
+    with pytest.raises(InvalidInputError, match="the recorded force is always 0") as refusal:
+        identify([without])
+    assert "column" not in str(refusal.value)
 
 
 def test_a_force_of_the_wrong_sign_is_refused() -> None:
@@ -115,7 +130,7 @@ def test_a_force_of_the_wrong_sign_is_refused() -> None:
 def test_a_slide_that_never_moves_is_refused() -> None:
     own = record("coulomb")
     still = Record("axis", 1e-3, np.zeros(len(own.position)), own.belt_velocity, own.force)
-    with pytest.raises(InvalidInputError, match="never slips"):
+    with pytest.raises(InvalidInputError, match="axis: the position has 1 value in 12000 samples"):
         identify([still])
 
 
@@ -172,3 +187,24 @@ def test_a_controller_is_found_beside_forces_that_are_added_to_it() -> None:
     added = found.added(replace(own, force=force))
     assert added[410:430] == pytest.approx(20.0, abs=1.0)
     assert np.count_nonzero(added) < 0.08 * len(added)
+
+
+def test_a_curve_does_not_rise_far_below_the_slowest_speed() -> None:
+    """A rise there is one with the force at rest: neither would be told."""
+    found = identify([record("coulomb")], "table")
+    fit = found.chosen.fit
+    assert isinstance(fit, Regression)
+    curve = SaturatingCurve()
+    saturating = regress(fit.rows, curve, fit.free, fit.fixed)
+    assert (saturating.shapes >= 0.999 * np.quantile(fit.rows.speeds, 0.02)).all()
+    for number, law in enumerate((COULOMB.forward, COULOMB.reverse)):
+        force = found.friction(number)
+        assert force.force[1] == pytest.approx(law.static, rel=0.3)
+
+
+def test_recordings_of_different_rates_are_refused() -> None:
+    own = record("coulomb")
+    with pytest.raises(
+        InvalidInputError, match=r"axis has a sample period of 0\.001 s and .* 0\.002 s"
+    ):
+        identify([own, replace(own, period=2e-3)])

@@ -14,8 +14,8 @@ import pytest
 from benchmarks import identification as study
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.identify import identify
-from stickslip_ros.identification.record import Record
-from stickslip_ros.identification.refinement import Refinement
+from stickslip_ros.identification.record import Record, evenly_spaced
+from stickslip_ros.identification.refinement import Refinement, repetition_of
 from stickslip_ros.physics.model.courses import Table as Course
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Directional, FrictionLaw, Table
@@ -184,11 +184,68 @@ def test_errors_that_repeat_are_noted() -> None:
     """A cycle of a whole number of samples: rounding is the same in each."""
     phase = np.arange(2000) / 50.0 * 2.0 * np.pi
     random = np.random.default_rng(0)
-    fit = Refinement.__new__(Refinement)
-    object.__setattr__(fit, "residual", np.sin(phase) + 0.1 * random.normal(size=2000))
-    assert fit.repetition == 50
-    object.__setattr__(fit, "residual", random.normal(size=2000))
-    assert fit.repetition is None
+    assert repetition_of(np.sin(phase) + 0.1 * random.normal(size=2000)) == 50
+    assert repetition_of(random.normal(size=2000)) is None
+
+
+def test_errors_that_are_coloured_only_do_not_repeat() -> None:
+    random = np.random.default_rng(0)
+    width = 150
+    smooth = np.convolve(random.normal(size=20_000), np.ones(width), "valid")
+    near = np.correlate(smooth[:-20], smooth[20:])[0] / np.sum(smooth**2)
+    assert near > 0.8
+    assert repetition_of(smooth) is None
+    assert repetition_of(np.arange(2000.0)) is None
+
+
+def test_only_errors_of_positions_are_compared() -> None:
+    own = study.record("coulomb", "ramp", 1, 2.0)
+    velocity = np.gradient(own.position, own.period)
+    velocity += 1e-3 * np.random.default_rng(0).normal(size=len(velocity))
+    fit = identify([replace(own, velocity=velocity)], "coulomb").chosen.fit
+    assert isinstance(fit, Refinement)
+    assert 2 * np.count_nonzero(fit.task.of_positions) == len(fit.residual)
+    assert (fit.task.measured[fit.task.of_positions] == fit.task.positions).all()
+
+
+def test_the_curve_is_that_of_the_recorded_slip() -> None:
+    """A slide on a belt that moves forward slips backward; with taps also forward."""
+    own = study.record("stribeck", "stick", 1, 2.5)
+    found = identify([own], "stribeck", {"mass": 100.0})
+    assert found.directions == [-1.0]
+    back = replace(own, position=-own.position, belt_velocity=-own.belt_velocity)
+    late = replace(back, belt_velocity=np.where(np.arange(2500) < 5, 0.0, back.belt_velocity))
+    found = identify([late], "stribeck", {"mass": 100.0})
+    assert found.directions == [1.0]
+    assert found.drive.belt_speed == float(back.belt_velocity[-1])
+
+
+def test_each_direction_has_its_curve() -> None:
+    law = Directional(Coulomb(static=0.25, viscous=0.6), Coulomb(static=0.35, viscous=0.9))
+    found = identify([reversing(law)], "coulomb", {"normal_force": 1000.0, "damping": 0.0})
+    assert found.directions == [1.0, -1.0]
+    for number, each in enumerate((law.forward, law.reverse)):
+        curve = found.friction(number)
+        true = 1000.0 * (each.static + each.viscous * curve.speed)
+        assert curve.force == pytest.approx(true, rel=0.01)
+        assert (curve.standard_error > 0.0).all()
+    assert "by direction" in found.unidentified["bias_force"]
+    alike = identify([reversing(Coulomb(static=0.3, viscous=0.8))], "coulomb", {"damping": 0.0})
+    assert "bias_force" not in alike.unidentified
+
+
+def test_missing_samples_are_not_measured() -> None:
+    own = study.record("stribeck", "stick", 2, 2.5)
+    position = own.position.copy()
+    position[::3] = np.nan
+    stamp = np.rint(1e9 * own.period * np.arange(len(position))).astype(np.int64)
+    columns = {"position": position, "belt_velocity": own.belt_velocity}
+    found = identify(evenly_spaced("log", stamp, columns), "stribeck", {"mass": study.MASS})
+    assert "33 % of the samples of log are missing" in found.notes[0]
+    true = study.truth("stribeck", "stick")
+    for name in ("stiffness", "friction.minimum_speed"):
+        estimate = found.fitted[name]
+        assert abs(estimate.value - true[name]) < _FAR * estimate.standard_error, name
 
 
 def test_long_recordings_are_used_in_parts() -> None:

@@ -103,5 +103,52 @@ def test_velocities_that_are_differences_are_no_measurements(span: int) -> None:
     assert record.velocity is not None
     gap = np.where(np.arange(800) == 5, np.nan, noisy)
     (record,) = evenly_spaced("log", _stamps(time), {**columns, "velocity": gap})
+    assert record.velocity is not None
+    assert np.flatnonzero(record.lost).tolist() == [5]
+    most = np.where(np.arange(800) % 3, np.nan, noisy)
+    (record,) = evenly_spaced("log", _stamps(time), {**columns, "velocity": most})
     assert record.velocity is None
+    assert len(record.position) == 800
+
+
+def test_samples_that_are_missing_have_no_weight() -> None:
+    time = 0.001 * np.arange(1500)
+    columns = _columns(time)
+    columns["position"][::3] = np.nan
+    columns["position"][-1] = 0.0
+    (record,) = evenly_spaced("log", _stamps(time), columns)
+    assert record.period == pytest.approx(0.001)
+    lost = np.arange(1, 1500) % 3 == 0
+    lost[-1] = False
+    assert (record.lost == lost).all()
+    assert (record.weight[lost] == 0.0).all()
+    assert (record.weight[~lost] > 0.0).any()
+    assert record.part(3, 9).lost.tolist() == lost[3:9].tolist()
+
+
+def test_the_share_of_samples_in_parts_that_are_too_short() -> None:
+    time = np.concatenate([0.001 * np.arange(900), 5.0 + 0.001 * np.arange(100)])
+    (record,) = evenly_spaced("log", _stamps(time), _columns(time))
+    assert len(record.position) == 900
+    assert record.left_out == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    "time",
+    [
+        np.cumsum(np.where(np.arange(1200) % 2, 1e-3, 3e-3)),
+        np.cumsum(np.where(np.arange(1201) % 2, 1e-3, 3e-3)),
+        np.cumsum(np.random.default_rng(0).uniform(1e-4, 3e-3, 1200)),
+        np.where(np.arange(1200) < 600, 0.0, -0.3) + 1e-3 * np.arange(1200),
+        np.zeros(1200),
+    ],
+)
+def test_a_clock_that_is_not_even_is_refused(time: np.ndarray) -> None:
+    with pytest.raises(InvalidInputError, match="must be even up to gaps"):
+        evenly_spaced("log", _stamps(time), _columns(time))
+
+
+def test_stamps_that_repeat_are_one_sample() -> None:
+    time = np.repeat(0.001 * np.arange(800), 2)
+    (record,) = evenly_spaced("log", _stamps(time), _columns(time))
     assert len(record.position) == 800
