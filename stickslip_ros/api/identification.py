@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.candidates import Estimate
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import AUTO, identify_recordings
@@ -70,9 +71,21 @@ class Model(Shown):
         dict
             `force_error`, `position_error` and `closed_loop_force_error` as shares of the rms of
             what was recorded, `free_run_error` and `segment_error` in m; None for what cannot be
-            predicted.
+            predicted, infinite for what is unbounded.
+
+        Raises
+        ------
+        BagError
+            If the recording cannot be read.
+        InvalidInputError
+            If it has several parts, or lacks what a prediction needs.
         """
         records = read_records(Path(recording), columns, start=start, end=end).records
+        if len(records) > 1:
+            raise InvalidInputError(
+                f"{recording} has {len(records)} parts between long gaps: one must be chosen by "
+                "start and end"
+            )
         return self.findings.check(records[0])
 
     def save(self, path: Path | str) -> Scenario:
@@ -105,7 +118,7 @@ class Model(Shown):
 
     def _parts(self) -> Parts:
         found = self.findings
-        return identification_tables(found, found.check(found.records[0]), [])
+        return identification_tables(found, found.check(found.records[0]), [], found.notes)
 
 
 def identify(
@@ -135,7 +148,7 @@ def identify(
     namespace : str, optional
         ROS namespace of the drive, where a bag holds several.
     belt_speed : float, optional
-        Belt speed, m/s, where the recordings do not have it.
+        Belt speed, m/s, in place of what the recordings have.
 
     Returns
     -------

@@ -119,7 +119,8 @@ def add_part(parser: argparse.ArgumentParser) -> None:
         "--belt-speed",
         type=velocity,
         metavar="V",
-        help="belt speed, m/s, for a bag whose joint states have a single joint, whatever its name",
+        help="belt speed, m/s, for a table without a belt velocity, and for a bag whose joint "
+        "states have a single joint, whatever its name",
     )
     parser.add_argument(
         "--from",

@@ -56,7 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="PARAMETER=VALUE",
-        help="a constant that is known, as in --fix plant.mass=95; can be repeated",
+        help="a constant that is known, as in --fix plant.mass=95: mass, damping, stiffness, "
+        "bias_force, normal_force, force_delay or, with --law, a constant of its friction; can be "
+        "repeated",
     )
     parser.add_argument(
         "--check",
@@ -104,18 +106,22 @@ def run(arguments: argparse.Namespace) -> int:
             [read[path] for path in dict.fromkeys(arguments.recordings)],
             arguments.law,
             fixed,
-            lambda _: progress(0.0),
+            lambda law: progress(0.0, f"identifying: {law}"),
         )
-        checks = [
-            {"recording": str(path), **found.check(record)}
-            for path in dict.fromkeys(arguments.check)
-            for record in read[path].records
-        ]
+        progress(0.0, "predicting")
         own = found.check(found.records[0])
+        checks: list[dict[str, Any]] = []
+        notes = [*found.notes]
+        for path in dict.fromkeys(arguments.check):
+            records = read[path].records
+            for number, record in enumerate(records, start=1):
+                name = str(path) if len(records) == 1 else f"{path}, part {number}"
+                checks.append({"recording": name, **found.check(record)})
+                notes += found.notes_on(record)
     if arguments.json:
-        print_json({**as_dict(found, own, checks), "versions": versions()})
+        print_json({**as_dict(found, own, checks, notes), "versions": versions()})
     else:
-        print_parts(identification_tables(found, own, checks))
+        print_parts(identification_tables(found, own, checks, notes))
     if arguments.out is not None:
         _write(arguments.out, found)
     if arguments.plot is not None:
@@ -132,11 +138,17 @@ def _write(path: Path, found: "Findings") -> None:
         files = written_scenario(found, path)
     names = printable(", ".join(map(str, files)))
     command = printable(shlex.join(["stickslip", "simulate", str(path)]))
-    print(f"{names}: written; `{command}` simulates the drive", file=sys.stderr)
+    moves = (
+        "" if found.has_spring else ", which stays at rest until a force or a reference moves it"
+    )
+    print(f"{names}: written; `{command}` simulates the drive{moves}", file=sys.stderr)
 
 
 def as_dict(
-    found: "Findings", own: dict[str, float | None], checks: Sequence[dict[str, Any]]
+    found: "Findings",
+    own: dict[str, float | None],
+    checks: Sequence[dict[str, Any]],
+    notes: Sequence[str],
 ) -> dict[str, Any]:
     """Return the findings for JSON."""
     curves: list[dict[str, Any]] = []
@@ -178,7 +190,7 @@ def as_dict(
             for each in found.candidates
         ],
         "curves": curves,
-        "notes": list(found.notes),
+        "notes": list(notes),
         "servo": None if found.servo is None else vars(found.servo),
         "force_delay": found.delay,
         "checks": list(checks),

@@ -2,9 +2,9 @@
 
 import json
 import sys
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from stickslip_ros.tables import TextTable
 from stickslip_ros.text import printable
@@ -18,6 +18,14 @@ _ALL_SI: Mapping[str, "Units"] = {}
 
 _FRAME = 3
 """Characters that the frame of a column takes, beside one for the whole table."""
+
+
+class Progress(Protocol):
+    """Shows how much is done, and what is done next if the label changes."""
+
+    def __call__(self, done: float, label: str | None = None) -> None:
+        """Show the progress."""
+        ...
 
 
 def print_json(values: Mapping[str, Any]) -> None:
@@ -62,10 +70,10 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
 
 
 @contextmanager
-def progress_bar(label: str, total: float | None) -> Generator[Callable[[float], None]]:
+def progress_bar(label: str, total: float | None) -> Generator[Progress]:
     """Show progress towards `total` on standard error if that is a terminal."""
     if not sys.stderr.isatty():
-        yield lambda done: None
+        yield lambda done, label=None: None
         return
     from rich.console import Console
     from rich.progress import (
@@ -80,7 +88,9 @@ def progress_bar(label: str, total: float | None) -> Generator[Callable[[float],
     columns = (text, BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(printable(label), total=total)
-        yield lambda done: bar.update(task, completed=done)
+        yield lambda done, label=None: bar.update(
+            task, completed=done, description=None if label is None else printable(label)
+        )
 
 
 def _print_framed(

@@ -22,6 +22,8 @@ from stickslip_ros.physics.model.friction import (
     Table,
 )
 
+_LEAST = 0.01
+"""Least friction of bristles at a speed, as a share of the largest."""
 POINTS = 40
 """Points that stand for a curve."""
 
@@ -79,8 +81,13 @@ def law_of(fit: Regression, direction: int, normal_force: float) -> FrictionLaw:
             decay_speed=float(fit.shapes[direction]),
             viscous=others[1],
         )
-    table = Table(table_of(fit, direction, normal_force))
+    points = table_of(fit, direction, normal_force)
     if not isinstance(fit.curve, FollowedCurve):
-        return table
-    largest = max(size for _, size in table.points)
-    return LuGre(table, bristle_stiffness=largest / fit.curve.deflection, bristle_damping=0.0)
+        return Table(points)
+    # A law has one contact: the mean friction of both directions is that of its stiffness.
+    tables = (table_of(fit, number, normal_force) for number in range(len(fit.rows.directions)))
+    mean = float(np.mean([max(size for _, size in each) for each in tables]))
+    # Bristles need friction to deflect.
+    points = tuple((speed, max(size, _LEAST * mean)) for speed, size in points)
+    stiffness = mean / fit.curve.deflection
+    return LuGre(Table(points), bristle_stiffness=stiffness, bristle_damping=0.0)

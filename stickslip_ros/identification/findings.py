@@ -9,7 +9,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.identification.axis_drive import axis_drive, law_of
-from stickslip_ros.identification.candidates import Candidate, Estimate
+from stickslip_ros.identification.candidates import Candidate, Estimate, better_by
 from stickslip_ros.identification.curve_bands import Friction, friction_of
 from stickslip_ros.identification.drives import POOR
 from stickslip_ros.identification.filtered import START, Filtered, filtered
@@ -89,6 +89,11 @@ class Findings:
         default_factory=dict[int, tuple[Record, FloatArray]], init=False, repr=False
     )
     """Free runs so far, each with its record, by the record's identity."""
+
+    def behind(self, candidate: Candidate) -> float:
+        """Return by how many standard errors a law predicts held-out parts worse than the best."""
+        allowed = [each for each in self.candidates if not each.remark] or self.candidates
+        return better_by(min(allowed, key=lambda each: each.error), candidate)
 
     @property
     def law(self) -> str:
@@ -460,8 +465,9 @@ class Findings:
         """Return what the model predicts of a record, as `CHECKED` names it.
 
         `free_run_error` and `segment_error` are in m, the others are shares of the rms of what was
-        recorded.
+        recorded. What is unbounded is infinite.
         """
+        record.require_motion()
         away = (self.free_run(record) - record.position)[~record.lost]
         error = rms(away[~np.isnan(away)]) if self.has_spring else rms(away)
         found: dict[str, float | None] = dict.fromkeys(CHECKED)
@@ -470,11 +476,21 @@ class Findings:
             "free_run_error": error if isfinite(error) else inf,
             "segment_error": self.segment_error(record),
         }
-        if self.servo is not None and record.reference is not None and record.force is not None:
-            position, force = closed_loop(record, self.drive, self.servo, self.delay)
-            found["position_error"] = _relative(position[START:], record.position[START:])
-            found["closed_loop_force_error"] = _relative(force[START:], record.force[START:])
+        led = record.led
+        if self.servo is not None and led is not None and led.force is not None:
+            position, force = closed_loop(led, self.drive, self.servo, self.delay)
+            found["position_error"] = _relative(position[START:], led.position[START:])
+            found["closed_loop_force_error"] = _relative(force[START:], led.force[START:])
         return found
+
+    def notes_on(self, record: Record) -> Sequence[str]:
+        """Sentences on what cannot be predicted of a record, and why."""
+        if self.servo is None or record.reference is None or record.led is not None:
+            return []
+        return [
+            f"the reference of {record.name} has no {FEWEST} samples in a row: the closed loop is "
+            "not predicted"
+        ]
 
 
 def _usual(belt: FloatArray) -> float:
@@ -494,7 +510,8 @@ def _divided(task: Trajectories, record: Record, length: float) -> Trajectories:
 
 
 def _relative(found: FloatArray, measured: FloatArray) -> float:
-    return rms(found - measured) / rms(measured)
+    """Return the rms error as a share of what was measured; infinite of an unbounded motion."""
+    return rms(found - measured) / rms(measured) if np.isfinite(found).all() else inf
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from stickslip_ros.arrays import rms
 from stickslip_ros.identification.curves import (
     CoulombCurve,
     Curve,
@@ -29,7 +30,7 @@ Values = Mapping[str, float]
 """Values of coordinates by name, SI units."""
 
 _TINY = 1e-9
-"""Smallest constant that must be above zero, as a share of the friction."""
+"""Smallest constant that must be above zero, as a share of the friction or of other forces."""
 _WIDE = 30.0
 """Viscous friction up to which is searched, in static friction at the fastest speed."""
 _STIFFEST = 3000.0
@@ -123,7 +124,7 @@ class CoulombModel(FrictionModel):
     def start(self, fit: Regression, direction: int) -> dict[str, float]:
         """Return static and viscous friction."""
         static, viscous = fit.forces(direction).tolist()
-        static = max(static, _TINY)
+        static = max(static, _least_force(fit))
         # A law without viscous friction has other equations, not a derivative by it.
         return {"static": static, "viscous": viscous or _TINY * static}
 
@@ -148,7 +149,7 @@ class StribeckModel(FrictionModel):
     def start(self, fit: Regression, direction: int) -> dict[str, float]:
         """Return the smallest friction, the rise to rest and the speed of the minimum."""
         static, drop = fit.forces(direction).tolist()
-        smaller, rise = _split(static, drop)
+        smaller, rise = _split(static, drop, _least_force(fit))
         return {"minimum": smaller, "rise": rise, "minimum_speed": float(fit.shapes[direction])}
 
     def static_force(self, values: Values) -> float:
@@ -174,7 +175,7 @@ class ExponentialModel(FrictionModel):
     def start(self, fit: Regression, direction: int) -> dict[str, float]:
         """Return kinetic friction, the rise to rest, the decay speed and viscous friction."""
         kinetic, drop, viscous = fit.forces(direction).tolist()
-        smaller, rise = _split(kinetic + drop, drop)
+        smaller, rise = _split(kinetic + drop, drop, _least_force(fit))
         return {
             "kinetic": smaller,
             "rise": rise,
@@ -361,9 +362,16 @@ def _by_direction(values: Values) -> tuple[dict[str, float], dict[str, float]]:
     return dict(values), {**values, **reverse}
 
 
-def _split(static: float, drop: float) -> tuple[float, float]:
+def _least_force(fit: Regression) -> float:
+    """Return the smallest friction from which a search starts, N, by the other forces."""
+    columns = fit.rows.columns
+    others = sum(abs(value) * rms(columns[name]) for name, value in fit.constants.items())
+    return _TINY * others if others > 0.0 else _TINY
+
+
+def _split(static: float, drop: float, smallest: float) -> tuple[float, float]:
     """Return the smaller friction and the rise above it to rest, both above zero."""
-    least = 1e-3 * max(static, _TINY)
+    least = 1e-3 * max(static, smallest)
     static = max(static, least)
     rise = min(max(drop, least), static - least)
     return static - rise, rise

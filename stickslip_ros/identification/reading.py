@@ -114,7 +114,8 @@ def read_records(
     namespace : str, optional
         ROS namespace of the drive, if a bag holds several.
     belt_speed : float, optional
-        Belt speed, m/s, where the recording does not have it.
+        Belt speed, m/s: in place of the column of a table, and of a bag whose joint states have a
+        single joint.
 
     Returns
     -------

@@ -158,6 +158,16 @@ class Record:
         moving = sizes[sizes > 0.0]
         return float(moving.min()) if len(moving) else 0.0
 
+    @property
+    def led(self) -> Self | None:
+        """Longest part in which each sample has a reference; None if it is too short."""
+        if self.reference is None:
+            return None
+        edges = np.flatnonzero(np.diff(np.isfinite(self.reference), prepend=False, append=False))
+        parts = [(int(low), int(high)) for low, high in edges.reshape(-1, 2)]
+        low, high = max(parts, key=lambda each: each[1] - each[0], default=(0, 0))
+        return self.part(low, high) if high - low >= FEWEST else None
+
     def part(self, start: int, end: int) -> Self:
         """Return the samples from `start` to before `end`."""
         optional = {

@@ -191,7 +191,9 @@ def refine(
     best = fit.first
     if len(free):
         bounds = fit.bounds()
-        inside = _INSIDE * np.abs(best) * np.array([[1.0], [-1.0]])
+        # No more than a part of narrow bounds that the start is far away from.
+        least = np.minimum(_INSIDE * np.abs(best), 0.25 * (bounds[1] - bounds[0]))
+        inside = least * np.array([[1.0], [-1.0]])
         solve: Any = least_squares  # its types know no function for jac
         best = solve(
             fit.residual,

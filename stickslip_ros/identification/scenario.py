@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.models import numbers_of
 from stickslip_ros.identification.refinement import Refinement
@@ -43,29 +44,35 @@ def written_scenario(found: Findings, path: Path) -> list[Path]:
     OSError
         If a file cannot be written or exists.
     """
-    written: list[Path] = []
-    files: dict[str, str] = {}
     laws = {"friction.": found.drive.friction}
     if isinstance(found.drive.friction, Directional):
         both = found.drive.friction
         laws = {"friction.": both.forward, "friction.reverse.": both.reverse}
-    for group, law in laws.items():
-        curve = law.curve if isinstance(law, CurveFollower) else law
-        if not isinstance(curve, Table):
-            continue
-        file = curve_files(path)["reverse" in group]
-        rows = "".join(f"{speed!r},{size!r}\n" for speed, size in curve.points)
-        with file.open("x", encoding="utf-8") as stream:
-            stream.write(rows)
-        written.append(file)
-        files[f"plant.{group}file"] = str(file.absolute())
-    scenario = _scenario(found, laws, files)
-    text = commented_file(scenario, _heading(found, path))
-    for file in written:
-        text = text.replace(str(file.absolute()), file.name)
+    written: list[Path] = []
+    files: dict[str, str] = {}
+    try:
+        for group, law in laws.items():
+            curve = law.curve if isinstance(law, CurveFollower) else law
+            if isinstance(curve, Table):
+                file = curve_files(path)["reverse" in group]
+                _write_new(file, "".join(f"{w!r},{size!r}\n" for w, size in curve.points))
+                written.append(file)
+                files[f"plant.{group}file"] = str(file.absolute())
+        # A scenario reads its curves: it can only be made when they are written.
+        text = commented_file(_scenario(found, laws, files), _heading(found, path))
+        for file in written:
+            text = text.replace(str(file.absolute()), file.name)
+        _write_new(path, text)
+    except (OSError, InvalidInputError):
+        for file in written:
+            file.unlink(missing_ok=True)
+        raise
+    return [path, *written]
+
+
+def _write_new(path: Path, text: str) -> None:
     with path.open("x", encoding="utf-8") as stream:
         stream.write(text)
-    return [path, *written]
 
 
 def _scenario(found: Findings, laws: dict[str, FrictionLaw], files: dict[str, str]) -> Scenario:
@@ -76,7 +83,9 @@ def _scenario(found: Findings, laws: dict[str, FrictionLaw], files: dict[str, st
     }
     values["plant.friction.law"] = laws["friction."].name
     for group, law in laws.items():
-        values |= {f"plant.{group}{name}": value for name, value in numbers_of(law).items()}
+        # What the contact remembers is one in both directions.
+        own = {} if isinstance(law, CurveFollower) and group != "friction." else numbers_of(law)
+        values |= {f"plant.{group}{name}": value for name, value in own.items()}
         if isinstance(law, CurveFollower) and group == "friction.":
             values["plant.friction.curve"] = law.curve.name
     values |= files

@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.filtered import START
-from stickslip_ros.identification.record import Record
+from stickslip_ros.identification.record import FEWEST, Record
 from stickslip_ros.identification.trajectory import Predictor
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.model.drive import Drive
@@ -67,7 +67,7 @@ def servo_of(record: Record) -> Servo | None:
     Parameters
     ----------
     record : Record
-        Positions, references and forces.
+        Positions, references and forces; samples without a finite reference are left out.
 
     Returns
     -------
@@ -76,13 +76,14 @@ def servo_of(record: Record) -> Servo | None:
     """
     if record.reference is None or record.force is None or not record.force.any():
         return None
-    if not np.isfinite(record.reference).all():
+    known = np.isfinite(record.reference)
+    if np.count_nonzero(known) < FEWEST:
         return None
     force, error = record.force, record.reference - record.position
     largest = float(np.abs(force).max())
     at_limit = np.count_nonzero(np.abs(force) >= (1.0 - 1e-9) * largest)
     limit = largest if at_limit >= _SATURATED else inf
-    free = np.abs(force) < _BELOW_LIMIT * largest
+    free = known & (np.abs(force) < _BELOW_LIMIT * largest)
     free[:START] = False
     best: tuple[float, Servo] | None = None
     for span in range(1, _LONGEST_DIFFERENCE + 1):

@@ -1,9 +1,12 @@
 """The tables of an identification: constants with intervals, laws that competed, predictions."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from math import floor, isfinite, log10
 from typing import Any
 
-from stickslip_ros.identification.candidates import Candidate
+import numpy as np
+
+from stickslip_ros.identification.candidates import Candidate, Estimate
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.intervals import QUANTILE
 from stickslip_ros.plots.units import SI
@@ -18,23 +21,28 @@ _PREDICTIONS = {
     "position_error": "closed loop, position error",
     "closed_loop_force_error": "closed loop, force error",
 }
+_DIGITS = 2, 10
+"""Digits of a value, at least and at most."""
 
 
 def identification_tables(
-    found: Findings, own: Mapping[str, Any], checks: Sequence[Mapping[str, Any]]
+    found: Findings,
+    own: Mapping[str, Any],
+    checks: Sequence[Mapping[str, Any]],
+    notes: Sequence[str],
 ) -> Iterator[TextTable | str]:
     """Yield the tables of what was found.
 
     `own` is what the model predicts of the first recording that it was fitted to, `checks` of
-    others.
+    others; `notes` are sentences on both.
     """
     units = {each.name: each.unit or "" for each in parameters_of(PlantParameters)}
     rows = [
         [
             f"plant.{name}",
-            SI.text(each.value, units[name]),
+            SI.texts([each.value], units[name], _digits(each))[0],
             SI.text(each.standard_error, units[name], largest=abs(each.value)),
-            " to ".join(SI.texts([*each.interval], units[name], digits=6)),
+            _interval(each, units[name]),
         ]
         for name, each in found.fitted.items()
     ]
@@ -57,11 +65,25 @@ def identification_tables(
         ["recording", *_PREDICTIONS.values()],
         [[name, *_predicted(values)] for name, values in shown],
     )
-    yield from found.notes
+    yield from notes
     for first, second, share in found.correlations:
         yield f"plant.{first} and plant.{second} are correlated, {share:.3f}"
     for name, why in found.unidentified.items():
         yield f"plant.{name} is not told: {why}"
+
+
+def _digits(estimate: Estimate) -> int:
+    """Return how many digits of a value its standard error tells: two digits of the latter."""
+    value, error = abs(estimate.value), estimate.standard_error
+    if not isfinite(error) or error == 0.0 or value == 0.0:
+        return _DIGITS[0]
+    return int(np.clip(floor(log10(value)) - floor(log10(error)) + 2, *_DIGITS))
+
+
+def _interval(estimate: Estimate, unit: str) -> str:
+    if not isfinite(estimate.standard_error):
+        return "unbounded"
+    return " to ".join(SI.texts([*estimate.interval], unit, max(6, _digits(estimate))))
 
 
 def _curve(found: Findings) -> TextTable:
@@ -86,7 +108,10 @@ def _verdict(found: Findings, candidate: Candidate) -> str:
         return "chosen"
     if candidate.remark:
         return candidate.remark
-    return "predicts as well, within the noise" if found.as_good.get(candidate.label) else ""
+    if found.as_good.get(candidate.label):
+        return "predicts as well, within the noise"
+    worse = found.behind(candidate)
+    return f"predicts worse, by {worse:.1f} standard errors" if isfinite(worse) else ""
 
 
 def _predicted(values: Mapping[str, Any]) -> list[str]:
@@ -96,5 +121,9 @@ def _predicted(values: Mapping[str, Any]) -> list[str]:
         if name in ("free_run_error", "segment_error") and value is not None:
             cells.append(SI.text(value, "m"))
         else:
-            cells.append("-" if value is None else f"{100.0 * value:.4g} %")
+            cells.append("-" if value is None else _percent(value))
     return cells
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.4g} %" if isfinite(share) else "unbounded"

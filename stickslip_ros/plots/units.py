@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import isfinite, isinf
 from typing import Any, Self
 
 import numpy as np
@@ -13,6 +14,8 @@ from stickslip_ros.text import prefix_for
 NOISE = 1e-9
 """Share of the largest value below which a value is rounding error and shown as 0."""
 
+_PREFIXED = ("kg",)
+"""Units that have a prefix of their own."""
 _SCALES = {"plant.mass", "plant.stiffness", "plant.normal_force"}
 
 
@@ -59,15 +62,17 @@ class Units:
     ) -> list[str]:
         """Return values as texts with their unit, all with the prefix of the largest.
 
-        A unit that starts with a number, such as 1/s, gets no prefix; None is "-". A value below
+        A unit that starts with a number, such as 1/s, gets no prefix, nor does kg, which has one;
+        None is "-", and what is infinite "unbounded". A value below
         1e-9 of the largest, or of a given `largest`, is shown as 0.
         """
         unit = self.of_unit(unit)
-        found = max((abs(value) for value in values if isinstance(value, float)), default=0.0)
+        sizes = (abs(value) for value in values if isinstance(value, float) and isfinite(value))
+        found = max(sizes, default=0.0)
         least = NOISE * max(found, largest)
         values = [0.0 if isinstance(v, float) and abs(v) < least else v for v in values]
         scale, prefix = prefix_for(found if found >= least else 0.0)
-        if not unit[:1].isalpha():
+        if not unit[:1].isalpha() or unit in _PREFIXED:
             scale, prefix = 1.0, ""
         return [_text(value, scale, f" {prefix}{unit}".rstrip(), digits) for value in values]
 
@@ -77,7 +82,9 @@ def _text(value: Any, scale: float, unit: str, digits: int) -> str:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value / scale:.{digits}g}{unit}" if isinstance(value, float) else str(value)
+    if not isinstance(value, float):
+        return str(value)
+    return "unbounded" if isinf(value) else f"{value / scale:.{digits}g}{unit}"
 
 
 SI = Units()

@@ -20,6 +20,7 @@ from stickslip_ros.physics.model.courses import Table as Course
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Directional, FrictionLaw, Table
 from stickslip_ros.physics.motion import Motion
+from stickslip_ros.plots.identification_table import identification_tables
 from tests.identification.axis_record import record as axis_record
 
 _FAR = 4.5
@@ -56,6 +57,28 @@ def test_the_model_predicts_a_record_that_it_was_not_fitted_to() -> None:
     error = fitted.check(study.record("exponential", "stick", 2, 2.5))["free_run_error"]
     assert error is not None
     assert error < 2e-6
+
+
+@pytest.mark.parametrize("belt", [1.0, 0.0])
+def test_records_that_no_drive_has_made_are_noted(belt: float) -> None:
+    """Positions in mm beside a belt in m/s, or a belt whose velocity is missing."""
+    own = study.record("stribeck", "stick", 1, 2.0)
+    wrong = replace(own, position=1e3 * own.position, belt_velocity=belt * own.belt_velocity)
+    found = identify([wrong], fixed={"mass": 100.0, "stiffness": 1e6})
+    assert "does not describe the recordings" in found.notes[0]
+    assert "check the units of time" in found.notes[-1]
+
+
+def test_what_no_motion_depends_on_is_not_told() -> None:
+    """With a mass that is far too large every predicted motion is out of bounds."""
+    own = study.record("stribeck", "stick", 1, 2.0)
+    found = identify([own], "coulomb", {"mass": 1e5})
+    assert np.isinf(found.fitted["stiffness"].standard_error)
+    assert "one of many values that fit alike" in found.unidentified["stiffness"]
+    tables = identification_tables(found, found.check(own), [], found.notes)
+    shown = "\n".join(str([*each.rows]) for each in tables if not isinstance(each, str))
+    assert "unbounded" in shown
+    assert "inf" not in shown
 
 
 def test_what_one_belt_speed_cannot_tell_is_named() -> None:

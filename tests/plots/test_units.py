@@ -49,3 +49,12 @@ def test_a_study_that_varies_one_of_its_scales_is_in_si() -> None:
 def test_a_drive_that_differs_in_one_scale_is_not(other: str) -> None:
     assert not Units.for_drive(replace(PAPER, **{other: 2.0})).dimensionless
     assert not Units.for_drive(None).dimensionless
+
+
+def test_a_unit_with_a_prefix_of_its_own_gets_no_other() -> None:
+    assert SI.text(0.027, "kg") == "0.027 kg"
+    assert SI.text(2000.0, "kg") == "2000 kg"
+
+
+def test_what_is_infinite_is_unbounded() -> None:
+    assert SI.texts([0.002, float("inf")], "m") == ["2 mm", "unbounded"]
