@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import isnan, nan
 
 import numpy as np
 
@@ -52,7 +51,9 @@ class AxisTask:
         self.fixed = {**dict.fromkeys(LINEAR[1:], 0.0), **own}
         self.free = [name for name in LINEAR if name not in self.fixed]
         self.delay: float | None = fixed.get(DELAY)
-        self.rows = self._rows(self.delay)
+        self._filtered = [filtered(each, decimated=True) for each in records]
+        self._by_delay: dict[float, Rows] = {}
+        self.rows = Rows.of(self._filtered) if self.delay is None else self._rows(self.delay)
 
     def candidates(self, law: str, progress: Callable[[str], None]) -> list[Candidate]:
         """Return the fits of the laws that compete, or of the one that is asked for."""
@@ -80,22 +81,22 @@ class AxisTask:
         fit.require("mass")
         if fit.curve.name != "table":
             return found
-        delay = 0.0 if isnan(found.delay) else found.delay
-        return replace(found, fit=adjusted(fit, self.records, delay))
+        return replace(found, fit=adjusted(fit, self.records, found.delay or 0.0))
 
     def _with_delay(self, curve: Curve) -> Candidate:
         """Return a fit with a delay if the records ask for one."""
-        plain = self._candidate(self.rows, curve, nan if self.delay is None else self.delay)
+        plain = self._candidate(self.rows, curve, self.delay)
         if self.delay is not None:
             return plain
         fit, found = plain.fit, plain
         period = self.records[0].period
+        tried: Sequence[float] = _DELAYS.tolist()
         for step in (0.25, 0.05):
             assert isinstance(fit, Regression)
-            middle = 0.0 if found is plain else found.delay / period
-            reach = _DELAYS if found is plain else middle + step * np.arange(-5.0, 6.0)
-            errors = [_error_with(fit, self._rows(each * period)) for each in reach]
-            delay = float(reach[int(np.argmin(errors))]) * period
+            if found.delay is not None:
+                tried = (found.delay / period + step * np.arange(-5.0, 6.0)).tolist()
+            errors = [_error_with(fit, self._rows(each * period)) for each in tried]
+            delay = tried[int(np.argmin(errors))] * period
             found = self._candidate(self._rows(delay), curve, delay)
             fit = found.fit
         return found if found.error < _RESOLVED * plain.error else plain
@@ -125,16 +126,27 @@ class AxisTask:
         )
         return replace(found, remark=remark)
 
-    def _candidate(self, rows: Rows, curve: Curve, delay: float) -> Candidate:
+    def _candidate(self, rows: Rows, curve: Curve, delay: float | None) -> Candidate:
         return self._as_candidate(regress(rows, curve, self.free, self.fixed), delay)
 
-    def _as_candidate(self, fit: Regression, delay: float) -> Candidate:
+    def _as_candidate(self, fit: Regression, delay: float | None) -> Candidate:
         scale = rms(fit.rows.force)
         size = len(fit.values) + len(fit.shapes) + (fit.curve.deflection > 0.0)
         return Candidate(fit.curve.name, size, fit.held_out, scale, fit, delay)
 
-    def _rows(self, delay: float | None) -> Rows:
-        return Rows.of([filtered(each, decimated=True, delay=delay) for each in self.records])
+    def _rows(self, delay: float) -> Rows:
+        if delay not in self._by_delay:
+            pairs = zip(self._filtered, self.records, strict=True)
+            rows = Rows.of([columns.with_delay(record, delay) for columns, record in pairs])
+            if delay not in self._tried_first:
+                return rows
+            self._by_delay[delay] = rows
+        return self._by_delay[delay]
+
+    @property
+    def _tried_first(self) -> Sequence[float]:
+        """Delays that are tried for each curve, s: their rows are kept."""
+        return [each * self.records[0].period for each in _DELAYS.tolist()]
 
 
 def _error_with(fit: Regression, rows: Rows) -> float:

@@ -42,9 +42,7 @@ def table_speeds(fit: Regression) -> FloatArray:
 def table_of(fit: Regression, direction: int, normal_force: float) -> Points:
     """Return points of speed (m/s) and coefficient of the curve in a direction of the rows."""
     speed = table_speeds(fit)
-    shape = float(fit.shapes[direction]) if len(fit.shapes) else 1.0
-    force = fit.curve.terms(speed, shape) @ fit.forces(direction)
-    size = np.maximum(force, 0.0) / normal_force
+    size = np.maximum(fit.friction(direction, speed), 0.0) / normal_force
     return tuple(zip(speed.tolist(), size.tolist(), strict=True))
 
 

@@ -47,8 +47,8 @@ class Candidate:
     """Root mean square of what is predicted, N or m."""
     fit: Regression | Refinement
     """The fit."""
-    delay: float = 0.0
-    """Time from a sample until its force acts, s; NaN if the samples' own forces are used."""
+    delay: float | None = None
+    """Time from a sample until its force acts, s; None if nothing asks for one."""
     by_direction: bool = False
     """Whether a law on a spring has constants of its own in each direction."""
     remark: str = ""

@@ -48,9 +48,8 @@ def friction_of(fit: Regression | Refinement, sign: float, fastest: float) -> Fr
         return _of_trajectories(fit, sign, fastest)
     direction = [*fit.rows.directions].index(sign)
     speed = table_speeds(fit)
-    shape = float(fit.shapes[direction]) if len(fit.shapes) else 1.0
+    shape, own = fit.shape(direction), fit.forces(direction)
     terms = fit.curve.terms(speed, shape)
-    own = fit.forces(direction)
     count, directions = len(own), len(fit.rows.directions)
     by = np.zeros((len(speed), len(fit.covariance)))
     place = len(fit.free) + direction * count
@@ -59,7 +58,7 @@ def friction_of(fit: Regression | Refinement, sign: float, fastest: float) -> Fr
         step = _STEP * shape
         change = (fit.curve.terms(speed, shape + step) - terms) @ own / step
         by[:, len(fit.free) + directions * count + direction] = change
-    return Friction(speed, terms @ own, _band(by, fit.covariance))
+    return Friction(speed, fit.friction(direction, speed), _band(by, fit.covariance))
 
 
 def _of_trajectories(fit: Refinement, sign: float, fastest: float) -> Friction:

@@ -34,7 +34,7 @@ _SHORT, _LONG = 1.25, 5.0
 _FIRST_STEPS, _STEPS, _FINALISTS = 5, 100, 2
 """Steps of the search from each start, steps from the best ones, and their number."""
 _BETTER = 0.8
-"""Squared error, in that before, to which other starts must lead to go on with them."""
+"""Other starts of segments must lower the squared error to this share, or the search ends."""
 _WHITE = 0.3
 """Correlation of successive errors up to which they are noise: rounding leaves some."""
 _SHAPES = (0.1, 0.3, 0.8)
@@ -42,11 +42,13 @@ _SHAPES = (0.1, 0.3, 0.8)
 POOR = 0.1
 """Error, as a share of the motion, from which a model does not describe it."""
 _HOPELESS = 4.0
-"""Squared error, in squared errors of the best model, from which a model is not fitted further."""
+"""A model whose squared error is larger than that of the best one by this factor is not fitted
+further."""
 _RISE = 0.3
 """Rise of static friction from which the search starts, as a share of the kinetic one."""
 _FAR = 100.0
-"""Squared error of a law after the first steps, in that of LuGre, from which it is given up."""
+"""A law whose squared error after the first steps is larger than LuGre's by this factor is given
+up."""
 _STIFF = (10.0, 100.0)
 """Stiffnesses of bristles from which the search starts, in stiffnesses of the spring."""
 _DAMPED = 0.03

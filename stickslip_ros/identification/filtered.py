@@ -1,6 +1,6 @@
 """Records filtered for regression: position, velocity, acceleration and force, all alike."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -54,6 +54,10 @@ class Filtered:
 
         chebyshev = cheby1(8, 0.05, 0.8 / DECIMATION, output="sos")
         return sosfiltfilt(chebyshev, values, axis=0)[::DECIMATION]
+
+    def with_delay(self, record: Record, delay: float) -> "Filtered":
+        """Return the columns, decimated, of the same record with another delay of its force, s."""
+        return replace(self, force=_shifted(record.held_force, delay / record.period)[START:-END])
 
 
 def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> Filtered:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf, isfinite, isinf, isnan
+from math import inf, isfinite, isinf
 
 import numpy as np
 
@@ -103,7 +103,7 @@ class Findings:
     @property
     def delay(self) -> float:
         """Time from a sample until its force acts, s."""
-        return 0.0 if isnan(self.chosen.delay) else self.chosen.delay
+        return 0.0 if self.chosen.delay is None else self.chosen.delay
 
     @property
     def has_spring(self) -> bool:
@@ -392,9 +392,8 @@ class Findings:
             The rows; of a drive on a spring those where it slips.
         """
         record = self.records[0] if record is None else record
-        delay = None if isnan(self.chosen.delay) else self.chosen.delay
         fit, spring = self.chosen.fit, self.has_spring
-        columns = filtered(record, decimated=not spring, delay=delay)
+        columns = filtered(record, decimated=not spring, delay=self.chosen.delay)
 
         def rows(values: FloatArray) -> FloatArray:
             return values[columns.settled] if spring else columns.rows(values)

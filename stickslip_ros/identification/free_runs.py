@@ -162,7 +162,6 @@ def _slope(fit: Regression, low: float, high: float) -> float:
     """Return the mean slope of the friction curves between two speeds, N s/m."""
     slopes: list[float] = []
     for number in range(len(fit.rows.directions)):
-        shape = float(fit.shapes[number]) if len(fit.shapes) else 1.0
-        low_force, high_force = fit.curve.terms(np.array([low, high]), shape) @ fit.forces(number)
+        low_force, high_force = fit.friction(number, np.array([low, high]))
         slopes.append(float(high_force - low_force) / (high - low))
     return float(np.mean(slopes))

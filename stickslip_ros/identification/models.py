@@ -24,11 +24,6 @@ class Model:
     friction: FrictionModel
     """Its friction law."""
 
-    @property
-    def law(self) -> str:
-        """Name of the friction law."""
-        return self.friction.law
-
     def start(self, fit: Regression) -> dict[str, float]:
         """Return the coordinates that a regression gives."""
         last = len(fit.rows.directions) - 1

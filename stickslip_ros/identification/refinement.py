@@ -20,17 +20,19 @@ _STEP = 1e-6
 _RANK = 1e-9
 """Share of the largest singular value below which the start of a segment is not told."""
 _ROUGHLY, _SETTLED = 0.03, 1e-6
-"""Share of the squared error that better starts may still take: while constants change, then."""
+"""Starts are good enough if better ones would lower the squared error by less than this share:
+while the constants change, and at their end."""
 _SHORTEST = 1e-3
-"""Share of a step of a start at which it counts as the best one."""
+"""A start whose steps are shortened below this share of a full one is not changed further."""
 _START_STEPS = 8
 """Largest number of steps of the starts for one set of constants."""
 _WORSE = 9.0
-"""Squared error of a segment, in that of the median one, from which its start is doubted."""
+"""The start of a segment is doubted if its squared error is larger than that of the median one by
+this factor."""
 _LEAST_CYCLE, _REPEATED = 20, 0.65
 """Samples of a cycle at least, and correlation of errors from which cycles are alike."""
 _UNLIKE = 0.3
-"""Correlation below which it falls in between."""
+"""Correlation below which errors have become unlike before they repeat."""
 _KICKS = (0.0, 0.5, -0.5, 2.0, -2.0)
 """Changes of the velocity at such a start, in errors of position per period."""
 

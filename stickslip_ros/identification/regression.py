@@ -124,6 +124,14 @@ class Regression:
         own = np.array_split(self.values[len(self.free) :], len(self.rows.directions))
         return own[number]
 
+    def shape(self, number: int) -> float:
+        """Return the shape of the curve in a direction of the rows, m/s; 1 without one."""
+        return float(self.shapes[number]) if len(self.shapes) else 1.0
+
+    def friction(self, number: int, speed: FloatArray) -> FloatArray:
+        """Return the friction force in a direction of the rows, N, at speeds |v_r|, m/s."""
+        return self.curve.terms(speed, self.shape(number)) @ self.forces(number)
+
     def at(self, point: FloatArray) -> "Regression":
         """Return the same with the values and then the shapes of a point."""
         count = len(self.values)

@@ -14,14 +14,18 @@ from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.motion import Motion
 
 _LONGEST_DIFFERENCE = 8
+"""Most samples over which the controller's velocity may be a difference."""
 _EXPLAINED = 0.02
 """Largest error of a controller that is believed, as a share of its force."""
 _SATURATED = 5
 """Samples at the largest force from which on it counts as a limit."""
 _BELOW_LIMIT = 0.98
-_TRIMS, _OUTLIER, _USED = 10, 4.0, 0.7
-"""Fits without outliers; share of samples that are none, at least, and size of one in errors that
-are as large as so many."""
+"""Share of the largest force up to which forces are those of the gains."""
+_TRIMS = 10
+"""Number of fits, each without the outliers of the one before."""
+_USED, _OUTLIER = 0.7, 4.0
+"""This share of the samples at least must be no outliers. An outlier has an error that is larger by
+this factor than the errors of so many samples."""
 _ADDED = 10.0
 """Size of a force that was added to the command, in largest errors of the controller."""
 

@@ -177,15 +177,15 @@ class Trajectories:
                 if of_constants is None:
                     continue
                 order = rows.shape[1] - len(of_constants)
-                columns_of = rows[:, order:] @ of_constants
+                derivatives = rows[:, order:] @ of_constants
                 if order > MEMORY:
                     speeds = float(velocity), float(belt[segment.start])
-                    columns_of += rows[:, MEMORY:order] @ by_coordinates(
+                    derivatives += rows[:, MEMORY:order] @ by_coordinates(
                         lambda other, speeds=speeds: (
                             np.array(steady_memory(other, *speeds)) / drive.length_scale
                         )
                     )
-                found.by_names[part, columns] = columns_of
+                found.by_names[part, columns] = derivatives
 
     def _by_record(
         self, starts: FloatArray
