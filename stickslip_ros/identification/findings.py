@@ -68,6 +68,20 @@ class ForceErrors:
 
 
 @dataclass(frozen=True, eq=False)
+class Residuals:
+    """What a model leaves of what it was fitted to, arrays of shape (rows,)."""
+
+    time: FloatArray
+    """Time from the first sample, s."""
+    position: FloatArray
+    """Displacement, m."""
+    relative_speed: FloatArray
+    """Velocity less that of the belt, m/s."""
+    error: FloatArray
+    """Measured less modelled force of an axis, N; position of a drive on a spring, m."""
+
+
+@dataclass(frozen=True, eq=False)
 class Findings:
     """The model that was chosen, and what the recordings tell of it."""
 
@@ -89,6 +103,10 @@ class Findings:
         default_factory=dict[int, tuple[Record, FloatArray]], init=False, repr=False
     )
     """Free runs so far, each with its record, by the record's identity."""
+    _errors_in_segments: dict[int, tuple[Record, Residuals]] = field(
+        default_factory=dict[int, tuple[Record, Residuals]], init=False, repr=False
+    )
+    """The same of position errors in segments."""
 
     def behind(self, candidate: Candidate) -> float:
         """Return by how many standard errors a law predicts held-out parts worse than the best."""
@@ -449,16 +467,43 @@ class Findings:
 
         Each segment starts from the state that fits best.
         """
+        return rms(self._in_segments(record).error) if self.has_spring else None
+
+    def residuals(self) -> Residuals:
+        """Return what the model leaves of the first record: position errors in segments, or forces.
+
+        The model of an axis is fitted to the forces, and has no segments.
+        """
+        record = self.records[0]
+        if self.has_spring:
+            return self._in_segments(record)
+        found = self.errors(record)
+        return Residuals(found.time, found.position, found.relative_speed, found.force_error)
+
+    def _in_segments(self, record: Record) -> Residuals:
+        key = id(record)
+        if key not in self._errors_in_segments:
+            self._errors_in_segments[key] = record, self._found_in_segments(record)
+        return self._errors_in_segments[key][1]
+
+    def _found_in_segments(self, record: Record) -> Residuals:
+        from scipy.signal import savgol_filter
+
         fit = self.chosen.fit
-        if isinstance(fit, Regression):
-            return None
+        assert isinstance(fit, Refinement)
         counts = [segment.count for segment in fit.task.segments]
         task = _divided(fit.task, record, float(np.median(counts)) * self.records[0].period)
         task = replace(task, predictors=[Predictor(replace(record, velocity=None))])
         starts = restarted(refine(task, (), fit.values)).starts
-        away = task.predicted(fit.values, starts) - task.positions
-        own = [~record.lost[each.start : each.start + each.count] for each in task.segments]
-        return rms(away[np.concatenate(own)])
+        away = task.positions - task.predicted(fit.values, starts)
+        rows = np.concatenate([np.arange(s.start, s.start + s.count) for s in task.segments])
+        measured = ~record.lost[rows]
+        away, rows = away[measured], rows[measured]
+        speed: FloatArray = np.asarray(
+            savgol_filter(record.position, 11, 3, deriv=1, delta=record.period)
+        )
+        relative = (speed - record.belt_velocity)[rows]
+        return Residuals(record.period * rows, record.position[rows], relative, away)
 
     def check(self, record: Record) -> dict[str, float | None]:
         """Return what the model predicts of a record, as `CHECKED` names it.

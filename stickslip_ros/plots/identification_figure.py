@@ -14,6 +14,10 @@ from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, set_title, styled
 from stickslip_ros.plots.units import SI
 
 _DOTS: Any = {"marker": ".", "ms": 2.0, "ls": "", "alpha": 0.4, "mew": 0.0, "rasterized": True}
+_MOST = 0.995
+"""Share of the dots that the vertical axis shows at least."""
+_WIDEST = 100.0
+"""Largest band that is drawn, in largest forces."""
 _NAMES = {1.0: "forward slip", -1.0: "backward slip"}
 
 
@@ -29,82 +33,92 @@ def identification_figure(found: Findings) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Friction curve with its 95 % band and what was measured, residuals over speed, position and
-        time, and the free run beside the measured positions.
+        Friction curve with its 95 % band and what was measured; residuals over speed, position and
+        time, of the forces of an axis, and of the positions in segments of a drive on a spring; and
+        the run without feedback beside the measured positions, with their difference.
     """
     figure = Figure(figsize=(10.0, 9.0))
     grid = figure.add_gridspec(3, 2)
-    errors = found.errors()
-    _friction(figure.add_subplot(grid[0, :]), found, errors)
-    for place, (values, name, unit) in enumerate(
-        (
-            (errors.relative_speed, "speed relative to the belt", "m/s"),
-            (errors.position, "displacement", "m"),
-        )
+    _friction(figure.add_subplot(grid[0, :]), found)
+    left = found.residuals()
+    quantity, error_unit = ("position", "m") if found.has_spring else ("force", "N")
+    errors = left.error, quantity, error_unit
+    for place, values, name, unit in (
+        (grid[1, 0], left.relative_speed, "speed relative to the belt", "m/s"),
+        (grid[1, 1], left.position, "displacement", "m"),
+        (grid[2, 0], left.time, "time", "s"),
     ):
-        _residuals(figure.add_subplot(grid[1, place]), values, errors.force_error, name, unit)
-    _residuals(figure.add_subplot(grid[2, 0]), errors.time, errors.force_error, "time", "s")
-    _free_run(figure.add_subplot(grid[2, 1]), found)
+        _residuals(figure.add_subplot(place), (values, name, unit), errors)
+    _free_run(figure, grid[2, 1], found)
     names = ", ".join(dict.fromkeys(Path(record.name).name for record in found.records))
-    set_title(figure, f"{names}: law {found.law}, error held out {found.chosen.error:.3%}")
+    error = f"{100.0 * found.chosen.error:.4g} %"
+    set_title(figure, f"{names}: law {found.chosen.label}, held-out error {error}")
     return figure
 
 
-def _friction(axes: Axes, found: Findings, errors: Any) -> None:
-    forces = errors.friction
-    scale, label = SI.axis("friction force", "N", forces)
+def _friction(axes: Axes, found: Findings) -> None:
+    errors = found.errors()
+    curves = [found.friction(number) for number in range(len(found.directions))]
+    sizes = [np.abs(errors.friction), *(curve.force for curve in curves)]
+    top = max(float(np.quantile(each, _MOST)) for each in sizes if len(each))
+    scale, label = SI.axis("friction force", "N", np.array([top]))
+    fastest = max(float(curve.speed[-1]) for curve in curves)
     speed_scale, speed_label = SI.axis(
-        "speed relative to the belt, size", "m/s", errors.relative_speed
+        "speed relative to the belt, size", "m/s", np.array([fastest])
     )
-    for number, (direction, colour) in enumerate(
-        zip(found.directions, (BLUE, ORANGE), strict=False)
-    ):
-        own = errors.relative_speed * direction > 0.0
+    for curve, direction, colour in zip(curves, found.directions, (BLUE, ORANGE), strict=False):
+        own, name = errors.relative_speed * direction > 0.0, _NAMES[direction]
         axes.plot(
             np.abs(errors.relative_speed[own]) / speed_scale,
-            direction * forces[own] / scale,
+            direction * errors.friction[own] / scale,
             color=colour,
+            label=f"{name}, measured",
             **_DOTS,
         )
-        curve = found.friction(number)
-        band = QUANTILE * curve.standard_error
-        axes.plot(curve.speed / speed_scale, curve.force / scale, color=colour, lw=1.5)
-        axes.fill_between(
-            curve.speed / speed_scale,
-            (curve.force - band) / scale,
-            (curve.force + band) / scale,
-            color=colour,
-            alpha=0.3,
-            lw=0.0,
-            label=f"{_NAMES[direction]}, 95 % band",
-        )
+        speed, force = curve.speed / speed_scale, curve.force / scale
+        axes.plot(speed, force, color=colour, lw=1.5, label="fitted")
+        band = QUANTILE * curve.standard_error / scale
+        # What is not told has a band that is not finite.
+        band = np.minimum(band, _WIDEST * top / scale)
+        limits = force - band, force + band
+        axes.fill_between(speed, *limits, color=colour, alpha=0.3, lw=0.0, label="95 % band")
     axes.set_xlabel(speed_label)
     axes.set_ylabel(label)
-    axes.set_xlim(left=0.0)
-    axes.set_ylim(bottom=0.0)
-    axes.set_title("friction: measured (dots) and fitted")
-    axes.legend(loc="lower right", fontsize="small")
+    axes.set_xlim(0.0, 1.05 * fastest / speed_scale)
+    # A band may be many times as large as the friction.
+    axes.set_ylim(0.0, 1.15 * top / scale)
+    axes.set_title("friction")
+    axes.legend(loc="best", fontsize="small", ncols=len(curves), markerscale=4.0)
 
 
-def _residuals(axes: Axes, over: FloatArray, residual: FloatArray, name: str, unit: str) -> None:
-    scale, label = SI.axis(name, unit, over)
-    force, force_label = SI.axis("force, measured less fitted", "N", residual)
-    axes.plot(over / scale, residual / force, color=BLUE, **_DOTS)
+def _residuals(
+    axes: Axes, over: tuple[FloatArray, str, str], of: tuple[FloatArray, str, str]
+) -> None:
+    (values, name, unit), (errors, quantity, error_unit) = over, of
+    scale, label = SI.axis(name, unit, values)
+    error_scale, error_label = SI.axis(f"{quantity}, measured less fitted", error_unit, errors)
+    axes.plot(values / scale, errors / error_scale, color=BLUE, **_DOTS)
     axes.axhline(0.0, color="black", lw=0.6)
     axes.set_xlabel(label)
-    axes.set_ylabel(force_label)
+    axes.set_ylabel(error_label)
     axes.set_title(f"residuals over {name}")
 
 
-def _free_run(axes: Axes, found: Findings) -> None:
+def _free_run(figure: Figure, place: Any, found: Findings) -> None:
     record = found.records[0]
     time = record.period * np.arange(len(record.position))
     run = found.free_run(record)
+    below = place.subgridspec(2, 1, height_ratios=(2.0, 1.0))
+    upper = figure.add_subplot(below[0])
+    lower = figure.add_subplot(below[1], sharex=upper)
     scale, label = SI.axis("displacement", "m", record.position)
-    axes.plot(time, record.position / scale, color=BLUE, label="measured")
-    axes.plot(time, run / scale, color=ORANGE, ls="--", label="simulated, no feedback")
-    axes.plot(time, (run - record.position) / scale, color=GREEN, ls=":", label="difference")
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel(label)
-    axes.set_title("run with the recorded force (in-sample)")
-    axes.legend(loc="lower center", fontsize="small", ncols=3)
+    upper.plot(time, record.position / scale, color=BLUE)
+    upper.plot(time, run / scale, color=ORANGE, ls="--")
+    upper.set_ylabel(label)
+    upper.set_title("in-sample: measured, and without feedback (dashed)")
+    upper.tick_params(labelbottom=False)
+    away = record.position - run
+    scale, label = SI.axis("difference", "m", away)
+    lower.plot(time, away / scale, color=GREEN)
+    lower.set_xlabel("time (s)")
+    lower.set_ylabel(label)

@@ -1,0 +1,58 @@
+"""The figure of an identification."""
+
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from benchmarks import identification as study
+from stickslip_ros.identification.curve_bands import Friction
+from stickslip_ros.identification.findings import Findings
+from stickslip_ros.identification.identify import identify
+from stickslip_ros.plots.identification_figure import identification_figure
+from tests.identification.axis_record import record
+
+
+def _axes(figure: Figure) -> dict[str, Axes]:
+    """Return the axes by their title, or else the label of their vertical axis."""
+    return {each.get_title() or each.get_ylabel().partition(" ")[0]: each for each in figure.axes}
+
+
+def test_a_band_that_is_huge_does_not_hide_the_curve() -> None:
+    found = identify([record("coulomb")], "coulomb")
+    own = found.friction
+
+    def vague(self: Findings, direction: int = 0) -> Friction:
+        curve = own(direction)
+        errors = np.where(curve.speed > 0.0, 1e6, np.inf)
+        return replace(curve, standard_error=errors)
+
+    kind = type("Vague", (Findings,), {"friction": vague})
+    object.__setattr__(found, "__class__", kind)
+    figure = identification_figure(found)
+    axes = _axes(figure)
+    largest = max(float(own(number).force.max()) for number in (0, 1))
+    assert axes["friction"].get_ylim()[1] < 1.3 * largest
+    entries = [text.get_text() for text in axes["friction"].get_legend().get_texts()]
+    assert entries == [
+        *("forward slip, measured", "fitted", "95 % band"),
+        *("backward slip, measured", "fitted", "95 % band"),
+    ]
+    assert axes["residuals over time"].get_ylabel() == "force, measured less fitted (N)"
+    figure.draw_without_rendering()
+
+
+def test_the_residuals_of_a_drive_on_a_spring_are_those_of_its_position() -> None:
+    own = study.record("stribeck", "stick", 1, 2.0)
+    found = identify([own], "stribeck", {"mass": study.MASS})
+    axes = _axes(identification_figure(found))
+    label = axes["residuals over time"].get_ylabel()
+    assert label == "position, measured less fitted (nm)"
+    error = found.segment_error(own)
+    assert error is not None
+    assert np.sqrt(np.mean(found.residuals().error ** 2)) == error
+    assert "difference" in axes
+    motion = axes["in-sample: measured, and without feedback (dashed)"]
+    assert motion.get_legend() is None
+    assert len(motion.lines) == 2
