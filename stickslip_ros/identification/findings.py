@@ -503,7 +503,8 @@ class Findings:
             savgol_filter(record.position, 11, 3, deriv=1, delta=record.period)
         )
         relative = (speed - record.belt_velocity)[rows]
-        return Residuals(record.period * rows, record.position[rows], relative, away)
+        time = record.period * rows.astype(float)
+        return Residuals(time, record.position[rows], relative, away)
 
     def check(self, record: Record) -> dict[str, float | None]:
         """Return what the model predicts of a record, as `CHECKED` names it.
