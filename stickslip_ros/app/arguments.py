@@ -113,14 +113,17 @@ def columns_of(text: str | None) -> dict[str, str] | None:
     return found
 
 
-def add_part(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say which part of a recording is used, and of which drive."""
+def add_part(parser: argparse.ArgumentParser, *, tables: str = "") -> None:
+    """Add the options that say which part of a recording is used, and of which drive.
+
+    `tables` says what the belt speed is for besides bags.
+    """
     parser.add_argument(
         "--belt-speed",
         type=velocity,
         metavar="V",
-        help="belt speed, m/s, for a table without a belt velocity, and for a bag whose joint "
-        "states have a single joint, whatever its name",
+        help=f"belt speed, m/s, for {tables}a bag whose joint states have a single joint, whatever "
+        "its name",
     )
     parser.add_argument(
         "--from",

@@ -68,14 +68,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="RECORDING",
         help="predict a recording that is not fitted; can be repeated",
     )
-    add_part(parser)
+    add_part(parser, tables="a table, in place of its belt velocity, and for ")
     parser.add_argument(
         "--out",
         type=Path,
         metavar="FILE",
         help="write a complete scenario of the drive; an existing file is refused",
     )
-    add_plot(parser, "the friction curve with its band, residuals over speed, position and time")
+    add_plot(parser, "the friction curve with its band, residuals, and the run without feedback")
     add_json(parser)
 
 
