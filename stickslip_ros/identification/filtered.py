@@ -8,7 +8,7 @@ import numpy as np
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.identification.record import Record
 
-CUTOFF = 100.0
+_CUTOFF = 100.0
 """Cutoff frequency of the low-pass, Hz; at most a tenth of the sample rate."""
 _ORDER, _PAD = 4, 12
 DECIMATION = 10
@@ -81,7 +81,7 @@ def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> 
     from scipy.signal import butter, filtfilt  # takes long to import
 
     rate = 1.0 / record.period
-    cutoff = min(CUTOFF, 0.1 * rate)
+    cutoff = min(_CUTOFF, 0.1 * rate)
     low_pass: Any = butter(_ORDER, cutoff / (0.5 * rate))
 
     def smooth(values: FloatArray) -> FloatArray:

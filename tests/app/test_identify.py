@@ -1,6 +1,7 @@
 """`stickslip identify`: from a log to a model, a scenario and a figure."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,9 @@ def test_a_log_becomes_a_model_a_scenario_and_a_figure(
 def test_the_tables_say_what_was_found(stickslip: Run, log: Path) -> None:
     done = stickslip("identify", "axis.csv", "--columns", _COLUMNS, "--law", "coulomb")
     assert done.returncode == 0, done.stderr
+    (mass,) = re.findall(r"plant\.mass +(\S+) kg +(\S+) kg ", done.stdout)
+    assert len(mass[0].partition(".")[2]) >= 2
+    assert float(mass[1]) < 1.0
     for words in (
         "law coulomb",
         "plant.mass",
@@ -253,3 +257,11 @@ def test_units_that_are_wrong_are_noted(stickslip: Run, log: Path) -> None:
     done = stickslip("identify", "axis.csv", "--columns", columns, "--law", "coulomb")
     assert done.returncode == 0, done.stderr
     assert "check the units of time, position and belt velocity" in done.stdout
+
+
+def test_laws_that_predict_worse_say_by_how_much(stickslip: Run, log: Path) -> None:
+    done = stickslip("identify", "axis.csv", "--columns", _COLUMNS)
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"coulomb .* predicts worse, by \d+\.\d standard errors", done.stdout)
+    assert "table and table" not in done.stdout
+    assert "exponential and table predict" not in done.stdout
