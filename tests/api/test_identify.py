@@ -27,7 +27,7 @@ def test_the_constants_of_exact_samples(model: ss.Model) -> None:
 def test_it_prints_and_plots(model: ss.Model) -> None:
     assert "plant.friction.minimum_speed" in repr(model)
     assert "<table>" in model._repr_html_()
-    assert len(model.plot().axes) == 5
+    assert len(model.plot().axes) == 6
 
 
 def test_the_scenario_can_be_designed_for(model: ss.Model, tmp_path: Path) -> None:

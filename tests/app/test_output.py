@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.app.output import print_figures, print_table
+from stickslip_ros.app.output import print_figures, print_table, progress_bar
 from tests.nodes.graph import PATIENCE
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
@@ -135,3 +135,14 @@ def test_rounding_reads_zero(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_transient_says_that_it_is_not_steady(capsys: pytest.CaptureFixture[str]) -> None:
     print_figures("", {"": {"regime": "stick_slip", "steady": False, "trend": "decaying"}})
     assert capsys.readouterr().out == "regime  stick-slip, not steady: decaying\n"
+
+
+def test_a_progress_bar_says_what_is_done_next(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("TTY_COMPATIBLE", "1")
+    with progress_bar("identifying", None) as progress:
+        progress(0.0)
+        progress(0.0, "identifying: stribeck")
+    assert "identifying: stribeck" in capsys.readouterr().err
