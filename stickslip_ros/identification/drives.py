@@ -41,6 +41,8 @@ _SHAPES = (0.1, 0.3, 0.8)
 """Shapes from which the search starts, besides that of the regression: shares of the speeds."""
 POOR = 0.1
 """Error, as a share of the motion, from which a model does not describe it."""
+_MEMORY = 0.5
+"""Such an error, from which a memory is not tried: an input is missing."""
 _HOPELESS = 4.0
 """A model whose squared error is larger than that of the best one by this factor is not fitted
 further."""
@@ -224,7 +226,8 @@ class DriveTask:
 
     def unfinished(self, near: Refinement) -> Candidate:
         """Return a fit to short segments that is out of the choice."""
-        return self._candidate(near, near.losses)
+        remark = "much worse in the search: not fitted further"
+        return replace(self._candidate(near, near.losses), remark=remark)
 
     def _candidate(self, fit: Refinement, held_out: FloatArray) -> Candidate:
         friction, measured = fit.task.model.friction, fit.task.positions
@@ -284,7 +287,7 @@ def drive_candidates(task: DriveTask, law: str, progress: Callable[[str], None])
         progress(f"{friction.law} by direction")
         found.append(task.searched(DirectionalModel(friction)))
     # A memory changes the motion near sticking: it does not explain an input that is missing.
-    near = not found or (law == AUTO and min(map(_share, found)) < POOR)
+    near = not found or (law == AUTO and min(map(_share, found)) < _MEMORY)
     if near and not any(map(is_white, found)):
         bristles: Refinement | None = None
         for friction in MEMORY_MODELS:
