@@ -32,8 +32,11 @@ from stickslip_ros.physics.theory.sticking import StickingOnset, sticking_onset
 _CURVE = 400
 """Number of belt speeds at which the equilibrium is computed."""
 
-_NEAR_HOPF = (0.3, 0.04)
-"""Distances from a Hopf point, relative to the next belt speed's: the cycle grows as their root."""
+_NEAR_HOPF = (1.5, 0.8, 0.4, 0.15, 0.03)
+"""Distances from a Hopf point, in steps of the belt speed there: a cycle grows as their root."""
+
+_BELOW_ONSET = 1e-6
+"""Relative distance from the onset of sticking at which the slide sticks for a telling time."""
 
 _HALVINGS = 5
 """How often the interval is halved in which two cycles meet."""
@@ -45,7 +48,7 @@ _AtSpeed = tuple[float, list[LimitCycle]]
 """Belt speed, m/s, and the cycles there, the smallest first."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Branch:
     """Equilibria, or limit cycles, that follow from each other as the belt speed changes."""
 
@@ -61,7 +64,7 @@ class Branch:
     """Whether motions that start nearby return to it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BifurcationBranches:
     """Equilibria and limit cycles of a drive without control over the belt speed; SI units."""
 
@@ -93,6 +96,23 @@ class BifurcationBranches:
             for end in (0, -1)
         )
         return sorted(speed for (speed, _), count in ends.items() if count == 2)
+
+    @staticmethod
+    def check(drive: Drive) -> None:
+        """Refuse a drive that the theory does not cover, see `over`, before anything is computed.
+
+        Parameters
+        ----------
+        drive : Drive
+            Drive in SI units.
+
+        Raises
+        ------
+        NotCoveredError
+            If friction differs between the directions, belt or load follow a course, or the drive
+            has no spring.
+        """
+        require("the bifurcation diagram", drive, SPRING, AUTONOMOUS, SYMMETRIC)
 
     @classmethod
     def over(cls, drive: Drive, belt_speeds: FloatArray) -> Self:
@@ -136,7 +156,7 @@ class BifurcationBranches:
         [False, True]
         >>> (cycle,) = found.cycles
         >>> cycle.stable, cycle.belt_speeds.round(4).tolist()
-        (True, [0.3, 0.4, 0.4621, 0.4852, 0.4888])
+        (True, [0.3, 0.3388, 0.4, 0.4088, 0.4395, 0.4395, 0.4488, 0.4738, 0.4858, 0.4888])
         """
         _check(drive, belt_speeds)
         return cls._found(drive, belt_speeds, hopf_points(drive), _onset(drive))
@@ -167,7 +187,7 @@ class BifurcationBranches:
         RunError
             If the motion is too stiff to follow.
         """
-        _require(drive)
+        cls.check(drive)
         hopf, onset = hopf_points(drive), _onset(drive)
         known = [abs(point.belt_speed) for point in hopf]
         known += [abs(drive.belt_speed)] if drive.belt_speed else []
@@ -194,7 +214,8 @@ class BifurcationBranches:
         points = [point for point in points if low < point.belt_speed < high]
         sticking = None if onset is None or onset.exact is None else side * onset.exact
         at_points = [point.belt_speed for point in points]
-        rows = _searched(drive, belt_speeds, at_points)
+        added = [] if sticking is None else [sticking * (1.0 - _BELOW_ONSET), sticking]
+        rows = _searched(drive, belt_speeds, at_points, added)
         return cls(
             drive=drive,
             belt_speeds=np.array([speed for speed, _ in rows]),
@@ -205,12 +226,8 @@ class BifurcationBranches:
         )
 
 
-def _require(drive: Drive) -> None:
-    require("the bifurcation diagram", drive, SPRING, AUTONOMOUS, SYMMETRIC)
-
-
 def _check(drive: Drive, belt_speeds: FloatArray) -> None:
-    _require(drive)
+    BifurcationBranches.check(drive)
     ascending = len(belt_speeds) > 1 and np.all(np.diff(belt_speeds) > 0.0)
     if not (
         ascending and np.all(np.isfinite(belt_speeds)) and belt_speeds[0] * belt_speeds[-1] > 0
@@ -237,21 +254,25 @@ def _equilibria(drive: Drive, low: float, high: float, hopf: Sequence[float]) ->
         yield Branch(speeds, position, position, np.zeros(len(speeds), dtype=bool), stable)
 
 
-def _searched(drive: Drive, belt_speeds: FloatArray, hopf: Sequence[float]) -> list[_AtSpeed]:
-    """Return the cycles at all belt speeds, and at those that are added."""
+def _searched(
+    drive: Drive, belt_speeds: FloatArray, hopf: Sequence[float], added: Sequence[float]
+) -> list[_AtSpeed]:
+    """Return the cycles at all belt speeds, at those `added`, and at more where cycles appear."""
 
     def cycles_at(speed: float) -> _AtSpeed:
         return speed, limit_cycles(replace(drive, belt_speed=speed))
 
+    low, high = belt_speeds[[0, -1]].tolist()
     near = [
-        point + part * (end - point)
-        for low, high in pairwise(belt_speeds.tolist())
+        point + side * part * (right - left)
+        for left, right in pairwise(belt_speeds.tolist())
         for point in hopf
-        if low < point < high
-        for end in (low, high)
+        if left < point < right
+        for side in (-1.0, 1.0)
         for part in _NEAR_HOPF
     ]
-    rows = [cycles_at(speed) for speed in np.union1d(belt_speeds, near).tolist()]
+    inside = [speed for speed in (*near, *added) if low < speed < high]
+    rows = [cycles_at(speed) for speed in np.union1d(belt_speeds, inside).tolist()]
     found = rows[:1]
     for before, after in pairwise(rows):
         if not any(before[0] < point < after[0] for point in hopf):
