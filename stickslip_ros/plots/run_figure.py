@@ -96,11 +96,13 @@ def run_figure(
         narrow=style.narrow,
         short=style.crowded(*size),
     )
-    figure = style.figure(*size, wide=1.1 if rows == 2 else 1.4, narrow=2.85 if rows == 2 else 4.0)
+    figure = style.figure(*size, wide=1.1 if rows == 2 else 1.4, narrow=3.0 if rows == 2 else 4.0)
     if history.left_out:
         notes = [*notes, f"not drawn: {history.left_out} samples without an increasing time"]
     style.set_title(figure, title, measures_text(measures, panels.units), *notes)
-    ratios = (5.0, 4.2, 4.0) if style.narrow else (3.0, 1.9, 1.2)
+    ratios = (3.0, 2.3, 1.4) if panels.short else (3.0, 1.9, 1.2)
+    if style.narrow:
+        ratios = (5.2, 4.2, 4.0)
     grid = figure.add_gridspec(rows, 1, height_ratios=ratios[:rows])
     above, below = grid[0], grid[1]
     panels.over_time(figure, above)
