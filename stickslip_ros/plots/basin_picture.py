@@ -21,6 +21,7 @@ from stickslip_ros.plots.style import (
     SKY_BLUE,
     YELLOW,
     FigureStyle,
+    round_ticks,
     styled,
 )
 from stickslip_ros.plots.titles import title_of
@@ -108,6 +109,7 @@ def basin_figure(
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
     style.legend_below(figure, handles, most=2)
+    round_ticks(figure)
     return figure
 
 

@@ -9,13 +9,20 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches, Branch
 from stickslip_ros.plots.regimes import REGIMES
-from stickslip_ros.plots.style import DASHES, GREY, SCREEN, FigureStyle, styled, text_width
+from stickslip_ros.plots.style import (
+    DASHES,
+    GREY,
+    SCREEN,
+    FigureStyle,
+    round_ticks,
+    styled,
+    text_width,
+)
 from stickslip_ros.plots.units import Units
 
 _UNSTABLE: Any = {"ls": (0, (4.0, 2.0))}
@@ -77,8 +84,7 @@ def branches_figure(
     axes.set_xlim(min(low, own, 0.0) / speed, max(high, own, 0.0) / speed)
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
+    round_ticks(figure)
     style.legend_below(figure, handles, most=3)
     _name_regions(figure, axes, found, speed)
     return figure

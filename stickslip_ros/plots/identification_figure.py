@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.intervals import QUANTILE
-from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, styled
+from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, round_ticks, styled
 from stickslip_ros.plots.units import SI
 
 _DOTS: Any = {"marker": ".", "ms": 2.0, "ls": "", "alpha": 0.4, "mew": 0.0, "rasterized": True}
@@ -69,6 +69,7 @@ def identification_figure(found: Findings, *, style: FigureStyle = SCREEN) -> Fi
     names = ", ".join(dict.fromkeys(Path(record.name).name for record in found.records))
     title = f"Identified drive, {names}: law {found.law}, error held out {found.chosen.error:.3%}"
     style.set_title(figure, title)
+    round_ticks(figure)
     return figure
 
 

@@ -40,6 +40,7 @@ from stickslip_ros.plots.style import (
     SCREEN,
     SKY_BLUE,
     FigureStyle,
+    round_ticks,
     styled,
 )
 from stickslip_ros.plots.units import Units
@@ -119,10 +120,11 @@ def run_figure(
     first, second = (figure.add_subplot(part) for part in cycles)
     panels.cycles(first, second)
     panels.law(figure.add_subplot(right))
+    sticks = "sticks" if panels.short else "sticks (paler: part of the time)"
     handles: list[Any] = [
         Line2D([], [], **_MOTION, label="slide"),
         Line2D([], [], **_BELT, label="belt speed"),
-        Patch(color=GREY, alpha=0.6, lw=0.0, label="sticks (paler: part of the time)"),
+        Patch(color=GREY, alpha=0.6, lw=0.0, label=sticks),
         Line2D([], [], **_CONTROL, label=force),
         Line2D([], [], **_FRICTION, label="friction force"),
         Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"),
@@ -136,6 +138,7 @@ def run_figure(
     if panels.short:
         handles += panels.of_law
     style.legend_below(figure, handles)
+    round_ticks(figure)
     return figure
 
 

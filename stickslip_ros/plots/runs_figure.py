@@ -35,6 +35,7 @@ from stickslip_ros.plots.style import (
     SCREEN,
     SKY_BLUE,
     FigureStyle,
+    round_ticks,
     styled,
 )
 from stickslip_ros.plots.units import SI, Units
@@ -92,6 +93,7 @@ def runs_figure(
         for run, look, marker in zip(runs, looks, _MARKERS, strict=False)
     ]
     style.legend_below(figure, handles)
+    round_ticks(figure)
     return figure
 
 

@@ -23,6 +23,7 @@ from stickslip_ros.plots.style import (
     SCREEN,
     SKY_BLUE,
     FigureStyle,
+    round_ticks,
     styled,
 )
 from stickslip_ros.plots.titles import title_of
@@ -66,6 +67,7 @@ def stability_figure(
     if critical is not None:
         _draw_critical_gains(panels[1], critical, found)
     style.legend_below(figure, handles, most=4)
+    round_ticks(figure)
     return figure
 
 
@@ -83,6 +85,7 @@ def design_figure(found: Design, *, style: FigureStyle = SCREEN) -> Figure:
     forces = found.peak_forces(around)
     handles += _draw_forces(axes, around, forces, found.task.force_limit)
     style.legend_below(figure, handles, most=3)
+    round_ticks(figure)
     return figure
 
 

@@ -17,6 +17,7 @@ from matplotlib.cbook import is_math_text
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextToPath
+from matplotlib.ticker import AutoLocator
 from PIL import Image
 
 from stickslip_ros.text import printable
@@ -165,6 +166,15 @@ def styled(draw: Callable[_P, _R]) -> Callable[_P, _R]:
             return draw(*arguments, **options)
 
     return drawn
+
+
+def round_ticks(figure: Figure) -> None:
+    """Let the ticks of all linear axes be whole multiples of 1, 2 or 5 times a power of ten."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            locator = axis.get_major_locator()
+            if isinstance(locator, AutoLocator):
+                locator.set_params(steps=[1.0, 2.0, 5.0, 10.0])
 
 
 def text_width(text: str, points: float) -> float:

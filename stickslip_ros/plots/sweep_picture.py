@@ -18,7 +18,16 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
-from stickslip_ros.plots.style import DASHES, GREY, LIGHT_GREY, MANY, SCREEN, FigureStyle, styled
+from stickslip_ros.plots.style import (
+    DASHES,
+    GREY,
+    LIGHT_GREY,
+    MANY,
+    SCREEN,
+    FigureStyle,
+    round_ticks,
+    styled,
+)
 from stickslip_ros.plots.titles import title_of
 from stickslip_ros.plots.units import Units
 from stickslip_ros.studies.columns import Columns
@@ -124,6 +133,7 @@ def diagram_figure(columns: Columns, study: Study, *, style: FigureStyle = SCREE
     lines[-1].set_xscale(**_scale(axis))
     lines[-1].margins(x=0.01)
     style.legend_below(figure, handles, most=3)
+    round_ticks(figure)
     return figure
 
 
@@ -191,6 +201,7 @@ def map_figure(
         Line2D([], [], color="black", ls=dashes, label=name) for name, _, dashes in _curves(found)
     ]
     style.legend_below(figure, handles, most=4)
+    round_ticks(figure)
     return figure
 
 

@@ -5,12 +5,21 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import matplotlib as mpl
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 
-from stickslip_ros.plots.style import SCREEN, STYLES, FigureStyle, save, styled, text_width
+from stickslip_ros.plots.style import (
+    SCREEN,
+    STYLES,
+    FigureStyle,
+    round_ticks,
+    save,
+    styled,
+    text_width,
+)
 
 ENDINGS = (".png", ".svg", ".pdf", ".PNG")
 
@@ -127,3 +136,12 @@ def test_the_width_of_a_text_is_that_of_the_drawn_one() -> None:
     label = figure.axes[0].xaxis.label
     drawn = label.get_window_extent().width / figure.dpi
     assert text_width(label.get_text(), label.get_size()) == pytest.approx(drawn, rel=0.05)
+
+
+def test_ticks_are_round() -> None:
+    figure = small_figure()
+    (axes,) = figure.axes
+    axes.set_xlim(0.08, 0.1)
+    round_ticks(figure)
+    steps = np.diff(axes.get_xticks())
+    assert f"{steps[0]:.6e}"[:8] in ("1.000000", "2.000000", "5.000000")

@@ -69,6 +69,7 @@ class BifurcationBranches:
     """Equilibria and limit cycles of a drive without control over the belt speed; SI units."""
 
     drive: Drive
+    """The drive."""
     belt_speeds: FloatArray
     """Belt speeds at which the cycles were searched for, m/s; some may be added to those given."""
     equilibria: tuple[Branch, ...]
