@@ -58,6 +58,8 @@ _STICKS: Any = {"color": GREY, "lw": 5.0, "solid_capstyle": "butt", "zorder": 1.
 
 _ENLARGED = ", enlarged"
 _SWITCHED_ON = f"control switched on{_ENLARGED}"
+_FIRST_FORCE = f"first force{_ENLARGED}"
+_CONTROL_ONLY = "control force"
 _LEAST_ROWS = 20
 """Rows of a motion that is worth being enlarged."""
 
@@ -70,7 +72,7 @@ def run_figure(
     *,
     title: str,
     notes: Sequence[str] = (),
-    force: str = "control force",
+    force: str = _CONTROL_ONLY,
     style: FigureStyle = SCREEN,
 ) -> Figure:
     """Return the figure of a run.
@@ -96,6 +98,7 @@ def run_figure(
         last if len(last.time) > 1 else history.end(float("inf")),
         narrow=style.narrow,
         short=style.crowded(*size),
+        first_force=_SWITCHED_ON if force == _CONTROL_ONLY else _FIRST_FORCE,
     )
     figure = style.figure(*size, wide=1.1 if rows == 2 else 1.4, narrow=3.0 if rows == 2 else 4.0)
     if history.left_out:
@@ -153,10 +156,11 @@ class _Panels:
         *,
         narrow: bool,
         short: bool,
+        first_force: str,
     ) -> None:
         self.units = units = Units.for_drive(drive).shortened()
         self._history, self._drive, self._last = history, drive, last
-        self._narrow, self.short = narrow, short
+        self._narrow, self.short, self._first_force = narrow, short, first_force
         motion = history.motion
         self._run = Pane.covering("whole run", motion, *self._force_times)
         self._length = units.axis(units.named("displacement", short=short), "m", motion.position)
@@ -217,7 +221,7 @@ class _Panels:
         rows = self._history.around_switch_on(before, after)
         if len(rows.time) < _LEAST_ROWS:
             return []
-        return [Pane(_SWITCHED_ON, rows, at - before, at + after)]
+        return [Pane(self._first_force, rows, at - before, at + after)]
 
     def _label_time(self, axes: Axes, pane: Pane) -> None:
         scale, label = self.units.axis("time", "s", pane.start, pane.end)
