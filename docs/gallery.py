@@ -50,10 +50,11 @@ def keep(figure: bytes, name: str) -> None:
     small.thumbnail((1000, 1000), Image.Resampling.LANCZOS)
     GALLERY.mkdir(exist_ok=True)
     path = GALLERY / f"{name}.png"
-    for colours in (256, 128, 64, 32):
-        small.quantize(colours, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
-            path, optimize=True
-        )
+    for colours in (256, 128, 64, 48, 32, 24):
+        # Without k-means the greys of a figure that has few colours left turn brown.
+        small.quantize(
+            colours, Image.Quantize.MAXCOVERAGE, kmeans=1, dither=Image.Dither.NONE
+        ).save(path, optimize=True)
         if path.stat().st_size < LARGEST:
             break
 

@@ -54,18 +54,20 @@ class Stability(Shown):
         -------
         matplotlib.figure.Figure
             Where the sampled loop is stable, and the critical gain over the delay of the force.
+            Without a controller: the bifurcation diagram over the belt speed.
 
         Raises
         ------
         InvalidInputError
-            If there is no linear sampled loop, without a controller for example.
+            If there is no linear sampled loop, or if the theory of limit cycles does not cover a
+            drive without a controller.
         """
-        reason = stabilities.why_no_stability_map(self.scenario)
+        reason = stabilities.why_no_figure(self.scenario)
         if reason is not None:
             raise InvalidInputError(f"there is nothing to draw: {reason}")
-        from stickslip_ros.plots.stability_map import stability_figure
+        from stickslip_ros.plots.scenario_stability import scenario_stability_figure
 
-        return shown_in_notebooks(stability_figure(*stabilities.stability_map(self.scenario)))
+        return shown_in_notebooks(scenario_stability_figure(self.scenario))
 
     def _parts(self) -> Parts:
         found = {name: value for name, value in vars(self).items() if name != "scenario"}
@@ -151,19 +153,18 @@ class Proposal(Shown):
         Returns
         -------
         matplotlib.figure.Figure
-            The decay rate over corner frequency and linear gain.
+            The decay rate over cutoff frequency and linear gain, and the force limit.
 
         Raises
         ------
         RunError
             If there is nothing to propose.
         """
-        around = self.design.map_around()
-        if around is None:
+        if self.design.map_around() is None:
             raise RunError(self._nothing)
-        from stickslip_ros.plots.stability_map import stability_figure
+        from stickslip_ros.plots.stability_map import design_figure
 
-        return shown_in_notebooks(stability_figure(around, None))
+        return shown_in_notebooks(design_figure(self.design))
 
     def to_pandas(self) -> "DataFrame":
         """Return the checks as a table.

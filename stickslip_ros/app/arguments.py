@@ -5,6 +5,7 @@ import sys
 import warnings
 from collections.abc import Callable, Collection, Generator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -20,6 +21,7 @@ from stickslip_ros.versions import versions
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from stickslip_ros.plots.style import FigureStyle
     from stickslip_ros.scenarios.files import Scenario
 
 DEFAULT_CONTROLLER = "(default: the one that the scenario has a section for)"
@@ -31,6 +33,8 @@ _SMALLEST, _LARGEST = 2, 50
 """Width and height of a figure, inches."""
 _DPI = 20, 600
 _MOST_PIXELS = 2e8
+_STYLES = "screen", "paper", "paper-double"
+"""The names of `plots.style.STYLES`; importing that takes long."""
 
 
 def add_scenario_file(parser: argparse.ArgumentParser) -> None:
@@ -180,7 +184,16 @@ def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
         help="width and height of the figure, inches, as in --size 6x4",
     )
     parser.add_argument(
-        "--dpi", type=_dpi, metavar="N", help="dots per inch of the figure (default: 130)"
+        "--style",
+        choices=_STYLES,
+        help="what the figure is for: a screen, or a column (85 mm) or two (180 mm) of a journal, "
+        "with fonts of 8 points (default: screen)",
+    )
+    parser.add_argument(
+        "--dpi",
+        type=_dpi,
+        metavar="N",
+        help="dots per inch of the figure (default: 130, in the styles for paper 300)",
     )
     parser.add_argument("--no-title", action="store_true", help="omit the title of the figure")
 
@@ -193,6 +206,7 @@ def check_figure(arguments: argparse.Namespace) -> None:
     given = {
         "--size": size is not None and f"{size[0]:g}x{size[1]:g}",
         "--dpi": dpi,
+        "--style": arguments.style,
         "--no-title": arguments.no_title and "",
     }
     shown = [
@@ -212,15 +226,20 @@ def check_figure(arguments: argparse.Namespace) -> None:
     _check_writable("--plot", path)
 
 
-def write_figure(arguments: argparse.Namespace, figure: "Figure") -> None:
-    """Write a figure to the file that --plot names."""
-    from stickslip_ros.plots.style import DPI, adapt, save
+def write_figure(arguments: argparse.Namespace, draw: "Callable[[FigureStyle], Figure]") -> None:
+    """Draw a figure as it is asked for, and write it to the file that --plot names."""
+    from stickslip_ros.plots.style import STYLES, save
 
-    adapt(figure, size=arguments.size, title=not arguments.no_title)
+    style = replace(
+        STYLES[arguments.style or "screen"],
+        size=arguments.size,
+        titled=not arguments.no_title,
+    )
+    figure = draw(style)
     with writing("--plot", arguments.plot), warnings.catch_warnings():
         warnings.filterwarnings("error", "constrained_layout not applied", UserWarning)
         try:
-            save(figure, arguments.plot, dots_per_inch=arguments.dpi or DPI)
+            save(figure, arguments.plot, dots_per_inch=arguments.dpi or style.dots_per_inch)
         except UserWarning:
             width, height = figure.get_size_inches()
             raise InvalidInputError(

@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
             from stickslip_ros.studies.columns import Columns
 
             columns = Columns.from_journal(journal)
-            write_figure(arguments, study_figure(columns, basins, study))
+            write_figure(arguments, lambda style: study_figure(columns, basins, study, style=style))
         write_results(arguments, journal, {"attractor": basins.place}, made)
         if not arguments.json:
             print_table(*basin_table(study, basins))

@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write a complete scenario with the proposed gains; an existing file is refused",
     )
-    add_plot(parser, "the decay rate over cutoff frequency and linear gain")
+    add_plot(parser, "the decay rate over cutoff frequency and linear gain, and the force limit")
     add_json(parser)
 
 
@@ -107,13 +107,12 @@ def _write(path: Path, found: "Design") -> None:
 
 
 def _draw(arguments: argparse.Namespace, found: "Design") -> None:
-    from stickslip_ros.plots.stability_map import stability_figure
+    from stickslip_ros.plots.stability_map import design_figure
 
-    around = found.map_around()
-    if around is None:
+    if found.map_around() is None:
         _report_omitted(f"--plot {arguments.plot}: not drawn")
     else:
-        write_figure(arguments, stability_figure(around, None))
+        write_figure(arguments, lambda style: design_figure(found, style=style))
 
 
 def _report_omitted(what: str) -> None:

@@ -127,7 +127,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.plot is not None:
         from stickslip_ros.plots.identification_figure import identification_figure
 
-        write_figure(arguments, identification_figure(found))
+        write_figure(arguments, lambda style: identification_figure(found, style=style))
     return 0
 
 

@@ -158,7 +158,10 @@ def _draw(
             for bag, report in reports.items()
             for sentence in [*report["missing"], *report["notes"]]
         ]
-        write_figure(arguments, runs_figure(runs, notes=notes))
+        write_figure(arguments, lambda style: runs_figure(runs, notes=notes, style=style))
         return
     (bag, history, _, drive), report = runs[0], reports[runs[0].name]
-    write_figure(arguments, recorded_run_figure(Path(bag), drive, history, report))
+    write_figure(
+        arguments,
+        lambda style: recorded_run_figure(Path(bag), drive, history, report, style=style),
+    )

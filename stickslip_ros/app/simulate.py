@@ -105,7 +105,10 @@ def run(arguments: argparse.Namespace) -> int:
     if plot is not None and history is not None:
         from stickslip_ros.plots.simulated_run import simulated_run_figure
 
-        write_figure(arguments, simulated_run_figure(scenario, history, true))
+        write_figure(
+            arguments,
+            lambda style: simulated_run_figure(scenario, history, true, style=style),
+        )
     if arguments.json:
         truth = None if told is None else true.as_dict()
         figures = {**measures.as_dict(), "truth": truth, "duration": duration}

@@ -22,7 +22,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_plot(
         parser,
         "where the sampled loop is stable and how fast it settles, over cutoff frequency and "
-        "linear gain, and the critical gain over the delay of the force",
+        "linear gain, and the critical gain over the delay of the force; with --no-control the "
+        "bifurcation diagram over the belt speed, with stable and unstable limit cycles",
     )
     add_json(parser)
 
@@ -31,20 +32,20 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     with interrupts_kept():
         from stickslip_ros.plots.stability_table import stability_tables
-        from stickslip_ros.studies.stability import stability, stability_map, why_no_stability_map
+        from stickslip_ros.studies.stability import stability, why_no_figure
     scenario = scenario_of(arguments)
     check_figure(arguments)
     if arguments.plot is not None:
-        reason = why_no_stability_map(scenario)
+        reason = why_no_figure(scenario)
         if reason is not None:
             raise InvalidInputError(f"--plot {arguments.plot}: there is nothing to draw: {reason}")
     with progress_bar(f"theory of {scenario.name}", None):
         found, notes = stability(scenario)
     if arguments.plot is not None:
         with progress_bar("drawing", None):
-            from stickslip_ros.plots.stability_map import stability_figure
+            from stickslip_ros.plots.scenario_stability import scenario_stability_figure
 
-            write_figure(arguments, stability_figure(*stability_map(scenario)))
+            write_figure(arguments, lambda style: scenario_stability_figure(scenario, style=style))
     if arguments.json:
         print_json({**found, "notes": notes, **made_of(scenario)})
     else:

@@ -102,4 +102,5 @@ def _draw(arguments: argparse.Namespace, journal: "Journal") -> None:
     from stickslip_ros.studies.columns import Columns
 
     columns = Columns.from_journal(journal)
-    write_figure(arguments, sweep_figure(columns, journal.study, arguments.colour))
+    study, colour = journal.study, arguments.colour
+    write_figure(arguments, lambda style: sweep_figure(columns, study, colour, style=style))

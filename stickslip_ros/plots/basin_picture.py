@@ -13,15 +13,30 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.basin_table import attractor_name
 from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
-from stickslip_ros.plots.style import AMBER, MANY, PURPLE, SKY_BLUE, YELLOW, set_title, styled
+from stickslip_ros.plots.style import (
+    AMBER,
+    MANY,
+    PURPLE,
+    SCREEN,
+    SKY_BLUE,
+    YELLOW,
+    FigureStyle,
+    round_ticks,
+    styled,
+)
+from stickslip_ros.plots.titles import title_of
 from stickslip_ros.plots.units import SI, Units
 from stickslip_ros.studies.basin import POSITION, VELOCITY, Attractor, Basins
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Grid
 from stickslip_ros.studies.study import Study
 
+_WHAT = "Basins of attraction"
 
-def study_figure(columns: Columns, basins: Basins, study: Study) -> Figure:
+
+def study_figure(
+    columns: Columns, basins: Basins, study: Study, *, style: FigureStyle = SCREEN
+) -> Figure:
     """Return the figure of which attractor each start of a study leads to."""
     plan, scenario = study.plan, study.scenario
     drive = scenario.plant.as_drive()
@@ -36,7 +51,8 @@ def study_figure(columns: Columns, basins: Basins, study: Study) -> Figure:
         belt_speed=drive.belt_speed,
         equilibrium_position=drive.equilibrium_position if drive.has_spring else None,
         units=units,
-        title=" ".join([scenario.name, *scenario.overrides]),
+        title=title_of(_WHAT, scenario),
+        style=style,
     )
 
 
@@ -52,23 +68,22 @@ def basin_figure(
     belt_speed: float,
     equilibrium_position: float | None,
     units: Units = SI,
-    title: str = "",
+    title: str = _WHAT,
+    style: FigureStyle = SCREEN,
 ) -> Figure:
     """Return the figure of the attractor that each of n starts leads to.
 
     `position` (m) and `velocity` (m/s) are those of the starts, and `attractor` is the index of
     each one's attractor in `regimes` and `labels`; arrays of shape (n,). The starts are a row-major
     grid of `grid_shape`, or scattered if that is None. Lines mark the `belt_speed` (m/s) and a
-    circle the equilibrium at `equilibrium_position` (m), if there is one. `title` names the
-    computed study.
+    circle the equilibrium at `equilibrium_position` (m), if there is one.
     """
-    figure = Figure(figsize=(7.5, 6.8))
-    what = f"Motion that each of {len(attractor)} starts leads to"
-    set_title(figure, f"{what}: {title}" if title else what)
+    figure = style.figure(7.5, 6.8, narrow=1.25)
+    style.set_title(figure, title, f"the motion that each of {len(attractor)} starts leads to")
     axes = figure.subplots()
     axes.grid(visible=False)
-    length, x_label = units.axis("initial displacement", "m", position)
-    speed, y_label = units.axis("initial velocity", "m/s", velocity, belt_speed)
+    length, x_label = units.axis(units.named("initial displacement"), "m", position)
+    speed, y_label = units.axis(units.named("initial velocity"), "m/s", velocity, belt_speed)
     x, y = position / length, velocity / speed
     handles: list[Any] = []
     rasterized = len(attractor) > MANY
@@ -93,7 +108,8 @@ def basin_figure(
         handles.append(Line2D([], [], label="equilibrium", **circle))
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    style.legend_below(figure, handles, most=2)
+    round_ticks(figure)
     return figure
 
 

@@ -24,14 +24,12 @@ def draw_conclusions(
 ) -> None:
     """Draw the mean cycle with its edges, and the distributions over the slips.
 
-    `part` has three columns.
+    `part` has three cells, beside each other or one above another.
     """
-    place = 0
     if found.mean_cycle is not None:
-        _cycle(figure.add_subplot(part[0, 0:2]), found.mean_cycle, units)
-        _residual(figure.add_subplot(part[0, 2]), found.mean_cycle, units)
-        place = 3
-    if found.slips is not None and place == 0:
+        _cycle(figure.add_subplot(part[0:2]), found.mean_cycle, units)
+        _residual(figure.add_subplot(part[2]), found.mean_cycle, units)
+    elif found.slips is not None:
         each = found.slips["each"]
         for column, (name, title, unit) in enumerate(
             (
@@ -41,11 +39,11 @@ def draw_conclusions(
             )
         ):
             values = np.array([value for value in each[name] if value is not None])
-            _distribution(figure.add_subplot(part[0, column]), values, title, unit, units)
+            _distribution(figure.add_subplot(part[column]), values, title, unit, units)
 
 
 def _cycle(axes: Axes, mean: MeanCycle, units: Units) -> None:
-    scale, label = units.axis("displacement", "m", mean.position)
+    scale, label = units.axis(units.named("displacement"), "m", mean.position)
     second, time_label = units.axis("time within the cycle", "s", mean.phase)
     order = np.argsort(mean.phase)
     axes.plot(mean.phase / second, mean.position / scale, **_RAW, label="measured, all cycles")

@@ -25,9 +25,9 @@ def control_coming_on_figure(
     before = figure.add_subplot(grid[2, 0])
     after = figure.add_subplot(grid[2, 1], sharex=before, sharey=before)
 
-    length, length_label = SI.axis("displacement", "m", states.position)
-    speed, speed_label = SI.axis("velocity", "m/s", states.velocity)
-    newton, force_label = SI.axis("control force", "N", forces.force)
+    length, length_label = SI.axis(SI.named("displacement"), "m", states.position)
+    speed, speed_label = SI.axis(SI.named("velocity"), "m/s", states.velocity)
+    newton, force_label = SI.axis(SI.named("control force"), "N", forces.force)
     start, end = switched_on - around[0], switched_on + around[1]
     shown = (time >= start) & (time <= end)
     x, v, belt = (each[shown] for each in (states.position, states.velocity, states.belt_velocity))

@@ -29,8 +29,12 @@ def comparison_figure(runs: Sequence[ControlledRun], shown: float = 0.6) -> Figu
 
     There are looks for three controllers.
     """
-    length, length_label = SI.axis("displacement", "m", *(run.states.position for run in runs))
-    newton, force_label = SI.axis("control force", "N", *(run.forces.force for run in runs))
+    length, length_label = SI.axis(
+        SI.named("displacement"), "m", *(run.states.position for run in runs)
+    )
+    newton, force_label = SI.axis(
+        SI.named("control force"), "N", *(run.forces.force for run in runs)
+    )
     speeds = sorted({run.belt_speed for run in runs})
     controllers = dict.fromkeys(run.controller for run in runs)
     thin, dashed, thick = (GREY, "-", 0.8), (ORANGE, "--", 1.2), (BLUE, "-", 1.6)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.intervals import QUANTILE
-from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, set_title, styled
+from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, round_ticks, styled
 from stickslip_ros.plots.units import SI
 
 _DOTS: Any = {"marker": ".", "ms": 2.0, "ls": "", "alpha": 0.4, "mew": 0.0, "rasterized": True}
@@ -22,13 +22,15 @@ _NAMES = {1.0: "forward slip", -1.0: "backward slip"}
 
 
 @styled
-def identification_figure(found: Findings) -> Figure:
+def identification_figure(found: Findings, *, style: FigureStyle = SCREEN) -> Figure:
     """Return the figure of what was found.
 
     Parameters
     ----------
     found : Findings
         The model.
+    style : FigureStyle, optional
+        What the figure is for, by default a screen.
 
     Returns
     -------
@@ -37,22 +39,33 @@ def identification_figure(found: Findings) -> Figure:
         time, of the forces of an axis, and of the positions in segments of a drive on a spring; and
         the run without feedback beside the measured positions, with their difference.
     """
-    figure = Figure(figsize=(10.0, 9.0))
-    grid = figure.add_gridspec(3, 2)
-    _friction(figure.add_subplot(grid[0, :]), found)
+    figure = style.figure(10.0, 9.0, narrow=2.6)
+    narrow = style.narrow
+    grid = figure.add_gridspec(5, 1) if narrow else figure.add_gridspec(3, 2)
+    first, *residuals, last = (
+        [grid[row, 0] for row in range(5)]
+        if narrow
+        else [grid[0, :], grid[1, 0], grid[1, 1], grid[2, 0], grid[2, 1]]
+    )
+    _friction(figure.add_subplot(first), found)
     left = found.residuals()
     quantity, error_unit = ("position", "m") if found.has_spring else ("force", "N")
-    errors = left.error, quantity, error_unit
-    for place, values, name, unit in (
-        (grid[1, 0], left.relative_speed, "speed relative to the belt", "m/s"),
-        (grid[1, 1], left.position, "displacement", "m"),
-        (grid[2, 0], left.time, "time", "s"),
+    what = "residual" if style.printed else "measured less fitted"
+    errors = left.error, f"{quantity}, {what}", error_unit
+    for place, values, name, unit in zip(
+        residuals,
+        (left.relative_speed, left.position, left.time),
+        ("velocity relative to the belt", "displacement", "time"),
+        ("m/s", "m", "s"),
+        strict=True,
     ):
         _residuals(figure.add_subplot(place), (values, name, unit), errors)
-    _free_run(figure, grid[2, 1], found)
+    _free_run(figure, last, found)
     names = ", ".join(dict.fromkeys(Path(record.name).name for record in found.records))
     error = f"{100.0 * found.chosen.error:.4g} %"
-    set_title(figure, f"{names}: law {found.chosen.label}, held-out error {error}")
+    title = f"Identified drive, {names}: law {found.chosen.label}, held-out error {error}"
+    style.set_title(figure, title)
+    round_ticks(figure)
     return figure
 
 
@@ -64,7 +77,7 @@ def _friction(axes: Axes, found: Findings) -> None:
     scale, label = SI.axis("friction force", "N", np.array([top]))
     fastest = max(float(curve.speed[-1]) for curve in curves)
     speed_scale, speed_label = SI.axis(
-        "speed relative to the belt, size", "m/s", np.array([fastest])
+        "size of the velocity relative to the belt $v_r$", "m/s", np.array([fastest])
     )
     for curve, direction, colour in zip(curves, found.directions, (BLUE, ORANGE), strict=False):
         own, name = errors.relative_speed * direction > 0.0, _NAMES[direction]
@@ -95,8 +108,8 @@ def _residuals(
     axes: Axes, over: tuple[FloatArray, str, str], of: tuple[FloatArray, str, str]
 ) -> None:
     (values, name, unit), (errors, quantity, error_unit) = over, of
-    scale, label = SI.axis(name, unit, values)
-    error_scale, error_label = SI.axis(f"{quantity}, measured less fitted", error_unit, errors)
+    scale, label = SI.axis(SI.named(name), unit, values)
+    error_scale, error_label = SI.axis(quantity, error_unit, errors)
     axes.plot(values / scale, errors / error_scale, color=BLUE, **_DOTS)
     axes.axhline(0.0, color="black", lw=0.6)
     axes.set_xlabel(label)
@@ -111,7 +124,7 @@ def _free_run(figure: Figure, place: Any, found: Findings) -> None:
     below = place.subgridspec(2, 1, height_ratios=(2.0, 1.0))
     upper = figure.add_subplot(below[0])
     lower = figure.add_subplot(below[1], sharex=upper)
-    scale, label = SI.axis("displacement", "m", record.position)
+    scale, label = SI.axis(SI.named("displacement"), "m", record.position)
     upper.plot(time, record.position / scale, color=BLUE)
     upper.plot(time, run / scale, color=ORANGE, ls="--")
     upper.set_ylabel(label)

@@ -10,10 +10,16 @@ from stickslip_ros.physics.measures.cycle_measures import measures_of
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.run_figure import run_figure
 from stickslip_ros.plots.run_history import RunHistory
+from stickslip_ros.plots.style import SCREEN, FigureStyle
 
 
 def recorded_run_figure(
-    bag: Path, drive: Drive | None, history: RunHistory, report: Mapping[str, Any]
+    bag: Path,
+    drive: Drive | None,
+    history: RunHistory,
+    report: Mapping[str, Any],
+    *,
+    style: FigureStyle = SCREEN,
 ) -> Figure:
     """Return the figure of a recorded run, with what the `report` of its bag notes.
 
@@ -22,4 +28,5 @@ def recorded_run_figure(
     notes = [*report["missing"], *report["notes"]]
     if drive is None:
         notes.append("it is not recorded what drive it was: no equilibrium, no friction law")
-    return run_figure(history, measures_of(report), drive, title=str(bag), notes=notes)
+    title = f"Recorded run, {bag}"
+    return run_figure(history, measures_of(report), drive, title=title, notes=notes, style=style)

@@ -5,9 +5,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpecFromSubplotSpec
+from matplotlib.gridspec import SubplotSpec
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -36,8 +37,10 @@ from stickslip_ros.plots.style import (
     LIGHT_GREY,
     MANY,
     ORANGE,
+    SCREEN,
     SKY_BLUE,
-    set_title,
+    FigureStyle,
+    round_ticks,
     styled,
 )
 from stickslip_ros.plots.units import Units
@@ -53,6 +56,13 @@ _FRICTION: Any = {"color": SKY_BLUE, "lw": 0.7}
 _EARLIER: Any = {"color": LIGHT_GREY, "lw": 0.7}
 _STICKS: Any = {"color": GREY, "lw": 5.0, "solid_capstyle": "butt", "zorder": 1.9}
 
+_ENLARGED = ", enlarged"
+_SWITCHED_ON = f"control switched on{_ENLARGED}"
+_FIRST_FORCE = f"first force{_ENLARGED}"
+_CONTROL_ONLY = "control force"
+_LEAST_ROWS = 20
+"""Rows of a motion that is worth being enlarged."""
+
 
 @styled
 def run_figure(
@@ -62,11 +72,13 @@ def run_figure(
     *,
     title: str,
     notes: Sequence[str] = (),
-    force: str = "control force",
+    force: str = _CONTROL_ONLY,
+    style: FigureStyle = SCREEN,
 ) -> Figure:
     """Return the figure of a run.
 
-    It shows the whole run and its last `LAST_CYCLES` cycles over time, shaded by the share of time
+    It shows the whole run, the instant at which the controller is switched on, if there is one,
+    and its last `LAST_CYCLES` cycles over time, shaded by the share of time
     in which the slide sticks; the phase portrait of these cycles and of the start; amplitude and
     stick fraction of each cycle; and the friction law with the range of relative speeds. The
     equilibrium and the friction law need a `drive`, the equilibrium also a moving belt. The belt
@@ -77,28 +89,45 @@ def run_figure(
     if drive is not None and len(motion.time):
         drive = replace(drive, belt_speed=float(motion.belt_velocity[-1]))
     last = history.end(end_duration(motion, measures, drive))
-    panels = _Panels(history, drive, last if len(last.time) > 1 else history.end(float("inf")))
     concluded = history.conclusions
     rows = 3 if concluded.mean_cycle is not None or concluded.slips is not None else 2
-    figure = Figure(figsize=(12.0, 10.0 if rows == 2 else 12.5))
+    size = (12.0, 10.0 if rows == 2 else 12.5)
+    panels = _Panels(
+        history,
+        drive,
+        last if len(last.time) > 1 else history.end(float("inf")),
+        narrow=style.narrow,
+        short=style.crowded(*size),
+        first_force=_SWITCHED_ON if force == _CONTROL_ONLY else _FIRST_FORCE,
+    )
+    figure = style.figure(*size, wide=1.1 if rows == 2 else 1.4, narrow=3.0 if rows == 2 else 4.0)
     if history.left_out:
         notes = [*notes, f"not drawn: {history.left_out} samples without an increasing time"]
-    set_title(figure, title, measures_text(measures, panels.units), *notes)
-    grid = figure.add_gridspec(rows, 1, height_ratios=(3.0, 1.9, 1.2)[:rows])
+    style.set_title(figure, title, measures_text(measures, panels.units), *notes)
+    ratios = (3.0, 2.3, 1.4) if panels.short else (3.0, 1.9, 1.2)
+    if style.narrow:
+        ratios = (5.2, 4.2, 4.0)
+    grid = figure.add_gridspec(rows, 1, height_ratios=ratios[:rows])
     above, below = grid[0], grid[1]
+    panels.over_time(figure, above)
+    if style.narrow:
+        parts = below.subgridspec(3, 2, height_ratios=(1.5, 1.0, 1.3))
+        left, right, cycles = parts[0, :], parts[2, :], (parts[1, 0], parts[1, 1])
+    else:
+        left, middle, right = below.subgridspec(1, 3)
+        cycles = middle.subgridspec(2, 1)
     if rows == 3:
-        draw_conclusions(figure, grid[2].subgridspec(1, 3), concluded, panels.units)
-    panels.over_time(figure, above.subgridspec(3, 2, width_ratios=(2.0, 1.0)))
-    left, middle, right = below.subgridspec(1, 3)
+        shape = (3, 1) if style.narrow else (1, 3)
+        draw_conclusions(figure, grid[2].subgridspec(*shape), concluded, panels.units)
     panels.portrait(figure.add_subplot(left))
-    upper, lower = middle.subgridspec(2, 1)
-    amplitude = figure.add_subplot(upper)
-    panels.cycles(amplitude, figure.add_subplot(lower, sharex=amplitude))
+    first, second = (figure.add_subplot(part) for part in cycles)
+    panels.cycles(first, second)
     panels.law(figure.add_subplot(right))
+    sticks = "sticks" if panels.short else "sticks (paler: part of the time)"
     handles: list[Any] = [
         Line2D([], [], **_MOTION, label="slide"),
         Line2D([], [], **_BELT, label="belt speed"),
-        Patch(color=GREY, alpha=0.6, lw=0.0, label="sticks (paler: part of the time)"),
+        Patch(color=GREY, alpha=0.6, lw=0.0, label=sticks),
         Line2D([], [], **_CONTROL, label=force),
         Line2D([], [], **_FRICTION, label="friction force"),
         Line2D([], [], **_EARLIER | {"lw": 4.0}, label="start of the run"),
@@ -109,44 +138,61 @@ def run_figure(
         handles.append(Line2D([], [], **_HELD, label="no new force: last one"))
     if panels.drops:
         handles.append(Line2D([], [], **_DROPPED | {"ms": 6.0}, label="sent, did not act"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    if panels.short:
+        handles += panels.of_law
+    style.legend_below(figure, handles)
+    round_ticks(figure)
     return figure
 
 
 class _Panels:
     """The panels of the figure, with their common units and data."""
 
-    def __init__(self, history: RunHistory, drive: Drive | None, last: DrawnMotion) -> None:
-        self.units = units = Units.for_drive(drive)
+    def __init__(
+        self,
+        history: RunHistory,
+        drive: Drive | None,
+        last: DrawnMotion,
+        *,
+        narrow: bool,
+        short: bool,
+        first_force: str,
+    ) -> None:
+        self.units = units = Units.for_drive(drive).shortened()
         self._history, self._drive, self._last = history, drive, last
+        self._narrow, self.short, self._first_force = narrow, short, first_force
         motion = history.motion
         self._run = Pane.covering("whole run", motion, *self._force_times)
-        self._length = units.axis("displacement", "m", motion.position)
-        self._speed = units.axis("velocity", "m/s", motion.velocity, motion.belt_velocity)
+        self._length = units.axis(units.named("displacement", short=short), "m", motion.position)
+        self._speed = units.axis(
+            units.named("velocity", short=short), "m/s", motion.velocity, motion.belt_velocity
+        )
         self.holds = False
         """Whether forces are missing for a while, so that the last one is drawn on."""
         self.drops = len(history.dropped.columns()[0]) > 0
         """Whether forces were sent that did not act."""
+        self.of_law: list[Artist] = []
+        """Entries of the legend for the friction law."""
 
     @property
     def _force_times(self) -> list[FloatArray]:
         return [trace.columns()[0] for trace in (self._history.control, self._history.dropped)]
 
-    def over_time(self, figure: Figure, parts: GridSpecFromSubplotSpec) -> None:
-        """Draw displacement, velocity and force: the whole run, and its end enlarged."""
+    def over_time(self, figure: Figure, part: SubplotSpec) -> None:
+        """Draw displacement, velocity and force: the whole run, and parts of it enlarged."""
         history = self._history
         others = [] if len(self._last.time) else self._force_times
-        end = Pane.covering("end of the run, enlarged", self._last, *others)
+        end = Pane.covering(f"end of the run{_ENLARGED}", self._last, *others)
         traces = history.friction, history.control, history.dropped
         whole = [trace.columns() for trace in traces]
-        ending = [trace.since(end.start) for trace in traces]
+        panes = [self._run, *self._switch_on(end), end]
+        drawn = [whole] * (len(panes) - 1) + [[trace.since(end.start) for trace in traces]]
         newton, label = self.units.axis("force", "N", *(columns[1] for columns in whole))
-        panels: Any = parts.subplots(sharex="col", sharey="row")
-        for column, pane, (friction, control, dropped) in zip(
-            panels.T, (self._run, end), (whole, ending), strict=True
-        ):
+        panels = _panels_over_time(figure, part, len(panes), narrow=self._narrow)
+        for column, pane, (friction, control, dropped) in zip(panels.T, panes, drawn, strict=True):
             position, velocity, force = column
-            position.set_title(pane.title)
+            title = pane.title.removesuffix(_ENLARGED) if self.short else pane.title
+            position.set_title(title)
             self._draw_motion(position, velocity, pane)
             draw_line(force, pane, friction, newton, history.gap, **_FRICTION)
             gap = history.control_gap
@@ -158,8 +204,24 @@ class _Panels:
         for row, of_row in zip(panels, labels, strict=True):
             row[0].set_ylabel(of_row)
             row[0].set_ylim(widened(*row[0].get_ylim()))
-            for axes, pane in zip(row, (self._run, end), strict=True):
+            for axes, pane in zip(row, panes, strict=True):
                 shade(axes, pane)
+
+    def _switch_on(self, end: Pane) -> list[Pane]:
+        """Return the instant at which the controller is switched on, if it is in the run.
+
+        There must be motion before it and behind it, and not as much as to be the whole run.
+        """
+        at, length = self._history.switched_on, end.end - end.start
+        if at is None or not len(end.rows.time):
+            return []
+        before, after = 0.5 * length, 1.5 * length
+        if at - before < self._run.start or at + after > end.start:
+            return []
+        rows = self._history.around_switch_on(before, after)
+        if len(rows.time) < _LEAST_ROWS:
+            return []
+        return [Pane(self._first_force, rows, at - before, at + after)]
 
     def _label_time(self, axes: Axes, pane: Pane) -> None:
         scale, label = self.units.axis("time", "s", pane.start, pane.end)
@@ -209,7 +271,6 @@ class _Panels:
         """Draw amplitude and stick fraction of each cycle over time."""
         time, *columns = self._history.cycles
         amplitude.set_title("each cycle")
-        amplitude.tick_params(labelbottom=False)
         scale, label = self.units.axis("amplitude", "m", columns[0])
         if not len(time):
             say(amplitude, "no cycle was completed")
@@ -225,6 +286,12 @@ class _Panels:
             axes.set_ylim(0.0, max(1.1 * float(values.max(initial=0.0)), least) or 1.0)
         amplitude.set_ylabel(label)
         stick_fraction.set_ylabel("stick fraction")
+        if self._narrow:  # beside each other
+            stick_fraction.set_title("each cycle")
+            self._label_time(amplitude, self._run)
+        else:
+            amplitude.sharex(stick_fraction)
+            amplitude.tick_params(labelbottom=False)
         self._label_time(stick_fraction, self._run)
 
     def law(self, axes: Axes) -> None:
@@ -232,7 +299,7 @@ class _Panels:
 
         Friction with a memory leaves the curve of steady slip: its loop is drawn.
         """
-        axes.set_title("friction law, with the range of this run")
+        axes.set_title("friction law" if self.short else "friction law, with the range of this run")
         drive, reached = self._drive, self._history.relative_speeds
         if drive is None:
             say(axes, "the drive is not known")
@@ -242,9 +309,10 @@ class _Panels:
         ends = min(least, at_rest, 0.0), max(largest, at_rest, 0.0)
         room = 0.1 * (ends[1] - ends[0]) or drive.speed_scale
         ends = ends[0] - room, ends[1] + room
-        scale, label = self.units.axis("velocity relative to the belt", "m/s", ends)
+        relative_speed = self.units.named("velocity relative to the belt", short=self.short)
+        scale, label = self.units.axis(relative_speed, "m/s", ends)
         axes.set_xlabel(label)
-        axes.set_ylabel("friction coefficient")
+        axes.set_ylabel(self.units.named("friction coefficient", short=self.short))
         self._law_between(axes, *ends, scale, color="black", lw=0.8, ls="-.")
         if reached is not None:
             axes.axvspan(least / scale, largest / scale, color=LIGHT_GREY, alpha=0.4, lw=0.0)
@@ -262,13 +330,14 @@ class _Panels:
             axes.plot(at_rest / scale, rest, zorder=3.0, **_POINT)
         axes.axvline(at_rest / scale, **_BELT)
         axes.set_xlim(ends[0] / scale, ends[1] / scale)
-        handles = [
+        self.of_law = [
             Line2D([], [], color="black", lw=0.8, ls="-.", label=curve),
             followed,
             Patch(color=LIGHT_GREY, alpha=0.4, lw=0.0, label="range of the whole run"),
-            Line2D([], [], **_BELT, label="slide at rest"),
         ]
-        axes.legend(handles=handles, loc="best")
+        if not self.short:  # otherwise there is no room for a legend within the panel
+            rest = Line2D([], [], **_BELT, label="slide at rest")
+            axes.legend(handles=[*self.of_law, rest], loc="best")
 
     def _loop(self, axes: Axes, relative: FloatArray) -> None:
         """Draw the friction of the last cycles over their relative speed."""
@@ -295,6 +364,25 @@ class _Panels:
         if least <= 0.0 <= largest:
             forward, backward = map(float, law.limits)
             axes.plot([0.0, 0.0], [-forward, backward], **look)
+
+
+def _panels_over_time(figure: Figure, part: SubplotSpec, panes: int, *, narrow: bool) -> Any:
+    """Return axes for three quantities and a number of panes; the first pane is the widest.
+
+    If the figure is narrow, the first pane is above the others.
+    """
+    if not narrow:
+        grid = part.subgridspec(3, panes, width_ratios=(2.0, *[1.0] * (panes - 1)))
+        return grid.subplots(sharex="col", sharey="row")
+    above, below = part.subgridspec(2, 1)
+    whole: Any = above.subgridspec(3, 1).subplots(sharex=True, squeeze=False)
+    others: Any = below.subgridspec(3, panes - 1).subplots(
+        sharex="col", sharey="row", squeeze=False
+    )
+    panels = np.concatenate([whole, others], axis=1)
+    for row in panels:
+        row[1].sharey(row[0])
+    return panels
 
 
 def _draw_held(

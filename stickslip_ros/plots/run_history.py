@@ -13,6 +13,9 @@ from stickslip_ros.samples import LARGEST
 _FIRST_ROWS = 20_000
 """Rows of the start that are kept unchanged, for a phase portrait."""
 
+_SWITCHED_ROWS = 20_000
+"""Rows from the first force on that are kept unchanged, and as much time before."""
+
 
 class DrawnMotion(NamedTuple):
     """Breakpoints, all or a part, as columns; SI units."""
@@ -46,10 +49,13 @@ class RunHistory:
         """Force (N) over the time from which it acts or is requested."""
         self.dropped = Trace(1)
         """Force (N) that was requested and did not act, as far as known."""
+        self.switched_on: float | None = None
+        """Time of the first force that is not zero, s; None as long as there is none."""
         self.conclusions = Conclusions(None, None)
         """What was concluded from a record."""
         self._motion, self._cycles = Trace(4), Trace(2)
         self._first: list[DrawnMotion] = []
+        self._switched: DrawnMotion | None = None
         self._first_rows = 0
         self._stick_time = 0.0
         self._motion_end = self._cycles_end = -float("inf")
@@ -70,6 +76,14 @@ class RunHistory:
     def end(self, duration: float) -> DrawnMotion:
         """Return the last `duration` (s) of the motion, of the 50,000 last rows or more."""
         return DrawnMotion(*self._motion.since(self._motion_end - duration))
+
+    def around_switch_on(self, before: float, after: float) -> DrawnMotion:
+        """Return the motion from `before` to `after` (s) the first force that is not zero."""
+        assert self.switched_on is not None
+        rows = self._switched or self.motion
+        start, end = self.switched_on - before, self.switched_on + after
+        shown = (rows.time >= start) & (rows.time <= end)
+        return DrawnMotion(*(column[shown] for column in rows))
 
     @property
     def cycles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -102,6 +116,7 @@ class RunHistory:
             time, breakpoints.position, breakpoints.velocity, belt_velocity, stick_time
         )
         self._motion.add(*drawn)
+        self._keep_switch_on()
         if self._first_rows < _FIRST_ROWS:
             self._first.append(drawn)
             self._first_rows += len(time)
@@ -109,6 +124,14 @@ class RunHistory:
         least, largest = self.relative_speeds or (np.inf, -np.inf)
         low, high = float(relative.min()), float(relative.max())
         self.relative_speeds = min(least, low), max(largest, high)
+
+    def _keep_switch_on(self) -> None:
+        """Keep the motion around the first force once there is enough of it."""
+        if self.switched_on is None or self._switched is not None:
+            return
+        if len(self._motion.since(self.switched_on)[0]) > _SWITCHED_ROWS:
+            kept = self._motion.since(2.0 * self.switched_on - self._motion_end)
+            self._switched = DrawnMotion(*(column.copy() for column in kept))
 
     def _take_cycles(self, motion: MeasuredMotion) -> None:
         time = np.array(motion.cycle_ends)
@@ -131,6 +154,9 @@ class RunHistory:
         self._control_end = float(time.max(initial=self._control_end))
         if self.control_gap == float("inf") and rows.sum() > 1:
             self.control_gap = LONGEST_GAP * float(np.median(np.diff(time[rows])))
+        acting = np.flatnonzero(rows & acted & (force != 0.0))
+        if self.switched_on is None and len(acting):
+            self.switched_on = float(time[acting[0]])
         for trace, drawn in ((self.control, rows & acted), (self.dropped, rows & ~acted)):
             trace.add(time[drawn], force[drawn])
 

@@ -32,8 +32,10 @@ from stickslip_ros.plots.style import (
     MANY,
     ORANGE,
     PURPLE,
+    SCREEN,
     SKY_BLUE,
-    set_title,
+    FigureStyle,
+    round_ticks,
     styled,
 )
 from stickslip_ros.plots.units import SI, Units
@@ -53,7 +55,9 @@ class DrawnRun(NamedTuple):
 
 
 @styled
-def runs_figure(runs: Sequence[DrawnRun], *, notes: Sequence[str] = ()) -> Figure:
+def runs_figure(
+    runs: Sequence[DrawnRun], *, notes: Sequence[str] = (), style: FigureStyle = SCREEN
+) -> Figure:
     """Return the figure of up to six runs, each in its own colour.
 
     Above a column for each run: displacement and force over time, with the same axes. Below, all
@@ -64,13 +68,23 @@ def runs_figure(runs: Sequence[DrawnRun], *, notes: Sequence[str] = ()) -> Figur
     looks: list[dict[str, Any]] = [
         {"color": colour, "ls": dashes} for colour, dashes in zip(_COLOURS, _DASHES, strict=True)
     ][: len(runs)]
-    figure = Figure(figsize=(12.0, 9.0))
-    set_title(figure, "; ".join(run.name for run in runs), *notes)
-    picture = _Picture(runs, looks)
-    above, below = figure.add_gridspec(2, 1, height_ratios=(1.3, 1.0))
-    panels: Any = above.subgridspec(2, len(runs)).subplots(sharex=True, sharey="row")
+    count = len(runs)
+    figure = style.figure(12.0, 9.0, wide=0.95, narrow=0.9 * count + 1.4)
+    style.set_title(figure, "Runs compared, " + "; ".join(run.name for run in runs), *notes)
+    picture = _Picture(runs, looks, short=style.crowded(12.0, 9.0))
+    ratios = (0.9 * count, 1.3) if style.narrow else (1.3, 1.0)
+    above, below = figure.add_gridspec(2, 1, height_ratios=ratios)
+    if style.narrow:
+        stacked: Any = above.subgridspec(2 * count, 1).subplots(sharex=True, squeeze=False)
+        panels = stacked.reshape(count, 2).T
+        for row in panels:
+            for axes in row[1:]:
+                axes.sharey(row[0])
+        left, middle, right = below.subgridspec(3, 1)
+    else:
+        panels = above.subgridspec(2, count).subplots(sharex=True, sharey="row", squeeze=False)
+        left, middle, right = below.subgridspec(1, 3)
     picture.over_time(panels)
-    left, middle, right = below.subgridspec(1, 3)
     picture.portrait(figure.add_subplot(left))
     amplitude = figure.add_subplot(middle)
     picture.cycles(amplitude, figure.add_subplot(right, sharex=amplitude))
@@ -78,27 +92,35 @@ def runs_figure(runs: Sequence[DrawnRun], *, notes: Sequence[str] = ()) -> Figur
         Line2D([], [], marker=marker, ms=4.0, label=run.name, **look)
         for run, look, marker in zip(runs, looks, _MARKERS, strict=False)
     ]
-    columns = max(1, min(len(handles), 120 // max(len(run.name) + 8 for run in runs)))
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+    style.legend_below(figure, handles)
+    round_ticks(figure)
     return figure
 
 
 class _Picture:
     """What the panels have in common, and each of them."""
 
-    def __init__(self, runs: Sequence[DrawnRun], looks: Sequence[dict[str, Any]]) -> None:
-        self._runs, self._looks = runs, looks
-        own = {Units.for_drive(run.drive) for run in runs}
+    def __init__(
+        self, runs: Sequence[DrawnRun], looks: Sequence[dict[str, Any]], *, short: bool
+    ) -> None:
+        self._runs, self._looks, self._short = runs, looks, short
+        own = {Units.for_drive(run.drive).shortened() for run in runs}
         self._units = own.pop() if len(own) == 1 else SI
         motions = [run.history.motion for run in runs]
         self._motions = motions
-        self._length = self._units.axis("displacement", "m", *(m.position for m in motions))
-        self._speed = self._units.axis("velocity", "m/s", *(m.velocity for m in motions))
+        self._length = self._units.axis(
+            self._units.named("displacement", short=short), "m", *(m.position for m in motions)
+        )
+        self._speed = self._units.axis(
+            self._units.named("velocity", short=short), "m/s", *(m.velocity for m in motions)
+        )
 
     def over_time(self, panels: Any) -> None:
         """Draw displacement and force of each run in its own column."""
         forces = [run.history.control.columns() for run in self._runs]
-        newton, force_label = self._units.axis("control force", "N", *(f[1] for f in forces))
+        newton, force_label = self._units.axis(
+            self._units.named("control force", short=self._short), "N", *(f[1] for f in forces)
+        )
         panes = [
             Pane.covering(run.name, motion, force[0])
             for run, motion, force in zip(self._runs, self._motions, forces, strict=True)
@@ -116,7 +138,9 @@ class _Picture:
                 force, pane, trace, newton, history.control_gap, drawstyle="steps-post", **solid
             )
             position.set_title(
-                f"{pane.title}\n{measures_text(run.measures, self._units)}", fontsize=8.0, wrap=True
+                f"{pane.title}\n{measures_text(run.measures, self._units)}",
+                fontsize="small",
+                wrap=True,
             )
             _label_time(force, scale, time_label)
             if not len(rows.time):

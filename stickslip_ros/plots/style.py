@@ -1,16 +1,23 @@
 """Common style of the figures: lines, fonts and colours, and how figures are saved."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import wraps
 from io import BytesIO
+from itertools import accumulate
 from pathlib import Path
 from textwrap import fill
-from typing import Any, ParamSpec, TypeVar
-from weakref import WeakKeyDictionary
+from typing import Any, ParamSpec, TypeVar, cast
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib import rc_context
+from matplotlib.artist import Artist
+from matplotlib.cbook import is_math_text
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import TextToPath
+from matplotlib.ticker import AutoLocator
 from PIL import Image
 
 from stickslip_ros.text import printable
@@ -50,52 +57,156 @@ _LOOK: dict[str, Any] = {
     "pdf.fonttype": 42,
 }
 
+_PRINTED: dict[str, Any] = {
+    "font.size": 8.0,
+    "axes.labelsize": 8.0,
+    "axes.titlesize": 8.0,
+    "figure.titlesize": 8.0,
+    "legend.fontsize": 7.0,
+    "legend.title_fontsize": 7.0,
+    "legend.handlelength": 1.8,
+    "legend.columnspacing": 1.2,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "axes.linewidth": 0.6,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "lines.linewidth": 1.0,
+    "figure.constrained_layout.h_pad": 0.03,
+    "figure.constrained_layout.w_pad": 0.03,
+}
+"""What differs in print."""
+
+_MILLIMETRE = 1.0 / 25.4
+
 _REPRODUCIBLE = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 """Metadata to omit by file type, so that the same figure gives the same file."""
 
-DPI = 130.0
-"""Dots per inch of a PNG."""
 
-_titles: WeakKeyDictionary[Figure, tuple[str, ...]] = WeakKeyDictionary()
-"""The lines above each figure, before they are broken to its width."""
+@dataclass(frozen=True)
+class FigureStyle:
+    """What a figure is drawn for: its size, its fonts, and whether it has a title."""
+
+    dots_per_inch: float = 130.0
+    """Dots per inch of a PNG."""
+    width: float | None = None
+    """Width of a column in print, inches; None: each figure has its own."""
+    narrow: bool = False
+    """Whether the panels are above each other, because two do not fit side by side."""
+    size: tuple[float, float] | None = None
+    """Width and height that were asked for, inches; None: that of the style."""
+    titled: bool = True
+    """Whether there is a title above the figure."""
+
+    @property
+    def printed(self) -> bool:
+        """Whether the figure is for print."""
+        return self.width is not None
+
+    def figure(
+        self, width: float, height: float, *, wide: float | None = None, narrow: float | None = None
+    ) -> Figure:
+        """Return an empty figure; `width` and `height` (inches) are those on a screen.
+
+        In print the height keeps the ratio to the width, unless the ratio of a `wide` figure, of
+        two columns, or of a `narrow` one is given.
+        """
+        if self.size is not None:
+            return Figure(figsize=self.size)
+        if self.width is None:
+            return Figure(figsize=(width, height))
+        ratio = (narrow if self.narrow else wide) or height / width
+        return Figure(figsize=(self.width, ratio * self.width))
+
+    def crowded(self, width: float, height: float) -> bool:
+        """Return whether a figure that has this size on a screen, inches, must do with less."""
+        if self.size is None:
+            return self.printed
+        return self.size[0] < 0.8 * width or self.size[1] < 0.8 * height
+
+    def set_title(self, figure: Figure, *lines: str) -> None:
+        """Set the title of a figure to `lines`; long lines are wrapped, and cut after three."""
+        if not self.titled:
+            return
+        points = FontProperties(size=mpl.rcParams["figure.titlesize"]).get_size_in_points()
+        letters = round(115.0 * float(figure.get_figwidth()) / points)
+        broken = (fill(printable(line), letters, max_lines=3, placeholder=" ...") for line in lines)
+        figure.suptitle("\n".join(broken), parse_math=False)
+
+    def legend_below(self, figure: Figure, handles: Sequence[Artist], most: int = 12) -> None:
+        """Set a legend below the panels, in as many columns as fit, at most so many."""
+        columns = _legend_columns(handles, 0.95 * float(figure.get_figwidth()), most)
+        figure.legend(handles=list(handles), loc="outside lower center", ncols=columns)
+
+
+SCREEN = FigureStyle()
+"""For the screen."""
+
+STYLES = {
+    "screen": SCREEN,
+    "paper": FigureStyle(300.0, 85.0 * _MILLIMETRE, narrow=True),
+    "paper-double": FigureStyle(300.0, 180.0 * _MILLIMETRE),
+}
+"""Styles by name: for the screen, and for one column or two of a journal."""
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 
 def styled(draw: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Decorate a function so that it draws in the common style, not with the user's settings."""
+    """Decorate a function so that it draws in its `style`, not with the user's settings.
+
+    The style is an argument by keyword; without it the function draws for the screen.
+    """
 
     @wraps(draw)
     def drawn(*arguments: _P.args, **options: _P.kwargs) -> _R:
         with rc_context():
-            _use_style()
+            _use_style(cast(FigureStyle, options.get("style", SCREEN)))
             return draw(*arguments, **options)
 
     return drawn
 
 
-def set_title(figure: Figure, *lines: str) -> None:
-    """Set the title of a figure to `lines`; long lines are wrapped, and cut after three."""
-    _titles[figure] = lines
-    letters = round(10.0 * float(figure.get_figwidth()))  # ten per inch, on average
-    broken = (fill(printable(line), letters, max_lines=3, placeholder=" ...") for line in lines)
-    figure.suptitle("\n".join(broken), parse_math=False)
+def round_ticks(figure: Figure) -> None:
+    """Let the ticks of all linear axes be whole multiples of 1, 2 or 5 times a power of ten."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            locator = axis.get_major_locator()
+            if isinstance(locator, AutoLocator):
+                locator.set_params(steps=[1.0, 2.0, 5.0, 10.0])
 
 
-@styled
-def adapt(figure: Figure, *, size: tuple[float, float] | None = None, title: bool = True) -> None:
-    """Give a figure another size (width and height, inches), or remove the title above it."""
-    if size is not None:
-        figure.set_size_inches(*size)
-    if not title:
-        figure.suptitle("")
-    elif figure in _titles:
-        set_title(figure, *_titles[figure])
+def text_width(text: str, points: float) -> float:
+    """Return the width of a line of text in a font of that size, inches."""
+    found = TextToPath().get_text_width_height_descent(
+        text, FontProperties(size=points), ismath=bool(is_math_text(text))
+    )
+    return float(found[0]) / 72.0
+
+
+def _legend_columns(handles: Sequence[Artist], room: float, most: int) -> int:
+    """Return the largest number of columns with which a legend is no wider than `room`, inches."""
+    settings: Any = mpl.rcParams
+    points = float(settings["legend.fontsize"])
+    widths = [text_width(str(handle.get_label()), points) for handle in handles]
+    handle = (settings["legend.handlelength"] + settings["legend.handletextpad"]) * points / 72.0
+    between = settings["legend.columnspacing"] * points / 72.0
+    for columns in range(min(most, len(handles)), 1, -1):
+        sizes = [len(part) for part in np.array_split(np.arange(len(widths)), columns)]
+        ends = list(accumulate(sizes))
+        widest = [max(widths[end - size : end]) for size, end in zip(sizes, ends, strict=True)]
+        if sum(widest) + columns * handle + (columns - 1) * between <= room:
+            return columns
+    return 1
 
 
 def save(
-    figure: Figure, path: Path, *, colours: int | None = None, dots_per_inch: float = DPI
+    figure: Figure,
+    path: Path,
+    *,
+    colours: int | None = None,
+    dots_per_inch: float = SCREEN.dots_per_inch,
 ) -> None:
     """Write a figure to `path`; the format follows the ending: .png, .svg or .pdf.
 
@@ -104,7 +215,7 @@ def save(
     """
     ending = path.suffix.lower()
     with rc_context():
-        _use_style()
+        _use_style(SCREEN)
         if ending == ".png" and colours is not None:
             buffer = BytesIO()
             figure.savefig(buffer, format="png", dpi=110)
@@ -116,7 +227,9 @@ def save(
             figure.savefig(path, dpi=dots_per_inch, metadata=_REPRODUCIBLE.get(ending))
 
 
-def _use_style() -> None:
+def _use_style(style: FigureStyle) -> None:
     mpl.rcdefaults()
     settings: Any = mpl.rcParams
     settings.update(_LOOK)
+    if style.printed:
+        settings.update(_PRINTED)

@@ -18,7 +18,17 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
-from stickslip_ros.plots.style import DASHES, GREY, LIGHT_GREY, MANY, set_title, styled
+from stickslip_ros.plots.style import (
+    DASHES,
+    GREY,
+    LIGHT_GREY,
+    MANY,
+    SCREEN,
+    FigureStyle,
+    round_ticks,
+    styled,
+)
+from stickslip_ros.plots.titles import title_of
 from stickslip_ros.plots.units import Units
 from stickslip_ros.studies.columns import Columns
 from stickslip_ros.studies.plan import Axis, Carry, Grid
@@ -49,7 +59,9 @@ Colour = Literal["regime", "amplitude", "stick_fraction"]
 """What a map shows."""
 
 
-def sweep_figure(columns: Columns, study: Study, colour: Colour = "regime") -> Figure:
+def sweep_figure(
+    columns: Columns, study: Study, colour: Colour = "regime", *, style: FigureStyle = SCREEN
+) -> Figure:
     """Return the bifurcation diagram of a sweep over one parameter, the map of one over two.
 
     Raises InvalidInputError for an unknown `colour`, and in a diagram for any but the regime.
@@ -60,14 +72,14 @@ def sweep_figure(columns: Columns, study: Study, colour: Colour = "regime") -> F
             f"colour = {shown(colour)} is refused: must be one of {', '.join(colours)}"
         )
     if len(_grid(study).axes) == 2:
-        return map_figure(columns, study, colour)
+        return map_figure(columns, study, colour, style=style)
     if colour != "regime":
         raise InvalidInputError(f"colour = {colour}: is for maps, of two parameters")
-    return diagram_figure(columns, study)
+    return diagram_figure(columns, study, style=style)
 
 
 @styled
-def diagram_figure(columns: Columns, study: Study) -> Figure:
+def diagram_figure(columns: Columns, study: Study, *, style: FigureStyle = SCREEN) -> Figure:
     """Return the bifurcation diagram of a sweep over one parameter.
 
     It shows turning points by regime, amplitude, stick fraction, and the transitions by theory.
@@ -77,13 +89,15 @@ def diagram_figure(columns: Columns, study: Study) -> Figure:
     grid = _grid(study)
     (axis,) = grid.axes
     both = grid.carry is Carry.BOTH
-    units = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
-    figure = Figure(figsize=(8.5, 8.0))
-    set_title(figure, _title(study))
+    own = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
+    units = own.shortened(terse=style.crowded(8.5, 8.0))
+    figure = style.figure(8.5, 8.0, narrow=1.7)
+    what = "Bifurcation diagram"
+    style.set_title(figure, title_of(what, study.scenario, grid.parameters))
     panels: list[Axes] = list(figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.0, 1.0)))
     section, *lines = panels
     every = np.fromiter(chain.from_iterable(columns.turning_points), dtype=float)
-    length, label = units.axis("turning points of x", "m", every)
+    length, label = units.axis(units.named("turning points"), "m", every)
     section.set_ylabel(label)
     scaled = {
         name: units.axis(title, unit, getattr(columns, name))
@@ -115,10 +129,11 @@ def diagram_figure(columns: Columns, study: Study) -> Figure:
     handles += _mark_transitions(panels, study, axis, units)
     for axes in lines:
         axes.set_ylim(bottom=0.0)
-    lines[-1].set_xlabel(units.label(axis.parameter, axis.unit))
+    lines[-1].set_xlabel(units.label(units.named(axis.parameter), axis.unit))
     lines[-1].set_xscale(**_scale(axis))
     lines[-1].margins(x=0.01)
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    style.legend_below(figure, handles, most=3)
+    round_ticks(figure)
     return figure
 
 
@@ -127,6 +142,8 @@ def map_figure(
     columns: Columns,
     study: Study,
     colour: Colour = "regime",
+    *,
+    style: FigureStyle = SCREEN,
 ) -> Figure:
     """Return the map of a sweep over two parameters, the first one on the horizontal axis.
 
@@ -137,9 +154,12 @@ def map_figure(
     first, second = grid.axes
     count = len(grid.directions)
     units = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
-    figure = Figure(figsize=(1.0 + 6.0 * count, 6.2))
-    set_title(figure, _title(study))
-    panels: list[Axes] = list(figure.subplots(1, count, sharex=True, sharey=True, squeeze=False)[0])
+    figure = style.figure(1.0 + 6.0 * count, 6.2, narrow=0.3 + 0.9 * count)
+    name = "regime" if colour == "regime" else _MEASURES[colour][0]
+    what = f"Map of the {name} of settled motions"
+    style.set_title(figure, title_of(what, study.scenario, grid.parameters))
+    shape = (count, 1) if style.narrow else (1, count)
+    panels: list[Axes] = list(figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).flat)
     found = transition_map(study, (first, second))
     mesh: Any = None
     scale, bar = 1.0, ""
@@ -156,15 +176,17 @@ def map_figure(
             mesh = _draw_values(axes, columns, grid, rows, getattr(columns, colour) / scale)
         for _, margins, dashes in _curves(found):
             # White below black is visible on any colour.
-            for black, width, style in ((False, 3.5, "-"), (True, 1.5, dashes)):
+            for black, width, pattern in ((False, 3.5, "-"), (True, 1.5, dashes)):
                 axes.contour(
                     found.first, found.second, margins, levels=[0.0],
-                    colors="black" if black else "white", linewidths=width, linestyles=style,
+                    colors="black" if black else "white", linewidths=width, linestyles=pattern,
                 )  # fmt: skip
-        axes.set_xlabel(units.label(first.parameter, first.unit))
+        if axes in (panels[-1], *panels[: 0 if style.narrow else count]):
+            axes.set_xlabel(units.label(units.named(first.parameter), first.unit))
+        if axes is panels[0] or style.narrow:
+            axes.set_ylabel(units.label(units.named(second.parameter), second.unit))
         if direction is not None:
-            axes.set_title(f"carried {direction} along {second.parameter}")
-    panels[0].set_ylabel(units.label(second.parameter, second.unit))
+            axes.set_title(f"carried {direction} along the {units.named(second.parameter)}")
     if mesh is not None:
         figure.colorbar(mesh, ax=panels, label=bar)
     handles: list[Artist] = []
@@ -178,7 +200,8 @@ def map_figure(
     handles += [
         Line2D([], [], color="black", ls=dashes, label=name) for name, _, dashes in _curves(found)
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    style.legend_below(figure, handles, most=4)
+    round_ticks(figure)
     return figure
 
 
@@ -310,12 +333,3 @@ def _scale(axis: Axis) -> dict[str, Any]:
     if axis.first > 0.0:
         return {"value": "log"}
     return {"value": "symlog", "linthresh": min(abs(axis.first), abs(axis.last))}
-
-
-def _title(study: Study) -> str:
-    """Return the title: the scenario with its overrides, but for parameters that vary."""
-    scenario = study.scenario
-    untold = (*study.plan.parameters, "plant.expects_control")
-    fixed = [text for text in scenario.overrides if text.partition("=")[0] not in untold]
-    control = "with control" if scenario.plant.expects_control else "no control"
-    return f"Settled motions of {' '.join([scenario.name, *fixed])}, {control}"

@@ -1,7 +1,7 @@
 """Display of quantities: in SI units with a prefix, or without units for a unit drive."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, isinf
 from typing import Any, Self
 
@@ -16,6 +16,48 @@ NOISE = 1e-9
 
 _PREFIXED = ("kg",)
 """Units that have a prefix of their own."""
+
+_SYMBOLS = {
+    "displacement": ("x", "X"),
+    "initial displacement": ("x(0)", "X(0)"),
+    "turning points": ("x", "X"),
+    "velocity": ("x'", "X'"),
+    "initial velocity": ("x'(0)", "X'(0)"),
+    "velocity relative to the belt": ("v_r", "v_r"),
+    "belt speed": ("v", "v_0"),
+    "control force": ("u", "U"),
+    "cutoff frequency": ("d", "d"),
+    "linear gain": ("k_1", "k_1"),
+    "critical linear gain": (r"k_1^{\ast}", r"k_1^{\ast}"),
+    "cubic gain": ("k_2", "k_2"),
+    "friction coefficient": (r"\mu", r"\mu"),
+    "mass": ("m", "m"),
+    "damping": ("c", r"2\beta"),
+    "stiffness": ("k", "k"),
+    "normal force": ("N", "N"),
+    "static friction coefficient": (r"\mu_s", r"\mu_s"),
+    "minimum friction coefficient": (r"\mu_m", r"\mu_m"),
+    "speed of minimum friction": ("v_m", "v_m"),
+}
+"""Symbols of docs/theory.md, in SI units and without units."""
+
+_PARAMETERS = {
+    "plant.mass": "mass",
+    "plant.damping": "damping",
+    "plant.stiffness": "stiffness",
+    "plant.normal_force": "normal force",
+    "plant.belt_speed": "belt speed",
+    "plant.rate": "sample rate",
+    "plant.force_delay": "force delay",
+    "plant.friction.static": "static friction coefficient",
+    "plant.friction.minimum": "minimum friction coefficient",
+    "plant.friction.minimum_speed": "speed of minimum friction",
+    "washout_controller.corner_frequency": "cutoff frequency",
+    "washout_controller.linear_gain": "linear gain",
+    "washout_controller.cubic_gain": "cubic gain",
+}
+"""What figures call a parameter."""
+
 _SCALES = {"plant.mass", "plant.stiffness", "plant.normal_force"}
 
 
@@ -24,6 +66,8 @@ class Units:
     """Units of quantities, SI or none, and their labels."""
 
     dimensionless: bool = False
+    terse: bool = False
+    """Whether labels omit that a quantity is dimensionless; a capital symbol says it, too."""
 
     @classmethod
     def for_drive(cls, drive: Drive | None, varied: Iterable[str] = ()) -> Self:
@@ -31,11 +75,26 @@ class Units:
         unit = drive is not None and drive.is_dimensionless
         return cls(dimensionless=unit and _SCALES.isdisjoint(varied))
 
+    def shortened(self, *, terse: bool = True) -> Self:
+        """Return the same units with terse labels."""
+        return replace(self, terse=terse)
+
     def label(self, name: str, unit: str) -> str:
         """Return the label of an axis, such as "velocity (mm/s)"; without a unit the name alone."""
-        if not unit:
+        if not unit or (self.terse and self.dimensionless):
             return name
         return f"{name} ({'dimensionless' if self.dimensionless else unit})"
+
+    def named(self, quantity: str, *, short: bool = False) -> str:
+        """Return a quantity, or a parameter, as a figure names it: with its symbol, if any.
+
+        A `short` name is the symbol alone.
+        """
+        quantity = _PARAMETERS.get(quantity, quantity)
+        if quantity not in _SYMBOLS:
+            return quantity
+        symbol = f"${_SYMBOLS[quantity][self.dimensionless]}$"
+        return symbol if short else f"{quantity} {symbol}"
 
     def axis(self, name: str, unit: str, *values: npt.ArrayLike) -> tuple[float, str]:
         """Return the divisor of the values (SI) on an axis, and its label.

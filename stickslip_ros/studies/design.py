@@ -5,9 +5,12 @@ checked by simulation of the drive, sampled, held and delayed as between the nod
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import copysign, inf, isinf, sqrt
 
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.physics.theory.stability_map import StabilityMap
@@ -46,6 +49,8 @@ class Design:
     """Smallest stability margins of the loops at all speeds; None without control."""
     checks: tuple[Check, ...] = ()
     """Checks of the proposal, in order of belt speed."""
+    vibrations: tuple[Vibration, ...] = field(default=(), compare=False, repr=False)
+    """Vibrations without control that the force was computed from, in order of belt speed."""
 
     @property
     def scenario(self) -> Scenario | None:
@@ -95,6 +100,35 @@ class Design:
         if self.slowest is None or self.controller is None:
             return None
         return StabilityMap.around(self.slowest, self.controller.gains)
+
+    def peak_forces(self, around: StabilityMap) -> FloatArray:
+        """Return the largest force over the gains of a map.
+
+        It is the force of a controller with the proposed cubic gain that is activated at the worst
+        phase of the vibration without control, at the worst belt speed.
+
+        Parameters
+        ----------
+        around : StabilityMap
+            Map of m cutoff frequencies and n linear gains.
+
+        Returns
+        -------
+        ndarray
+            Force in N, shape (m, n); zero where nothing vibrates.
+        """
+        linear, cubic = around.linear_gains[:, np.newaxis], around.gains.cubic
+        forces = np.zeros((len(around.corner_frequencies), len(around.linear_gains)))
+        for row, corner_frequency in enumerate(around.corner_frequencies.tolist()):
+            for vibration in self.vibrations:
+                speeds = np.linspace(0.0, _largest(vibration.filtered(corner_frequency)), 50)
+                force = np.abs(linear * speeds + cubic * speeds**3).max(axis=1)
+                forces[row] = np.maximum(forces[row], force)
+        return forces
+
+
+def _largest(values: FloatArray) -> float:
+    return float(np.abs(values).max(initial=0.0))
 
 
 def design(task: Task, progress: Progress = lambda _: None) -> Design:
@@ -198,7 +232,8 @@ def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Desi
         if failure is None:
             progress(1.0)
             remark = "; ".join(filter(None, (remark, little))) or None
-            return Design(task, controller, remark, slowest, found, tuple(checks))
+            seen = tuple(candidates.vibrations)
+            return Design(task, controller, remark, slowest, found, tuple(checks), seen)
         peak = max((check.peak_force or 0.0 for check in checks), default=0.0)
         if peak > task.force_limit:
             strength *= 0.97 * task.force_limit / peak

@@ -11,6 +11,7 @@ from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
+from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.critical_gains import critical_gains, why_no_linear_gain
 from stickslip_ros.physics.theory.gain_intervals import gains_of, why_no_gains
@@ -356,11 +357,19 @@ def _cycle(cycle: LimitCycle) -> Section:
     }
 
 
-def why_no_stability_map(scenario: Scenario) -> str | None:
-    """Return why there is no linear sampled loop for a map; None if there is one."""
+def why_no_figure(scenario: Scenario) -> str | None:
+    """Return why there is no figure; None if there is one.
+
+    A map needs a linear sampled loop, the bifurcation diagram without control a drive that the
+    search for limit cycles covers.
+    """
     plant, law = scenario.plant, scenario.control_law
     if law is None:
-        return _NO_CONTROL
+        try:
+            BifurcationBranches.check(plant.as_drive())
+        except NotCoveredError as error:
+            return str(error)
+        return None
     no_loop = why_no_linear_loop(plant.as_drive(), plant.rate, plant.force_delay)
     return no_loop or why_no_gains(law)
 
@@ -368,7 +377,7 @@ def why_no_stability_map(scenario: Scenario) -> str | None:
 def stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]:
     """Return the map of decay rates of the sampled loop, and the critical gains over the delay.
 
-    Call it only if `why_no_stability_map` returns None.
+    Call it only with control, and if `why_no_figure` returns None.
     """
     plant = scenario.plant
     drive, gains = plant.as_drive(), gains_of(scenario.control_law)
@@ -382,3 +391,11 @@ def stability_map(scenario: Scenario) -> tuple[StabilityMap, CriticalGainCurves]
         drive, gains.corner_frequency, rates, delays, plant.as_sensor()
     )
     return StabilityMap.around(loop, gains), curves
+
+
+def bifurcation_branches(scenario: Scenario) -> BifurcationBranches:
+    """Return equilibria and limit cycles without control over the belt speed.
+
+    Call it only if `why_no_figure` returns None.
+    """
+    return BifurcationBranches.around(scenario.plant.as_drive())

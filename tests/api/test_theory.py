@@ -24,9 +24,17 @@ def test_stability_is_that_of_the_command_twice() -> None:
     assert isinstance(ours.plot(), Figure)
 
 
-def test_without_control_there_is_no_map() -> None:
-    with pytest.raises(InvalidInputError, match="nothing to draw: the scenario has no controller"):
-        ss.stability(ss.scenario("paper", expects_control=False)).plot()
+def test_without_control_the_figure_is_the_bifurcation_diagram() -> None:
+    figure = ss.stability(ss.scenario("paper", expects_control=False)).plot()
+    assert figure.get_suptitle() == "Bifurcation diagram, paper, no control"
+    (axes,) = figure.axes
+    assert axes.get_xlabel() == "belt speed $v_0$ (dimensionless)"
+
+
+def test_friction_that_differs_between_the_directions_has_no_bifurcation_diagram() -> None:
+    scenario = ss.scenario("paper", expects_control=False, friction_reverse_static=0.5)
+    with pytest.raises(InvalidInputError, match="nothing to draw: the bifurcation diagram needs"):
+        ss.stability(scenario).plot()
 
 
 def test_under_another_control_law_there_is_no_map_and_no_design() -> None:

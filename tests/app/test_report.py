@@ -83,7 +83,7 @@ def test_a_picture_changes_nothing_of_the_report(command, tmp_path):
     assert (status, error) == (0, "")
     assert json.loads(out) == plain
     shown = texts(picture)
-    assert "displacement (µm)" in shown
+    assert "amplitude (µm)" in shown
     assert any("stick-slip, not steady: decaying, amplitude 325.8 µm" in text for text in shown)
     for bag_lacks in ("the drive is not known", "no cycle was completed"):
         assert bag_lacks not in shown
@@ -259,7 +259,7 @@ def test_several_bags_are_drawn_in_one_figure(command, tmp_path, monkeypatch):
     status, out, error = command("report", "first", "second", "--json", "--plot", "runs.svg")
     assert (status, out, error) == (0, plain, "")
     shown = texts(tmp_path / "runs.svg")
-    assert "first; second" in shown
+    assert "Runs compared, first; second" in shown
     assert shown.count("first") >= 2  # above its column, and in the legend
 
 
@@ -269,6 +269,8 @@ def test_several_bags_are_drawn_in_one_figure(command, tmp_path, monkeypatch):
         ((), 1560, 1300),
         (("--size", "10x8"), 1300, 1040),
         (("--size", "10x8", "--dpi", "50"), 500, 400),
+        (("--style", "paper-double"), 2125, 2338),
+        (("--style", "paper-double", "--size", "8x9", "--dpi", "100"), 800, 900),
     ],
 )
 def test_a_figure_has_the_size_that_is_asked_for(command, tmp_path, options, width, height):
@@ -306,7 +308,9 @@ def test_a_figure_that_is_nonsense_is_refused(command, tmp_path, options, compla
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("options", [("--size", "6x4"), ("--dpi", "100"), ("--no-title",)])
+@pytest.mark.parametrize(
+    "options", [("--size", "6x4"), ("--dpi", "100"), ("--style", "paper"), ("--no-title",)]
+)
 @pytest.mark.parametrize(
     "arguments",
     [

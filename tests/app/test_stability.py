@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PIL import Image
 
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.stability import stability as theory_of
@@ -148,13 +149,29 @@ def test_the_map_is_drawn(stickslip: Run, tmp_path: Path) -> None:
     assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_without_control_the_bifurcation_diagram_is_drawn(stickslip: Run, tmp_path: Path) -> None:
+    paper = ("--style", "paper", "--no-title")
+    done = stickslip("stability", "paper", "--no-control", "--plot", "diagram.png", *paper)
+    assert done.returncode == 0, done.stderr
+    with Image.open(tmp_path / "diagram.png") as image:
+        assert image.width == pytest.approx(85.0 / 25.4 * 300.0, abs=1.0)
+        assert image.info["dpi"] == pytest.approx((300.0, 300.0), rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
         (("--plot", "map.txt"), ("--plot map.txt", ".png")),
         (("--plot", "nowhere/map.png"), ("nowhere",)),
         (("--plot", "map.png", "-p", "plant.belt_speed=0.0"), ("map.png", "the belt rests")),
-        (("--plot", "map.png", "--no-control"), ("map.png", "no controller")),
+        (
+            ("--plot", "map.png", "--no-control", "-p", "plant.friction.reverse.static=0.5"),
+            ("map.png", "nothing to draw", "the same in both directions"),
+        ),
+        (
+            ("--plot", "map.png", "--no-control", "-p", "plant.stiffness=0"),
+            ("map.png", "nothing to draw", "needs a spring"),
+        ),
         (("--plot", "/proc/map.png"), ("/proc/map.png", "cannot be written")),
     ],
 )

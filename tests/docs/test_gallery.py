@@ -31,8 +31,8 @@ def run(script: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_there_are_as_many_as_the_page_says() -> None:
-    assert (len(SCRIPTS), len(NODES), len(NOTEBOOKS)) == (18, 2, 3)
-    assert "Eighteen scripts, two controllers and three notebooks" in PAGE
+    assert (len(SCRIPTS), len(NODES), len(NOTEBOOKS)) == (19, 2, 3)
+    assert "Nineteen scripts, two controllers and three notebooks" in PAGE
 
 
 @pytest.mark.parametrize("script", sorted(QUICK))

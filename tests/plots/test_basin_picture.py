@@ -11,8 +11,9 @@ from PIL import Image
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.basin_picture import basin_figure
 from stickslip_ros.plots.regimes import REGIMES as LOOKS
-from stickslip_ros.plots.style import GREEN, ORANGE, SKY_BLUE, save
+from stickslip_ros.plots.style import GREEN, ORANGE, SKY_BLUE, STYLES, save
 from stickslip_ros.plots.units import Units
+from tests.plots.texts import faults
 
 LABELS = ["stick-slip, amplitude 0.318 m: 68.8 % +- 0.7 %", "equilibrium: 31.2 %"]
 REGIMES = [Regime.STICK_SLIP, Regime.EQUILIBRIUM]
@@ -60,9 +61,9 @@ def test_the_format_follows_the_ending(
 
 def test_it_says_what_it_shows(tmp_path: Path) -> None:
     picture = drawn(tmp_path / "basin.svg").read_text(encoding="utf-8")
-    for text in (*LABELS, "belt speed", "equilibrium", "initial displacement (m)"):
+    for text in (*LABELS, "belt speed", "equilibrium"):
         assert text in picture
-    assert "Motion that each of 1200 starts leads to" in picture
+    assert "the motion that each of 1200 starts leads to" in picture
 
 
 def test_it_is_in_the_units_of_the_drive() -> None:
@@ -70,14 +71,14 @@ def test_it_is_in_the_units_of_the_drive() -> None:
     found = starts(**small, belt_speed=4e-4, equilibrium_position=5e-4, title="a $title")
     figure = basin_figure(**found)
     (axes,) = figure.axes
-    assert axes.get_xlabel() == "initial displacement (mm)"
-    assert axes.get_ylabel() == "initial velocity (mm/s)"
-    assert figure.get_suptitle().endswith(": a $title")
+    assert axes.get_xlabel() == "initial displacement $x(0)$ (mm)"
+    assert axes.get_ylabel() == "initial velocity $x'(0)$ (mm/s)"
+    assert figure.get_suptitle().startswith("a $title\n")
     *_, belt, equilibrium = axes.lines
     assert belt.get_ydata() == pytest.approx([0.4, 0.4])
     assert equilibrium.get_xdata() == pytest.approx([0.5])
     (axes,) = basin_figure(**found, units=Units(dimensionless=True)).axes
-    assert axes.get_xlabel() == "initial displacement (dimensionless)"
+    assert axes.get_xlabel() == "initial displacement $X(0)$ (dimensionless)"
     assert axes.lines[-1].get_xdata() == [5e-4]
 
 
@@ -139,3 +140,8 @@ def test_two_attractors_of_one_regime_have_two_colours(tmp_path: Path) -> None:
 def test_the_belt_line_hides_no_points() -> None:
     (axes,) = basin_figure(**starts()).axes
     assert "white" not in {line.get_color() for line in axes.lines if line.get_marker() == "None"}
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_no_text_is_cut_off_or_overlaps(style: str) -> None:
+    assert faults(basin_figure(**starts(grid_shape=(30, 40)), style=STYLES[style])) == []

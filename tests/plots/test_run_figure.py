@@ -24,9 +24,10 @@ from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.plots.panes import LAST_CYCLES
 from stickslip_ros.plots.run_figure import run_figure
 from stickslip_ros.plots.run_history import RunHistory
-from stickslip_ros.plots.style import save
+from stickslip_ros.plots.style import STYLES, save
 from stickslip_ros.samples import SampleColumns
 from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.plots.texts import faults
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -116,16 +117,16 @@ def labels(figure: Figure) -> set[str]:
 
 def test_axes_are_in_si_with_prefixes(reference: Drawn) -> None:
     assert labels(reference.figure) == {
-        "", "time (s)", "displacement (µm)", "velocity (mm/s)", "force (N)", "amplitude (µm)",
-        "stick fraction", "velocity relative to the belt (mm/s)", "friction coefficient",
+        "", "time (s)", "displacement $x$ (µm)", "velocity $x'$ (mm/s)", "force (N)",
+        "amplitude (µm)", "stick fraction", "velocity relative to the belt $v_r$ (mm/s)",
+        r"friction coefficient $\mu$",
     }  # fmt: skip
 
 
 def test_axes_of_the_unit_drive_are_dimensionless(limit_cycle: Drawn) -> None:
-    of_numbers = {"", "stick fraction", "friction coefficient"}
-    assert all(
-        label.endswith("(dimensionless)") for label in labels(limit_cycle.figure) - of_numbers
-    )
+    found = labels(limit_cycle.figure)
+    assert {"displacement $X$", "velocity $X'$", "force", "amplitude", "time"} <= found
+    assert not any("(" in label for label in found)
 
 
 def test_lines_have_every_extreme_of_the_bag(reference: Drawn) -> None:
@@ -469,3 +470,62 @@ def test_what_was_concluded_of_a_noisy_record_is_shown() -> None:
     assert any("departure ±" in label for label in labels)
     raw, fitted = axes.lines[:2]
     assert len(raw.get_xdata()) == len(fitted.get_xdata()) > 1200
+
+
+def switching(at: float, duration: float = 4.0) -> RunHistory:
+    """Return a run of 100 rows per unit of time whose forces are zero up to a time."""
+    history = RunHistory()
+    time = np.arange(0.0, duration, 0.01)
+    belt = np.full(len(time), 0.4)
+    see(history, time, np.sin(40.0 * time), 40.0 * np.cos(40.0 * time), belt, 0.1 * belt)
+    force = np.where(time < at, 0.0, 3.0)
+    history.take_control(time, force, all_acted(time))
+    return history
+
+
+def titles(history: RunHistory) -> list[str]:
+    figure = run_figure(history, CycleMeter(20).measures(), None, title="it")
+    return [axes.get_title() for axes in figure.axes]
+
+
+def test_the_instant_of_switching_on_is_enlarged() -> None:
+    history = switching(at=2.0)
+    figure = run_figure(history, CycleMeter(20).measures(), None, title="it")
+    number = titles(history).index("control switched on, enlarged")
+    low, high = figure.axes[number].get_xlim()
+    assert low < 2.0 < high
+    assert high - low < 1.0
+    x, _ = np.array(figure.axes[number].lines[-1].get_xydata()).T
+    assert len(x) > 20
+    assert low - 0.02 <= x.min() < x.max() <= high + 0.02
+
+
+@pytest.mark.parametrize(
+    "at", [0.0, 0.02, 3.9, 9.0], ids=["always", "at once", "at the end", "never"]
+)
+def test_a_run_without_motion_before_and_after_it_shows_no_switching_on(at: float) -> None:
+    assert "control switched on, enlarged" not in titles(switching(at))
+
+
+def test_of_a_long_run_the_motion_around_switching_on_is_complete() -> None:
+    history = RunHistory()
+    step, rows = 1e-3, 5_000
+    for block in range(80):
+        time = step * (np.arange(rows) + block * rows)
+        belt = np.full(rows, 0.4)
+        see(history, time, np.sin(40.0 * time), 40.0 * np.cos(40.0 * time), belt, 0.1 * belt)
+        history.take_control(time, np.where(time < 100.0, 0.0, 3.0), all_acted(time))
+    assert history.switched_on == pytest.approx(100.0)
+    shown = history.around_switch_on(0.5, 1.5)
+    assert np.diff(shown.time).max() == pytest.approx(step)
+    assert shown.time[[0, -1]] == pytest.approx([99.5, 101.5], abs=2.0 * step)
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_no_text_is_cut_off_or_overlaps(style: str) -> None:
+    history, measures = switching(at=2.0), CycleMeter(20).measures()
+    look = STYLES[style]
+    for drive in (FEED_DRIVE, PAPER):
+        assert faults(run_figure(history, measures, drive, title="it", style=look)) == []
+        untitled = replace(look, titled=False)
+        assert faults(run_figure(history, measures, drive, title="it", style=untitled)) == []

@@ -10,8 +10,9 @@ from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.runs_figure import DrawnRun, runs_figure
-from stickslip_ros.plots.style import save
+from stickslip_ros.plots.style import STYLES, save
 from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.plots.texts import faults
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -49,8 +50,12 @@ def test_each_run_has_a_column_and_a_line_in_each_common_panel(tmp_path: Path) -
 
 
 def test_without_units_only_where_all_drives_have_none() -> None:
-    assert runs_figure([drawn("a", 1.0, PAPER)] * 2).axes[0].get_ylabel() == (
-        "displacement (dimensionless)"
-    )
+    assert runs_figure([drawn("a", 1.0, PAPER)] * 2).axes[0].get_ylabel() == ("displacement $X$")
     mixed = runs_figure([drawn("a", 1.0, PAPER), drawn("b", 1.0)])
-    assert mixed.axes[0].get_ylabel() == "displacement (µm)"
+    assert mixed.axes[0].get_ylabel() == "displacement $x$ (µm)"
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_no_text_is_cut_off_or_overlaps(style: str) -> None:
+    runs = [drawn("long", 2.0), drawn("short", 1.0)]
+    assert faults(runs_figure(runs, style=STYLES[style])) == []

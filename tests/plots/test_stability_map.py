@@ -11,9 +11,12 @@ from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
-from stickslip_ros.plots.stability_map import stability_figure
-from stickslip_ros.plots.style import save
+from stickslip_ros.plots.stability_map import design_figure, stability_figure
+from stickslip_ros.plots.style import STYLES, save
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.studies.design import Design, Task, design
 from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.plots.texts import faults
 
 GAINS = WashoutGains(20.0, -3000.0, 0.0)
 
@@ -85,13 +88,65 @@ def test_the_format_follows_the_ending(
     assert path.read_bytes().startswith(start)
 
 
-def test_axes_have_units(tmp_path: Path) -> None:
-    path = tmp_path / "map.svg"
-    save(stability_figure(map_of(), None), path)
-    picture = path.read_text(encoding="utf-8")
-    for label in ("cutoff frequency d (rad/s)", "linear gain k1 (N s/m)", "decay rate (1/s)"):
-        assert label in picture
-    assert "belt speed 40 mm/s, sample rate 1 kHz, force delay 2.5 ms" in picture
+def test_axes_have_symbols_and_units() -> None:
+    figure = stability_figure(map_of(), None, title="a loop")
+    axes, bar = figure.axes
+    assert axes.get_xlabel() == "cutoff frequency $d$ (rad/s)"
+    assert axes.get_ylabel() == "linear gain $k_1$ (N s/m)"
+    assert bar.get_ylabel() == "decay rate (1/s)"
+    values = "belt speed 40 mm/s, sample rate 1 kHz, force delay 2.5 ms"
+    assert figure.get_suptitle() == f"a loop\n{values}"
+
+
+def test_the_colour_bar_has_round_numbers() -> None:
+    _, bar = stability_figure(map_of(), None).axes
+    ticks = bar.get_yticks()
+    step = ticks[1] - ticks[0]
+    assert ticks[0] == 0.0
+    assert np.allclose(ticks, step * np.arange(len(ticks)))
+    assert f"{step:.0e}"[0] in "125"
+    assert ticks[-1] >= map_of().decay_rates.max()
+
+
+def test_each_side_of_the_limit_is_named_where_it_is() -> None:
+    found = map_of()
+    axes, _ = stability_figure(found, None).axes
+    names = {text.get_text(): text.get_position() for text in axes.texts}
+    assert names.keys() == {"stable", "unstable"}
+    for name, (corner_frequency, gain) in names.items():
+        rate = found.loop.decay_rate(WashoutGains(corner_frequency, gain, 0.0))
+        assert (rate > 0.0) == (name == "stable")
+
+
+def designed(force_limit: float) -> Design:
+    limit = f"washout_controller.force_limit={force_limit}"
+    return design(Task.from_scenario(load_scenario("feed_drive", [limit]), (0.04, 0.04)))
+
+
+def test_a_design_shows_the_force_limit_as_a_contour() -> None:
+    found = designed(200.0)
+    around, controller = found.map_around(), found.controller
+    assert around is not None
+    assert controller is not None
+    forces = found.peak_forces(around)
+    row, column = 40, int(np.abs(around.linear_gains - controller.linear_gain).argmin())
+    assert around.corner_frequencies[row] == pytest.approx(controller.corner_frequency)
+    (check,) = found.checks
+    assert forces[row, column] == pytest.approx(check.peak_force, rel=0.1)
+    assert forces[row, column] < 200.0 < forces.max()
+    figure = design_figure(found)
+    (legend,) = figure.legends
+    names = {text.get_text() for text in legend.get_texts()}
+    assert {"force limit 200 N", "needs a larger force"} <= names
+    assert "Designed gains, feed_drive, washout control" in figure.get_suptitle()
+
+
+def test_a_design_without_a_limit_shows_contours_of_the_force() -> None:
+    figure = design_figure(designed(inf))
+    (legend,) = figure.legends
+    names = {text.get_text() for text in legend.get_texts()}
+    assert "largest force at switch-on" in names
+    assert "needs a larger force" not in names
 
 
 def test_curves_are_told_apart_without_colour() -> None:
@@ -109,10 +164,11 @@ def test_for_the_unit_drive_it_is_dimensionless() -> None:
     loop = LinearSampledLoop.from_drive(PAPER, 100.0, 0.0)
     assert loop is not None
     found = StabilityMap.around(loop, WashoutGains(2.0, -1.0, -1.0), points=11)
-    axes, bar = stability_figure(found, None).axes
-    assert axes.get_xlabel() == "cutoff frequency d (dimensionless)"
+    figure = stability_figure(found, None)
+    axes, bar = figure.axes
+    assert axes.get_xlabel() == "cutoff frequency $d$ (dimensionless)"
     assert bar.get_ylabel() == "decay rate (dimensionless)"
-    assert axes.get_title() == "belt speed 0.4, sample rate 100"
+    assert figure.get_suptitle() == "belt speed 0.4, sample rate 100"
 
 
 def test_where_nothing_is_stable_there_is_a_picture_all_the_same(tmp_path: Path) -> None:
@@ -121,3 +177,15 @@ def test_where_nothing_is_stable_there_is_a_picture_all_the_same(tmp_path: Path)
     found = StabilityMap.around(loop, replace(GAINS, linear=0.0), points=11)
     assert -inf < found.decay_rates.max() < 0.0
     save(stability_figure(found, None), tmp_path / "map.png")
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_no_text_is_cut_off_or_overlaps(style: str) -> None:
+    look = STYLES[style]
+    critical = CriticalGainCurves.over(
+        FEED_DRIVE, 20.0, np.array([100.0, 1000.0]), np.linspace(0.0, 0.006, 4)
+    )
+    title = "Stability of the sampled loop, feed_drive, washout control"
+    assert faults(stability_figure(map_of(), critical, title=title, style=look)) == []
+    assert faults(stability_figure(map_of(), None, style=replace(look, titled=False))) == []
+    assert faults(design_figure(designed(200.0), style=look)) == []

@@ -1,14 +1,25 @@
 """How figures are written to files."""
 
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import matplotlib as mpl
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from PIL import Image
 
-from stickslip_ros.plots.style import save, set_title, styled
+from stickslip_ros.plots.style import (
+    SCREEN,
+    STYLES,
+    FigureStyle,
+    round_ticks,
+    save,
+    styled,
+    text_width,
+)
 
 ENDINGS = (".png", ".svg", ".pdf", ".PNG")
 
@@ -63,7 +74,7 @@ def test_a_users_own_settings_neither_matter_nor_change(tmp_path: Path) -> None:
 
 def test_a_title_is_shown_as_it_is_within_the_picture() -> None:
     figure = Figure(figsize=(8.0, 2.0))
-    set_title(figure, "a $name$ with \x1b[31m" + " and more" * 40, "a second line")
+    SCREEN.set_title(figure, "a $name$ with \x1b[31m" + " and more" * 40, "a second line")
     title, *more = figure.get_suptitle().split("\n")
     assert title.startswith("a $name$ with ")
     assert "\x1b" not in title
@@ -72,3 +83,65 @@ def test_a_title_is_shown_as_it_is_within_the_picture() -> None:
     figure.draw_without_rendering()
     box = next(text for text in figure.texts).get_window_extent()
     assert 0.0 < box.x0 < box.x1 < figure.bbox.x1
+
+
+@styled
+def labelled_figure(*, style: FigureStyle = SCREEN) -> Figure:
+    figure = style.figure(8.0, 4.0, narrow=1.5)
+    style.set_title(
+        figure, "a title that is longer than one column of a journal is wide, on purpose"
+    )
+    (axes,) = figure.subplots(1, 1, squeeze=False)[0]
+    axes.set_xlabel("displacement $x$ (mm)")
+    labels = ["short", "a label of some length", "another label of some length", "$k_1$", "last"]
+    handles = [Line2D([], [], label=label) for label in labels]
+    style.legend_below(figure, handles, most=5)
+    return figure
+
+
+@pytest.mark.parametrize(
+    ("name", "width", "height", "points"),
+    [("screen", 8.0, 4.0, 9.0), ("paper", 3.346, 5.02, 8.0), ("paper-double", 7.087, 3.543, 8.0)],
+)
+def test_a_style_gives_size_and_font(name: str, width: float, height: float, points: float) -> None:
+    figure = labelled_figure(style=STYLES[name])
+    assert figure.get_size_inches() == pytest.approx([width, height], rel=1e-3)
+    assert figure.axes[0].xaxis.label.get_size() == points
+
+
+@pytest.mark.parametrize("name", STYLES)
+def test_title_and_legend_are_within_the_figure(name: str) -> None:
+    figure = labelled_figure(style=STYLES[name])
+    figure.draw_without_rendering()
+    for artist in (*figure.texts, *figure.legends):
+        box = artist.get_window_extent()
+        assert figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1
+        assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1
+
+
+def test_a_size_that_is_asked_for_beats_that_of_the_style() -> None:
+    figure = labelled_figure(style=replace(STYLES["paper"], size=(6.0, 5.0)))
+    assert figure.get_size_inches().tolist() == [6.0, 5.0]
+    assert figure.axes[0].xaxis.label.get_size() == 8.0
+
+
+def test_without_a_title_there_is_none() -> None:
+    figure = labelled_figure(style=replace(SCREEN, titled=False))
+    assert figure.get_suptitle() == ""
+
+
+def test_the_width_of_a_text_is_that_of_the_drawn_one() -> None:
+    figure = small_figure("velocity $x'$ (mm/s)")
+    figure.draw_without_rendering()
+    label = figure.axes[0].xaxis.label
+    drawn = label.get_window_extent().width / figure.dpi
+    assert text_width(label.get_text(), label.get_size()) == pytest.approx(drawn, rel=0.05)
+
+
+def test_ticks_are_round() -> None:
+    figure = small_figure()
+    (axes,) = figure.axes
+    axes.set_xlim(0.08, 0.1)
+    round_ticks(figure)
+    steps = np.diff(axes.get_xticks())
+    assert f"{steps[0]:.6e}"[:8] in ("1.000000", "2.000000", "5.000000")

@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 from PIL import Image
 
-from stickslip_ros.plots.style import BLUE, GREEN, LIGHT_GREY, ORANGE, save
+from stickslip_ros.plots.style import BLUE, GREEN, LIGHT_GREY, ORANGE, STYLES, save
 from stickslip_ros.plots.sweep_picture import diagram_figure, map_figure
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.columns import Columns
@@ -16,6 +16,7 @@ from stickslip_ros.studies.plan import Axis, Carry, Grid
 from stickslip_ros.studies.runner import run
 from stickslip_ros.studies.settling import SettlingCourse
 from stickslip_ros.studies.study import Study
+from tests.plots.texts import faults
 
 pytestmark = pytest.mark.usefixtures("coarse_maps")
 
@@ -87,8 +88,10 @@ def test_the_format_follows_the_ending(
 
 def test_a_diagram_names_axes_regimes_and_transitions(tmp_path: Path, over_speed: Swept) -> None:
     picture = diagram(tmp_path / "diagram.svg", over_speed)
-    for name in ("plant.belt_speed", "turning points of x", "amplitude"):
-        assert f"{name} (dimensionless)" in picture
+    section, amplitude, stick_fraction = diagram_figure(*over_speed).axes
+    assert section.get_ylabel() == "turning points $X$ (dimensionless)"
+    assert amplitude.get_ylabel() == "amplitude (dimensionless)"
+    assert stick_fraction.get_xlabel() == "belt speed $v_0$ (dimensionless)"
     for text in ("stick-slip", "equilibrium", "stick fraction", "no control"):
         assert text in picture
     for text in ("Hopf point 0.48876", "limit of sticking 0.43947"):
@@ -100,9 +103,9 @@ def test_a_diagram_names_axes_regimes_and_transitions(tmp_path: Path, over_speed
 def test_a_study_that_varies_the_scales_is_in_si() -> None:
     figure = diagram_figure(*swept("plant.stiffness=1e4:4e4:3", overrides=(FREE, "plant.mass=1")))
     section, amplitude, _ = figure.axes
-    assert section.get_ylabel() == "turning points of x (µm)"
+    assert section.get_ylabel() == "turning points $x$ (µm)"
     assert amplitude.get_ylabel() == "amplitude (µm)"
-    assert figure.axes[-1].get_xlabel() == "plant.stiffness (N/m)"
+    assert figure.axes[-1].get_xlabel() == "stiffness $k$ (N/m)"
 
 
 def test_regimes_of_a_diagram_have_markers_of_their_own(over_speed: Swept) -> None:
@@ -158,9 +161,11 @@ def test_a_map_says_what_its_colours_are(
     tmp_path: Path, over_two: Swept, colour: str, label: str
 ) -> None:
     path = tmp_path / "map.svg"
-    save(map_figure(*over_two, colour), path)
+    figure = map_figure(*over_two, colour)
+    assert figure.axes[0].get_xlabel() == r"static friction coefficient $\mu_s$"
+    save(figure, path)
     picture = path.read_text(encoding="utf-8")
-    for text in (label, "no result", "Hopf point", "limit of sticking", "plant.friction.static"):
+    for text in (label, "no result", "Hopf point", "limit of sticking"):
         assert text in picture
 
 
@@ -201,11 +206,9 @@ def test_a_map_carried_both_ways_has_two_panels(tmp_path: Path) -> None:
         overrides=HYSTERESIS,
         carry=Carry.BOTH,
     )
-    path = tmp_path / "map.svg"
-    save(map_figure(*found), path)
-    picture = path.read_text(encoding="utf-8")
-    for text in ("carried up along plant.belt_speed", "carried down along plant.belt_speed"):
-        assert text in picture
+    assert [axes.get_title() for axes in map_figure(*found).axes] == [
+        f"carried {direction} along the belt speed $v_0$" for direction in ("up", "down")
+    ]
     path = tmp_path / "map.png"
     save(map_figure(*found), path)
     green = (pixels(path) == [0x00, 0x9E, 0x73]).all(axis=-1)
@@ -231,4 +234,15 @@ def test_the_title_omits_overrides_of_the_parameter_that_varies() -> None:
         "plant.belt_speed=0.5:0.6:2", overrides=(FREE, "plant.belt_speed=0.3", "plant.damping=0.03")
     )
     title = diagram_figure(columns, study).get_suptitle()
-    assert title == "Settled motions of paper plant.damping=0.03, no control"
+    assert title == "Bifurcation diagram, paper plant.damping=0.03, no control"
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_no_text_is_cut_off_or_overlaps(
+    over_speed: Swept, both_ways: Swept, over_two: Swept, style: str
+) -> None:
+    look = STYLES[style]
+    for found in (over_speed, both_ways):
+        assert faults(diagram_figure(*found, style=look)) == []
+    for colour in ("regime", "amplitude"):
+        assert faults(map_figure(*over_two, colour, style=look)) == []

@@ -12,7 +12,7 @@ from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.parameters import controller_model
 from stickslip_ros.studies.design import Task
-from stickslip_ros.studies.stability import stability, why_no_stability_map
+from stickslip_ros.studies.stability import stability, why_no_figure
 from tests.physics.drives import FEED_DRIVE
 from tests.physics.parts import Switching
 
@@ -56,7 +56,7 @@ def test_velocity_feedback_has_a_theory_without_gains(damped: Scenario) -> None:
     for name in ("critical_linear_gain", "stable_linear_gains"):
         assert notes[f"sampled_loop.{name}"] == ONLY
     assert "critical_linear_gain" not in found["closed_forms"]
-    assert why_no_stability_map(damped) == ONLY
+    assert why_no_figure(damped) == ONLY
 
 
 def test_the_cycle_that_little_feedback_leaves(damped: Scenario) -> None:

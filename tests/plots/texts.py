@@ -1,0 +1,58 @@
+"""Whether the texts of a figure can be read."""
+
+from collections.abc import Iterator
+from itertools import combinations
+
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+
+_TOUCHING = 0.5
+"""Overlap of two boxes that is no fault, pixels."""
+
+
+def faults(figure: Figure) -> list[str]:
+    """Return a sentence for each text that is cut off by the figure or overlaps another one."""
+    figure.draw_without_rendering()
+    shown = [(text.get_text(), text.get_window_extent()) for text in _texts(figure)]
+    whole = figure.bbox
+    found = [
+        f"{name!r} is cut off"
+        for name, box in shown
+        if box.x0 < whole.x0 - 1.0
+        or box.y0 < whole.y0 - 1.0
+        or box.x1 > whole.x1 + 1.0
+        or box.y1 > whole.y1 + 1.0
+    ]
+    for (name, box), (other, other_box) in combinations(shown, 2):
+        both = Bbox.intersection(box, other_box)
+        if both is not None and min(both.width, both.height) > _TOUCHING:
+            found.append(f"{name!r} overlaps {other!r}")
+    return found
+
+
+def _texts(figure: Figure) -> Iterator[Text]:
+    """Yield the texts that are visible, tick labels of the drawn range only."""
+    for axes in figure.axes:
+        if not axes.get_visible():
+            continue
+        for axis, (low, high) in (
+            (axes.xaxis, sorted(axes.get_xlim())),
+            (axes.yaxis, sorted(axes.get_ylim())),
+        ):
+            for tick in axis.get_major_ticks():
+                if low <= tick.get_loc() <= high and tick.label1.get_visible():
+                    yield from _written(tick.label1)
+            yield from _written(axis.label)
+        for text in (axes.title, *axes.texts):
+            yield from _written(text)
+    for legend in figure.legends:
+        for text in legend.get_texts():
+            yield from _written(text)
+    for text in figure.texts:
+        yield from _written(text)
+
+
+def _written(text: Text) -> Iterator[Text]:
+    if text.get_visible() and text.get_text().strip():
+        yield text
