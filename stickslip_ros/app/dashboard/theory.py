@@ -42,18 +42,18 @@ class FrictionCurve(NamedTuple):
     relative_speed: FloatArray
     """m/s, shape (n,)."""
     coefficient: FloatArray
-    """Shape (n,); NaN at rest, where the coefficient jumps."""
+    """Shape (n,); at rest both limits."""
 
 
 class Decay(NamedTuple):
-    """How small deviations from the equilibrium decay, with one sample of the loop as the step."""
+    """How small deviations from the equilibrium of the sampled loop decay."""
 
     uncontrolled: list[complex]
-    """Eigenvalues without control."""
+    """Exponents without control, 1/s: a deviation changes like exp(s t)."""
     uncontrolled_rate: float
     """Decay rate without control, 1/s; below zero the deviation grows."""
     controlled: list[complex]
-    """Eigenvalues with control; empty for a drive that expects none."""
+    """Exponents with control; empty for a drive that expects none."""
     rate: float | None
     """Decay rate with control, 1/s."""
 
@@ -73,27 +73,27 @@ def stability_map(plant: Values, law: str, controller: Values) -> StabilityMap:
 
 
 def decay(plant: Values, law: str, controller: Values) -> Decay:
-    """Return the eigenvalues of the sampled loop, and its decay rate."""
+    """Return the exponents of the sampled loop, and its decay rate."""
     loop = _loop(plant)
     exponents = np.linalg.eigvals(loop.jacobian) * loop.drive.angular_frequency
-    uncontrolled = np.exp(exponents / loop.rate).tolist()
-    slowest = -float(exponents.real.max())
+    uncontrolled, slowest = exponents.tolist(), -float(exponents.real.max())
     if not (controller and plant["expects_control"]):
         return Decay(uncontrolled, slowest, [], None)
     model = CONTROLLER_PARAMETERS[law].validated(controller, law).as_law()
-    controlled = np.linalg.eigvals(loop.transition_matrix(model)).tolist()
+    multipliers = np.linalg.eigvals(loop.transition_matrix(model)).astype(complex)
+    lasting = multipliers[np.abs(multipliers) > 0.0]
+    controlled = (loop.rate * np.log(lasting)).tolist()
     return Decay(uncontrolled, slowest, controlled, loop.decay_rate(model))
 
 
 def friction_curve(plant: Values) -> FrictionCurve:
     """Return the friction curve around the belt speed, in both directions."""
     drive = _drive(plant)
-    farthest = 2.0 * max(abs(drive.belt_speed), drive.friction.characteristic_speed)
-    side = farthest * np.linspace(0.0, 1.0, 121)[1:] ** 2
-    speed = np.concatenate([-side[::-1], [0.0], side])
-    coefficient = np.array(drive.friction.coefficient(speed, np.sign(speed)), dtype=float)
-    coefficient[len(side)] = np.nan
-    return FrictionCurve(speed, coefficient)
+    farthest = 2.0 * (abs(drive.belt_speed) or drive.speed_scale)
+    side = farthest * np.linspace(0.0, 1.0, 121) ** 2
+    speed = np.concatenate([-side[::-1], side])
+    sign = np.repeat([-1.0, 1.0], len(side))
+    return FrictionCurve(speed, np.array(drive.friction.coefficient(speed, sign), dtype=float))
 
 
 def _drive(plant: Values) -> Drive:
