@@ -31,11 +31,11 @@ CURSOR: dict[str, Any] = {"trigger": "axis", "axisPointer": {"type": "cross"}}
 _LEFT, _RIGHT = 64, 16
 
 
-def line(name: str, colour: str, style: str = "solid", **more: Any) -> dict[str, Any]:
+def line(name: str, colour: str, style: str = "solid") -> dict[str, Any]:
     """Return a series that is drawn as a line."""
     look = {"color": colour, "width": 1.3, "type": style}
     series: dict[str, Any] = {"type": "line", "name": name, "symbol": "none", "data": []}
-    return series | {"lineStyle": look, "itemStyle": {"color": colour}} | more
+    return series | {"lineStyle": look, "itemStyle": {"color": colour}}
 
 
 def _of(grid: int) -> dict[str, int]:
@@ -57,11 +57,11 @@ TRACE: dict[str, Any] = {
     ],
     "yAxis": [AXIS | {"gridIndex": index} for index in range(3)],
     "series": [
-        line("slide", BLUE, **_of(0)),
-        line("slide", BLUE, **_of(1)),
-        line("belt", GREY, "dashed", **_of(1)),
-        line("control force", ORANGE, step="end", **_of(2)),
-        line("held, no new force", ORANGE, "dotted", **_of(2)),
+        line("slide", BLUE) | _of(0),
+        line("slide", BLUE) | _of(1),
+        line("belt", GREY, "dashed") | _of(1),
+        line("control force", ORANGE) | {"step": "end"} | _of(2),
+        line("held, no new force", ORANGE, "dotted") | _of(2),
         {
             "type": "scatter",
             "name": "sent, not applied",
@@ -130,7 +130,7 @@ CYCLES: dict[str, Any] = {
     ],
     "series": [
         line("amplitude", BLUE),
-        line("stick fraction", ORANGE, "dashed", yAxisIndex=1),
+        line("stick fraction", ORANGE, "dashed") | {"yAxisIndex": 1},
     ],
 }
 """Amplitude and stick fraction of the last cycles."""

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import ceil, floor, log2, log10
 from typing import Any
 
@@ -229,17 +230,17 @@ class Settings:
         self._use: dict[str, ui.button] = {}
         with ui.row().classes("items-center gap-1"):
             for name in "AB":
-                ui.button(f"Store {name}", on_click=lambda n=name: self._store(n)).props(
+                ui.button(f"Store {name}", on_click=partial(self._store, name)).props(
                     "outline dense"
                 )
-                use = ui.button(f"Use {name}", on_click=lambda n=name: self._apply(n))
+                use = ui.button(f"Use {name}", on_click=partial(self._apply, name))
                 self._use[name] = use.props("outline dense")
                 use.set_enabled(False)
             ui.checkbox("overlay", value=True, on_change=self._overlay)
         self._refusal = refusal_label()
         columns = [
             {"name": name, "label": label, "field": name, "align": "left"}
-            for name, label in (("what", ""), ("A", "A"), ("B", "B"), ("now", "now"))
+            for name, label in (("what", "setting"), ("A", "A"), ("B", "B"), ("now", "now"))
         ]
         self._table = ui.table(columns=columns, rows=[], row_key="what")
         self._table.classes("w-full").props("flat dense wrap-cells hide-bottom")

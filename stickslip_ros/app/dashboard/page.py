@@ -20,7 +20,6 @@ from stickslip_ros.app.dashboard.controls import (
     OtherParameter,
     Settings,
     SliderField,
-    current,
     main_parameters,
     other_parameters,
     refusal_label,
@@ -36,14 +35,17 @@ from stickslip_ros.app.dashboard.theory import (
     friction_curve,
     stability_map,
 )
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.theory.gain_intervals import gains_of
 from stickslip_ros.physics.theory.linear_sampled_loop import settling_time
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.parameters import controller_node
+from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, controller_node
 
 _REFRESH = 0.25
 _EVENTS = 100
@@ -387,29 +389,26 @@ class _Page:
         self._theory.follow()
         if drive is None:
             return
-        law = self._listener.law
-        values = {name: current(self._listener, name) for name in main_parameters(law)}
-        gains = [
-            values.get(f"{controller_node(law)}.{n}") for n in ("corner_frequency", "linear_gain")
-        ]
-        drawings: dict[str, tuple[Any, tuple[Any, ...], Callable[[Any], Any]]] = {
-            "map": (
-                stability_map,
-                (*gains,),
-                lambda found: theory_charts.stability_chart(found, drive, (gains[0], gains[1])),
-            ),
+        gains = self._gains()
+        drawings: dict[str, tuple[Any, Any, Callable[[Any], Any]]] = {
             "bifurcation": (
                 bifurcation,
-                (drive.belt_speed,),
+                drive.belt_speed,
                 lambda found: theory_charts.bifurcation_chart(found, drive),
             ),
             "friction": (
                 friction_curve,
-                (),
+                None,
                 lambda found: theory_charts.friction_chart(found, drive),
             ),
-            "decay": (decay, (), lambda found: theory_charts.decay_chart(found, drive)),
+            "decay": (decay, None, lambda found: theory_charts.decay_chart(found, drive)),
         }
+        if gains is not None:
+            drawings["map"] = (
+                stability_map,
+                gains,
+                lambda found: theory_charts.stability_chart(found, drive, gains),
+            )
         for name, (computation, place, draw) in drawings.items():
             result = self._theory.result(computation)
             state = (result.version, place)
@@ -428,6 +427,15 @@ class _Page:
                     ui.run_javascript(f"stickslip.frictionScale = {scale!r}")
                 if name == "decay":
                     self._said[name].set_text(_decay_text(result.value, units))
+
+    def _gains(self) -> WashoutGains | None:
+        """Return the gains of the controller; None while they are not known, or it has others."""
+        law = self._listener.law
+        values = self._listener.parameters[controller_node(law)]
+        try:
+            return gains_of(CONTROLLER_PARAMETERS[law].validated(values, law).as_law())
+        except InvalidInputError:  # a controller of another version
+            return None
 
     def _follow_end(self) -> None:
         if not self._listener.ended:

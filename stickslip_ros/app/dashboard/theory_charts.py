@@ -9,6 +9,7 @@ from contourpy import contour_generator
 from stickslip_ros.app.dashboard.charts import AXIS, CENTRED, TOOLBOX, line
 from stickslip_ros.app.dashboard.theory import Decay, FrictionCurve
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches, Branch
 from stickslip_ros.physics.theory.stability_map import StabilityMap
@@ -50,27 +51,29 @@ def bifurcation_chart(found: BifurcationBranches, drive: Drive) -> Options:
     return _options(speed_label, reach_label, series, legend=list(names))
 
 
-def stability_chart(found: StabilityMap, drive: Drive, gains: tuple[float, float]) -> Options:
-    """Return the limit of stability over the gains, and the present gains (SI units) as a point."""
+def stability_chart(found: StabilityMap, drive: Drive, gains: WashoutGains) -> Options:
+    """Return the limit of stability over the gains, and the present gains as a point."""
     units = Units.for_drive(drive)
     gain, label = units.axis("linear gain k1", "N s/m", found.linear_gains)
     corners, linear = found.corner_frequencies, found.linear_gains / gain
-    contours = contour_generator(corners, linear, found.decay_rates.T)
+    contours: Any = contour_generator(corners, linear, found.decay_rates.T)
     fastest = float(np.nanmax(found.decay_rates, initial=0.0))
     series = [
-        _line("limit of stability", *each.T, ORANGE, width=2.5) for each in contours.lines(0.0)
+        _line("limit of stability", each[:, 0], each[:, 1], ORANGE, width=2.5)
+        for each in contours.lines(0.0)
     ]
     continuous = found.continuous / gain
     inside = (continuous >= linear[0]) & (continuous <= linear[-1])
     shown = np.where(inside, continuous, np.nan)
     series.append(_line("limit, not sampled", corners, shown, GREY, "dashed"))
-    series.append(_point("gains in use", gains[0], gains[1] / gain))
+    series.append(_point("gains in use", gains.corner_frequency, gains.linear / gain))
     for share, style in ((0.25, "dotted"), (0.5, "dashed"), (0.75, "solid")):
         if fastest > 0.0:
             level = float(f"{share * fastest:.1g}")
             name = f"decay rate {level:g} {units.of_unit('1/s')}".rstrip()
             series += [
-                _line(name, *each.T, SKY_BLUE, style, width=1.2) for each in contours.lines(level)
+                _line(name, each[:, 0], each[:, 1], SKY_BLUE, style, width=1.2)
+                for each in contours.lines(level)
             ]
     series += [_region(text, *place) for text, place in _regions(found, linear)]
     options = _options(
