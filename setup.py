@@ -18,7 +18,7 @@ EXECUTABLES = {
 }
 
 ANALYSIS = ["pandas>=2.2.2", "xarray>=2024.6"]  # pandas: the first built for numpy 2
-DASHBOARD = ["fastapi", "nicegui>=3", "orjson", "uvicorn"]
+DASHBOARD = ["contourpy", "fastapi", "nicegui>=3", "orjson", "uvicorn"]
 
 STUB = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
 
@@ -92,6 +92,7 @@ setup(
         "test": [
             *ANALYSIS,
             *DASHBOARD,
+            "axe-playwright-python",  # checks the dashboard for accessibility
             "distributed",
             "hypothesis",
             "ipykernel",  # runs the notebooks of examples/, with nbclient
