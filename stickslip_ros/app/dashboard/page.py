@@ -11,7 +11,7 @@ from typing import Any
 
 from fastapi import FastAPI, Response, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse
-from nicegui import ui
+from nicegui import background_tasks, ui
 from nicegui.events import GenericEventArguments
 
 from stickslip_ros.app.dashboard import theory_charts
@@ -445,7 +445,7 @@ class _Page:
                 _call("restart()")
         elif not self._end_shown:
             self._end_shown = True
-            asyncio.create_task(self.show_end())  # noqa: RUF006 - the page keeps its result
+            background_tasks.create(self.show_end())
 
     async def show_end(self, *, last: bool = False) -> None:
         """Show that the run has ended; `last`: keep what is offered, as the server ends."""
