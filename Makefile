@@ -86,7 +86,7 @@ gallery: setup
 
 # The picture of the dashboard in README.md; needs a browser, and a machine that has time for it.
 screenshot: setup
-	$(BIN)/python -m tests.app.screenshot docs/dashboard.png
+	$(BIN)/python -m tests.app.screenshot docs
 
 clean:
 	rm -rf .venv .venv-* build install log dist *.egg-info .pytest_cache .ruff_cache .hypothesis

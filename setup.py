@@ -18,7 +18,7 @@ EXECUTABLES = {
 }
 
 ANALYSIS = ["pandas>=2.2.2", "xarray>=2024.6"]  # pandas: the first built for numpy 2
-DASHBOARD = ["fastapi", "nicegui>=3", "orjson", "uvicorn"]
+DASHBOARD = ["contourpy", "fastapi", "nicegui>=3", "orjson", "uvicorn"]
 
 STUB = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
 
@@ -52,7 +52,7 @@ setup(
     license=MANIFEST.findtext("license"),
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={
-        NAME: ["py.typed", "app/dashboard/*.js", "paper/claims/*.toml", "nodes/base/*.xml"]
+        NAME: ["py.typed", "app/dashboard/*.js", "app/dashboard/*.css", "paper/claims/*.toml", "nodes/base/*.xml"]
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
@@ -92,6 +92,7 @@ setup(
         "test": [
             *ANALYSIS,
             *DASHBOARD,
+            "axe-playwright-python",  # checks the dashboard for accessibility
             "distributed",
             "hypothesis",
             "ipykernel",  # runs the notebooks of examples/, with nbclient

@@ -213,7 +213,7 @@ def _dashboard(namespace: str) -> Generator[None]:
     finally:
         process.terminate()
         with suppress(subprocess.TimeoutExpired):
-            process.wait(5.0)
+            process.wait(10.0)  # its pages fetch the bag
         process.kill()
         process.wait()
 

@@ -37,6 +37,8 @@ class Frame(NamedTuple):
     """Forces that were sent and did not act, over time."""
     orbit: Line
     """Velocity over displacement."""
+    loop: Line
+    """Friction force over the velocity relative to the belt."""
 
 
 class LiveTrace:
@@ -69,7 +71,11 @@ class LiveTrace:
                     self._first = int(states.stamp[0])
                 self._newest = int(states.stamp[-1])
                 self._states.add(
-                    states.stamp, states.position, states.velocity, states.belt_velocity
+                    states.stamp,
+                    states.position,
+                    states.velocity,
+                    states.belt_velocity,
+                    states.friction_force,
                 )
             # A restarted controller may answer old samples: the figure follows the stamps.
             later = forces.stamp > self._newest_force
@@ -98,12 +104,12 @@ class LiveTrace:
             begin = end - round(min(window, self.longest) * NANOSECONDS)
             # With a fixed grid of times the points of a moving figure keep their places.
             width = max((end - begin) // buckets, 1)
-            stamp, *columns = _since(self._states, begin)
+            stamp, *columns, _ = _since(self._states, begin)
             force_stamp, force, lost = _since(self._forces, begin)
             acted = ~np.isnan(force)
             lost_stamp = force_stamp[~np.isnan(lost)]
             turning = round(orbit * NANOSECONDS)
-            orbit_stamp, x, v, _ = _since(self._states, end - turning)
+            orbit_stamp, x, v, moving, friction = _since(self._states, end - turning)
             rows = peaks(orbit_stamp // max(turning // 1_000, 1), x, v)
             position, velocity, belt = (
                 _line(stamp, column, end, width, self._states.interval) for column in columns
@@ -118,12 +124,41 @@ class LiveTrace:
                 ),
                 _line(lost_stamp, lost[~np.isnan(lost)], end, width, self._forces.interval),
                 Line(x[rows], v[rows]),
+                Line((v - moving)[rows], friction[rows]),
             )
+
+    def samples(self, window: float, end: float) -> list[FloatArray]:
+        """Return what is kept of the `window` s up to `end`, sample by sample.
+
+        Times are s from the first sample of all. The columns are time, position, velocity, belt
+        velocity, friction force and the control force that was sent for the sample; NaN: none.
+        """
+        with self._lock:
+            if self._first is None:
+                return [np.empty(0)] * 6
+            last = self._first + round(end * NANOSECONDS)
+            begin = last - round(min(window, self.longest) * NANOSECONDS)
+            stamp, *columns = _since(self._states, begin)
+            shown = stamp <= last
+            stamp = stamp[shown]
+            sent_stamp, acted, lost = self._forces.columns()
+            force = np.full(len(stamp), np.nan)
+            if len(sent_stamp):
+                rows = np.clip(np.searchsorted(sent_stamp, stamp), 0, len(sent_stamp) - 1)
+                same = sent_stamp[rows] == stamp
+                force[same] = np.where(np.isnan(acted), lost, acted)[rows][same]
+            time = (stamp - self._first) / NANOSECONDS
+            return [time, *(column[shown] for column in columns), force]
+
+    @property
+    def newest(self) -> int:
+        """Stamp of the newest sample, ns; -1 before the first."""
+        return self._newest
 
     def _begin(self) -> None:
         self._first: int | None = None
         self._newest = self._newest_force = -1
-        self._states = Trace(3, np.int64)
+        self._states = Trace(4, np.int64)
         self._forces = Trace(2, np.int64)
         """Columns of forces that acted and that did not; one of the two is NaN in each row."""
         self._dropped = DroppedForces()

@@ -1,51 +1,86 @@
-"""Options of the charts of the page; page.js draws the data of each frame into them."""
+"""Options of the charts of the motion; page.js draws the data of each frame into them."""
 
 from typing import Any
 
 from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE
 
-_AXIS: dict[str, Any] = {
+AXIS: dict[str, Any] = {
     "type": "value",
     "scale": True,
     "axisLine": {"onZero": False},
     "nameTextStyle": {"align": "left"},
     "axisLabel": {"showMinLabel": False, "showMaxLabel": False, "hideOverlap": True},
 }
-_CENTRED: dict[str, Any] = {
+CENTRED: dict[str, Any] = {
     "nameLocation": "middle",
     "nameGap": 28,
     "nameTextStyle": {"align": "center"},
 }
+TOOLBOX: dict[str, Any] = {
+    "right": 0,
+    "top": 0,
+    "itemSize": 13,
+    "feature": {
+        "dataZoom": {"title": {"zoom": "zoom", "back": "zoom back"}},
+        "restore": {"title": "whole"},
+        "saveAsImage": {"title": "PNG", "pixelRatio": 2},
+    },
+}
+CURSOR: dict[str, Any] = {"trigger": "axis", "axisPointer": {"type": "cross"}}
+
+_LEFT, _RIGHT = 64, 16
 
 
-def _line(colour: str, style: str = "solid", **more: Any) -> dict[str, Any]:
-    line: dict[str, Any] = {"type": "line", "showSymbol": False, "silent": True}
-    return line | {"lineStyle": {"color": colour, "width": 1.3, "type": style}} | more
+def line(name: str, colour: str, style: str = "solid") -> dict[str, Any]:
+    """Return a series that is drawn as a line."""
+    look = {"color": colour, "width": 1.3, "type": style}
+    series: dict[str, Any] = {"type": "line", "name": name, "symbol": "none", "data": []}
+    return series | {"lineStyle": look, "itemStyle": {"color": colour}}
+
+
+def _of(grid: int) -> dict[str, int]:
+    return {"xAxisIndex": grid, "yAxisIndex": grid}
 
 
 TRACE: dict[str, Any] = {
     "animation": False,
+    "backgroundColor": "transparent",
+    "legend": {"top": 0, "type": "scroll"},
     "grid": [
-        {"left": 70, "right": 20, "top": "8%", "height": "22%"},
-        {"left": 70, "right": 20, "top": "39%", "height": "22%"},
-        {"left": 70, "right": 20, "top": "70%", "height": "17%"},
+        {"left": _LEFT, "right": _RIGHT, "top": top, "height": "22%"}
+        for top in ("11%", "40%", "69%")
     ],
     "xAxis": [
-        _AXIS | {"gridIndex": 0, "axisLabel": {"show": False}},
-        _AXIS | {"gridIndex": 1, "axisLabel": {"show": False}},
-        _AXIS | _CENTRED | {"gridIndex": 2},
+        AXIS | {"gridIndex": 0, "axisLabel": {"show": False}},
+        AXIS | {"gridIndex": 1, "axisLabel": {"show": False}},
+        AXIS | CENTRED | {"gridIndex": 2},
     ],
-    "yAxis": [_AXIS | {"gridIndex": index} for index in range(3)],
-    "series": [{"type": "line", "xAxisIndex": index, "yAxisIndex": index} for index in range(3)],
+    "yAxis": [AXIS | {"gridIndex": index} for index in range(3)],
+    "series": [
+        line("slide", BLUE) | _of(0),
+        line("slide", BLUE) | _of(1),
+        line("belt", GREY, "dashed") | _of(1),
+        line("control force", ORANGE) | {"step": "end"} | _of(2),
+        line("held, no new force", ORANGE, "dotted") | _of(2),
+        {
+            "type": "scatter",
+            "name": "sent, not applied",
+            "symbolSize": 3,
+            "itemStyle": {"color": ORANGE},
+            "data": [],
+            **_of(2),
+        },
+    ],
 }
-"""Axes for displacement, velocity of slide and belt, and control force over time."""
+"""Displacement, velocity of slide and belt, and control force over time."""
 
 PORTRAIT: dict[str, Any] = {
     "animation": False,
-    "legend": {"top": 0, "data": ["equilibrium"]},
-    "grid": {"left": 70, "right": 20, "top": 60, "bottom": 45},
-    "xAxis": _AXIS | _CENTRED,
-    "yAxis": _AXIS,
+    "backgroundColor": "transparent",
+    "legend": {"top": 0, "data": ["slide", "equilibrium"]},
+    "grid": {"left": _LEFT, "right": _RIGHT, "top": 56, "bottom": 45},
+    "xAxis": AXIS | CENTRED,
+    "yAxis": AXIS,
     "series": [
         {
             "type": "scatter",
@@ -54,13 +89,15 @@ PORTRAIT: dict[str, Any] = {
             "symbolSize": 14,
             "itemStyle": {"color": GREEN},
             "silent": True,
+            "data": [],
         },
-        {
-            "type": "line",
+        line("slide", BLUE)
+        | {
             "markLine": {
                 "symbol": "none",
                 "silent": True,
                 "animation": False,
+                "backgroundColor": "transparent",
                 "lineStyle": {"color": GREY, "type": "dashed"},
                 "label": {"formatter": "belt", "position": "insideEndTop"},
                 "data": [],
@@ -72,25 +109,28 @@ PORTRAIT: dict[str, Any] = {
 
 CYCLES: dict[str, Any] = {
     "animation": False,
-    "legend": {"top": 0},
-    "grid": {"left": 70, "right": 60, "top": 60, "bottom": 45},
-    "xAxis": _AXIS | _CENTRED | {"minInterval": 1, "name": "cycle"},
+    "backgroundColor": "transparent",
+    "legend": {"top": 0, "left": 0, "right": 100},
+    "toolbox": TOOLBOX,
+    "tooltip": CURSOR,
+    "grid": {"left": _LEFT, "right": 56, "top": 56, "bottom": 45},
+    "xAxis": AXIS | CENTRED | {"minInterval": 1, "name": "cycle"},
     "yAxis": [
-        _AXIS | {"min": 0},
+        AXIS | {"min": 0},
         {
             "type": "value",
             "name": "stick fraction",
             "position": "right",
             "axisLine": {"onZero": False},
-            **_CENTRED,
+            **CENTRED,
             "nameGap": 36,
             "min": 0,
             "max": 1,
         },
     ],
     "series": [
-        _line(BLUE, name="amplitude", itemStyle={"color": BLUE}),
-        _line(ORANGE, "dashed", name="stick fraction", yAxisIndex=1, itemStyle={"color": ORANGE}),
+        line("amplitude", BLUE),
+        line("stick fraction", ORANGE, "dashed") | {"yAxisIndex": 1},
     ],
 }
 """Amplitude and stick fraction of the last cycles."""

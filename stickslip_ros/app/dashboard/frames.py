@@ -2,7 +2,9 @@
 
 import struct
 from collections.abc import Mapping
-from typing import Any
+from io import StringIO
+from itertools import zip_longest
+from typing import Any, NamedTuple
 
 import numpy as np
 import orjson
@@ -16,12 +18,18 @@ from stickslip_ros.plots.live_trace import Line, LiveTrace
 from stickslip_ros.plots.units import Units
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.parameters import PlantParameters
+from stickslip_ros.stamps import NANOSECONDS
 
 PERIODS = (10, 50, 200)
 """Selectable lengths of the traces, in natural periods."""
 
 _QUANTITIES = (("displacement", "m"), ("velocity", "m/s"), ("control force", "N"))
 _UNKNOWN_PERIOD = 1.0
+_LEAST_SPAN = 1e-3
+"""Least length of an axis, relative to the largest value that the drive lets expect."""
+_APART = 1.0
+"""Time, s, between two changes of a parameter that have a mark each."""
+_COLUMNS = "time", "position", "velocity", "belt_velocity", "friction_force", "control_force"
 
 
 class Frames:
@@ -57,6 +65,28 @@ class Frames:
         self._trace.longest = PERIODS[-1] * self.period
         self._trace.feed(states, forces, dropped)
 
+    def table(self, periods: int, end: float) -> str:
+        """Return the samples of the last `periods` natural periods up to `end` (s) as CSV, SI."""
+        columns = self._trace.samples(periods * self.period, end)
+        text = StringIO()
+        np.savetxt(text, np.transpose(columns), "%.9g", ",", header=",".join(_COLUMNS), comments="")
+        return text.getvalue().replace("nan", "")
+
+    def _marks(self, window: float) -> list[tuple[float, str]]:
+        """Return the times (s before now) of events in the window, and their marks."""
+        newest = self._trace.newest
+        events = [event for event in list(self._listener.events) if event.mark]
+        # Of a slider that is moved in steps, the last.
+        last = [
+            one
+            for one, other in zip_longest(events, events[1:])
+            if other is None
+            or other.when - one.when > _APART
+            or other.mark.split()[0] != one.mark.split()[0]
+        ]
+        times = [((event.stamp - newest) / NANOSECONDS, event.mark) for event in last]
+        return [(time, mark) for time, mark in times if -window < time <= 0.0]
+
     def frame(self, periods: int) -> bytes:
         """Return a frame with the last `periods` natural periods and the last cycles.
 
@@ -67,12 +97,12 @@ class Frames:
         period, drive = self.period, self.drive
         frame = self._trace.frame(periods * period, 5.0 * period, buckets=400)
         axes = _axes(drive)
-        length, speed, force = (scale for scale, _ in axes)
+        length, speed, force = (axis.scale for axis in axes)
         cycles = {
             "count": self._listener.cycle_count,
             "amplitude": [a / length for a in list(self._listener.cycles[AMPLITUDE])],
             "stick_fraction": list(self._listener.cycles[STICK_FRACTION]),
-            "label": axes[0][1].replace("displacement", "amplitude"),
+            "label": axes[0].label.replace("displacement", "amplitude"),
         }
         body: dict[str, Any] = {"motion": None, "cycles": cycles}
         lines: dict[str, list[FloatArray]] = {}
@@ -85,11 +115,15 @@ class Frames:
                 "dropped": _scaled(frame.dropped, 1.0, force),
                 "orbit": _scaled(frame.orbit, length, speed),
             }
+            if drive is not None and drive.friction.states:
+                lines["loop"] = _scaled(frame.loop, 1.0, drive.normal_force)
             in_equilibrium = drive is not None and drive.has_spring and drive.belt_speed
             body["motion"] = {
                 "end": frame.end,
                 "window": periods * period,
-                "labels": [label for _, label in axes],
+                "labels": [axis.label for axis in axes],
+                "spans": [axis.span for axis in axes],
+                "marks": self._marks(periods * period),
                 "time_label": Units.for_drive(drive).label("time before now", "s"),
                 "counts": {name: len(line[0]) for name, line in lines.items()},
                 "equilibrium": (
@@ -105,8 +139,15 @@ class Frames:
         return b"".join([struct.pack("<I", len(text)), text, *floats])
 
 
-def _axes(drive: Drive | None) -> list[tuple[float, str]]:
-    """Return scale and label of displacement, speed and force.
+class _Axis(NamedTuple):
+    scale: float
+    label: str
+    span: float
+    """Least length, in its unit: what is smaller is rounding."""
+
+
+def _axes(drive: Drive | None) -> list[_Axis]:
+    """Return the axes of displacement, speed and force.
 
     They depend on the drive, not on the motion, so that a decaying vibration is visible.
     """
@@ -117,10 +158,11 @@ def _axes(drive: Drive | None) -> list[tuple[float, str]]:
         reach = friction / drive.stiffness if drive.has_spring else drive.length_scale
         largest = (reach, speed, friction)
     units = Units.for_drive(drive)
-    return [
-        units.axis(*quantity, magnitude)
-        for quantity, magnitude in zip(_QUANTITIES, largest, strict=True)
-    ]
+    axes: list[_Axis] = []
+    for quantity, magnitude in zip(_QUANTITIES, largest, strict=True):
+        scale, label = units.axis(*quantity, magnitude)
+        axes.append(_Axis(scale, label, _LEAST_SPAN * magnitude / scale))
+    return axes
 
 
 def _scaled(line: Line, x_scale: float, y_scale: float) -> list[FloatArray]:

@@ -8,7 +8,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass, field
 from functools import partial
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import WrenchStamped
@@ -68,6 +68,8 @@ _LAWS = {controller_node(law): law for law in CONTROLLER_PARAMETERS}
 
 _ANSWER_TIMEOUT = 10.0
 _CYCLES_KEPT = 200
+_STILL = 0.5
+"""Time without samples, s, after which a plant in lockstep waits for a reply."""
 
 Answer = Future[str]
 """Result of a request: empty if it succeeded, otherwise a sentence with the reason."""
@@ -85,6 +87,18 @@ class Health:
     figures: Mapping[str, str] = field(default_factory=dict)
     heard_at: float = 0.0
     """Time of the diagnostics on the monotonic clock, s."""
+
+
+class Event(NamedTuple):
+    """Something that happened in a run."""
+
+    when: float
+    """s since the epoch."""
+    text: str
+    mark: str = ""
+    """Short text for a mark in the time plots; empty: no mark."""
+    stamp: int = 0
+    """Stamp of the newest sample then, ns."""
 
 
 class ListenerNode(PollingNode):
@@ -114,8 +128,11 @@ class ListenerNode(PollingNode):
         """The measures of the last cycles by topic."""
         self.cycle_count = 0
         """Number of all cycles received."""
-        self.events: deque[tuple[float, str]] = deque(maxlen=200)
-        """Time (s since the epoch) and text of the events of the nodes, the newest last."""
+        self.events: deque[Event] = deque(maxlen=200)
+        """What happened, the newest last."""
+        self.moved_at = 0.0
+        """Time of the newest samples on the monotonic clock, s."""
+        self._answering_since: int | None = None
         self._steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._calls: list[tuple[ServiceCall, float, Callable[[], None]]] = []
         self._asked_parameters: dict[str, ServiceCall] = {}
@@ -132,7 +149,9 @@ class ListenerNode(PollingNode):
         for topic in (AMPLITUDE, STICK_FRACTION, FREQUENCY):
             self.cycles[topic] = deque(maxlen=_CYCLES_KEPT)
             callback, qos = partial(self._on_cycle, topic), qos_profile(topic, _CYCLES_KEPT)
-            self.create_subscription(Float64, topic.name, callback, qos)
+            subscription = self.create_subscription(Float64, topic.name, callback, qos)
+            if topic is AMPLITUDE:
+                self._amplitudes = subscription
         self.create_subscription(
             DiagnosticArray, DIAGNOSTICS.name, self._on_diagnostics, qos_profile(DIAGNOSTICS)
         )
@@ -150,8 +169,41 @@ class ListenerNode(PollingNode):
         """Name of the controller relative to the namespace."""
         return controller_node(self.law)
 
+    @property
+    def ended(self) -> bool:
+        """Whether a run was heard whose plant and analyzer have left."""
+        return self._newest > 0 and not any(
+            topic.get_publisher_count() for topic in (self._states, self._amplitudes)
+        )
+
+    @property
+    def acts_in(self) -> float:
+        """Simulated time until the force of the active controller acts, s; 0 if it does."""
+        delay = self.parameters[self.controller].get("start_after", 0.0)
+        active = self.health.get(self.controller, Health()).state == "active"
+        if not (delay and active) or self._answering_since is None:
+            return 0.0
+        return max(delay - (self._newest - self._answering_since) / NANOSECONDS, 0.0)
+
+    @property
+    def waits_for_reply(self) -> float:
+        """Time that a plant in lockstep may still wait for a controller, s; 0 if it does not."""
+        plant = self.parameters["plant"]
+        still = time.monotonic() - self.moved_at
+        waiting = self.moved_at and self.health["plant"].state == "active" and still > _STILL
+        if not waiting or plant.get("pace") != "lockstep" or not plant.get("expects_control"):
+            return 0.0
+        return max(plant.get("reply_timeout", 0.0) - still, 0.0)
+
     def set_parameter(self, node: str, name: str, value: Any) -> Answer:
         """Set a parameter of a node while it runs."""
+
+        def outcome(response: Any) -> str:
+            if response.result.successful:
+                return ""
+            self._tell(f"{node} refused: {response.result.reason}")
+            return response.result.reason
+
         return self._request(
             node,
             SetParametersAtomically,
@@ -159,7 +211,7 @@ class ListenerNode(PollingNode):
             SetParametersAtomically.Request(
                 parameters=[Parameter(name, value=value).to_parameter_msg()]
             ),
-            lambda response: "" if response.result.successful else response.result.reason,
+            outcome,
         )
 
     def set_active(self, node: str, active: bool) -> Answer:
@@ -177,13 +229,14 @@ class ListenerNode(PollingNode):
 
     def reset(self) -> Answer:
         """Reset the motion to its initial state."""
-        return self._request(
-            "plant",
-            Trigger,
-            "reset",
-            Trigger.Request(),
-            lambda response: "" if response.success else response.message,
-        )
+
+        def outcome(response: Any) -> str:
+            if not response.success:
+                return response.message
+            self._tell("reset to the initial state", "reset")
+            return ""
+
+        return self._request("plant", Trigger, "reset", Trigger.Request(), outcome)
 
     def tap(self, force: float, duration: float) -> Answer:
         """Apply an impulse to the slide: a force (N) for a simulated time (s)."""
@@ -201,7 +254,7 @@ class ListenerNode(PollingNode):
             self._take()
             self._disturbance.publish(pack_wrench(self._newest, force))
             self._tap_end = self._newest + round(duration * NANOSECONDS)
-            self.events.append((time.time(), f"impulse of {force:g} N for {duration:g} s"))
+            self._tell(f"impulse of {force:g} N for {duration:g} s", f"{force:g} N")
             if self._tap_timer is None:
                 self._tap_timer = self._every(0.002, self._take)
             _settle(answer, "")
@@ -267,6 +320,7 @@ class ListenerNode(PollingNode):
         dropped, _ = wrench_columns(list(waiting_messages(self._dropped_forces)))
         if len(states.stamp):
             self._newest = int(states.stamp[-1])
+            self.moved_at = time.monotonic()
         if len(states.stamp) or len(forces.stamp) or len(dropped.stamp):
             self._show(states, forces, dropped)
         if self._tap_timer is not None and self._newest >= self._tap_end:
@@ -274,7 +328,7 @@ class ListenerNode(PollingNode):
 
     def _end_tap(self) -> None:
         self._disturbance.publish(pack_wrench(self._newest, 0.0))
-        self.events.append((time.time(), "the impulse has ended"))
+        self._tell("the impulse has ended")
         if self._tap_timer is not None:
             self.destroy_timer(self._tap_timer)
             self._tap_timer = None
@@ -317,19 +371,30 @@ class ListenerNode(PollingNode):
             self.law = _LAWS[node]
         restarted = state == before.state and _has_restarted(before.figures, figures)
         if restarted:
-            self.events.append((time.time(), f"{node} restarted"))
+            self._tell(f"{node} restarted")
         self._update(node, Health(state, status.level[0], message, figures, time.monotonic()))
+        if node == self.controller:
+            rate, answered = self.parameters["plant"].get("rate"), figures.get("answered", "")
+            known = bool(rate) and answered.isdecimal()
+            period = NANOSECONDS / rate if rate else 0.0
+            self._answering_since = self._newest - round(int(answered) * period) if known else None
         if node in NODE_PARAMETERS and (restarted or state != before.state):
             self._ask_parameters(node)  # it may be another node of the same name
+
+    def _tell(self, text: str, mark: str = "") -> None:
+        self.events.append(Event(time.time(), text, mark, self._newest))
 
     def _update(self, node: str, health: Health) -> None:
         before = self.health.get(node, Health())
         self.health = {**self.health, node: health}
         if health.state != before.state:
             back = "is back, " if before.state == SILENT else ""
-            self.events.append((time.time(), f"{node} {back}{health.state or 'heard'}"))
+            mark = ""
+            if node in _LAWS and before.state != ABSENT:
+                mark = {"active": "control on", "inactive": "control off"}.get(health.state, "")
+            self._tell(f"{node} {back}{health.state or 'heard'}", mark)
         if health.message and _wording(health.message) != _wording(before.message):
-            self.events.append((time.time(), f"{node}: {health.message}"))
+            self._tell(f"{node}: {health.message}")
 
     def _ask_parameters(self, node: str) -> None:
         names = list(known_parameters(NODE_PARAMETERS[node]))
@@ -347,7 +412,14 @@ class ListenerNode(PollingNode):
             known = known_parameters(NODE_PARAMETERS[node])
             changed = (*event.new_parameters, *event.changed_parameters)
             values = {p.name: parameter_value_to_python(p.value) for p in changed}
-            self._know(node, {name: value for name, value in values.items() if name in known})
+            values = {name: value for name, value in values.items() if name in known}
+            for name, value in values.items():
+                before = self.parameters[node].get(name)
+                if before is not None and before != value:
+                    text = f"{value:g}" if isinstance(value, float) else str(value)
+                    old = f"{before:g}" if isinstance(before, float) else str(before)
+                    self._tell(f"{node}.{name}: {old} to {text}", f"{name} {text}")
+            self._know(node, values)
             asked = self._asked_parameters.get(node)
             if asked is not None and asked.answer is None:  # its answer may be outdated
                 self._ask_parameters(node)

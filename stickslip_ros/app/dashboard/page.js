@@ -2,21 +2,24 @@
 // up; a hidden page requests none. The charts draw axes and marks only when these change. Lines are
 // drawn on a canvas above them: this leaves more processor time for a simulation on this machine.
 
+// Once paused, ECharts draws the lines itself, with cursor and zoom.
+
 const INTERVAL = 1000 / 30;
 const CYCLES_INTERVAL = 500;
 const MARGIN = 1.08;
-const LEAST_SPAN = 1e-4; // of an axis, in its units: smaller spans are rounding
-const HELD = "dotted: held, no new force";
-const DROPPED = "dots: sent, not applied";
+const MARK_WIDTH = 70; // pixels between the texts of two marks
 const page = window.stickslip;
 const limits = {};
 const shown = {};
+const kept = {};
+const dark = window.matchMedia("(prefers-color-scheme: dark)");
 let cyclesDrawn = { at: -Infinity };
+let socket;
 
 const chartOf = (name) => window.getElement(page[name])?.chart;
 
 // An axis only grows, so that a decaying vibration is visible. `fit` resets it.
-function range(name, lines) {
+function range(name, lines, span) {
   let [low, high] = limits[name] ?? [Infinity, -Infinity];
   for (const { y } of lines) {
     for (let i = 0; i < y.length; i += 1) {
@@ -25,8 +28,10 @@ function range(name, lines) {
     }
   }
   limits[name] = [low, high];
-  if (high - low >= LEAST_SPAN) return { min: low, max: high };
-  return Number.isFinite(low) ? { min: low - 1, max: high + 1 } : { min: -1, max: 1 };
+  if (!Number.isFinite(low)) return { min: -span, max: span };
+  if (high - low >= span) return { min: low, max: high };
+  const middle = Math.abs(low + high) < span / 1e3 ? 0 : (low + high) / 2;
+  return { min: middle - span / 2, max: middle + span / 2 };
 }
 
 function setChanged(name, option) {
@@ -65,9 +70,9 @@ function scaleOf(chart, gridIndex) {
   return { x0, y0, x1: x1 - x0, y1: y1 - y0 };
 }
 
-function drawLine(context, scale, { x, y }, colour, { dashed = false, stepped = false } = {}) {
+function drawLine(context, scale, { x, y }, colour, { dash = [], stepped = false } = {}) {
   context.strokeStyle = colour;
-  context.setLineDash(dashed ? [5, 4] : []);
+  context.setLineDash(dash);
   context.beginPath();
   let down = false;
   for (let i = 0; i < x.length; i += 1) {
@@ -96,38 +101,91 @@ function drawDots(context, scale, { x, y }, colour) {
   }
 }
 
-// Draws the last force dotted where no new one arrived, so that late forces leave no gap.
-function drawHeld(context, scale, { x, y }, colour) {
-  context.strokeStyle = colour;
-  context.setLineDash([1.5, 3]);
-  context.beginPath();
+// Returns the last force where no new one arrived, so that late forces leave no gap.
+function heldOf({ x, y }) {
+  const line = { x: [], y: [] };
   for (let i = 1; i + 1 < x.length; i += 1) {
     if (isHeld(y, i)) {
-      const [held, next] = [scale.y0 + y[i - 1] * scale.y1, scale.x0 + x[i + 1] * scale.x1];
-      context.moveTo(scale.x0 + x[i - 1] * scale.x1, held);
-      context.lineTo(next, held);
-      context.lineTo(next, scale.y0 + y[i + 1] * scale.y1);
+      line.x.push(x[i - 1], x[i + 1], x[i + 1], x[i + 1]);
+      line.y.push(y[i - 1], y[i - 1], y[i + 1], NaN);
     }
   }
-  context.stroke();
+  return line;
 }
 
-function drawMotion({ lines, labels, time_label, window: width, end, equilibrium, belt_speed }) {
+// Returns what the time plots draw, in the order of their series; then the motions kept.
+function layersOf({ lines }) {
+  const { BLUE, GREY, ORANGE, GREEN, SKY_BLUE } = page.colours;
+  const layers = [
+    { name: "slide", grid: 0, line: lines.position, colour: BLUE },
+    { name: "slide", grid: 1, line: lines.velocity, colour: BLUE },
+    { name: "belt", grid: 1, line: lines.belt, colour: GREY, dash: [5, 4] },
+    { name: "control force", grid: 2, line: lines.force, colour: ORANGE, stepped: true },
+    { name: "held, no new force", grid: 2, line: heldOf(lines.force), colour: ORANGE, dash: [1.5, 3] },
+    { name: "sent, not applied", grid: 2, line: lines.dropped, colour: ORANGE, dots: true },
+  ];
+  for (const [name, motion] of Object.entries(overlaid())) {
+    const look = { name, colour: name === "A" ? GREEN : SKY_BLUE, dash: [2, 2] };
+    layers.push({ ...look, grid: 0, line: motion.lines.position });
+    layers.push({ ...look, grid: 1, line: motion.lines.velocity });
+    layers.push({ ...look, grid: 2, line: motion.lines.force, stepped: true });
+  }
+  return layers;
+}
+
+// A motion that was kept in other units is not comparable.
+function overlaid() {
+  if (page.overlay === false || !page.motion) return {};
+  const same = ([, motion]) => String(motion.labels) === String(page.motion.labels);
+  return Object.fromEntries(Object.entries(kept).filter(same));
+}
+
+const paint = (context, scale, { line, colour, dots, ...look }) =>
+  dots ? drawDots(context, scale, line, colour) : drawLine(context, scale, line, colour, look);
+
+function drawMarks(context, chart, marks) {
+  const ink = dark.matches ? "#d0d4da" : "#444b55";
+  context.fillStyle = ink;
+  context.strokeStyle = ink;
+  context.setLineDash([1, 3]);
+  context.font = "11px sans-serif";
+  const bottom = chart.convertToPixel({ gridIndex: 2 }, [0, limits.force?.[0] ?? 0])[1];
+  const top = 0.11 * chart.getHeight();
+  let free = -Infinity;
+  for (const [time, text] of marks) {
+    const [x] = chart.convertToPixel({ gridIndex: 0 }, [time, 0]);
+    context.beginPath();
+    context.moveTo(x, top);
+    context.lineTo(x, bottom);
+    context.stroke();
+    if (x > free) {
+      const room = chart.getWidth() - 16 - x;
+      context.textAlign = room < MARK_WIDTH ? "right" : "left";
+      context.fillText(text, x + (room < MARK_WIDTH ? -3 : 3), top + 10);
+      free = x + MARK_WIDTH;
+    }
+  }
+}
+
+function drawMotion(motion) {
+  const { lines, labels, spans, time_label, window: width, end, equilibrium, belt_speed } = motion;
   const last = page.motion;
   const another = last && (String(last.labels) !== String(labels) || end < last.end);
   if (another) page.fit(); // other units, or another run
+  page.motion = motion;
   const { position, velocity, belt, force, dropped, orbit } = lines;
   const [displacement, speed, push] = labels;
-  const speeds = range("velocity", [velocity, belt]);
-  const positions = range("position", [position]);
-  const held = force.y.some((_, i) => i > 0 && i + 1 < force.y.length && isHeld(force.y, i));
-  const pushes = [push, ...(held ? [HELD] : []), ...(dropped.y.length ? [DROPPED] : [])];
+  const old = Object.values(overlaid()).map((each) => each.lines);
+  const of = (name) => old.map((each) => each[name]);
+  const speeds = range("velocity", [velocity, belt, ...of("velocity")], spans[1]);
+  const positions = range("position", [position, ...of("position")], spans[0]);
+  const forces = range("force", [force, dropped, ...of("force")], spans[2]);
   setChanged("trace", {
     xAxis: ["", "", time_label].map((name) => ({ name, min: -width, max: 0 })),
     yAxis: [
       { name: displacement, ...positions },
       { name: speed, ...speeds },
-      { name: pushes.join(", "), ...range("force", [force, dropped]) },
+      { name: push, ...forces },
     ],
   });
   setChanged("portrait", {
@@ -138,23 +196,71 @@ function drawMotion({ lines, labels, time_label, window: width, end, equilibrium
       { markLine: { data: [{ yAxis: belt_speed }] } },
     ],
   });
-  const { BLUE, GREY, ORANGE } = page.colours;
+  const { BLUE, GREEN, SKY_BLUE } = page.colours;
   const trace = chartOf("trace");
   const context = canvasOn(trace);
-  drawLine(context, scaleOf(trace, 0), position, BLUE);
-  drawLine(context, scaleOf(trace, 1), velocity, BLUE);
-  drawLine(context, scaleOf(trace, 1), belt, GREY, { dashed: true });
-  drawLine(context, scaleOf(trace, 2), force, ORANGE, { stepped: true });
-  drawHeld(context, scaleOf(trace, 2), force, ORANGE);
-  drawDots(context, scaleOf(trace, 2), dropped, ORANGE);
+  layersOf(motion).forEach((layer) => paint(context, scaleOf(trace, layer.grid), layer));
+  drawMarks(context, trace, motion.marks);
   const portrait = chartOf("portrait");
   const plane = canvasOn(portrait);
   const scale = scaleOf(portrait, 0);
+  for (const [name, each] of Object.entries(overlaid())) {
+    drawLine(plane, scale, each.lines.orbit, name === "A" ? GREEN : SKY_BLUE, { dash: [2, 2] });
+  }
   drawLine(plane, scale, orbit, BLUE);
+  plane.setLineDash([]);
   plane.beginPath();
   const [x, y] = [orbit.x.at(-1), orbit.y.at(-1)];
   plane.arc(scale.x0 + x * scale.x1, scale.y0 + y * scale.y1, 4, 0, 2 * Math.PI);
+  plane.fillStyle = BLUE;
   plane.fill();
+}
+
+// Draws the friction over the relative speed, of a law with a memory.
+function drawLoop({ lines }) {
+  const series = chartOf("friction")?.getOption()?.series;
+  if (!lines.loop || series?.[1]?.name !== "motion") return;
+  const { x, y } = lines.loop;
+  chartOf("friction").setOption({
+    series: [{}, { data: Array.from(x, (value, i) => [value / page.frictionScale, y[i]]) }],
+  });
+}
+
+const short = (value) => (value === null ? "" : Number(value).toPrecision(5));
+
+const points = ({ x, y }) => Array.from(x, (time, i) => [time, Number.isNaN(y[i]) ? null : y[i]]);
+
+// Hands the lines to ECharts, with a cursor and zoom, or takes them back.
+function show(paused) {
+  const cursor = { axisPointer: { type: "cross" }, show: paused, valueFormatter: short };
+  const layers = paused && page.motion ? layersOf(page.motion) : [];
+  const series = layers.map(({ name, grid, line, colour, dash, stepped, dots }) => ({
+    type: dots ? "scatter" : "line",
+    symbolSize: 3,
+    showSymbol: Boolean(dots),
+    name,
+    xAxisIndex: grid,
+    yAxisIndex: grid,
+    step: stepped ? "end" : false,
+    lineStyle: { color: colour, width: 1.3, type: dash ? "dashed" : "solid" },
+    itemStyle: { color: colour },
+    data: points(line),
+  }));
+  const options = window.getElement(page.trace).options;
+  chartOf("trace").setOption(
+    {
+      tooltip: { ...cursor, trigger: "axis" },
+      axisPointer: { link: [{ xAxisIndex: "all" }] },
+      dataZoom: paused ? [{ type: "inside", xAxisIndex: [0, 1, 2] }] : [],
+      series: paused ? series : options.series,
+    },
+    { replaceMerge: ["dataZoom", "series"] },
+  );
+  chartOf("portrait").setOption({
+    tooltip: { ...cursor, trigger: "axis" },
+    series: [{}, { data: paused && page.motion ? points(page.motion.lines.orbit) : [] }],
+  });
+  ["trace", "portrait"].forEach((name) => canvasOn(chartOf(name)));
 }
 
 function drawCycles({ count, amplitude, stick_fraction, label }) {
@@ -189,18 +295,20 @@ function read(bytes) {
 
 function draw({ motion, cycles }) {
   if (motion) drawMotion(motion);
+  if (motion && cyclesDrawn.at + CYCLES_INTERVAL < performance.now()) drawLoop(motion);
   drawCycles(cycles);
   page.frames += 1;
-  page.motion = motion;
 }
 
+const drawable = () => chartOf("trace")?.getWidth() && chartOf("portrait") && chartOf("cycles");
+
 function follow() {
-  const socket = new WebSocket(`ws://${location.host}/frames`);
+  socket = new WebSocket(`ws://${location.host}/frames`);
   socket.binaryType = "arraybuffer";
   let asked = 0;
   const ask = () => {
     if (socket.readyState !== WebSocket.OPEN) return;
-    if (document.hidden || !(chartOf("trace") && chartOf("portrait") && chartOf("cycles"))) {
+    if (document.hidden || page.paused || !drawable()) {
       setTimeout(ask, 100);
       return;
     }
@@ -209,12 +317,84 @@ function follow() {
   };
   socket.onopen = ask;
   socket.onmessage = ({ data }) => {
-    draw(read(data));
+    if (!page.paused) draw(read(data));
     setTimeout(ask, Math.max(asked + INTERVAL - performance.now(), 0));
   };
-  socket.onclose = () => setTimeout(follow, 1000);
+  socket.onclose = () => page.final || setTimeout(follow, 1000);
 }
 
+function redraw() {
+  if (!page.charts.every(chartOf)) {
+    setTimeout(redraw, 50);
+    return;
+  }
+  page.charts.forEach((name) => chartOf(name).setTheme(dark.matches ? "dark" : "default"));
+  Object.keys(shown).forEach((name) => delete shown[name]);
+}
+
+function save(url, name) {
+  const link = document.createElement("a");
+  link.href = url;
+  link.download = name;
+  link.click();
+}
+
+const shownRows = () => `/shown.csv?periods=${page.periods}&end=${page.motion?.end ?? 0}`;
+
 page.fit = () => Object.keys(limits).forEach((name) => delete limits[name]);
+page.show = (periods) => {
+  page.periods = periods;
+  page.fit();
+};
+page.keep = (name) => {
+  if (page.motion) kept[name] = page.motion;
+};
+page.pause = (paused) => {
+  page.paused = paused;
+  show(paused);
+};
+page.csv = () => save(page.rows ?? shownRows(), "stickslip.csv");
+
+// Puts the charts of the motion, as they are shown, into one picture.
+page.png = () => {
+  const canvases = ["trace", "portrait", "cycles"].flatMap((name) => [
+    ...chartOf(name).getDom().querySelectorAll("canvas"),
+  ]);
+  const boxes = canvases.map((canvas) => canvas.getBoundingClientRect());
+  const [left, top] = [Math.min(...boxes.map((b) => b.left)), Math.min(...boxes.map((b) => b.top))];
+  const ratio = window.devicePixelRatio;
+  const picture = document.createElement("canvas");
+  picture.width = ratio * (Math.max(...boxes.map((b) => b.right)) - left);
+  picture.height = ratio * (Math.max(...boxes.map((b) => b.bottom)) - top);
+  const context = picture.getContext("2d");
+  context.scale(ratio, ratio);
+  context.fillStyle = dark.matches ? "#1b1e23" : "#ffffff";
+  context.fillRect(0, 0, picture.width, picture.height);
+  canvases.forEach((canvas, i) =>
+    context.drawImage(canvas, boxes[i].left - left, boxes[i].top - top, boxes[i].width, boxes[i].height),
+  );
+  save(picture.toDataURL("image/png"), "stickslip.png");
+};
+
+const blobOf = async (url) => {
+  const answer = await fetch(url);
+  return answer.ok ? URL.createObjectURL(await answer.blob()) : null;
+};
+
+// Fetches what the page offers, before the server ends.
+page.end = async () => {
+  page.final = true;
+  document.body.classList.add("ended");
+  const link = document.querySelector('a[href="/bag.mcap"]');
+  const bag = link && (await blobOf("/bag.mcap"));
+  if (bag) link.href = bag;
+  page.rows = await blobOf(shownRows());
+  return true;
+};
+page.restart = () => page.fit();
 page.frames = 0;
-page.start = follow;
+page.start = () => {
+  dark.addEventListener("change", redraw);
+  redraw();
+  follow();
+};

@@ -18,7 +18,7 @@ from rclpy.task import Future
 from stickslip_ros.app.dashboard import DEFAULT_PORT, LARGEST_PORT
 from stickslip_ros.app.dashboard.frames import Frames
 from stickslip_ros.app.dashboard.listener import ListenerNode
-from stickslip_ros.app.dashboard.page import add_page
+from stickslip_ros.app.dashboard.page import Pages
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.nodes.base.process import initialise, spin
 
@@ -43,8 +43,13 @@ def serve(namespace: str, port: int | None, reach: str) -> None:
         with _running(listener):
             app = FastAPI(openapi_url=None)
             _keep_others_out(app)
-            add_page(app, listener, frames)
-            ui.run_with(app, title=f"stickslip {namespace}", show_welcome_message=False)
+            pages = Pages(app, listener, frames)
+            ui.run_with(
+                app,
+                title=f"stickslip {namespace}",
+                language="en-US",
+                show_welcome_message=False,
+            )
             host, port = listening.getsockname()
             print(f"dashboard of {namespace}, {reach}: http://{host}:{port}", file=sys.stderr)
             config = uvicorn.Config(
@@ -53,9 +58,21 @@ def serve(namespace: str, port: int | None, reach: str) -> None:
                 timeout_graceful_shutdown=1,
                 ws_per_message_deflate=False,  # slower than the loopback
             )
-            uvicorn.Server(config).run(sockets=[listening])
+            _Server(config, pages.take_leave).run(sockets=[listening])
     finally:
         rclpy.try_shutdown()
+
+
+class _Server(uvicorn.Server):
+    """A server that takes leave of its pages before it ends."""
+
+    def __init__(self, config: uvicorn.Config, take_leave: Callable[[], Awaitable[None]]) -> None:
+        super().__init__(config)
+        self._take_leave = take_leave
+
+    async def main_loop(self) -> None:
+        await super().main_loop()
+        await self._take_leave()
 
 
 def _keep_others_out(app: FastAPI) -> None:

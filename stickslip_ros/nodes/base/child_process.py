@@ -45,11 +45,19 @@ def die_with_parent() -> None:
     Linux only; on other systems this does nothing.
     """
     parent = os.environ.pop(_PARENT_VARIABLE, "")
-    if not parent or sys.platform != "linux":
-        return
-    _signal_at_death_of_parent(signal.SIGTERM)
-    if os.getppid() != int(parent):
-        sys.exit(1)
+    if parent:
+        end_with(int(parent))
+
+
+def end_with(parent: int) -> None:
+    """Have SIGTERM sent to this process when its parent, with that process number, ends.
+
+    Linux only; on other systems this does nothing.
+    """
+    if sys.platform == "linux":
+        _signal_at_death_of_parent(signal.SIGTERM)
+        if os.getppid() != parent:
+            sys.exit(1)
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
+from stickslip_ros.app.dashboard.listener import Event
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.files import load_scenario
@@ -36,7 +37,9 @@ def decoded(frame: bytes) -> Decoded:
 
 def observed(parameters: dict[str, Any]) -> Any:
     cycles = {AMPLITUDE: deque([4e-4]), STICK_FRACTION: deque([0.1]), FREQUENCY: deque([8.0])}
-    return SimpleNamespace(parameters={"plant": parameters}, cycles=cycles, cycle_count=7)
+    return SimpleNamespace(
+        parameters={"plant": parameters}, cycles=cycles, cycle_count=7, events=deque[Event]()
+    )
 
 
 def fed(parameters: dict[str, Any], seconds: float, rate: float) -> Frames:

@@ -123,7 +123,7 @@ def test_the_controller_is_switched_off_and_on(graph: Graph, observer: ListenerN
         graph.wait_until(
             lambda s=state: observer.health["washout_controller"].state == s, f"it is {state}"
         )
-    assert [what for _, what in observer.events if "inactive" in what] == [
+    assert [each.text for each in observer.events if "inactive" in each.text] == [
         "washout_controller inactive"
     ]
 
@@ -188,7 +188,7 @@ def test_a_node_that_was_started_again_at_once_is_asked_again(
     graph.wait_until(
         lambda: observer.parameters["plant"].get("damping") == 0.3, "the parameters of the other"
     )
-    assert SILENT not in {what.split()[-1] for _, what in observer.events}
+    assert SILENT not in {each.text.split()[-1] for each in observer.events}
 
 
 def test_the_health_of_a_limited_number_of_nodes_is_kept(
@@ -233,5 +233,5 @@ def test_a_node_that_falls_silent_and_comes_back_is_shown_as_that(
     graph.wait_until(lambda: observer.health["plant"].state == SILENT, "silence")
     graph.executor.add_node(plant)
     graph.wait_until(lambda: observer.health["plant"].state == "active", "the plant again")
-    events = [what for _, what in observer.events]
+    events = [each.text for each in observer.events]
     assert events.index("plant silent") < events.index("plant is back, active")

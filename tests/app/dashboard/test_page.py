@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, Locator, Page, expect
 
 from stickslip_ros.bags.reader import Recording
 from tests.app.browser import headless_browser
@@ -81,6 +82,10 @@ def swing(page: Page) -> float:
     }""")
 
 
+def events(page: Page) -> Locator:
+    return page.get_by_role("log")
+
+
 def last_amplitude(page: Page) -> float:
     """Return the amplitude of the last cycle that the chart shows, in its unit."""
     return page.evaluate("""() => {
@@ -104,7 +109,7 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
     expect(control).to_be_checked()
 
     control.click()
-    expect(page.get_by_text("washout_controller inactive")).to_be_visible()
+    expect(events(page).get_by_text("washout_controller inactive")).to_be_visible()
     page.get_by_role("button", name="Reset").click()
     expect(page.get_by_text("stick-slip", exact=True)).to_be_visible()
     expect(page.get_by_text(re.compile(r"^43\d(\.\d+)? µm$"))).to_be_visible()
@@ -118,31 +123,36 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
     page.get_by_text("10 periods").click()
     wait_for(lambda: 0.0 <= swing(page) < 50.0, "the collapse is drawn")
 
-    speed = page.get_by_label("plant.belt_speed")
+    speed = page.get_by_label("belt speed V, value")
     speed.fill("0.02")
     speed.press("Enter")
-    expect(page.get_by_text("now 0.02 m/s")).to_be_visible()
+    expect(events(page).get_by_text("plant.belt_speed: 0.04 to 0.02")).to_be_visible()
+    page.get_by_role("button", name="undo belt speed V").click()
+    expect(events(page).get_by_text("plant.belt_speed: 0.02 to 0.04")).to_be_visible()
+    expect(speed).to_have_value("0.04")
 
-    corner = page.get_by_label("washout_controller.corner_frequency")
+    corner = page.get_by_label("cutoff frequency d, value")
     corner.fill("-3")
     corner.press("Enter")
     refusal = "corner_frequency = -3.0 is refused: must be a finite number above 0"
-    expect(page.get_by_text(re.compile(re.escape(refusal)))).to_be_visible()
-    expect(page.get_by_text("now 20 rad/s")).to_be_visible()
-    corner.fill("fast")
-    corner.press("Enter")
-    expect(page.get_by_text("'fast' is not a number")).to_be_visible()
+    expect(page.get_by_role("alert").get_by_text(re.compile(re.escape(refusal)))).to_be_visible()
+    expect(events(page).get_by_text("washout_controller refused")).to_be_visible()
+    expect(corner).to_have_value("20")
 
     page.get_by_label("another parameter").click()
-    page.get_by_role("option", name="plant.damping").click()
+    page.get_by_role("option", name="plant.damping = 200 N s/m").click()
+    expect(page.get_by_text("now 200 N s/m")).to_be_visible()
     value = page.get_by_label("value", exact=True)
+    value.fill("fast")
+    value.press("Enter")
+    expect(page.get_by_text("'fast' is not a number")).to_be_visible()
     value.fill("250")
     value.press("Enter")
     expect(page.get_by_text("now 250 N s/m")).to_be_visible()
 
     page.get_by_role("button", name="Impulse").click()
-    expect(page.get_by_text("impulse of 250 N for 0.016 s")).to_be_visible()
-    expect(page.get_by_text("the impulse has ended")).to_be_visible()
+    expect(events(page).get_by_text("impulse of 250 N for 0.016 s")).to_be_visible()
+    expect(events(page).get_by_text("the impulse has ended")).to_be_visible()
     wait_for(lambda: swing(page) > 50.0, "the impulse is drawn")
     page.close()
     assert served.end() == 130
@@ -151,6 +161,106 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
         applied = recording.applied_disturbances.force
     assert applied.max() == 250.0
     assert applied[-1] == 0.0
+
+
+CROSSED = """() => {
+    const series = window.getElement(stickslip.map).chart?.getOption()?.series ?? [];
+    const points = (name) => series.filter((one) => one.name === name).flatMap((one) => one.data);
+    const [gains] = points("gains in use");
+    const [limit] = points("limit of stability")
+        .sort((a, b) => Math.abs(a[0] - gains[0]) - Math.abs(b[0] - gains[0]));
+    return limit ? gains[1] < limit[1] : null;
+}"""
+"""Whether the gains lie below the limit in the map, where they suppress a vibration."""
+
+
+def accessibility(page: Page) -> list[str]:
+    """Return what axe finds against WCAG 2.2 AA and good practice."""
+    rules = ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa", "best-practice"]
+    found = Axe().run(page, options={"runOnly": rules}).response["violations"]
+    return [f"{each['id']}: {each['nodes'][0]['html']}" for each in found]
+
+
+def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Path) -> None:
+    served = Served(
+        start_stickslip(
+            *("run", "feed_drive", "--dashboard", "--bag", "bag"),
+            *("-p", "plant.real_time_factor=0.25", "-p", "plant.belt_speed=0.05"),
+            *("-p", "washout_controller.start_after=0"),
+            *("-p", "washout_controller.linear_gain=-1000"),
+        )
+    )
+    page.goto(served.url)
+    control = page.get_by_role("switch", name="washout controller")
+    expect(control).to_be_checked()
+    control.click()
+    expect(events(page).get_by_text("washout_controller inactive")).to_be_visible()
+    wait_for(
+        lambda: page.evaluate(CROSSED) is True, "at this belt speed the gains suppress a vibration"
+    )
+
+    # The belt speed is lowered by its slider until the slide vibrates.
+    slider = page.get_by_role("slider", name="belt speed V")
+    slider.focus()
+    wait_for(lambda: _pressed(slider) <= 0.04, "the slider is moved")
+    page.get_by_role("button", name="Reset").click()
+    expect(page.get_by_text("stick-slip", exact=True).first).to_be_visible()
+    wait_for(lambda: page.evaluate(CROSSED) is False, "the gains come to lie on the unstable side")
+    assert "plant.belt_speed" in events(page).inner_text()
+    wait_for(lambda: swing(page) > 500.0, "the vibration is drawn")
+    page.get_by_role("button", name="Store A").click()
+
+    gain = page.get_by_label("linear gain k1, value")
+    gain.fill("-3000")
+    gain.press("Enter")
+    wait_for(lambda: page.evaluate(CROSSED) is True, "more gain is on the stable side")
+    control.click()
+    expect(page.get_by_text("equilibrium", exact=True).first).to_be_visible()
+    page.get_by_role("button", name="Store B").click()
+    row = page.get_by_role("row").filter(has=page.get_by_text("regime", exact=True))
+    expect(row).to_contain_text("stick-slip")
+    expect(row).to_contain_text("equilibrium")
+    assert accessibility(page) == []
+
+    # Before and after are in the window of 200 periods, and in its samples.
+    page.get_by_text("200 periods").click()
+    wait_for(lambda: swing(page) > 500.0, "before and after are drawn")
+    page.get_by_role("button", name="Pause view").click()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="CSV").click()
+    rows = np.genfromtxt(download.value.path(), delimiter=",", names=True)
+    assert 1e6 * np.ptp(rows["position"]) == pytest.approx(swing(page), rel=1e-5)
+    with page.expect_download() as picture:
+        page.get_by_role("button", name="PNG").click()
+    assert picture.value.path().stat().st_size > 10_000
+
+    assert served.end() == 130
+    expect(page.get_by_role("heading", name="Run ended")).to_be_visible()
+    expect(page.get_by_text("Recorded in bag")).to_be_visible()
+    with page.expect_download() as bag:  # although the server has ended
+        page.get_by_role("link", name="Download the bag").click()
+    written = next((tmp_path / "bag").glob("*.mcap"))
+    assert bag.value.path().read_bytes() == written.read_bytes()
+    assert accessibility(page) == []
+    assert "Traceback" not in "".join(served.said)
+
+
+def _pressed(slider: Locator) -> float:
+    """Press the key that lowers a slider; return the value that it had."""
+    value = float(slider.input_value())
+    if value > 0.04:
+        slider.press("ArrowLeft")
+    return value
+
+
+def test_the_empty_page_says_how_to_start_a_run(start_stickslip: Start, page: Page) -> None:
+    served = Served(start_stickslip("dashboard", "--namespace", "/test"))
+    page.emulate_media(color_scheme="dark")
+    page.goto(served.url)
+    expect(page.get_by_text("No drive is running in /test")).to_be_visible()
+    expect(page.get_by_text("stickslip run feed_drive --namespace /test")).to_be_visible()
+    assert accessibility(page) == []
+    assert served.end() == 130
 
 
 # A click is a message to each listener; those to all but the first come later than a refresh.
@@ -177,7 +287,7 @@ def test_a_click_that_arrives_in_parts_switches_the_controller(
     page.wait_for_function("window.did_handshake")
     page.evaluate(DELAYED)
     control.click()
-    expect(page.get_by_text("washout_controller inactive")).to_be_visible()
+    expect(events(page).get_by_text("washout_controller inactive")).to_be_visible()
     expect(control).not_to_be_checked()
     assert served.end() == 130
 
@@ -241,17 +351,16 @@ def test_a_long_event_is_wrapped_within_its_box(
     served = Served(start_stickslip("dashboard", "--namespace", "/test"))
     page.goto(served.url)
     processes.node("plant", pace="realtime", rate=200.0)
-    event = page.locator(".nicegui-log").get_by_text("no control force arrives: continuing without")
+    event = events(page).get_by_text("no control force arrives: continuing without")
     expect(event).to_be_visible()
-    box = page.locator(".nicegui-log .q-scrollarea__container")
-    widths = box.evaluate("box => [box.scrollWidth, box.clientWidth]")
+    widths = events(page).evaluate("box => [box.scrollWidth, box.clientWidth]")
     assert widths[0] <= widths[1]
-    assert event.evaluate("line => line.getBoundingClientRect().height") > 30.0
+    assert event.evaluate("line => line.getBoundingClientRect().height") > 25.0
     assert served.end() == 130
 
 
 OVERLAPS = """
-() => ["trace", "portrait", "cycles"].flatMap((name) => {
+() => stickslip.charts.flatMap((name) => {
   const { chart } = window.getElement(stickslip[name]);
   const words = chart.getZr().storage.getDisplayList()
     .filter((part) => part.type === "tspan" && !part.ignore && part.style.text)
@@ -270,7 +379,7 @@ OVERLAPS = """
 
 
 RESIZED = """
-() => ["trace", "portrait", "cycles"].every((name) => {
+() => stickslip.charts.every((name) => {
   const { chart } = window.getElement(stickslip[name]);
   return chart.getWidth() === chart.getDom().clientWidth;
 })
@@ -300,7 +409,7 @@ def test_no_words_in_the_charts_overlap_in_a_narrow_window(
     processes.node("analyzer")
     processes.node("plant", pace="realtime", expects_control="false", **drive)
     page.wait_for_function(ENOUGH)
-    for width in range(800, 1601, 100):
+    for width in (390, *range(800, 1601, 100)):
         page.set_viewport_size({"width": width, "height": 900})
         page.wait_for_function(RESIZED)
         assert page.evaluate(OVERLAPS) == [], width

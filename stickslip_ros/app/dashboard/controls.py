@@ -1,0 +1,315 @@
+"""Controls of the page: what sets a parameter, and what waits for the answer."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from math import ceil, floor, log2, log10
+from typing import Any
+
+from nicegui import ui
+from nicegui.events import GenericEventArguments
+
+from stickslip_ros.app.dashboard.listener import Answer, ListenerNode
+from stickslip_ros.physics.model.constants import constants_of
+from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
+from stickslip_ros.plots.units import Units
+from stickslip_ros.scenarios.parameter_field import Fixed, Parameter, known_parameters
+from stickslip_ros.scenarios.parameters import (
+    CONTROLLER_PARAMETERS,
+    NODE_PARAMETERS,
+    controller_node,
+)
+
+_SYMBOLS = {
+    "belt_speed": "belt speed V",
+    "corner_frequency": "cutoff frequency d",
+    "linear_gain": "linear gain k1",
+    "cubic_gain": "cubic gain k2",
+}
+
+
+def main_parameters(law: str) -> list[str]:
+    """Return the parameters with a slider, as NODE.PARAMETER: belt speed and own gains of a law."""
+    common = constants_of(ControlLaw)
+    known = known_parameters(CONTROLLER_PARAMETERS[law])
+    own = [
+        f"{controller_node(law)}.{name}"
+        for name in CONTROL_LAWS[law].constants()
+        if name not in common and name in known and _is_adjustable(known[name])
+    ]
+    return ["plant.belt_speed", *own]
+
+
+def other_parameters(law: str) -> list[str]:
+    """Return all other numbers that can be changed while the nodes run, as NODE.PARAMETER."""
+    names = [
+        f"{node}.{name}"
+        for node in ("plant", controller_node(law))
+        for name, parameter in known_parameters(NODE_PARAMETERS[node]).items()
+        if _is_adjustable(parameter)
+    ]
+    return [name for name in names if name not in main_parameters(law)]
+
+
+def described(full_name: str) -> Parameter:
+    """Return the description of NODE.PARAMETER."""
+    node, _, name = full_name.partition(".")
+    return known_parameters(NODE_PARAMETERS[node])[name]
+
+
+def symbol(full_name: str) -> str:
+    """Return the name of NODE.PARAMETER for a reader, with the symbol of the theory."""
+    name = full_name.partition(".")[2]
+    return _SYMBOLS.get(name, name.replace("_", " "))
+
+
+def slider_range(value: float, parameter: Parameter) -> tuple[float, float, float]:
+    """Return least and largest value and step of a slider around a value.
+
+    The range is a round one that a smaller change of the value does not change.
+    """
+    scale = value or parameter.default or 1.0
+    size = 2.0 ** (ceil(log2(abs(scale))) + 1)
+    low, high = (0.0, size) if scale > 0.0 else (-size, 0.25 * size)
+    if parameter.least is not None:
+        low = max(low, 0.0 if abs(parameter.least) < 1e-20 else parameter.least)
+    step = 10.0 ** floor(log10((high - low) / 100.0))
+    return low, high, step
+
+
+def current(listener: ListenerNode, full_name: str) -> Any:
+    """Return the current value of NODE.PARAMETER; None if it is not known."""
+    node, _, name = full_name.partition(".")
+    return listener.parameters[node].get(name)
+
+
+class SliderField:
+    """Slider and number for a parameter, with its unit, undo and the reason of a refusal."""
+
+    def __init__(self, listener: ListenerNode, full_name: str) -> None:
+        self._listener, self.full_name = listener, full_name
+        self._parameter = described(full_name)
+        self._earlier: list[float] = []
+        self._shown: float | None = None
+        self._held = False
+        name = symbol(full_name)
+        with ui.element("div").classes("w-full"):
+            with ui.row().classes("w-full items-center no-wrap gap-1"):
+                self._label = ui.label(name).classes("grow text-sm")
+                self._number = ui.number(format="%.6g").classes("w-28")
+                self._number.props(f'dense outlined aria-label="{name}, value"')
+                self._number.on("keydown.enter", self._enter)
+                self._number.on("blur", self._enter)
+                self._undo = ui.button(icon="undo", on_click=self._go_back)
+                self._undo.props(f'flat dense round size=sm aria-label="undo {name}"')
+            self._slider = ui.element("input").classes("w-full slider")
+            self._slider.props(f'type=range aria-label="{name}"')
+            self._slider.on("input", self._hold)
+            self._slider.on("change", self._slide, js_handler="(e) => emit(e.target.value)")
+            self._refusal = refusal_label()
+
+    def refresh(self, units: Units) -> None:
+        """Show the current value, unless the user is about to change it."""
+        value = current(self._listener, self.full_name)
+        unit = units.of_unit(self._parameter.unit or "")
+        self._label.set_text(
+            f"{symbol(self.full_name)} ({unit})" if unit else symbol(self.full_name)
+        )
+        known = isinstance(value, float)
+        self._number.set_enabled(known)
+        self._undo.set_enabled(known and bool(self._earlier))
+        if known and not self._held and value != self._shown:
+            self._show(value)
+
+    def _show(self, value: float) -> None:
+        self._shown = value
+        low, high, step = slider_range(value, self._parameter)
+        # The value last: a range input keeps it within the limits that it has.
+        self._slider.props(f"min={low!r} max={high!r} step={step!r} value={value!r}")
+        self._number.set_value(value)
+
+    def _hold(self) -> None:
+        self._held = True
+
+    async def _slide(self, event: GenericEventArguments) -> None:
+        self._held = False
+        await self._set(float(f"{float(event.args):.9g}"))
+
+    async def _enter(self) -> None:
+        if self._number.value is None:
+            self._refusal.set_text("a number is needed")
+        elif self._number.value != self._shown:
+            await self._set(float(self._number.value))
+
+    async def _go_back(self) -> None:
+        if self._earlier:
+            await self._set(self._earlier.pop(), again=True)
+
+    async def _set(self, value: float, *, again: bool = False) -> None:
+        before = current(self._listener, self.full_name)
+        node, _, name = self.full_name.partition(".")
+        answer = await asyncio.wrap_future(self._listener.set_parameter(node, name, value))
+        self._refusal.set_text(answer)
+        if answer:
+            self._show(before)
+        elif not again and before is not None and before != value:
+            self._earlier.append(before)
+
+
+class OtherParameter:
+    """Any other parameter: a list with value, unit and meaning, and a field for a new value."""
+
+    def __init__(self, listener: ListenerNode, names: list[str]) -> None:
+        self._listener, self._names = listener, names
+        self._choice = ui.select(names, label="another parameter", with_input=True)
+        self._choice.classes("w-full").props("dense outlined")
+        self._meaning = ui.label().classes("text-sm")
+        self._field = ui.input("value").classes("w-full").props("dense outlined")
+        self._field.on("keydown.enter", self._apply)
+        with self._field.add_slot("append"):
+            ui.button("Set", on_click=self._apply).props("flat dense")
+        self._refusal = refusal_label()
+        self._options: dict[str, str] = {}
+
+    def refresh(self, units: Units) -> None:
+        """Show the current values."""
+        options = {name: f"{name} = {self._value(name, units)}" for name in self._names}
+        if options != self._options:
+            self._options = options
+            self._choice.set_options(options, value=self._choice.value)
+        chosen = self._choice.value
+        if chosen is None:
+            self._meaning.set_text("")
+        else:
+            self._meaning.set_text(f"{described(chosen).meaning}; now {self._value(chosen, units)}")
+
+    def _value(self, full_name: str, units: Units) -> str:
+        value = current(self._listener, full_name)
+        if value is None:
+            return "unknown"
+        number = f"{value:g}" if isinstance(value, float) else str(value)
+        return f"{number} {units.of_unit(described(full_name).unit or '')}".rstrip()
+
+    async def _apply(self) -> None:
+        chosen, text = self._choice.value, self._field.value or ""
+        if chosen is None:
+            self._refusal.set_text("choose a parameter first")
+            return
+        try:
+            value = float(text)
+        except ValueError:
+            self._refusal.set_text(f"{text!r} is not a number")
+            return
+        node, _, name = chosen.partition(".")
+        await report(self._listener.set_parameter(node, name, value), self._refusal)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Parameters with a slider, whether control is on, and the measures under them."""
+
+    values: dict[str, float]
+    active: bool
+    measures: list[str]
+
+
+class Settings:
+    """Two stored settings to compare; storing also keeps the motion that is drawn."""
+
+    def __init__(
+        self,
+        listener: ListenerNode,
+        is_active: Callable[[], bool],
+        set_active: Callable[[bool], Any],
+        measures: Callable[[], dict[str, str]],
+    ) -> None:
+        self._listener, self._is_active, self._set_active = listener, is_active, set_active
+        self._measures = measures
+        self._stored: dict[str, Setting] = {}
+        self._use: dict[str, ui.button] = {}
+        with ui.row().classes("items-center gap-1"):
+            for name in "AB":
+                ui.button(f"Store {name}", on_click=partial(self._store, name)).props(
+                    "outline dense"
+                )
+                use = ui.button(f"Use {name}", on_click=partial(self._apply, name))
+                self._use[name] = use.props("outline dense")
+                use.set_enabled(False)
+            ui.checkbox("overlay", value=True, on_change=self._overlay)
+        self._refusal = refusal_label()
+        columns = [
+            {"name": name, "label": label, "field": name, "align": "left"}
+            for name, label in (("what", "setting"), ("A", "A"), ("B", "B"), ("now", "now"))
+        ]
+        self._table = ui.table(columns=columns, rows=[], row_key="what")
+        self._table.classes("w-full").props("flat dense wrap-cells hide-bottom")
+        self._table.set_visibility(False)
+
+    def refresh(self) -> None:
+        """Show the settings side by side with what is there now."""
+        if not self._stored:
+            return
+        now = self._now()
+        sides = {"A": self._stored.get("A"), "B": self._stored.get("B"), "now": now}
+        rows = [
+            {"what": symbol(name)}
+            | {
+                side: f"{s.values[name]:g}" if s and name in s.values else ""
+                for side, s in sides.items()
+            }
+            for name in now.values
+        ]
+        rows.append(
+            {"what": "control"}
+            | {k: ("on" if s.active else "off") if s else "" for k, s in sides.items()}
+        )
+        for place, name in enumerate(self._measures()):
+            rows.append(
+                {"what": name} | {k: s.measures[place] if s else "" for k, s in sides.items()}
+            )
+        if rows != self._table.rows:
+            self._table.rows = rows
+
+    def _now(self) -> Setting:
+        names = main_parameters(self._listener.law)
+        known = {name: current(self._listener, name) for name in names}
+        values = {name: value for name, value in known.items() if value is not None}
+        return Setting(values, self._is_active(), list(self._measures().values()))
+
+    def _store(self, name: str) -> None:
+        self._stored[name] = self._now()
+        self._use[name].set_enabled(True)
+        self._table.set_visibility(True)
+        ui.run_javascript(f"stickslip.keep({name!r})")
+        self.refresh()
+
+    async def _apply(self, name: str) -> None:
+        stored = self._stored[name]
+        refusals: list[str] = []
+        for full_name, value in stored.values.items():
+            if current(self._listener, full_name) != value:
+                node, _, parameter = full_name.partition(".")
+                answer = self._listener.set_parameter(node, parameter, value)
+                refusals.append(await asyncio.wrap_future(answer))
+        if stored.active != self._is_active():
+            await self._set_active(stored.active)
+        self._refusal.set_text("; ".join(filter(None, refusals)))
+
+    def _overlay(self, event: Any) -> None:
+        ui.run_javascript(f"stickslip.overlay = {'true' if event.value else 'false'}")
+
+
+def refusal_label() -> ui.label:
+    """Return a label for the reason of a refusal, hidden while it is empty."""
+    label = ui.label().classes("text-sm refusal").props("role=alert")
+    return label.bind_visibility_from(label, "text")
+
+
+async def report(answer: Answer, refusal: ui.label) -> None:
+    """Wait for an answer and show it if it is a refusal."""
+    refusal.set_text(await asyncio.wrap_future(answer))
+
+
+def _is_adjustable(parameter: Parameter) -> bool:
+    return parameter.kind is float and parameter.fixed is Fixed.NEVER

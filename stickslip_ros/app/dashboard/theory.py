@@ -1,0 +1,226 @@
+"""The theory of a running drive, computed in a process of its own when parameters change."""
+
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from math import ceil, copysign, log2
+from multiprocessing import get_context
+from time import monotonic
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from stickslip_ros.app.dashboard.listener import ListenerNode
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.errors import InvalidInputError, StickslipError
+from stickslip_ros.nodes.base.child_process import end_with
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches
+from stickslip_ros.physics.theory.gain_intervals import gains_of, why_no_gains
+from stickslip_ros.physics.theory.linear_sampled_loop import (
+    LinearSampledLoop,
+    why_no_linear_loop,
+)
+from stickslip_ros.physics.theory.stability_map import StabilityMap
+from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, PlantParameters
+
+Values = Mapping[str, Any]
+"""Parameters of a node by flat name."""
+
+_SETTLED = 0.3
+"""Time, s, without a change before a computation starts: a slider may still move."""
+_SPEEDS = 30
+_POINTS = 61
+
+
+class FrictionCurve(NamedTuple):
+    """Friction coefficient in steady slip over the relative speed."""
+
+    relative_speed: FloatArray
+    """m/s, shape (n,)."""
+    coefficient: FloatArray
+    """Shape (n,); at rest both limits."""
+
+
+class Decay(NamedTuple):
+    """How small deviations from the equilibrium of the sampled loop decay."""
+
+    uncontrolled: list[complex]
+    """Exponents without control, 1/s: a deviation changes like exp(s t)."""
+    uncontrolled_rate: float
+    """Decay rate without control, 1/s; below zero the deviation grows."""
+    controlled: list[complex]
+    """Exponents with control; empty for a drive that expects none."""
+    rate: float | None
+    """Decay rate with control, 1/s."""
+
+
+def bifurcation(plant: Values) -> BifurcationBranches:
+    """Return the equilibria and limit cycles over the belt speed, without control."""
+    return BifurcationBranches.around(_drive(plant), _SPEEDS)
+
+
+def stability_map(plant: Values, law: str, controller: Values) -> StabilityMap:
+    """Return the decay rates over the gains, around those in use."""
+    model = CONTROLLER_PARAMETERS[law].validated(controller, law).as_law()
+    gains = gains_of(model)
+    if gains is None:
+        raise InvalidInputError(f"{why_no_gains(model)}")
+    return StabilityMap.around(_loop(plant), gains, _POINTS)
+
+
+def decay(plant: Values, law: str, controller: Values) -> Decay:
+    """Return the exponents of the sampled loop, and its decay rate."""
+    loop = _loop(plant)
+    exponents = np.linalg.eigvals(loop.jacobian) * loop.drive.angular_frequency
+    uncontrolled, slowest = exponents.tolist(), -float(exponents.real.max())
+    if not (controller and plant["expects_control"]):
+        return Decay(uncontrolled, slowest, [], None)
+    model = CONTROLLER_PARAMETERS[law].validated(controller, law).as_law()
+    multipliers = np.linalg.eigvals(loop.transition_matrix(model)).astype(complex)
+    lasting = multipliers[np.abs(multipliers) > 0.0]
+    controlled = (loop.rate * np.log(lasting)).tolist()
+    return Decay(uncontrolled, slowest, controlled, loop.decay_rate(model))
+
+
+def friction_curve(plant: Values) -> FrictionCurve:
+    """Return the friction curve around the belt speed, in both directions."""
+    drive = _drive(plant)
+    farthest = 2.0 * (abs(drive.belt_speed) or drive.speed_scale)
+    side = farthest * np.linspace(0.0, 1.0, 121) ** 2
+    speed = np.concatenate([-side[::-1], side])
+    sign = np.repeat([-1.0, 1.0], len(side))
+    return FrictionCurve(speed, np.array(drive.friction.coefficient(speed, sign), dtype=float))
+
+
+def _drive(plant: Values) -> Drive:
+    return PlantParameters.validated(plant, "plant").as_drive()
+
+
+def _loop(plant: Values) -> LinearSampledLoop:
+    parameters = PlantParameters.validated(plant, "plant")
+    drive, rate, delay = parameters.as_drive(), parameters.rate, parameters.force_delay
+    loop = LinearSampledLoop.from_drive(drive, rate, delay, parameters.as_sensor())
+    if loop is None:
+        raise InvalidInputError(f"{why_no_linear_loop(drive, rate, delay)}")
+    return loop
+
+
+@dataclass
+class Result:
+    """The newest result of a computation."""
+
+    value: Any = None
+    refusal: str = ""
+    """Why there is none; empty while nothing was computed."""
+    inputs: tuple[Any, ...] = ()
+    version: int = 0
+    """Number of results so far."""
+
+
+@dataclass
+class _Job:
+    compute: Callable[..., Any]
+    asked: tuple[Any, ...] = ()
+    changed_at: float = 0.0
+    result: Result = field(default_factory=Result)
+
+
+class Theory:
+    """Computes what the charts of the theory show, one computation at a time.
+
+    Nothing is computed while no page asks: `follow` is called by each open page.
+    """
+
+    def __init__(self, listener: ListenerNode) -> None:
+        self._listener = listener
+        self._jobs = {
+            each: _Job(each) for each in (friction_curve, decay, stability_map, bifurcation)
+        }
+        self._pool: ProcessPoolExecutor | None = None
+        self._running: tuple[_Job, tuple[Any, ...], Future[Any]] | None = None
+
+    def result(self, computation: Callable[..., Any]) -> Result:
+        """Return the newest result of one of the computations of this module."""
+        return self._jobs[computation].result
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being computed, or is to be."""
+        return self._running is not None or any(
+            job.asked and job.asked != job.result.inputs for job in self._jobs.values()
+        )
+
+    def follow(self) -> None:
+        """Take a finished result, and start the next computation whose parameters changed."""
+        now = monotonic()
+        for job in self._jobs.values():
+            inputs = self._inputs(job.compute)
+            if inputs != job.asked:
+                job.asked, job.changed_at = inputs, now
+        self._take()
+        if self._running is None:
+            for job in self._jobs.values():
+                stale = bool(job.asked) and job.asked != job.result.inputs
+                if stale and now - job.changed_at > _SETTLED:
+                    self._running = job, job.asked, self._submit(job)
+                    return
+
+    def close(self) -> None:
+        """End the process."""
+        if self._pool is not None:
+            self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def _inputs(self, computation: Callable[..., Any]) -> tuple[Any, ...]:
+        """Return the arguments of a computation; empty if they are not known.
+
+        The ranges of map and diagram follow gains and belt speed by octaves, so that the present
+        point moves in a picture that stays.
+        """
+        plant = dict(self._listener.parameters["plant"])
+        if not plant:
+            return ()
+        if computation is friction_curve:
+            return (plant,)
+        if computation is bifurcation:
+            return (plant | {"belt_speed": _octave(plant["belt_speed"])},)
+        controller = dict(self._listener.parameters[self._listener.controller])
+        if computation is stability_map:
+            if not controller:
+                return ()
+            gains = "corner_frequency", "linear_gain"
+            controller |= {name: _octave(controller[name]) for name in gains if name in controller}
+        return (plant, self._listener.law, controller)
+
+    def _submit(self, job: _Job) -> Future[Any]:
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(1, get_context("spawn"), _begin, (os.getpid(),))
+        return self._pool.submit(job.compute, *job.asked)
+
+    def _take(self) -> None:
+        if self._running is None or not self._running[2].done():
+            return
+        job, inputs, future = self._running
+        self._running = None
+        done = replace(job.result, inputs=inputs, version=job.result.version + 1)
+        try:
+            job.result = replace(done, value=future.result(), refusal="")
+        except StickslipError as error:
+            job.result = replace(done, value=None, refusal=str(error))
+        except BrokenProcessPool:
+            self._pool = None
+            job.result = replace(done, value=None, refusal="the computation was ended")
+
+
+def _octave(value: float) -> float:
+    """Return the next power of two away from zero."""
+    return copysign(2.0 ** ceil(log2(abs(value))), value) if value else 0.0
+
+
+def _begin(parent: int) -> None:
+    end_with(parent)
+    with suppress(OSError):
+        os.nice(9)

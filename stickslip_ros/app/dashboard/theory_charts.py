@@ -1,0 +1,208 @@
+"""Charts of the theory: options that draw a result, with the present state as a point."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from contourpy import contour_generator
+
+from stickslip_ros.app.dashboard.charts import AXIS, CENTRED, TOOLBOX, line
+from stickslip_ros.app.dashboard.theory import Decay, FrictionCurve
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches, Branch
+from stickslip_ros.physics.theory.stability_map import StabilityMap
+from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
+from stickslip_ros.plots.units import Units
+
+Options = dict[str, Any]
+
+_SLOWEST = 4.0
+"""Largest size of an exponent that is drawn, in natural angular frequencies."""
+_PARTS = ("real", "1/s"), ("imaginary", "rad/s")
+_NOW = {"symbol": "diamond", "symbolSize": 14, "color": GREEN}
+_DIGITS = 5
+"""Significant digits of what is sent to the page."""
+
+
+def bifurcation_chart(found: BifurcationBranches, drive: Drive) -> Options:
+    """Return least and greatest displacement over the belt speed, and the present belt speed."""
+    units = Units.for_drive(drive)
+    branches = (*found.equilibria, *found.cycles)
+    speeds = [branch.belt_speeds for branch in branches]
+    reaches = [side for branch in branches for side in (branch.least, branch.greatest)]
+    speed, speed_label = units.axis("belt speed V", "m/s", *speeds)
+    reach, reach_label = units.axis("displacement x", "m", *reaches)
+
+    def drawn(branch: Branch, what: str, colour: str, side: FloatArray) -> Options:
+        name = f"{'stable' if branch.stable else 'unstable'} {what}"
+        style = "solid" if branch.stable else "dashed"
+        return _line(name, branch.belt_speeds / speed, side / reach, colour, style, width=2.0)
+
+    series = [drawn(each, "equilibrium", GREEN, each.greatest) for each in found.equilibria]
+    for branch in found.cycles:
+        series += [drawn(branch, "cycle", ORANGE, s) for s in (branch.least, branch.greatest)]
+    marks = [(point.belt_speed / speed, "Hopf", GREY) for point in found.hopf_points]
+    if found.sticking_onset is not None:
+        marks.append((found.sticking_onset / speed, "sticks below", GREY))
+    series.append(_verticals([*marks, (drive.belt_speed / speed, "now", BLUE)]))
+    names = dict.fromkeys(each["name"] for each in series if each.get("name"))
+    return _options(speed_label, reach_label, series, legend=list(names))
+
+
+def stability_chart(found: StabilityMap, drive: Drive, gains: WashoutGains) -> Options:
+    """Return the limit of stability over the gains, and the present gains as a point."""
+    units = Units.for_drive(drive)
+    gain, label = units.axis("linear gain k1", "N s/m", found.linear_gains)
+    corners, linear = found.corner_frequencies, found.linear_gains / gain
+    contours: Any = contour_generator(corners, linear, found.decay_rates.T)
+    fastest = float(np.nanmax(found.decay_rates, initial=0.0))
+    series = [
+        _line("limit of stability", each[:, 0], each[:, 1], ORANGE, width=2.5)
+        for each in contours.lines(0.0)
+    ]
+    continuous = found.continuous / gain
+    inside = (continuous >= linear[0]) & (continuous <= linear[-1])
+    shown = np.where(inside, continuous, np.nan)
+    series.append(_line("limit, not sampled", corners, shown, GREY, "dashed"))
+    series.append(_point("gains in use", gains.corner_frequency, gains.linear / gain))
+    for share, style in ((0.25, "dotted"), (0.5, "dashed"), (0.75, "solid")):
+        if fastest > 0.0:
+            level = float(f"{share * fastest:.1g}")
+            name = f"decay rate {level:g} {units.of_unit('1/s')}".rstrip()
+            series += [
+                _line(name, each[:, 0], each[:, 1], SKY_BLUE, style, width=1.2)
+                for each in contours.lines(level)
+            ]
+    series += [_region(text, *place) for text, place in _regions(found, linear)]
+    options = _options(
+        units.label("cutoff frequency d", "rad/s"),
+        label,
+        series,
+        legend=list(dict.fromkeys(each["name"] for each in series if each["name"])),
+    )
+    options["xAxis"] |= {"type": "log", "min": float(corners[0]), "max": float(corners[-1])}
+    options["yAxis"] |= {"min": float(linear[0]), "max": float(linear[-1])}
+    return options
+
+
+def friction_chart(found: FrictionCurve, drive: Drive) -> Options:
+    """Return the friction curve and the operating point.
+
+    The second series is for the loop of a law with a memory, which page.js draws.
+    """
+    units = Units.for_drive(drive)
+    speed, label = units.axis("relative speed", "m/s", found.relative_speed)
+    series = [_line("in steady slip", found.relative_speed / speed, found.coefficient, GREY)]
+    if drive.friction.states:
+        series.append(line("motion", BLUE))
+    if drive.belt_speed:
+        rest = float(drive.friction.at_rest(drive.belt_speed))
+        series.append(_point("slide at rest", -drive.belt_speed / speed, rest))
+    return _options(label, "friction coefficient", series, legend=[s["name"] for s in series])
+
+
+def decay_chart(found: Decay, drive: Drive) -> Options:
+    """Return the exponents of the sampled loop: deviations decay left of the dashed line.
+
+    Exponents that are much faster than the drive itself are left out.
+    """
+    units = Units.for_drive(drive)
+    reach = _SLOWEST * drive.angular_frequency
+    series: list[Options] = []
+    for name, values, colour, symbol in (
+        ("without control", found.uncontrolled, ORANGE, "triangle"),
+        ("with control", found.controlled, BLUE, "circle"),
+    ):
+        points = [[_number(s.real), _number(s.imag)] for s in values if abs(s) < reach]
+        if points:
+            look = {"symbol": symbol, "symbolSize": 10, "itemStyle": {"color": colour}}
+            series.append({"type": "scatter", "name": name, "data": points} | look)
+    series.append(_verticals([(0.0, "limit of stability", GREY)]))
+    names = [str(each["name"]) for each in series if each["name"]]
+    real, imaginary = (units.label(f"{part} part", unit) for part, unit in _PARTS)
+    return _options(real, imaginary, series, names)
+
+
+def _regions(found: StabilityMap, linear: Any) -> Iterable[tuple[str, tuple[float, float]]]:
+    """Yield "stable" and "unstable", each at the middle of the largest such part of a column."""
+    for text, inside in (
+        ("stable", found.decay_rates > 0.0),
+        ("unstable", found.decay_rates < 0.0),
+    ):
+        rows, columns = np.nonzero(inside)
+        if len(rows) > 20:
+            yield (
+                text,
+                (
+                    float(found.corner_frequencies[int(np.median(rows))]),
+                    float(linear[int(np.median(columns))]),
+                ),
+            )
+
+
+def _options(x: str, y: str, series: Sequence[Options], legend: Sequence[str]) -> Options:
+    return {
+        "animation": False,
+        "backgroundColor": "transparent",
+        "legend": {"top": 0, "data": list(legend), "type": "scroll", "right": 100, "left": 0},
+        "grid": {"left": 60, "right": 20, "top": 56, "bottom": 45},
+        "toolbox": TOOLBOX,
+        "tooltip": {"trigger": "item", "axisPointer": {"type": "cross"}},
+        "xAxis": AXIS | CENTRED | {"name": x},
+        "yAxis": AXIS | {"name": y},
+        "series": list(series),
+    }
+
+
+def _line(
+    name: str, x: Any, y: Any, colour: str, style: str = "solid", *, width: float = 1.5
+) -> Options:
+    series = line(name, colour, style)
+    series["lineStyle"]["width"] = width
+    series["data"] = [[_number(a), _number(b)] for a, b in zip(x, y, strict=True)]
+    return series
+
+
+def _point(name: str, x: float, y: float) -> Options:
+    return {
+        "type": "scatter",
+        "name": name,
+        "symbol": _NOW["symbol"],
+        "symbolSize": _NOW["symbolSize"],
+        "itemStyle": {"color": _NOW["color"]},
+        "z": 5,
+        "data": [[_number(x), _number(y)]],
+    }
+
+
+def _region(text: str, x: float, y: float) -> Options:
+    label = {"show": True, "formatter": text, "fontStyle": "italic", "fontSize": 12, "color": GREY}
+    return {
+        "type": "scatter",
+        "name": "",
+        "symbolSize": 1,
+        "silent": True,
+        "label": label,
+        "data": [[_number(x), _number(y)]],
+    }
+
+
+def _verticals(marks: Iterable[tuple[float, str, str]]) -> Options:
+    """Return vertical lines at (place, text, colour)."""
+    lines = [
+        {
+            "xAxis": _number(place),
+            "lineStyle": {"color": colour, "type": "dotted", "width": 1.5},
+            "label": {"formatter": text, "position": "insideEndTop", "color": colour},
+        }
+        for place, text, colour in marks
+    ]
+    drawn = {"symbol": "none", "silent": True, "animation": False, "data": lines}
+    return {"type": "line", "name": "", "data": [], "markLine": drawn}
+
+
+def _number(value: Any) -> float | None:
+    """Return a number with the digits that a chart needs; None, a gap, for NaN."""
+    return float(f"{float(value):.{_DIGITS}g}") if np.isfinite(value) else None

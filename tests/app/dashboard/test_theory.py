@@ -1,0 +1,199 @@
+"""The theory beside the motion: what is computed, when, and what the charts show of it."""
+
+import time
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stickslip_ros.app.dashboard import theory as module
+from stickslip_ros.app.dashboard.controls import (
+    described,
+    main_parameters,
+    other_parameters,
+    slider_range,
+)
+from stickslip_ros.app.dashboard.theory import (
+    Theory,
+    bifurcation,
+    decay,
+    friction_curve,
+    stability_map,
+)
+from stickslip_ros.app.dashboard.theory_charts import (
+    bifurcation_chart,
+    decay_chart,
+    friction_chart,
+    stability_chart,
+)
+from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.studies.stability import stability
+from tests.nodes.graph import wait_for
+
+SCENARIO = load_scenario("feed_drive")
+PLANT, GAINS = SCENARIO.plant.flat(), SCENARIO.controller.flat()
+DRIVE = SCENARIO.plant.as_drive()
+
+
+@pytest.fixture(scope="module")
+def reference() -> dict[str, Any]:
+    """What `stickslip stability` says of the drive."""
+    return stability(SCENARIO)[0]
+
+
+@pytest.fixture
+def listener() -> Any:
+    """What a listener knows of a drive that runs."""
+    parameters = {"plant": dict(PLANT), "washout_controller": dict(GAINS)}
+    return SimpleNamespace(parameters=parameters, law="washout", controller="washout_controller")
+
+
+@pytest.fixture
+def theory(listener: Any) -> Iterator[Theory]:
+    found = Theory(listener)
+    yield found
+    found.close()
+
+
+def settle(theory: Theory) -> None:
+    def done() -> bool:
+        theory.follow()
+        return not theory.busy
+
+    wait_for(done, "all is computed")
+
+
+def series(options: dict[str, Any], name: str) -> np.ndarray:
+    """Return the points of all series of a name."""
+    points = [each["data"] for each in options["series"] if each["name"] == name]
+    assert points, name
+    return np.array([point for part in points for point in part], dtype=float)
+
+
+def test_decay_is_that_of_the_sampled_loop(reference: dict[str, Any]) -> None:
+    found = decay(PLANT, "washout", GAINS)
+    assert found.rate == pytest.approx(reference["sampled_loop"]["decay_rate"])
+    assert max(s.real for s in found.controlled) == pytest.approx(-found.rate)
+    eigenvalues = [complex(*pair) for pair in reference["open_loop"]["eigenvalues"]]
+    assert sorted(found.uncontrolled, key=str) == pytest.approx(sorted(eigenvalues, key=str))
+    alone = decay(PLANT | {"expects_control": False}, "washout", GAINS)
+    assert alone.controlled == []
+    assert alone.rate is None
+    drawn = series(decay_chart(found, DRIVE), "with control")
+    assert drawn[:, 0].max() == pytest.approx(-found.rate, rel=1e-4)
+
+
+def test_the_limit_in_the_map_is_the_critical_gain(reference: dict[str, Any]) -> None:
+    found = stability_map(PLANT, "washout", GAINS)
+    gains = WashoutGains(GAINS["corner_frequency"], GAINS["linear_gain"], 0.0)
+    options = stability_chart(found, DRIVE, gains)
+    assert options["yAxis"]["name"] == "linear gain k1 (kN s/m)"
+    limit = series(options, "limit of stability")
+    limit = limit[np.argsort(limit[:, 0])]
+    at_gains = 1e3 * np.interp(20.0, *limit.T)
+    assert at_gains == pytest.approx(reference["sampled_loop"]["critical_linear_gain"], rel=0.01)
+    assert series(options, "gains in use").tolist() == [[20.0, -3.0]]
+    words = [each["label"]["formatter"] for each in options["series"] if "label" in each]
+    assert words == ["stable", "unstable"]
+
+
+def test_the_diagram_has_branches_and_the_present_belt_speed(reference: dict[str, Any]) -> None:
+    options = bifurcation_chart(bifurcation(PLANT), DRIVE)
+    (hopf,) = reference["open_loop"]["hopf_speeds"]
+    stable = series(options, "stable equilibrium")
+    assert stable[:, 0].min() == pytest.approx(1e3 * hopf, rel=1e-3)
+    cycle = series(options, "stable cycle")
+    (known,) = reference["open_loop"]["limit_cycles"]
+    near = np.abs(cycle[:, 0] - 1e3 * DRIVE.belt_speed) < 3.0
+    half = np.ptp(cycle[near][:, 1]) / 2.0
+    assert half == pytest.approx(1e6 * known["amplitude"], rel=0.05)
+    marks = options["series"][-1]["markLine"]["data"]
+    assert {mark["label"]["formatter"]: mark["xAxis"] for mark in marks}["now"] == 40.0
+
+
+def test_the_friction_curve_has_the_operating_point() -> None:
+    options = friction_chart(friction_curve(PLANT), DRIVE)
+    curve, point = series(options, "in steady slip"), series(options, "slide at rest")
+    assert np.ptp(curve[:, 1]) == pytest.approx(2.0 * PLANT["friction.static"], rel=1e-3)
+    assert point[0, 0] == -40.0
+    assert np.interp(-40.0, *curve.T) == pytest.approx(point[0, 1], rel=1e-3)
+    memory = load_scenario("feed_drive", ["plant.friction.law=lugre"]).plant
+    names = [
+        s["name"]
+        for s in friction_chart(friction_curve(memory.flat()), memory.as_drive())["series"]
+    ]
+    assert "motion" in names
+
+
+@pytest.mark.process
+def test_only_what_a_parameter_changes_is_computed_again(listener: Any, theory: Theory) -> None:
+    settle(theory)
+    versions = {each: theory.result(each).version for each in (bifurcation, stability_map, decay)}
+    assert set(versions.values()) == {1}
+    slower = listener.parameters["plant"] | {"belt_speed": 0.039}
+    listener.parameters = listener.parameters | {"plant": slower}
+    settle(theory)
+    assert theory.result(bifurcation).version == 1
+    assert theory.result(stability_map).version == 2
+    gains = listener.parameters["washout_controller"] | {"linear_gain": -2900.0}
+    listener.parameters = listener.parameters | {"washout_controller": gains}
+    settle(theory)
+    assert theory.result(stability_map).version == 2
+    assert theory.result(decay).version == 3
+
+
+@pytest.mark.process
+def test_what_the_theory_does_not_cover_is_said(listener: Any, theory: Theory) -> None:
+    listener.parameters["plant"] |= {"stiffness": 0.0}
+    settle(theory)
+    for each in (bifurcation, stability_map, decay):
+        assert theory.result(each).value is None
+        assert "spring" in theory.result(each).refusal
+    assert theory.result(friction_curve).value is not None
+
+
+def test_nothing_is_computed_while_a_slider_moves(
+    listener: Any, theory: Theory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "monotonic", lambda: now)
+    now = 100.0
+    theory.follow()
+    now += 0.2
+    listener.parameters = listener.parameters | {"plant": PLANT | {"belt_speed": 0.03}}
+    theory.follow()
+    now += 0.2
+    theory.follow()
+    assert theory.result(decay).version == 0
+    monkeypatch.setattr(module, "monotonic", time.monotonic)
+
+
+def test_an_unknown_drive_has_no_theory(listener: Any, theory: Theory) -> None:
+    listener.parameters = {"plant": {}, "washout_controller": {}}
+    theory.follow()
+    assert not theory.busy
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "low", "high"),
+    [
+        ("plant.belt_speed", 0.04, 0.0, 0.125),
+        ("plant.belt_speed", 0.045, 0.0, 0.125),
+        ("washout_controller.linear_gain", -3000.0, -8192.0, 2048.0),
+        ("washout_controller.corner_frequency", 20.0, 0.0, 64.0),
+    ],
+)
+def test_a_slider_has_room_on_both_sides(name: str, value: float, low: float, high: float) -> None:
+    assert slider_range(value, described(name))[:2] == (low, high)
+
+
+def test_a_slider_for_each_own_constant_of_a_law() -> None:
+    names = ["corner_frequency", "linear_gain", "cubic_gain"]
+    assert main_parameters("washout") == ["plant.belt_speed"] + [
+        f"washout_controller.{name}" for name in names
+    ]
+    others = other_parameters("washout")
+    assert "plant.damping" in others
+    assert not {*others} & {*main_parameters("washout")}
