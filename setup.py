@@ -52,7 +52,13 @@ setup(
     license=MANIFEST.findtext("license"),
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={
-        NAME: ["py.typed", "app/dashboard/*.js", "app/dashboard/*.css", "paper/claims/*.toml", "nodes/base/*.xml"]
+        NAME: [
+            "py.typed",
+            "app/dashboard/*.css",
+            "app/dashboard/*.js",
+            "paper/claims/*.toml",
+            "nodes/base/*.xml",
+        ]
     },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
