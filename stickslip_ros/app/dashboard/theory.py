@@ -59,8 +59,17 @@ class Decay(NamedTuple):
 
 
 def bifurcation(plant: Values) -> BifurcationBranches:
-    """Return the equilibria and limit cycles over the belt speed, without control."""
-    return BifurcationBranches.around(_drive(plant), _SPEEDS)
+    """Return the equilibria and limit cycles over the belt speed, without control.
+
+    Raises InvalidInputError for friction with a memory, too, which takes up to minutes.
+    """
+    drive = _drive(plant)
+    if drive.friction.states:
+        raise InvalidInputError(
+            "with this friction law the diagram takes up to minutes: `stickslip stability SCENARIO "
+            "--no-control --plot FILE` draws it"
+        )
+    return BifurcationBranches.around(drive, _SPEEDS)
 
 
 def stability_map(plant: Values, law: str, controller: Values) -> StabilityMap:

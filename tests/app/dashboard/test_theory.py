@@ -28,6 +28,7 @@ from stickslip_ros.app.dashboard.theory_charts import (
     friction_chart,
     stability_chart,
 )
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.studies.stability import stability
