@@ -104,7 +104,7 @@ def friction_chart(found: FrictionCurve, drive: Drive) -> Options:
 
 
 def decay_chart(found: Decay, drive: Drive) -> Options:
-    """Return the exponents of the sampled loop: deviations decay left of the dashed line.
+    """Return the exponents of the sampled loop: deviations decay left of the dotted line.
 
     Exponents that are much faster than the drive itself are left out.
     """
@@ -126,7 +126,7 @@ def decay_chart(found: Decay, drive: Drive) -> Options:
 
 
 def _regions(found: StabilityMap, linear: Any) -> Iterable[tuple[str, tuple[float, float]]]:
-    """Yield "stable" and "unstable", each at the middle of the largest such part of a column."""
+    """Yield "stable" and "unstable", each with the median place of its region."""
     for text, inside in (
         ("stable", found.decay_rates > 0.0),
         ("unstable", found.decay_rates < 0.0),

@@ -127,6 +127,8 @@ def test_the_friction_curve_has_the_operating_point() -> None:
         for s in friction_chart(friction_curve(memory.flat()), memory.as_drive())["series"]
     ]
     assert "motion" in names
+    with pytest.raises(InvalidInputError, match="takes up to minutes"):
+        bifurcation(memory.flat())
 
 
 @pytest.mark.process
