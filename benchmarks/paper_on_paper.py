@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.bags.table_file import table_columns
+from stickslip_ros.bags.table_file import quantities_of, table_of
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.measures.slips import SlipMeter, SlipThreshold
@@ -124,7 +124,8 @@ def features(time: FloatArray, position: FloatArray, stiffness: float) -> Featur
 def measured(stiffness: int, speed: int) -> Features:
     """Return the features of a record."""
     columns = {"time": "t", "position": f"Fnorm*{NORMAL_FORCE / stiffness!r}"}
-    found = table_columns(DATA / f"k{stiffness}Nm_v{speed}.mat", columns)
+    path = DATA / f"k{stiffness}Nm_v{speed}.mat"
+    found = quantities_of(path, table_of(path), columns)
     return features(found["time"], found["position"], stiffness)
 
 

@@ -415,7 +415,8 @@ class ListenerNode(PollingNode):
             values = {name: value for name, value in values.items() if name in known}
             for name, value in values.items():
                 before = self.parameters[node].get(name)
-                if before is not None and before != value:
+                # Nodes that end take their parameters back.
+                if None not in (before, value) and before != value:
                     text = f"{value:g}" if isinstance(value, float) else str(value)
                     old = f"{before:g}" if isinstance(before, float) else str(before)
                     self._tell(f"{node}.{name}: {old} to {text}", f"{name} {text}")

@@ -178,7 +178,8 @@ def accessibility(page: Page) -> list[str]:
     """Return what axe finds against WCAG 2.2 AA and good practice."""
     rules = ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa", "best-practice"]
     found = Axe().run(page, options={"runOnly": rules}).response["violations"]
-    return [f"{each['id']}: {each['nodes'][0]['html']}" for each in found]
+    nodes = [(each["id"], each["nodes"][0]) for each in found]
+    return [f"{name}: {node['html']} {node['failureSummary']}" for name, node in nodes]
 
 
 def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Path) -> None:
@@ -364,11 +365,20 @@ OVERLAPS = """
   const { chart } = window.getElement(stickslip[name]);
   const words = chart.getZr().storage.getDisplayList()
     .filter((part) => part.type === "tspan" && !part.ignore && part.style.text)
+    .filter((part) => part.style.text !== "1/1")  // of a legend without further pages: hidden
     .map((part) => {
       const box = part.getBoundingRect().clone();
       if (part.transform) box.applyTransform(part.transform);
+      for (const clip of part.__clipPaths ?? []) {  // of a legend with pages
+        const shown = clip.getBoundingRect().clone();
+        if (clip.transform) shown.applyTransform(clip.transform);
+        const end = Math.min(box.x + box.width, shown.x + shown.width);
+        box.x = Math.max(box.x, shown.x);
+        box.width = Math.max(end - box.x, 0);
+      }
       return { text: part.style.text, box };
-    });
+    })
+    .filter(({ box }) => box.width > 1);
   const outside = words.filter(({ box }) => box.x < 0 || box.x + box.width > chart.getWidth());
   const pairs = words.flatMap((one, place) => words.slice(place + 1)
     .filter((other) => one.box.intersect(other.box))
