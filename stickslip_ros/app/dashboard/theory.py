@@ -151,6 +151,7 @@ class Theory:
         }
         self._pool: ProcessPoolExecutor | None = None
         self._running: tuple[_Job, tuple[Any, ...], Future[Any]] | None = None
+        self._closed = False
 
     def result(self, computation: Callable[..., Any]) -> Result:
         """Return the newest result of one of the computations of this module."""
@@ -165,6 +166,8 @@ class Theory:
 
     def follow(self) -> None:
         """Take a finished result, and start the next computation whose parameters changed."""
+        if self._closed:
+            return
         now = monotonic()
         for job in self._jobs.values():
             inputs = self._inputs(job.compute)
@@ -179,7 +182,8 @@ class Theory:
                     return
 
     def close(self) -> None:
-        """End the process."""
+        """End the process; nothing is computed from then on."""
+        self._closed = True
         if self._pool is not None:
             self._pool.shutdown(wait=False, cancel_futures=True)
 
