@@ -228,8 +228,11 @@ class McapFile:
             return True
         # Checked first: with a wrong position the summary might be the whole file.
         before = max(0, start - len(_DATA_END) - 4)
-        if not 0 <= end - start <= LARGEST or self._read(before, len(_DATA_END)) != _DATA_END:
-            return False
+        moved = not 0 <= end - start <= LARGEST or self._read(before, len(_DATA_END)) != _DATA_END
+        if moved:
+            start = self._start_of_summary(end)
+            if start is None or footer.summary_crc == 0:
+                return False
         summary = self._read(start, end - start)
         checked = self._read(end, HEAD.size + 16)  # without the checksum itself
         if footer.summary_crc not in (0, zlib.crc32(checked, zlib.crc32(summary))):
@@ -237,10 +240,18 @@ class McapFile:
         try:
             for opcode, begin, stop in records_in(summary):
                 content = summary[begin : min(stop, begin + LARGEST_TABLE)]
-                self._note(opcode, start, content, checked=True)
+                # Where bytes before it are lost, its definitions still hold, but no position.
+                if not moved or opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+                    self._note(opcode, start, content, checked=True)
         except DamageError:
             return False
-        return True
+        return not moved
+
+    def _start_of_summary(self, end: int) -> int | None:
+        """Return where a summary that ends there starts; None if it is not found."""
+        earliest = max(0, end - LARGEST_TABLE)
+        place = self._read(earliest, end - earliest).rfind(_DATA_END)
+        return None if place < 0 else earliest + place + len(_DATA_END) + 4
 
     def _note(self, opcode: int, start: int, content: bytes, *, checked: bool) -> None:
         """Keep what a record describes; `start` is its place, or that of the chunk around it.

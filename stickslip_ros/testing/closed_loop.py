@@ -167,8 +167,10 @@ class ClosedLoop:
     def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
         running = self._running
         with self._opened:
-            if isinstance(running, ControllerThread) and running.unreported and error is None:
-                running.check()
+            if isinstance(running, ControllerThread) and error is None:
+                running.settle()  # it may be about to raise
+                if running.unreported:
+                    running.check()
 
     def run(self, duration: float, *, timeout: float = 300.0) -> RunResult:
         """Run the loop for some simulated time and return the result.

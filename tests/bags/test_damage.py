@@ -179,6 +179,12 @@ def check(content, file, path):
     assert not (understood and set(expected) - set(read)), f"intact chunks {intact} are lost"
 
 
+def test_the_type_of_a_topic_is_known_from_a_summary_that_has_moved(sound, scratch):
+    name = sound.content.index(b"sensor_msgs/msg/JointState")
+    first = sound.content.index(sound.chunks[0])
+    check(damaged(sound.content, [("flip", name, 1), ("remove", first - 39, 40)]), sound, scratch)
+
+
 @examples(quick=50, thorough=500)
 @given(st.data())
 def test_damage_is_survived(sound, scratch, data):
