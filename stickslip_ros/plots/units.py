@@ -56,7 +56,7 @@ _PARAMETERS = {
     "washout_controller.linear_gain": "linear gain",
     "washout_controller.cubic_gain": "cubic gain",
 }
-"""What figures call a parameter."""
+"""What figures and the page call a parameter."""
 
 _SCALES = {"plant.mass", "plant.stiffness", "plant.normal_force"}
 
@@ -90,11 +90,17 @@ class Units:
 
         A `short` name is the symbol alone.
         """
-        quantity = _PARAMETERS.get(quantity, quantity)
+        quantity = plain_name(quantity)
         if quantity not in _SYMBOLS:
             return quantity
         symbol = f"${_SYMBOLS[quantity][self.dimensionless]}$"
         return symbol if short else f"{quantity} {symbol}"
+
+    def plain(self, quantity: str) -> str:
+        """Return the same for text without formulas, such as "linear gain k1"."""
+        quantity = plain_name(quantity)
+        symbol = _SYMBOLS.get(quantity, ("", ""))[self.dimensionless]
+        return f"{quantity} {symbol.replace(chr(92) + 'mu', 'μ').replace('_', '')}".rstrip()
 
     def axis(self, name: str, unit: str, *values: npt.ArrayLike) -> tuple[float, str]:
         """Return the divisor of the values (SI) on an axis, and its label.
@@ -134,6 +140,11 @@ class Units:
         if not unit[:1].isalpha() or unit in _PREFIXED:
             scale, prefix = 1.0, ""
         return [_text(value, scale, f" {prefix}{unit}".rstrip(), digits) for value in values]
+
+
+def plain_name(quantity: str) -> str:
+    """Return what figures call a parameter, NODE.PARAMETER; any other quantity as it is."""
+    return _PARAMETERS.get(quantity, quantity)
 
 
 def _text(value: Any, scale: float, unit: str, digits: int) -> str:

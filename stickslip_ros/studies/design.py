@@ -12,6 +12,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
 from stickslip_ros.physics.theory.stability_map import StabilityMap
 from stickslip_ros.progress import Progress
@@ -117,12 +118,13 @@ class Design:
         ndarray
             Force in N, shape (m, n); zero where nothing vibrates.
         """
-        linear, cubic = around.linear_gains[:, np.newaxis], around.gains.cubic
+        linear = around.linear_gains[:, np.newaxis]
         forces = np.zeros((len(around.corner_frequencies), len(around.linear_gains)))
         for row, corner_frequency in enumerate(around.corner_frequencies.tolist()):
             for vibration in self.vibrations:
                 speeds = np.linspace(0.0, _largest(vibration.filtered(corner_frequency)), 50)
-                force = np.abs(linear * speeds + cubic * speeds**3).max(axis=1)
+                gains = WashoutGains(corner_frequency, linear, around.gains.cubic)
+                force = np.abs(gains.force(speeds)).max(axis=1)
                 forces[row] = np.maximum(forces[row], force)
         return forces
 

@@ -58,3 +58,11 @@ def test_a_unit_with_a_prefix_of_its_own_gets_no_other() -> None:
 
 def test_what_is_infinite_is_unbounded() -> None:
     assert SI.texts([0.002, float("inf")], "m") == ["2 mm", "unbounded"]
+
+
+def test_names_in_text_have_their_symbols_and_no_formula() -> None:
+    assert SI.plain("washout_controller.linear_gain") == "linear gain k1"
+    assert SI.plain("friction coefficient") == "friction coefficient μ"
+    assert SI.plain("plant.belt_speed") == "belt speed v"
+    assert Units(dimensionless=True).plain("plant.belt_speed") == "belt speed v0"
+    assert SI.plain("stick fraction") == "stick fraction"

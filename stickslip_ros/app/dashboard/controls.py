@@ -13,20 +13,13 @@ from nicegui.events import GenericEventArguments
 from stickslip_ros.app.dashboard.listener import Answer, ListenerNode
 from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
-from stickslip_ros.plots.units import Units
+from stickslip_ros.plots.units import Units, plain_name
 from stickslip_ros.scenarios.parameter_field import Fixed, Parameter, known_parameters
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     NODE_PARAMETERS,
     controller_node,
 )
-
-_SYMBOLS = {
-    "belt_speed": "belt speed V",
-    "corner_frequency": "cutoff frequency d",
-    "linear_gain": "linear gain k1",
-    "cubic_gain": "cubic gain k2",
-}
 
 
 def main_parameters(law: str) -> list[str]:
@@ -58,10 +51,10 @@ def described(full_name: str) -> Parameter:
     return known_parameters(NODE_PARAMETERS[node])[name]
 
 
-def symbol(full_name: str) -> str:
-    """Return the name of NODE.PARAMETER for a reader, with the symbol of the theory."""
-    name = full_name.partition(".")[2]
-    return _SYMBOLS.get(name, name.replace("_", " "))
+def name_of(full_name: str) -> str:
+    """Return the name of NODE.PARAMETER for a reader."""
+    named = plain_name(full_name)
+    return named if named != full_name else full_name.partition(".")[2].replace("_", " ")
 
 
 def slider_range(value: float, parameter: Parameter) -> tuple[float, float, float]:
@@ -93,7 +86,7 @@ class SliderField:
         self._earlier: list[float] = []
         self._shown: float | None = None
         self._held = False
-        name = symbol(full_name)
+        name = name_of(full_name)
         with ui.element("div").classes("w-full"):
             with ui.row().classes("w-full items-center no-wrap gap-1"):
                 self._label = ui.label(name).classes("grow text-sm")
@@ -113,9 +106,8 @@ class SliderField:
         """Show the current value, unless the user is about to change it."""
         value = current(self._listener, self.full_name)
         unit = units.of_unit(self._parameter.unit or "")
-        self._label.set_text(
-            f"{symbol(self.full_name)} ({unit})" if unit else symbol(self.full_name)
-        )
+        named = units.plain(name_of(self.full_name))
+        self._label.set_text(f"{named} ({unit})" if unit else named)
         known = isinstance(value, float)
         self._number.set_enabled(known)
         self._undo.set_enabled(known and bool(self._earlier))
@@ -253,7 +245,7 @@ class Settings:
         now = self._now()
         sides = {"A": self._stored.get("A"), "B": self._stored.get("B"), "now": now}
         rows = [
-            {"what": symbol(name)}
+            {"what": name_of(name)}
             | {
                 side: f"{s.values[name]:g}" if s and name in s.values else ""
                 for side, s in sides.items()

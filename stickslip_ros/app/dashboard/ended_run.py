@@ -2,12 +2,12 @@
 
 import asyncio
 import shlex
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from nicegui import ui
 
+from stickslip_ros.app.dashboard.elements import heading, show_commands
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError
@@ -60,8 +60,7 @@ class EndedRun:
 
     def show(self) -> None:
         """Add it to the page."""
-        with ui.element("h2").classes("text-lg font-bold"):
-            ui.label("Run ended")
+        heading(2, "Run ended", "text-lg font-bold")
         if self._report:
             plant = self._listener.parameters["plant"]
             units = Units.for_drive(PlantParameters.validated(plant, "plant").as_drive())
@@ -83,11 +82,5 @@ class EndedRun:
         ui.label("In a terminal:")
         commands = [f"stickslip report {shlex.quote(str(bag))}"] if bag is not None else []
         namespace = self._listener.get_namespace()
-        commands.append(f"stickslip run feed_drive --dashboard --namespace {namespace}")
+        commands.append(f"stickslip run SCENARIO --dashboard --namespace {namespace}")
         show_commands(commands)
-
-
-def show_commands(commands: Sequence[str]) -> None:
-    """Add commands for a terminal to the page."""
-    shown = ui.code("\n".join(commands), language="bash").classes("w-full")
-    shown.copy_button.props('aria-label="copy"')

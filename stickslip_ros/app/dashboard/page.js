@@ -144,6 +144,7 @@ const paint = (context, scale, { line, colour, dots, ...look }) =>
   dots ? drawDots(context, scale, line, colour) : drawLine(context, scale, line, colour, look);
 
 function drawMarks(context, chart, marks) {
+  if (!marks.length) return;
   const ink = dark.matches ? "#d0d4da" : "#444b55";
   context.fillStyle = ink;
   context.strokeStyle = ink;

@@ -4,8 +4,8 @@ import asyncio
 import json
 import shlex
 import time
-from collections.abc import Callable, Generator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,6 @@ from fastapi.responses import FileResponse
 from nicegui import background_tasks, ui
 from nicegui.events import GenericEventArguments
 
-from stickslip_ros.app.dashboard import theory_charts
 from stickslip_ros.app.dashboard.charts import CYCLES, PORTRAIT, TRACE
 from stickslip_ros.app.dashboard.controls import (
     OtherParameter,
@@ -25,35 +24,33 @@ from stickslip_ros.app.dashboard.controls import (
     refusal_label,
     report,
 )
-from stickslip_ros.app.dashboard.ended_run import EndedRun, show_commands
+from stickslip_ros.app.dashboard.elements import call, card, chart, heading, show_commands
+from stickslip_ros.app.dashboard.ended_run import EndedRun
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
 from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Health, ListenerNode
-from stickslip_ros.app.dashboard.theory import (
-    Theory,
-    bifurcation,
-    decay,
-    friction_curve,
-    stability_map,
-)
-from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.app.dashboard.theory import Theory
+from stickslip_ros.app.dashboard.theory_panel import TheoryPanel
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.theory.gain_intervals import gains_of
-from stickslip_ros.physics.theory.linear_sampled_loop import settling_time
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
 from stickslip_ros.plots.units import Units
-from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, controller_node
+from stickslip_ros.scenarios.parameters import controller_node
 
 _REFRESH = 0.25
 _EVENTS = 100
 _FAREWELL = 5.0
 """Time, s, for open pages to fetch what they offer after the server has ended."""
 
-_LATE = _FAREWELL - 0.5
-"""Time before that, s, from which nodes that are still there stay there."""
+_LEAVING = 0.5
+"""Time, s, in which the nodes of a run that ends with the server have left."""
+_MEASURES = (
+    (AMPLITUDE, "amplitude", "m"),
+    (STICK_FRACTION, "stick fraction", ""),
+    (FREQUENCY, "frequency", "Hz"),
+)
+"""Topic, name and unit of the measures of a cycle."""
 
 _HERE = Path(__file__).parent
 
@@ -104,13 +101,12 @@ class Pages:
 
     async def take_leave(self) -> None:
         """Show the end of a run on open pages, with what they need once the server is gone."""
-        deadline = time.monotonic() + _FAREWELL
-        while self._open and not self._listener.ended and time.monotonic() < deadline - _LATE:
+        left = time.monotonic() + _LEAVING
+        while self._open and not self._listener.ended and time.monotonic() < left:
             await asyncio.sleep(0.05)
         if self._open and self._listener.ended:
-            await self._ended.read()
             with suppress(TimeoutError):
-                async with asyncio.timeout(max(deadline - time.monotonic(), 1.0)):
+                async with asyncio.timeout(_FAREWELL):
                     await asyncio.gather(*(page.show_end(last=True) for page in self._open))
         self.theory.close()
 
@@ -128,14 +124,12 @@ class _Page:
     ) -> None:
         self._listener = listener
         self._frames = frames
-        self._theory = theory
         self._ended = ended
         self._busy = False
         self._newest_event = 0.0
         self._tap_scales: tuple[float, float] | None = None
         self._law: str | None = None
         self._fields: list[SliderField | OtherParameter] = []
-        self._drawn: dict[str, Any] = {}
         self._end_shown = False
         ui.colors(primary=BLUE)
         ui.dark_mode(value=None)
@@ -151,17 +145,18 @@ class _Page:
                     self._add_charts()
                 with ui.element("div").classes("controls").props("id=controls"):
                     self._add_control()
-                    with _card("Parameters"):
+                    with card("Parameters"):
                         self._parameters = ui.column().classes("w-full gap-2")
-                    with _card("Compare two settings"):
+                    with card("Compare two settings"):
                         self._settings = Settings(
                             listener, self._is_active, self._pursue_control, self._measured
                         )
                     self._add_health()
-                    with _card("Events"):
+                    with card("Events"):
                         self._events = ui.element("div").classes("events")
                         self._events.props('role=log tabindex=0 aria-label="events"')
-                self._add_theory()
+                self._theory = TheoryPanel(listener, theory)
+                self._charts |= self._theory.charts
         start = {
             **{name: chart.id for name, chart in self._charts.items()},
             "charts": [*self._charts],
@@ -179,7 +174,7 @@ class _Page:
 
     def _add_header(self) -> None:
         with ui.row().classes("w-full items-center"):
-            _heading(1, self._listener.get_namespace(), "text-2xl font-bold")
+            heading(1, self._listener.get_namespace(), "text-2xl font-bold")
             self._regime = ui.label("").classes("regime")
             self._wait = ui.label("").props("role=status")
             self._trouble = ui.label("").classes("refusal").props("role=alert")
@@ -192,49 +187,30 @@ class _Page:
             )
             window.props("no-caps outline")
             self._view = ui.button("Pause view", on_click=self._pause_view).props("outline no-caps")
-            for text, call in (("Fit", "fit"), ("CSV", "csv"), ("PNG", "png")):
-                button = ui.button(text, on_click=lambda c=call: _call(f"{c}()"))
+            for text, function in (("Fit", "fit"), ("CSV", "csv"), ("PNG", "png")):
+                button = ui.button(text, on_click=partial(call, f"{function}()"))
                 button.props("outline no-caps")
 
     def _add_charts(self) -> None:
         self._charts: dict[str, ui.echart] = {}
-        with _card("Motion"):
-            self._chart("trace", TRACE, "displacement, velocity and force over time", "tall")
+        with card("Motion"):
+            over_time = "displacement, velocity and force over time"
+            self._charts["trace"] = chart(TRACE, over_time, "tall")
         with ui.element("div").classes("pair"):
-            with _card("Phase portrait"):
-                self._chart("portrait", PORTRAIT, "velocity over displacement")
-            with _card("Cycles"):
-                self._chart("cycles", CYCLES, "amplitude and stick fraction of each cycle")
+            with card("Phase portrait"):
+                self._charts["portrait"] = chart(PORTRAIT, "velocity over displacement")
+            with card("Cycles"):
+                each = "amplitude and stick fraction of each cycle"
+                self._charts["cycles"] = chart(CYCLES, each)
                 with ui.row().classes("w-full gap-4"):
                     self._measures: dict[Any, ui.label] = {}
-                    for topic, name in (
-                        (AMPLITUDE, "amplitude"),
-                        (STICK_FRACTION, "stick fraction"),
-                        (FREQUENCY, "frequency"),
-                    ):
+                    for topic, name, _ in _MEASURES:
                         with ui.row().classes("gap-1"):
                             ui.label(name).classes("text-sm")
                             self._measures[topic] = ui.label("-").classes("text-sm font-bold")
 
-    def _add_theory(self) -> None:
-        self._said: dict[str, ui.label] = {}
-        with ui.element("div").classes("theory"):
-            for name, title, text in (
-                ("map", "Stability over the gains", "limit of stability over the gains"),
-                ("bifurcation", "Bifurcation diagram, no control", "displacement over belt speed"),
-                ("friction", "Friction", "friction coefficient over relative speed"),
-                ("decay", "Exponents of the sampled loop", "exponents in the complex plane"),
-            ):
-                with _card(title):
-                    self._said[name] = ui.label("").classes("text-sm")
-                    self._chart(name, {"series": []}, text)
-
-    def _chart(self, name: str, options: dict[str, Any], text: str, more: str = "") -> None:
-        chart = ui.echart(options).classes(f"relative w-full chart {more}")
-        self._charts[name] = chart.props(f'role=img aria-label="{text}"')
-
     def _add_control(self) -> None:
-        with _card("Control"):
+        with card("Control"):
             self._switch = ui.switch()
             self._switch.on("update:model-value", self._switch_control, [None])  # by the user only
             self._switch_refusal = refusal_label()
@@ -253,7 +229,7 @@ class _Page:
             {"name": name, "label": name, "field": name, "align": "left"}
             for name in ("node", "state", "health")
         ]
-        with _card("Nodes"):
+        with card("Nodes"):
             self._health = ui.table(columns=columns, rows=[], row_key="node")
             self._health.classes("w-full").props("wrap-cells flat dense hide-bottom")
             self._shares = ui.label("").classes("text-sm")
@@ -262,7 +238,7 @@ class _Page:
 
     def _say_how_to_start(self) -> None:
         namespace = self._listener.get_namespace()
-        _heading(2, f"No drive is running in {namespace}", "text-lg font-bold")
+        heading(2, f"No drive is running in {namespace}", "text-lg font-bold")
         ui.label("Start one in a terminal; this page shows it as soon as it is there:")
         command = ["stickslip", "run", "feed_drive"]
         show_commands([shlex.join([*command, "--namespace", namespace])])
@@ -308,17 +284,13 @@ class _Page:
                 for old in self._events.default_slot.children[_EVENTS:]:
                     self._events.remove(old)
                 self._newest_event = event.when
-        self._show_theory(drive, units)
+        self._theory.refresh(drive)
         self._follow_end()
 
     def _measured(self) -> dict[str, str]:
         units = Units.for_drive(self._frames.drive)
         found: dict[str, str] = {}
-        for topic, name, unit in (
-            (AMPLITUDE, "amplitude", "m"),
-            (STICK_FRACTION, "stick fraction", ""),
-            (FREQUENCY, "frequency", "Hz"),
-        ):
+        for topic, name, unit in _MEASURES:
             values = self._listener.cycles[topic]
             largest = max(values, default=0.0)
             found[name] = units.text(values[-1] if values else None, unit, largest=largest)
@@ -385,64 +357,12 @@ class _Page:
             )
         )
 
-    def _show_theory(self, drive: Drive | None, units: Units) -> None:
-        self._theory.follow()
-        if drive is None:
-            return
-        gains = self._gains()
-        drawings: dict[str, tuple[Any, Any, Callable[[Any], Any]]] = {
-            "bifurcation": (
-                bifurcation,
-                drive.belt_speed,
-                lambda found: theory_charts.bifurcation_chart(found, drive),
-            ),
-            "friction": (
-                friction_curve,
-                None,
-                lambda found: theory_charts.friction_chart(found, drive),
-            ),
-            "decay": (decay, None, lambda found: theory_charts.decay_chart(found, drive)),
-        }
-        if gains is not None:
-            drawings["map"] = (
-                stability_map,
-                gains,
-                lambda found: theory_charts.stability_chart(found, drive, gains),
-            )
-        for name, (computation, place, draw) in drawings.items():
-            result = self._theory.result(computation)
-            state = (result.version, place)
-            if self._drawn.get(name) == state or not result.version:
-                continue
-            self._drawn[name] = state
-            self._charts[name].set_visibility(not result.refusal)
-            self._said[name].set_text(result.refusal)
-            if result.value is not None:
-                chart = self._charts[name]
-                chart.options.clear()
-                chart.options.update(draw(result.value))
-                chart.update()
-                if name == "friction":
-                    scale, _ = units.axis("", "m/s", result.value.relative_speed)
-                    ui.run_javascript(f"stickslip.frictionScale = {scale!r}")
-                if name == "decay":
-                    self._said[name].set_text(_decay_text(result.value, units))
-
-    def _gains(self) -> WashoutGains | None:
-        """Return the gains of the controller; None while they are not known, or it has others."""
-        law = self._listener.law
-        values = self._listener.parameters[controller_node(law)]
-        try:
-            return gains_of(CONTROLLER_PARAMETERS[law].validated(values, law).as_law())
-        except InvalidInputError:  # a controller of another version
-            return None
-
     def _follow_end(self) -> None:
         if not self._listener.ended:
             if self._end_shown:
                 self._end_shown = False
                 self._end.set_visibility(False)
-                _call("restart()")
+                call("restart()")
         elif not self._end_shown:
             self._end_shown = True
             background_tasks.create(self.show_end())
@@ -498,38 +418,12 @@ class _Page:
         await report(self._listener.reset(), self._act_refusal)
 
     def _show_window(self, event: Any) -> None:
-        _call(f"show({int(event.value)})")
+        call(f"show({int(event.value)})")
 
     def _pause_view(self) -> None:
         paused = self._view.text == "Pause view"
         self._view.set_text("Continue view" if paused else "Pause view")
-        _call(f"pause({'true' if paused else 'false'})")
-
-
-def _decay_text(found: Any, units: Units) -> str:
-    unit = units.of_unit("1/s")
-    without = f"{found.uncontrolled_rate:.3g} {unit}".rstrip()
-    if found.rate is None:
-        return f"decay rate {without}"
-    text = f"decay rate {found.rate:.3g} {unit}".rstrip() + f" ({without} without control)"
-    settles = settling_time(found.rate)
-    return text if settles is None else f"{text}, settles in {units.text(settles, 's')}"
-
-
-def _call(script: str) -> None:
-    ui.run_javascript(f"stickslip.{script}")
-
-
-def _heading(level: int, text: str, classes: str) -> None:
-    with ui.element(f"h{level}").classes(classes):
-        ui.label(text)
-
-
-@contextmanager
-def _card(title: str) -> Generator[None]:
-    with ui.element("section").classes("panel"):
-        _heading(2, title, "font-bold")
-        yield
+        call(f"pause({'true' if paused else 'false'})")
 
 
 def _row(node: str, health: Health) -> dict[str, str]:

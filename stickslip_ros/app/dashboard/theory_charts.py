@@ -21,7 +21,6 @@ Options = dict[str, Any]
 _SLOWEST = 4.0
 """Largest size of an exponent that is drawn, in natural angular frequencies."""
 _PARTS = ("real", "1/s"), ("imaginary", "rad/s")
-_NOW = {"symbol": "diamond", "symbolSize": 14, "color": GREEN}
 _DIGITS = 5
 """Significant digits of what is sent to the page."""
 
@@ -32,8 +31,8 @@ def bifurcation_chart(found: BifurcationBranches, drive: Drive) -> Options:
     branches = (*found.equilibria, *found.cycles)
     speeds = [branch.belt_speeds for branch in branches]
     reaches = [side for branch in branches for side in (branch.least, branch.greatest)]
-    speed, speed_label = units.axis("belt speed V", "m/s", *speeds)
-    reach, reach_label = units.axis("displacement x", "m", *reaches)
+    speed, speed_label = units.axis(units.plain("belt speed"), "m/s", *speeds)
+    reach, reach_label = units.axis(units.plain("displacement"), "m", *reaches)
 
     def drawn(branch: Branch, what: str, colour: str, side: FloatArray) -> Options:
         name = f"{'stable' if branch.stable else 'unstable'} {what}"
@@ -51,10 +50,10 @@ def bifurcation_chart(found: BifurcationBranches, drive: Drive) -> Options:
     return _options(speed_label, reach_label, series, legend=list(names))
 
 
-def stability_chart(found: StabilityMap, drive: Drive, gains: WashoutGains) -> Options:
-    """Return the limit of stability over the gains, and the present gains as a point."""
+def stability_chart(found: StabilityMap, drive: Drive, gains: WashoutGains | None) -> Options:
+    """Return the limit of stability over the gains, and the present gains, if any, as a point."""
     units = Units.for_drive(drive)
-    gain, label = units.axis("linear gain k1", "N s/m", found.linear_gains)
+    gain, label = units.axis(units.plain("linear gain"), "N s/m", found.linear_gains)
     corners, linear = found.corner_frequencies, found.linear_gains / gain
     contours: Any = contour_generator(corners, linear, found.decay_rates.T)
     fastest = float(np.nanmax(found.decay_rates, initial=0.0))
@@ -66,7 +65,8 @@ def stability_chart(found: StabilityMap, drive: Drive, gains: WashoutGains) -> O
     inside = (continuous >= linear[0]) & (continuous <= linear[-1])
     shown = np.where(inside, continuous, np.nan)
     series.append(_line("limit, not sampled", corners, shown, GREY, "dashed"))
-    series.append(_point("gains in use", gains.corner_frequency, gains.linear / gain))
+    if gains is not None:
+        series.append(_point("gains in use", gains.corner_frequency, gains.linear / gain))
     for share, style in ((0.25, "dotted"), (0.5, "dashed"), (0.75, "solid")):
         if fastest > 0.0:
             level = float(f"{share * fastest:.1g}")
@@ -77,7 +77,7 @@ def stability_chart(found: StabilityMap, drive: Drive, gains: WashoutGains) -> O
             ]
     series += [_region(text, *place) for text, place in _regions(found, linear)]
     options = _options(
-        units.label("cutoff frequency d", "rad/s"),
+        units.label(units.plain("cutoff frequency"), "rad/s"),
         label,
         series,
         legend=list(dict.fromkeys(each["name"] for each in series if each["name"])),
@@ -93,14 +93,16 @@ def friction_chart(found: FrictionCurve, drive: Drive) -> Options:
     The second series is for the loop of a law with a memory, which page.js draws.
     """
     units = Units.for_drive(drive)
-    speed, label = units.axis("relative speed", "m/s", found.relative_speed)
+    relative = units.plain("velocity relative to the belt")
+    speed, label = units.axis(relative, "m/s", found.relative_speed)
     series = [_line("in steady slip", found.relative_speed / speed, found.coefficient, GREY)]
     if drive.friction.states:
         series.append(line("motion", BLUE))
     if drive.belt_speed:
         rest = float(drive.friction.at_rest(drive.belt_speed))
         series.append(_point("slide at rest", -drive.belt_speed / speed, rest))
-    return _options(label, "friction coefficient", series, legend=[s["name"] for s in series])
+    names = [each["name"] for each in series]
+    return _options(label, units.plain("friction coefficient"), series, names)
 
 
 def decay_chart(found: Decay, drive: Drive) -> Options:
@@ -169,9 +171,9 @@ def _point(name: str, x: float, y: float) -> Options:
     return {
         "type": "scatter",
         "name": name,
-        "symbol": _NOW["symbol"],
-        "symbolSize": _NOW["symbolSize"],
-        "itemStyle": {"color": _NOW["color"]},
+        "symbol": "diamond",
+        "symbolSize": 14,
+        "itemStyle": {"color": GREEN},
         "z": 5,
         "data": [[_number(x), _number(y)]],
     }

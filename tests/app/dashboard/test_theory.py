@@ -31,6 +31,7 @@ from stickslip_ros.app.dashboard.theory_charts import (
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
 from stickslip_ros.studies.stability import stability
 from tests.nodes.graph import wait_for
 
@@ -99,6 +100,13 @@ def test_the_limit_in_the_map_is_the_critical_gain(reference: dict[str, Any]) ->
     assert series(options, "gains in use").tolist() == [[20.0, -3.0]]
     words = [each["label"]["formatter"] for each in options["series"] if "label" in each]
     assert words == ["stable", "unstable"]
+
+
+def test_a_law_without_these_gains_has_no_map_and_still_a_decay_rate() -> None:
+    values = CONTROLLER_PARAMETERS["velocity_feedback"]().flat()
+    with pytest.raises(InvalidInputError, match="velocity_feedback"):
+        stability_map(PLANT, "velocity_feedback", values)
+    assert decay(PLANT, "velocity_feedback", values).rate is not None
 
 
 def test_the_diagram_has_branches_and_the_present_belt_speed(reference: dict[str, Any]) -> None:

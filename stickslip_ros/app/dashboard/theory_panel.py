@@ -1,0 +1,117 @@
+"""The part of the page that shows the theory of the running drive."""
+
+from typing import Any
+
+from nicegui import ui
+
+from stickslip_ros.app.dashboard.elements import call, card, chart
+from stickslip_ros.app.dashboard.listener import ListenerNode
+from stickslip_ros.app.dashboard.theory import (
+    Decay,
+    Theory,
+    bifurcation,
+    decay,
+    friction_curve,
+    stability_map,
+)
+from stickslip_ros.app.dashboard.theory_charts import (
+    bifurcation_chart,
+    decay_chart,
+    friction_chart,
+    stability_chart,
+)
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.theory.gain_intervals import gains_of
+from stickslip_ros.physics.theory.linear_sampled_loop import settling_time
+from stickslip_ros.plots.units import Units
+from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, controller_node
+
+_CHARTS = (
+    ("map", stability_map, "Stability over the gains", "limit of stability over the gains"),
+    ("bifurcation", bifurcation, "Bifurcation diagram, no control", "displacement over belt speed"),
+    ("friction", friction_curve, "Friction", "friction coefficient over relative speed"),
+    ("decay", decay, "Exponents of the sampled loop", "exponents in the complex plane"),
+)
+"""Name, computation, title, and text for readers of screens."""
+
+
+class TheoryPanel:
+    """Charts of the theory, each with the present state as a point, or why there is none."""
+
+    def __init__(self, listener: ListenerNode, theory: Theory) -> None:
+        """Add the charts."""
+        self._listener, self._theory = listener, theory
+        self.charts: dict[str, ui.echart] = {}
+        """The charts by name."""
+        self._said: dict[str, ui.label] = {}
+        self._drawn: dict[str, Any] = {}
+        with ui.element("div").classes("theory"):
+            for name, _, title, text in _CHARTS:
+                with card(title):
+                    self._said[name] = ui.label("").classes("text-sm")
+                    self.charts[name] = chart({"series": []}, text)
+
+    def refresh(self, drive: Drive | None) -> None:
+        """Draw what has changed; `drive` is None while it is not known."""
+        self._theory.follow()
+        if drive is None:
+            return
+        gains = self._gains()
+        places: dict[str, Any] = {"map": gains, "bifurcation": drive.belt_speed}
+        for name, computation, _, _ in _CHARTS:
+            result = self._theory.result(computation)
+            state = (result.version, places.get(name))
+            if self._drawn.get(name) == state or not result.version:
+                continue
+            self._drawn[name] = state
+            self.charts[name].set_visibility(not result.refusal)
+            self._said[name].set_text(result.refusal)
+            if result.value is not None:
+                self._draw(name, _options(name, result.value, drive, gains))
+                self._explain(name, result.value, Units.for_drive(drive))
+
+    def _draw(self, name: str, options: dict[str, Any]) -> None:
+        self.charts[name].options.clear()
+        self.charts[name].options.update(options)
+        self.charts[name].update()
+
+    def _explain(self, name: str, value: Any, units: Units) -> None:
+        if name == "friction":  # page.js draws the loop of a law with a memory
+            scale, _ = units.axis("", "m/s", value.relative_speed)
+            call(f"frictionScale = {scale!r}")
+        if name == "decay":
+            self._said[name].set_text(_decay_text(value, units))
+
+    def _gains(self) -> WashoutGains | None:
+        """Return the gains of the controller; None while they are not known, or it has others."""
+        law = self._listener.law
+        values = self._listener.parameters[controller_node(law)]
+        try:
+            return gains_of(CONTROLLER_PARAMETERS[law].validated(values, law).as_law())
+        except InvalidInputError:  # a controller of another version
+            return None
+
+
+def _options(name: str, found: Any, drive: Drive, gains: WashoutGains | None) -> dict[str, Any]:
+    """Return the options of the chart of that name, with a result drawn."""
+    match name:
+        case "map":
+            return stability_chart(found, drive, gains)
+        case "bifurcation":
+            return bifurcation_chart(found, drive)
+        case "friction":
+            return friction_chart(found, drive)
+        case _:
+            return decay_chart(found, drive)
+
+
+def _decay_text(found: Decay, units: Units) -> str:
+    unit = units.of_unit("1/s")
+    without = f"{found.uncontrolled_rate:.3g} {unit}".rstrip()
+    if found.rate is None:
+        return f"decay rate {without}"
+    text = f"decay rate {found.rate:.3g} {unit}".rstrip() + f" ({without} without control)"
+    settles = settling_time(found.rate)
+    return text if settles is None else f"{text}, settles in {units.text(settles, 's')}"
