@@ -1,10 +1,10 @@
-// Draws up to thirty frames a second of the motion. The page requests each frame, so that none queue
+// Draws up to 20 frames a second of the motion. The page requests each frame, so that none queue
 // up; a hidden page requests none. The charts draw axes and marks only when these change. Lines are
 // drawn on a canvas above them: this leaves more processor time for a simulation on this machine.
 
 // Once paused, ECharts draws the lines itself, with cursor and zoom.
 
-const INTERVAL = 1000 / 30;
+const INTERVAL = 1000 / 20;
 const CYCLES_INTERVAL = 500;
 const MARGIN = 1.08;
 const MARK_WIDTH = 70; // pixels between the texts of two marks
@@ -14,6 +14,7 @@ const shown = {};
 const kept = {};
 const dark = window.matchMedia("(prefers-color-scheme: dark)");
 let cyclesDrawn = { at: -Infinity };
+let loopDrawn = -Infinity;
 let socket;
 
 const chartOf = (name) => window.getElement(page[name])?.chart;
@@ -219,12 +220,14 @@ function drawMotion(motion) {
 
 // Draws the friction over the relative speed, of a law with a memory.
 function drawLoop({ lines }) {
-  const series = chartOf("friction")?.getOption()?.series;
-  if (!lines.loop || series?.[1]?.name !== "motion") return;
+  const now = performance.now();
+  if (!lines.loop || now - loopDrawn < CYCLES_INTERVAL) return;
+  loopDrawn = now;
+  const chart = chartOf("friction");
+  if (chart?.getOption()?.series?.[1]?.name !== "motion") return;
   const { x, y } = lines.loop;
-  chartOf("friction").setOption({
-    series: [{}, { data: Array.from(x, (value, i) => [value / page.frictionScale, y[i]]) }],
-  });
+  const data = Array.from(x, (value, i) => [value / page.frictionScale, y[i]]);
+  chart.setOption({ series: [{}, { data }] });
 }
 
 const short = (value) => (value === null ? "" : Number(value).toPrecision(5));
@@ -296,7 +299,7 @@ function read(bytes) {
 
 function draw({ motion, cycles }) {
   if (motion) drawMotion(motion);
-  if (motion && cyclesDrawn.at + CYCLES_INTERVAL < performance.now()) drawLoop(motion);
+  if (motion) drawLoop(motion);
   drawCycles(cycles);
   page.frames += 1;
 }

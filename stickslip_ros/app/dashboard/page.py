@@ -131,6 +131,7 @@ class _Page:
         self._law: str | None = None
         self._fields: list[SliderField | OtherParameter] = []
         self._end_shown = False
+        self._regime_colour = ""
         ui.colors(primary=BLUE)
         ui.dark_mode(value=None)
         with ui.element("div").classes("whole"):
@@ -335,7 +336,10 @@ class _Page:
             self._regime.set_text(f"not steady: {trend}")
         else:
             self._regime.set_text(look.label if known else "not measured")
-        self._regime.style(f"border-color: {GREY if trend else look.colour}")
+        colour = GREY if trend else look.colour
+        if colour != self._regime_colour:
+            self._regime_colour = colour
+            self._regime.style(f"border-color: {colour}")
 
     def _show_health(self) -> None:
         health = sorted(self._listener.health.items())
