@@ -29,7 +29,8 @@ from stickslip_ros.samples import SampleColumns
 from tests.physics.drives import FEED_DRIVE, PAPER
 from tests.plots.texts import faults
 
-pytestmark = pytest.mark.filterwarnings("error")
+# Old versions of matplotlib call names that its parser of formulas has deprecated since.
+pytestmark = pytest.mark.filterwarnings("error", "ignore::DeprecationWarning")
 
 FloatArray = npt.NDArray[np.float64]
 

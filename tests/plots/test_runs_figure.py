@@ -14,7 +14,8 @@ from stickslip_ros.plots.style import STYLES, save
 from tests.physics.drives import FEED_DRIVE, PAPER
 from tests.plots.texts import faults
 
-pytestmark = pytest.mark.filterwarnings("error")
+# Old versions of matplotlib call names that its parser of formulas has deprecated since.
+pytestmark = pytest.mark.filterwarnings("error", "ignore::DeprecationWarning")
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
 
