@@ -183,12 +183,7 @@ def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
         metavar="WxH",
         help="width and height of the figure, inches, as in --size 6x4",
     )
-    parser.add_argument(
-        "--style",
-        choices=_STYLES,
-        help="what the figure is for: a screen, or a column (85 mm) or two (180 mm) of a journal, "
-        "with fonts of 8 points (default: screen)",
-    )
+    add_style(parser)
     parser.add_argument(
         "--dpi",
         type=_dpi,
@@ -196,6 +191,16 @@ def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
         help="dots per inch of the figure (default: 130, in the styles for paper 300)",
     )
     parser.add_argument("--no-title", action="store_true", help="omit the title of the figure")
+
+
+def add_style(parser: argparse.ArgumentParser) -> None:
+    """Add --style, a name of `plots.style.STYLES`."""
+    parser.add_argument(
+        "--style",
+        choices=_STYLES,
+        help="what a figure is for: a screen, or a column (85 mm) or two (180 mm) of a journal, "
+        "with fonts of 8 points (default: screen)",
+    )
 
 
 def check_figure(arguments: argparse.Namespace) -> None:

@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stickslip_ros.app.arguments import add_json, writing
+from stickslip_ros.app.arguments import add_json, add_style, writing
 from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_json, print_table, progress_bar
 from stickslip_ros.versions import versions
@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"directory for {_REPORT}.md, {_REPORT}.json and the figures in {_REPORT}/; files of "
         "an earlier call are replaced",
     )
+    add_style(parser)
     add_json(parser)
 
 
@@ -40,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     with writing("--out", out):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / _name(NUMBERS[0])).touch()
-    figures = _draw_figures(folder)
+    figures = _draw_figures(folder, arguments.style)
     findings = _judge(figures)
     found = report(findings, {f"{_REPORT}/{_name(n)}": figures[n] for n in NUMBERS})
     text = json.dumps(found, indent=1, ensure_ascii=False, allow_nan=False)
@@ -59,7 +60,7 @@ def _name(number: int) -> str:
     return f"figure_{number:02}.png"
 
 
-def _draw_figures(folder: Path) -> "dict[int, PaperFigure]":
+def _draw_figures(folder: Path, style: str | None) -> "dict[int, PaperFigure]":
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from multiprocessing import get_context
 
@@ -71,7 +72,9 @@ def _draw_figures(folder: Path) -> "dict[int, PaperFigure]":
         progress_bar("figures", len(NUMBERS)) as progress,
         ProcessPoolExecutor(mp_context=get_context("spawn")) as pool,
     ):
-        jobs = {pool.submit(_draw, number, folder / _name(number)): number for number in NUMBERS}
+        jobs = {
+            pool.submit(_draw, number, folder / _name(number), style): number for number in NUMBERS
+        }
         try:
             for job in as_completed(jobs):
                 figures[jobs[job]] = job.result()
@@ -82,14 +85,17 @@ def _draw_figures(folder: Path) -> "dict[int, PaperFigure]":
     return figures
 
 
-def _draw(number: int, path: Path) -> "PaperFigure":
+def _draw(number: int, path: Path, style: str | None) -> "PaperFigure":
     from stickslip_ros.paper.figures import BifurcationFigure, compute_figure
     from stickslip_ros.paper.pictures import draw_paper_figure
-    from stickslip_ros.paper.transition_marks import transition_marks
+    from stickslip_ros.paper.transition_marks import transition_marks, unstable_equilibria
+    from stickslip_ros.plots.style import STYLES
 
     figure = compute_figure(number)
-    transitions = transition_marks(figure) if isinstance(figure, BifurcationFigure) else {}
-    draw_paper_figure(path, figure, transitions)
+    marks, unstable = {}, None
+    if isinstance(figure, BifurcationFigure):
+        marks, unstable = transition_marks(figure), unstable_equilibria(figure)
+    draw_paper_figure(path, figure, marks, unstable, style=STYLES[style or "screen"])
     return figure
 
 

@@ -18,7 +18,7 @@ from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
 from stickslip_ros.progress import Progress
-from stickslip_ros.studies.bifurcation import COURSE, BifurcationDiagram, bifurcation_diagram
+from stickslip_ros.studies.bifurcation import BifurcationDiagram, bifurcation_diagram
 
 STRIBECK = Stribeck(static=0.4, minimum=0.25, minimum_speed=0.5)
 """The paper's friction law with the paper's constants."""
@@ -155,7 +155,7 @@ def _dampings(
 
 
 def _stiffnesses(stiffnesses: Sequence[float], belt_speed: float) -> list[PortraitCase]:
-    return _cases("stiffness", stiffnesses, lambda k: unit_drive(belt_speed, stiffness=k))
+    return _cases("γ =", stiffnesses, lambda k: unit_drive(belt_speed, stiffness=k))
 
 
 def _stribeck(minimum: float) -> Stribeck:
@@ -177,29 +177,34 @@ def _gains(corner_frequency: float, gains: Sequence[tuple[float, float]]) -> lis
 _LONG = 3000.0
 """Duration in which a slow motion settles too."""
 
-_SETTLED_ON = f"What the motion from rest is after {COURSE.transient:g} natural periods"
+_DRIVE = "drive of the paper, no control"
 
 _BIFURCATIONS = {
     2: _Bifurcation(
-        f"{_SETTLED_ON}, over the belt speed: β = 0.01", "belt speed v0", 0.0, 1.0, unit_drive
+        f"Bifurcation diagram over the belt speed, {_DRIVE}: β = 0.01",
+        "belt speed v0",
+        0.0,
+        1.0,
+        unit_drive,
     ),
     3: _Bifurcation(
-        f"{_SETTLED_ON}, over the damping: v0 = 0.477",
-        "damping β (the coefficient of dX/dτ is 2β)",
+        f"Bifurcation diagram over the damping, {_DRIVE}: v0 = 0.477",
+        "damping β (the coefficient of X' is 2β)",
         0.0,
         0.05,
         lambda beta: unit_drive(0.477, damping=2.0 * beta),
     ),
     4: _Bifurcation(
-        f"{_SETTLED_ON}, over the stiffness: v0 = 0.2, β = 0.01",
-        "stiffness (at fixed scales)",
+        f"Bifurcation diagram over the stiffness, {_DRIVE}: v0 = 0.2, β = 0.01",
+        "stiffness γ (at fixed scales)",
         0.2,
         5.0,
         lambda stiffness: unit_drive(0.2, stiffness=stiffness),
     ),
     5: _Bifurcation(
-        f"{_SETTLED_ON}, over the ratio of friction coefficients: v0 = 0.4, β = 0.01, μs = 0.4",
-        "static over smallest kinetic coefficient μs/μm",
+        f"Bifurcation diagram over the ratio of friction coefficients, {_DRIVE}: "
+        "v0 = 0.4, β = 0.01, μs = 0.4",
+        "ratio of static to smallest kinetic coefficient, μs / μm",
         1.0,
         2.0,
         lambda ratio: unit_drive(0.4, friction=_stribeck(STRIBECK.static / ratio)),
@@ -208,19 +213,19 @@ _BIFURCATIONS = {
 
 _PORTRAITS = {
     6: _Portraits(
-        "Motion from rest at several belt speeds",
+        f"Phase portraits at several belt speeds, {_DRIVE}",
         {"β = 0.01": _cases("v0 =", (0.2, 0.3, 0.42, 0.45, 0.48, 0.495, 0.6), unit_drive)},
     ),
     7: _Portraits(
-        "Motion from rest with several dampings, Stribeck friction",
+        f"Phase portraits with several dampings, {_DRIVE}",
         {"v0 = 0.4": _dampings((0.01, 0.03, 0.045, 0.06, 0.09), 0.4)},
     ),
     8: _Portraits(
-        "Motion from rest with several dampings, Coulomb friction",
+        f"Phase portraits with several dampings and Coulomb friction, {_DRIVE}",
         {"v0 = 0.2": _dampings((0.0, 0.01, 0.05, 0.1), 0.2, Coulomb(STRIBECK.static))},
     ),
     9: _Portraits(
-        "Motion from rest with several dampings, friction falling linearly with speed",
+        f"Phase portraits with friction that falls linearly with speed, {_DRIVE}",
         {
             f"v0 = 0.2, slope {TANGENT_SLOPE:g}: that of the Stribeck law at zero speed": (
                 _dampings((0.01, 0.05, 0.1, 0.2, 0.23), 0.2, Linear(STRIBECK.static, TANGENT_SLOPE))
@@ -234,7 +239,7 @@ _PORTRAITS = {
         },
     ),
     10: _Portraits(
-        "Motion from rest with several stiffnesses",
+        f"Phase portraits with several stiffnesses, {_DRIVE}",
         {
             "v0 = 0.2, β = 0.01": _stiffnesses((0.5, 1.0, 2.0, 4.0, 10.0, 50.0), 0.2),
             "v0 = 0.2, β = 0.01: stiffer": _stiffnesses((100.0, 400.0, 1000.0), 0.2),
@@ -242,7 +247,7 @@ _PORTRAITS = {
         },
     ),
     11: _Portraits(
-        "Motion from rest with several smallest kinetic friction coefficients",
+        f"Phase portraits with several smallest kinetic coefficients, {_DRIVE}",
         {
             "v0 = 0.4, β = 0.01, μs = 0.4": _cases(
                 "μm =",
@@ -252,7 +257,7 @@ _PORTRAITS = {
         },
     ),
     12: _Portraits(
-        "Motion from rest near the Hopf speed, sooner and later",
+        f"Phase portraits near the Hopf speed, sooner and later, {_DRIVE}",
         {
             f"2β = {damping:g}, up to τ = {duration:g}": (
                 _cases("v0 =", (0.48, 0.49, 0.492), partial(unit_drive, damping=damping), duration)
@@ -262,7 +267,7 @@ _PORTRAITS = {
         },
     ),
     13: _Portraits(
-        "Motion from rest under washout control",
+        "Phase portraits, drive of the paper, washout control",
         {
             "v0 = 0.4, d = 2: linear gain": _gains(
                 2.0, [(k1, 0.0) for k1 in (0.0, -0.3, -0.5, -0.7, -0.9, -1.0)]

@@ -8,6 +8,7 @@ from typing import Any
 
 from stickslip_ros.paper.claims import CHAPTERS, Finding, Verdict
 from stickslip_ros.paper.figures import BifurcationFigure, PaperFigure
+from stickslip_ros.studies.bifurcation import COURSE
 
 Report = Mapping[str, Any]
 """The report as in JSON: `claims` and `figures`, each a list of objects."""
@@ -125,6 +126,9 @@ def _shown(value: float | str | None, digits: int = 6) -> str:
 def _caption(figure: PaperFigure) -> str:
     if isinstance(figure, BifurcationFigure):
         start, end = figure.values[[0, -1]]
-        values = f"{len(figure.values)} values of {figure.parameter} from {start:g} to {end:g}"
-        return f"{figure.title}; {values}."
+        return (
+            f"{figure.title}. Turning points of the motion from rest after {COURSE.transient:g} "
+            f"natural periods, for {len(figure.values)} values of the {figure.parameter} from "
+            f"{start:g} to {end:g}."
+        )
     return f"{figure.title}."

@@ -1,7 +1,10 @@
-"""The transitions by theory in the paper's bifurcation diagrams."""
+"""What theory adds to the paper's bifurcation diagrams: transitions and unstable equilibria."""
 
 from collections.abc import Callable
 
+import numpy as np
+
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.figures import BifurcationFigure, bifurcation_drive
 from stickslip_ros.studies.settling import ControlledDrive
 from stickslip_ros.studies.transitions import (
@@ -28,3 +31,13 @@ def transition_marks(figure: BifurcationFigure) -> dict[str, float]:
         if values := list(sign_changes(margin, figure.values.tolist())):
             found[name] = values[-1]
     return found
+
+
+def unstable_equilibria(figure: BifurcationFigure) -> FloatArray:
+    """Return the displacement of the unstable equilibrium for each drive, NaN if it is stable."""
+    return np.array(
+        [
+            drive.equilibrium_position if hopf_margin(ControlledDrive(drive)) < 0.0 else np.nan
+            for drive in figure.diagram.drives
+        ]
+    )

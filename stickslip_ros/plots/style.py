@@ -218,7 +218,7 @@ def save(
         _use_style(SCREEN)
         if ending == ".png" and colours is not None:
             buffer = BytesIO()
-            figure.savefig(buffer, format="png", dpi=110)
+            figure.savefig(buffer, format="png", dpi=dots_per_inch)
             with Image.open(buffer) as image:
                 # This method, unlike the usual one, keeps colours that few points have.
                 few = image.convert("RGB").quantize(colours, Image.Quantize.MAXCOVERAGE)
