@@ -76,6 +76,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
     def __init__(self, **options: Any) -> None:
         super().__init__("analyzer", AnalyzerParameters, **options)
         self._bags_opened = 0
+        self._bag: Path | None = None
 
     def connect(self) -> None:
         """Refuse a bag that cannot be written; publish the measures."""
@@ -147,12 +148,14 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
 
     def diagnose(self) -> Diagnosis:
         """Return regime and steadiness, counts of samples, and problems with them."""
+        bag = {"bag": str(self._bag)} if self._bag is not None else {}
         if not self.active:
-            return OK, "", {}
+            return OK, "", bag
         report = self._meter.report(quick=True)
         counts = {name: report[name] for name in ("regime", "steady", "samples", "lost_samples")}
         counts["trend"] = report["trend"] or ""
-        figures = {**counts, **self.dropped.figures, "notes": "; ".join(report["notes"])}
+        notes = {"notes": "; ".join(report["notes"])}
+        figures = {**counts, **self.dropped.figures, **notes, **bag}
         if self._bag_failure:
             return ERROR, self._bag_failure, figures
         complaints = [self.dropped.complaint, *duplicate_publishers(self, *RECORDED_TOPICS)]
@@ -295,6 +298,7 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             shutil.rmtree(recorder.directory, ignore_errors=True)
             raise
         self._bags_opened += 1
+        self._bag = recorder.directory.resolve()
         self._recorder = recorder
         self._keep("stickslip_ros/versions", versions())
         self._keep("stickslip_ros/analyzer", self.parameters.flat())

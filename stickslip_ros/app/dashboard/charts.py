@@ -22,7 +22,6 @@ TOOLBOX: dict[str, Any] = {
     "itemSize": 13,
     "feature": {
         "dataZoom": {"title": {"zoom": "zoom", "back": "zoom back"}},
-        "restore": {"title": "whole"},
         "saveAsImage": {"title": "PNG", "pixelRatio": 2},
     },
 }
@@ -110,7 +109,7 @@ PORTRAIT: dict[str, Any] = {
 CYCLES: dict[str, Any] = {
     "animation": False,
     "backgroundColor": "transparent",
-    "legend": {"top": 0, "left": 0, "right": 100},
+    "legend": {"top": 0, "left": 0},
     "toolbox": TOOLBOX,
     "tooltip": CURSOR,
     "grid": {"left": _LEFT, "right": 56, "top": 56, "bottom": 45},

@@ -174,7 +174,7 @@ class OtherParameter:
         if chosen is None:
             self._meaning.set_text("")
         else:
-            self._meaning.set_text(f"{described(chosen).meaning}; now {self._value(chosen, units)}")
+            self._meaning.set_text(f"{described(chosen).meaning} Now {self._value(chosen, units)}.")
 
     def _value(self, full_name: str, units: Units) -> str:
         value = current(self._listener, full_name)

@@ -14,6 +14,7 @@ from stickslip_ros.errors import BagError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.plots.measure_table import LABELS
 from stickslip_ros.plots.units import Units
+from stickslip_ros.scenarios.files import shipped_scenarios
 from stickslip_ros.scenarios.parameters import PlantParameters
 
 _LARGEST = 200_000_000
@@ -30,11 +31,12 @@ class EndedRun:
         self._report: dict[str, Any] = {}
         self._problem = ""
         self._read_path: Path | None = None
+        self._reading = asyncio.Lock()
 
     @property
     def bag(self) -> Path | None:
         """The bag that the analyzer has written; None if it has written none."""
-        name = self._listener.parameters["analyzer"].get("bag")
+        name = self._listener.health["analyzer"].figures.get("bag")
         return Path(name) if name else None
 
     @property
@@ -48,15 +50,16 @@ class EndedRun:
         return one if one is not None and one.stat().st_size <= _LARGEST else None
 
     async def read(self) -> None:
-        """Read the report of the bag, once."""
-        bag = self.bag
-        if bag is None or bag == self._read_path:
-            return
-        self._read_path = bag
-        try:
-            self._report, self._problem = await asyncio.to_thread(report_of_bag, bag), ""
-        except BagError as error:
-            self._report, self._problem = {}, str(error) if bag.exists() else ""
+        """Read the report of the bag, once; who comes meanwhile waits for it."""
+        async with self._reading:
+            bag = self.bag
+            if bag is None or bag == self._read_path:
+                return
+            try:
+                self._report, self._problem = await asyncio.to_thread(report_of_bag, bag), ""
+            except BagError as error:
+                self._report, self._problem = {}, str(error) if bag.exists() else ""
+            self._read_path = bag
 
     def show(self) -> None:
         """Add it to the page."""
@@ -74,7 +77,7 @@ class EndedRun:
             ui.label(self._problem)
         bag = self.bag
         if bag is not None:
-            there = "" if bag.exists() else ", relative to where the analyzer was started"
+            there = "" if bag.exists() else ", on the machine of the analyzer"
             ui.label(f"Recorded in {bag}{there}")
             with ui.row().classes("gap-3"):
                 if self.file is not None:
@@ -82,5 +85,8 @@ class EndedRun:
         ui.label("In a terminal:")
         commands = [f"stickslip report {shlex.quote(str(bag))}"] if bag is not None else []
         namespace = self._listener.get_namespace()
-        commands.append(f"stickslip run SCENARIO --dashboard --namespace {namespace}")
+        scenario = namespace.strip("/")  # by default a drive's namespace is that of its scenario
+        if scenario not in shipped_scenarios():
+            scenario = f"SCENARIO --namespace {namespace}"
+        commands.append(f"stickslip run {scenario} --dashboard")
         show_commands(commands)

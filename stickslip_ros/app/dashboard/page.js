@@ -332,8 +332,15 @@ function redraw() {
     setTimeout(redraw, 50);
     return;
   }
-  page.charts.forEach((name) => chartOf(name).setTheme(dark.matches ? "dark" : "default"));
+  // A theme brings back the first option of a chart, and none of what came later.
+  page.charts.forEach((name) => {
+    chartOf(name).setTheme(dark.matches ? "dark" : "default");
+    chartOf(name).setOption(window.getElement(page[name]).options, true);
+  });
   Object.keys(shown).forEach((name) => delete shown[name]);
+  cyclesDrawn = { at: -Infinity };
+  loopDrawn = -Infinity;
+  if (page.paused) show(true);
 }
 
 function save(url, name) {

@@ -52,6 +52,8 @@ _MEASURES = (
 )
 """Topic, name and unit of the measures of a cycle."""
 
+_AT_REST = {AMPLITUDE: 0.0, STICK_FRACTION: 0.0, FREQUENCY: None}
+
 _HERE = Path(__file__).parent
 
 
@@ -131,6 +133,7 @@ class _Page:
         self._law: str | None = None
         self._fields: list[SliderField | OtherParameter] = []
         self._end_shown = False
+        self._final = False
         self._regime_colour = ""
         ui.colors(primary=BLUE)
         ui.dark_mode(value=None)
@@ -233,6 +236,7 @@ class _Page:
         with card("Nodes"):
             self._health = ui.table(columns=columns, rows=[], row_key="node")
             self._health.classes("w-full").props("wrap-cells flat dense hide-bottom")
+            self._complaints = ui.label("").classes("text-sm whitespace-pre-line")
             self._shares = ui.label("").classes("text-sm")
             with ui.expansion("all values").classes("w-full").props("dense"):
                 self._raw = ui.label("").classes("text-xs whitespace-pre-wrap break-all")
@@ -291,10 +295,12 @@ class _Page:
     def _measured(self) -> dict[str, str]:
         units = Units.for_drive(self._frames.drive)
         found: dict[str, str] = {}
+        # At rest the last cycles are rounding errors.
+        rests = self._listener.health["analyzer"].figures.get("regime") == Regime.EQUILIBRIUM
         for topic, name, unit in _MEASURES:
             values = self._listener.cycles[topic]
-            largest = max(values, default=0.0)
-            found[name] = units.text(values[-1] if values else None, unit, largest=largest)
+            value = values[-1] if values else None
+            found[name] = units.text(_AT_REST[topic] if rests else value, unit)
         return found | {"regime": self._regime.text}
 
     def _show_waits(self, units: Units) -> None:
@@ -346,6 +352,9 @@ class _Page:
         rows = [_row(node, each) for node, each in health]
         if rows != self._health.rows:
             self._health.rows = rows
+        self._complaints.set_text(
+            "\n".join(f"{node}: {each.message}" for node, each in health if each.message)
+        )
         figures = self._listener.health["plant"].figures
         samples = int(figures.get("samples", "0") or 0)
         shares = [
@@ -374,6 +383,9 @@ class _Page:
     async def show_end(self, *, last: bool = False) -> None:
         """Show that the run has ended; `last`: keep what is offered, as the server ends."""
         await self._ended.read()
+        if self._final:
+            return
+        self._final = last
         with self._client:
             self._end_shown = True
             self._end.clear()
@@ -433,8 +445,4 @@ class _Page:
 def _row(node: str, health: Health) -> dict[str, str]:
     levels = "OK", "warning", "error", "stale"
     level = levels[min(health.level, 3)] if health.heard_at else ""
-    return {
-        "node": node,
-        "state": health.state,
-        "health": f"{level}: {health.message}" if health.message else level,
-    }
+    return {"node": node, "state": health.state, "health": level}

@@ -21,6 +21,8 @@ Options = dict[str, Any]
 _SLOWEST = 4.0
 """Largest size of an exponent that is drawn, in natural angular frequencies."""
 _PARTS = ("real", "1/s"), ("imaginary", "rad/s")
+_LEFT_OF_IT, _RIGHT_OF_IT, _ABOVE_IT = "insideEndTop", "insideEndBottom", "end"
+"""Positions of the text of a vertical line, as ECharts names them."""
 _DIGITS = 5
 """Significant digits of what is sent to the page."""
 
@@ -42,10 +44,11 @@ def bifurcation_chart(found: BifurcationBranches, drive: Drive) -> Options:
     series = [drawn(each, "equilibrium", GREEN, each.greatest) for each in found.equilibria]
     for branch in found.cycles:
         series += [drawn(branch, "cycle", ORANGE, s) for s in (branch.least, branch.greatest)]
-    marks = [(point.belt_speed / speed, "Hopf", GREY) for point in found.hopf_points]
+    # Marks may be close to each other: their texts stand on different sides.
+    marks = [(each.belt_speed / speed, "Hopf", GREY, _RIGHT_OF_IT) for each in found.hopf_points]
     if found.sticking_onset is not None:
-        marks.append((found.sticking_onset / speed, "sticks below", GREY))
-    series.append(_verticals([*marks, (drive.belt_speed / speed, "now", BLUE)]))
+        marks.append((found.sticking_onset / speed, "sticks below", GREY, _LEFT_OF_IT))
+    series.append(_verticals([*marks, (drive.belt_speed / speed, "now", BLUE, _ABOVE_IT)]))
     names = dict.fromkeys(each["name"] for each in series if each.get("name"))
     return _options(speed_label, reach_label, series, legend=list(names))
 
@@ -121,7 +124,7 @@ def decay_chart(found: Decay, drive: Drive) -> Options:
         if points:
             look = {"symbol": symbol, "symbolSize": 10, "itemStyle": {"color": colour}}
             series.append({"type": "scatter", "name": name, "data": points} | look)
-    series.append(_verticals([(0.0, "limit of stability", GREY)]))
+    series.append(_verticals([(0.0, "limit of stability", GREY, _LEFT_OF_IT)]))
     names = [str(each["name"]) for each in series if each["name"]]
     real, imaginary = (units.label(f"{part} part", unit) for part, unit in _PARTS)
     return _options(real, imaginary, series, names)
@@ -148,9 +151,9 @@ def _options(x: str, y: str, series: Sequence[Options], legend: Sequence[str]) -
     return {
         "animation": False,
         "backgroundColor": "transparent",
-        "legend": {"top": 0, "data": list(legend), "type": "scroll", "right": 100, "left": 0},
-        "grid": {"left": 60, "right": 20, "top": 56, "bottom": 45},
-        "toolbox": TOOLBOX,
+        "legend": {"top": 0, "data": list(legend), "type": "scroll", "left": 0},
+        "grid": {"left": 60, "right": 20, "top": 74, "bottom": 45},
+        "toolbox": TOOLBOX | {"top": 14},  # below the legend, which may need the whole width
         "tooltip": {"trigger": "item", "axisPointer": {"type": "cross"}},
         "xAxis": AXIS | CENTRED | {"name": x},
         "yAxis": AXIS | {"name": y},
@@ -191,15 +194,15 @@ def _region(text: str, x: float, y: float) -> Options:
     }
 
 
-def _verticals(marks: Iterable[tuple[float, str, str]]) -> Options:
-    """Return vertical lines at (place, text, colour)."""
+def _verticals(marks: Iterable[tuple[float, str, str, str]]) -> Options:
+    """Return vertical lines at (place, text, colour, position of the text)."""
     lines = [
         {
             "xAxis": _number(place),
             "lineStyle": {"color": colour, "type": "dotted", "width": 1.5},
-            "label": {"formatter": text, "position": "insideEndTop", "color": colour},
+            "label": {"formatter": text, "position": position, "color": colour},
         }
-        for place, text, colour in marks
+        for place, text, colour, position in marks
     ]
     drawn = {"symbol": "none", "silent": True, "animation": False, "data": lines}
     return {"type": "line", "name": "", "data": [], "markLine": drawn}

@@ -109,9 +109,9 @@ def _options(name: str, found: Any, drive: Drive, gains: WashoutGains | None) ->
 
 def _decay_text(found: Decay, units: Units) -> str:
     unit = units.of_unit("1/s")
-    without = f"{found.uncontrolled_rate:.3g} {unit}".rstrip()
+    without = f"{found.uncontrolled_rate + 0.0:.3g} {unit}".rstrip()
     if found.rate is None:
         return f"decay rate {without}"
-    text = f"decay rate {found.rate:.3g} {unit}".rstrip() + f" ({without} without control)"
+    text = f"decay rate {found.rate + 0.0:.3g} {unit}".rstrip() + f" ({without} without control)"
     settles = settling_time(found.rate)
     return text if settles is None else f"{text}, settles in {units.text(settles, 's')}"

@@ -90,8 +90,15 @@ def last_amplitude(page: Page) -> float:
     """Return the amplitude of the last cycle that the chart shows, in its unit."""
     return page.evaluate("""() => {
         const cycles = window.getElement(stickslip.cycles).chart.getOption().series[0].data;
-        return cycles[cycles.length - 1][1];
+        return cycles.length ? cycles[cycles.length - 1][1] : Infinity;
     }""")
+
+
+FRICTION = """() => {
+    const series = window.getElement(stickslip.friction)?.chart?.getOption()?.series ?? [];
+    return series.find((one) => one.name === "slide at rest")?.data ?? null;
+}"""
+"""The operating point on the friction curve."""
 
 
 def test_a_limit_cycle_is_seen_stopped_and_changed(
@@ -141,14 +148,22 @@ def test_a_limit_cycle_is_seen_stopped_and_changed(
 
     page.get_by_label("another parameter").click()
     page.get_by_role("option", name="plant.damping = 200 N s/m").click()
-    expect(page.get_by_text("now 200 N s/m")).to_be_visible()
+    expect(page.get_by_text("Now 200 N s/m.")).to_be_visible()
     value = page.get_by_label("value", exact=True)
     value.fill("fast")
     value.press("Enter")
     expect(page.get_by_text("'fast' is not a number")).to_be_visible()
     value.fill("250")
     value.press("Enter")
-    expect(page.get_by_text("now 250 N s/m")).to_be_visible()
+    expect(page.get_by_text("Now 250 N s/m.")).to_be_visible()
+
+    # All that is shown stays as it is when the system changes to dark.
+    wait_for(lambda: page.evaluate(FRICTION) is not None, "the friction curve is drawn")
+    before = page.evaluate(FRICTION)
+    page.emulate_media(color_scheme="dark")
+    wait_for(lambda: last_amplitude(page) < 200.0, "the cycles are drawn again")
+    assert page.evaluate(FRICTION) == before
+    page.emulate_media(color_scheme="light")
 
     page.get_by_role("button", name="Impulse").click()
     expect(events(page).get_by_text("impulse of 250 N for 0.016 s")).to_be_visible()
@@ -237,7 +252,8 @@ def test_what_an_engineer_does(start_stickslip: Start, page: Page, tmp_path: Pat
 
     assert served.end() == 130
     expect(page.get_by_role("heading", name="Run ended")).to_be_visible()
-    expect(page.get_by_text("Recorded in bag")).to_be_visible()
+    expect(page.get_by_text(f"Recorded in {tmp_path / 'bag'}", exact=True)).to_be_visible()
+    expect(page.get_by_text("stickslip run feed_drive --dashboard")).to_be_visible()
     with page.expect_download() as bag:  # although the server has ended
         page.get_by_role("link", name="Download the bag").click()
     written = next((tmp_path / "bag").glob("*.mcap"))
@@ -364,7 +380,7 @@ OVERLAPS = """
 () => stickslip.charts.flatMap((name) => {
   const { chart } = window.getElement(stickslip[name]);
   const words = chart.getZr().storage.getDisplayList()
-    .filter((part) => part.type === "tspan" && !part.ignore && part.style.text)
+    .filter((part) => !part.ignore && (part.__title || part.type === "tspan" && part.style.text))
     .filter((part) => part.style.text !== "1/1")  // of a legend without further pages: hidden
     .map((part) => {
       const box = part.getBoundingRect().clone();
@@ -376,17 +392,19 @@ OVERLAPS = """
         box.x = Math.max(box.x, shown.x);
         box.width = Math.max(end - box.x, 0);
       }
-      return { text: part.style.text, box };
+      return { text: part.__title ? `tool ${part.__title}` : part.style.text, box };
     })
     .filter(({ box }) => box.width > 1);
   const outside = words.filter(({ box }) => box.x < 0 || box.x + box.width > chart.getWidth());
   const pairs = words.flatMap((one, place) => words.slice(place + 1)
     .filter((other) => one.box.intersect(other.box))
-    .map((other) => `${one.text} | ${other.text}`));
+    .map((other) => `${name}: ${one.text} | ${other.text}`));
   return [...pairs, ...outside.map(({ text }) => `${text} is cut off`)];
 })
 """
+"""Texts, and tools of the toolbox, that overlap in a chart."""
 
+LAID_OUT = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 RESIZED = """
 () => stickslip.charts.every((name) => {
@@ -403,7 +421,7 @@ MACHINE = {"mass": 100.0, "stiffness": 1e6, "normal_force": 1000.0, "friction__m
 @pytest.mark.parametrize(
     "drive",
     [
-        MACHINE | {"damping": 200.0, "belt_speed": 0.02, "rate": 500.0},
+        MACHINE | {"damping": 200.0, "belt_speed": 0.04, "rate": 500.0},
         {"damping": 0.02, "belt_speed": 0.2, "rate": 20.0, "real_time_factor": 20.0},
     ],
     ids=["SI", "dimensionless"],
@@ -421,6 +439,8 @@ def test_no_words_in_the_charts_overlap_in_a_narrow_window(
     page.wait_for_function(ENOUGH)
     for width in (390, *range(800, 1601, 100)):
         page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_function("width => window.innerWidth === width", arg=width)
+        page.evaluate(LAID_OUT)
         page.wait_for_function(RESIZED)
         assert page.evaluate(OVERLAPS) == [], width
     assert served.end() == 130
