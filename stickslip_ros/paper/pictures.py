@@ -30,7 +30,7 @@ from stickslip_ros.plots.style import (
     save,
     styled,
 )
-from stickslip_ros.plots.units import Units
+from stickslip_ros.plots.units import Units, typeset
 
 _FIRST, _LATER, _BELT = "#888888", "#DDDDDD", "black"
 
@@ -50,21 +50,6 @@ _LETTERS = 44
 """Letters in a line of a column in print."""
 
 _UNITS = Units(dimensionless=True, terse=True)
-
-_SYMBOLS = {
-    "v0": "v_0",
-    "k1": "k_1",
-    "k2": "k_2",
-    "d": "d",
-    "X'": "X'",
-    "β": r"\beta",
-    "γ": r"\gamma",
-    "τ": r"\tau",
-    "μs": r"\mu_s",
-    "μm": r"\mu_m",
-}
-
-_SYMBOL = re.compile(rf"(?<![A-Za-z])({'|'.join(_SYMBOLS)})(?![A-Za-z])")
 
 
 def draw_paper_figure(
@@ -122,7 +107,7 @@ def _bifurcation(
     below.plot(figure.values, stick, color=ORANGE, lw=1.5)
     below.set_ylabel("stick fraction")
     below.set_ylim(0.0, max(1.05 * float(np.nanmax(stick, initial=0.0)), _LEAST_STICK_FRACTION))
-    below.set_xlabel(_typeset(figure.parameter))
+    below.set_xlabel(typeset(figure.parameter))
     below.margins(x=0.01)
     for (name, value), dashes in zip(marks.items(), cycle(DASHES)):
         for axes in (above, below):
@@ -166,7 +151,7 @@ def _portraits(figure: PortraitFigure, *, style: FigureStyle) -> Figure:
 
 def _panel(subfigure: SubFigure, panel: Panel, rows: int, columns: int, style: FigureStyle) -> None:
     title = fill(panel.title, _LETTERS) if style.narrow else panel.title
-    subfigure.suptitle(_typeset(title), fontweight="bold")
+    subfigure.suptitle(typeset(title), fontweight="bold")
     bounded = [portrait for portrait in panel.portraits if not portrait.runs_away]
     # A diverging motion gets a frame of its own: in a common one the others would be too small.
     share = len(bounded) == len(panel.portraits)
@@ -203,7 +188,7 @@ def _portrait(axes: Axes, portrait: Portrait, style: FigureStyle) -> None:
         outcome = re.sub(r"(?<=[,:]) ", "\n", outcome)
     if style.narrow:
         outcome = outcome.replace("amplitude", "ampl.")
-    title = f"{_typeset(portrait.case.label)}\n{outcome}"
+    title = f"{typeset(portrait.case.label)}\n{outcome}"
     axes.set_title(title, fontsize="small")
     axes.locator_params(nbins=4 if style.printed else 5, steps=[1.0, 2.0, 5.0, 10.0])
 
@@ -222,7 +207,7 @@ def _outcome(portrait: Portrait) -> str:
     outcome = REGIMES[measures.regime].label
     if portrait.runs_away:
         time = portrait.time_beyond(_FRAME * abs(portrait.drive.belt_speed))
-        return f"{outcome}: {_typeset(f'{_FRAME:g} v0 at τ = {time:.1f}')}"
+        return f"{outcome}: {typeset(f'{_FRAME:g} v0 at τ = {time:.1f}')}"
     if measures.period is None or measures.amplitude is None:
         return outcome
     if measures.stick_fraction:
@@ -238,8 +223,3 @@ def _range(*columns: FloatArray) -> tuple[float, float]:
     highest = max(float(column.max()) for column in columns)
     room = 0.06 * (highest - lowest)
     return lowest - room, highest + room
-
-
-def _typeset(text: str) -> str:
-    """Return a text with its symbols as formulas."""
-    return _SYMBOL.sub(lambda found: f"${_SYMBOLS[found[1]]}$", text)

@@ -1,5 +1,6 @@
 """Display of quantities: in SI units with a prefix, or without units for a unit drive."""
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, isinf
@@ -40,6 +41,11 @@ _SYMBOLS = {
     "speed of minimum friction": ("v_m", "v_m"),
 }
 """Symbols of docs/theory.md, in SI units and without units."""
+
+_GREEK = {"μ": r"\mu", "β": r"\beta", "γ": r"\gamma", "τ": r"\tau"}
+
+_SYMBOL = re.compile(r"(?<![A-Za-z])(?:([vkμ])([0-9sm])|([dβγτ]|X'))(?![A-Za-z])")
+"""A symbol in plain text: with an index, or without."""
 
 _PARAMETERS = {
     "plant.mass": "mass",
@@ -100,7 +106,9 @@ class Units:
         """Return the same for text without formulas, such as "linear gain k1"."""
         quantity = plain_name(quantity)
         symbol = _SYMBOLS.get(quantity, ("", ""))[self.dimensionless]
-        return f"{quantity} {symbol.replace(chr(92) + 'mu', 'μ').replace('_', '')}".rstrip()
+        for letter, formula in _GREEK.items():
+            symbol = symbol.replace(formula, letter)
+        return f"{quantity} {symbol.replace('_', '')}".rstrip()
 
     def axis(self, name: str, unit: str, *values: npt.ArrayLike) -> tuple[float, str]:
         """Return the divisor of the values (SI) on an axis, and its label.
@@ -145,6 +153,17 @@ class Units:
 def plain_name(quantity: str) -> str:
     """Return what figures call a parameter, NODE.PARAMETER; any other quantity as it is."""
     return _PARAMETERS.get(quantity, quantity)
+
+
+def typeset(text: str) -> str:
+    """Return a plain text, such as "belt speed v0", with its symbols as formulas."""
+
+    def formula(found: re.Match[str]) -> str:
+        letter, index, alone = found.groups()
+        symbol = f"{_GREEK.get(letter, letter)}_{index}" if index else _GREEK.get(alone, alone)
+        return f"${symbol}$"
+
+    return _SYMBOL.sub(formula, text)
 
 
 def _text(value: Any, scale: float, unit: str, digits: int) -> str:

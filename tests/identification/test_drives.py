@@ -285,8 +285,7 @@ _STUDY = json.loads(
 
 @pytest.mark.parametrize("case", _STUDY["cases"], ids=lambda case: f"{case['law']}-{case['kind']}")
 def test_the_study_of_100_seeds(case: dict[str, Any]) -> None:
-    # A LuGre seed takes half a minute.
-    assert case["seeds"] >= (45 if case["law"] == "lugre" else study.SEEDS)
+    assert case["seeds"] >= study.SEEDS
     if case["kind"] == "narrow":
         assert case["told"] <= 0.15
         return

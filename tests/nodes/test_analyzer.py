@@ -164,7 +164,9 @@ def test_activated_again_it_opens_a_further_bag(graph: Graph, tmp_path: Path) ->
     analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
     for name in ("bag", "bag_2", "bag_3"):
         graph.wait_until(lambda: analyzer.active, "analyzer active")
+        assert analyzer.diagnose()[2]["bag"] == str(tmp_path / name)
         analyzer.trigger_deactivate()
+        assert analyzer.diagnose()[2] == {"bag": str(tmp_path / name)}
         assert (tmp_path / name / "metadata.yaml").is_file()
         analyzer.trigger_activate()
 

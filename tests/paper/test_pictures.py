@@ -57,7 +57,7 @@ def test_portraits_say_what_they_show(tmp_path: Path, small_figure: PortraitFigu
     picture = path.read_text(encoding="utf-8")
     for text in ("a title", "it sticks", "sticks 28.6%, amplitude 0.319", "equilibrium"):
         assert text in picture
-    for text in ("unbounded: 10", "no whole cycle", "belt speed"):
+    for text in (r"unbounded: 10 $v_0$ at $\tau$ = 8.", "no whole cycle", "belt speed", "$X'$"):
         assert text in picture
 
 
@@ -84,7 +84,7 @@ def test_a_bifurcation_diagram_names_regimes_and_marks(tmp_path: Path) -> None:
     marks = {"Hopf point": 0.48876, "limit of sticking": 0.4396}
     draw_paper_figure(path, figure, marks, unstable_equilibria(figure))
     picture = path.read_text(encoding="utf-8")
-    for text in ("belt speed", "turning points", "stick-slip", "unstable equilibrium"):
+    for text in ("belt speed $v_0$", "turning points $X$", "stick-slip", "unstable equilibrium"):
         assert text in picture
     for text in ("stuck", "Hopf point 0.48876", "limit of sticking 0.4396"):
         assert text in picture

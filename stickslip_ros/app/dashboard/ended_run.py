@@ -50,7 +50,7 @@ class EndedRun:
         return one if one is not None and one.stat().st_size <= _LARGEST else None
 
     async def read(self) -> None:
-        """Read the report of the bag, once; who comes meanwhile waits for it."""
+        """Read the report of the bag, once; concurrent callers wait for it."""
         async with self._reading:
             bag = self.bag
             if bag is None or bag == self._read_path:

@@ -332,7 +332,7 @@ function redraw() {
     setTimeout(redraw, 50);
     return;
   }
-  // A theme brings back the first option of a chart, and none of what came later.
+  // A change of the theme restores the first option of a chart; later ones are lost.
   page.charts.forEach((name) => {
     chartOf(name).setTheme(dark.matches ? "dark" : "default");
     chartOf(name).setOption(window.getElement(page[name]).options, true);
