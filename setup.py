@@ -120,6 +120,13 @@ setup(
             "pymdown-extensions",
             "ruff",  # breaks the lines of signatures
         ],
-        "dev": ["colcon-common-extensions", "colcon-ros", "pyright", "pytest-xdist", "ruff"],
+        "dev": [
+            "colcon-common-extensions",
+            "colcon-ros",
+            "psutil",  # processor time of a dashboard and its browser (make bench)
+            "pyright",
+            "pytest-xdist",
+            "ruff",
+        ],
     },
 )

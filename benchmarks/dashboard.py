@@ -3,8 +3,8 @@
 Ours: plant, controller and analyzer as three processes, as in `stickslip run`, with a dashboard
 whose page is open in a headless Chromium, which draws without a graphics processor. Peers: the same
 processes with a dashboard without a page, and without a dashboard. Scenario `paper` in lockstep
-gives the steps per second, `feed_drive` in real time at 1 kHz the missed deadlines and the late
-forces, and the page the frames drawn per second.
+gives the steps per second, `feed_drive` in real time at 1 kHz the missed deadlines, the late
+forces, and the processor time of server and browser, and the page the frames drawn per second.
 
 All run in turns, one slice at a time; meanwhile the other dashboards are stopped and the other
 pages empty.
@@ -17,13 +17,15 @@ import socket
 import sys
 import time
 import urllib.request
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from statistics import median
 from urllib.error import URLError
+
+import psutil
 
 from benchmarks.parties import READY_TIMEOUT, ObservedPlant, Slice, closed_loop, party
 from benchmarks.slices import Row, by_turns, compare_rates, lacks, show
@@ -47,38 +49,54 @@ class Figures:
     missed_deadlines: int
     late_forces: int
     frames_per_second: float
+    server: float
+    """Processors that the server kept busy, with what it computes in other processes."""
+    browser: float
+    """Processors that the browser kept busy."""
 
 
-Frames = Callable[[], float]
-"""Returns the number of frames drawn so far."""
+@dataclass(frozen=True)
+class Spent:
+    """What a dashboard has done and used so far."""
+
+    frames: float = 0.0
+    server: float = 0.0
+    """Processor time, s."""
+    browser: float = 0.0
+    """Processor time, s."""
+
+
+Watch = Callable[[], Spent]
 
 
 @contextmanager
 def watched(scenario: str, by: str) -> Generator[Slice[Figures]]:
     with ExitStack() as resources:
         loop = resources.enter_context(closed_loop(ObservedPlant, scenario, composed=False))
-        watching = partial(nullcontext, lambda: 0.0)
+        watching = partial(nullcontext, Spent)
         if by != NOBODY:
             watching = resources.enter_context(dashboard(with_page=by == SEEN))
 
         def run(samples: int) -> Figures:
-            with watching() as frames:
-                started, before = time.monotonic(), frames()
+            with watching() as watch:
+                started, before = time.monotonic(), watch()
                 loop.run(samples)
-                drawn = (frames() - before) / (time.monotonic() - started)
+                after, duration = watch(), time.monotonic() - started
             figures = loop.plant.diagnose()[2]
             return Figures(
                 figures["steps_per_second"],
                 figures["missed_deadlines"],
                 figures["late_forces"],
-                drawn,
+                (after.frames - before.frames) / duration,
+                (after.server - before.server) / duration,
+                (after.browser - before.browser) / duration,
             )
 
         yield run
 
 
 @contextmanager
-def dashboard(*, with_page: bool) -> Generator[Callable[[], AbstractContextManager[Frames]]]:
+def dashboard(*, with_page: bool) -> Generator[Callable[[], AbstractContextManager[Watch]]]:
     """Start a dashboard, and a browser; yield a context manager in which they are active."""
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
@@ -100,18 +118,32 @@ def dashboard(*, with_page: bool) -> Generator[Callable[[], AbstractContextManag
         wait_for_page(url)
         os.kill(process.pid, signal.SIGSTOP)
 
+        def watch() -> Spent:
+            server = psutil.Process(process.pid)
+            own = psutil.Process().children(recursive=True)
+            return Spent(
+                page.evaluate("stickslip.frames") if page is not None else 0.0,
+                _processor_time([server, *server.children(recursive=True)]),
+                _processor_time(each for each in own if each.name().startswith("chrom")),
+            )
+
         @contextmanager
-        def watching() -> Generator[Frames]:
+        def watching() -> Generator[Watch]:
             os.kill(process.pid, signal.SIGCONT)
             if page is not None:
                 page.goto(url)
                 page.wait_for_function("stickslip.frames > 5")
-            yield lambda: page.evaluate("stickslip.frames") if page is not None else 0.0
+            yield watch
             if page is not None:
                 page.goto("about:blank")
             os.kill(process.pid, signal.SIGSTOP)
 
         yield watching
+
+
+def _processor_time(processes: Iterable[psutil.Process]) -> float:
+    times = [process.cpu_times() for process in processes]
+    return sum(each.user + each.system for each in times)
 
 
 def wait_for_page(url: str) -> None:
@@ -155,8 +187,10 @@ def measure() -> list[Row]:
                 )
                 name = f"{what.replace('_', ' ')} of {count} at 1 kHz, page open"
                 rows.append(Row(name, "", ours, by, peer, peer / max(ours, 1.0)))
-    drawn = median(each.frames_per_second for each in seen)
-    return [*rows, Row("frames drawn at 1 kHz", "1/s", drawn)]
+    for what, unit in (("frames_per_second", "1/s"), ("server", "cores"), ("browser", "cores")):
+        name = f"{what.replace('_', ' ')} at 1 kHz, page open"
+        rows.append(Row(name, unit, median(getattr(each, what) for each in seen)))
+    return rows
 
 
 if __name__ == "__main__":

@@ -416,11 +416,12 @@ class ListenerNode(PollingNode):
             for name, value in values.items():
                 before = self.parameters[node].get(name)
                 # Nodes that end take their parameters back.
-                if None not in (before, value) and before != value:
-                    text = f"{value:g}" if isinstance(value, float) else str(value)
-                    old = f"{before:g}" if isinstance(before, float) else str(before)
+                text = f"{value:g}" if isinstance(value, float) else str(value)
+                old = f"{before:g}" if isinstance(before, float) else str(before)
+                if None not in (before, value) and text != old:
                     self._tell(f"{node}.{name}: {old} to {text}", f"{name} {text}")
-            self._know(node, values)
+            if self.parameters[node]:  # otherwise only these would be known
+                self._know(node, values)
             asked = self._asked_parameters.get(node)
             if asked is not None and asked.answer is None:  # its answer may be outdated
                 self._ask_parameters(node)

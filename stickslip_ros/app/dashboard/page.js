@@ -1,10 +1,13 @@
-// Draws up to 20 frames a second of the motion. The page requests each frame, so that none queue
+// Draws up to 15 frames a second of the motion. The page requests each frame, so that none queue
 // up; a hidden page requests none. The charts draw axes and marks only when these change. Lines are
-// drawn on a canvas above them: this leaves more processor time for a simulation on this machine.
+// drawn on a canvas above them. The phase portrait changes in every third frame, since a browser
+// composes whatever lies between two changes. This leaves more processor time for a simulation on
+// this machine.
 
 // Once paused, ECharts draws the lines itself, with cursor and zoom.
 
-const INTERVAL = 1000 / 20;
+const INTERVAL = 1000 / 15;
+const FRAMES_OF_PORTRAIT = 3;
 const CYCLES_INTERVAL = 500;
 const MARGIN = 1.08;
 const MARK_WIDTH = 70; // pixels between the texts of two marks
@@ -170,12 +173,12 @@ function drawMarks(context, chart, marks) {
 }
 
 function drawMotion(motion) {
-  const { lines, labels, spans, time_label, window: width, end, equilibrium, belt_speed } = motion;
+  const { lines, labels, spans, time_label, window: width, end } = motion;
   const last = page.motion;
   const another = last && (String(last.labels) !== String(labels) || end < last.end);
   if (another) page.fit(); // other units, or another run
   page.motion = motion;
-  const { position, velocity, belt, force, dropped, orbit } = lines;
+  const { position, velocity, belt, force, dropped } = lines;
   const [displacement, speed, push] = labels;
   const old = Object.values(overlaid()).map((each) => each.lines);
   const of = (name) => old.map((each) => each[name]);
@@ -190,6 +193,16 @@ function drawMotion(motion) {
       { name: push, ...forces },
     ],
   });
+  const trace = chartOf("trace");
+  const context = canvasOn(trace);
+  layersOf(motion).forEach((layer) => paint(context, scaleOf(trace, layer.grid), layer));
+  drawMarks(context, trace, motion.marks);
+  if (page.frames % FRAMES_OF_PORTRAIT === 0) drawPortrait(motion, positions, speeds);
+}
+
+function drawPortrait({ lines: { orbit }, labels: [displacement, speed], ...motion }, positions, speeds) {
+  const { BLUE, GREEN, SKY_BLUE } = page.colours;
+  const { equilibrium, belt_speed } = motion;
   setChanged("portrait", {
     xAxis: { name: displacement, ...positions },
     yAxis: { name: speed, ...speeds },
@@ -198,11 +211,6 @@ function drawMotion(motion) {
       { markLine: { data: [{ yAxis: belt_speed }] } },
     ],
   });
-  const { BLUE, GREEN, SKY_BLUE } = page.colours;
-  const trace = chartOf("trace");
-  const context = canvasOn(trace);
-  layersOf(motion).forEach((layer) => paint(context, scaleOf(trace, layer.grid), layer));
-  drawMarks(context, trace, motion.marks);
   const portrait = chartOf("portrait");
   const plane = canvasOn(portrait);
   const scale = scaleOf(portrait, 0);

@@ -125,7 +125,6 @@ class Result:
     value: Any = None
     refusal: str = ""
     """Why there is none; empty while nothing was computed."""
-    inputs: tuple[Any, ...] = ()
     version: int = 0
     """Number of results so far."""
 
@@ -135,7 +134,13 @@ class _Job:
     compute: Callable[..., Any]
     asked: tuple[Any, ...] = ()
     changed_at: float = 0.0
+    answered: str = ""
+    """Inputs of the result, as text: a NaN that was received twice is no change."""
     result: Result = field(default_factory=Result)
+
+    @property
+    def is_stale(self) -> bool:
+        return bool(self.asked) and repr(self.asked) != self.answered
 
 
 class Theory:
@@ -160,9 +165,7 @@ class Theory:
     @property
     def busy(self) -> bool:
         """Whether something is being computed, or is to be."""
-        return self._running is not None or any(
-            job.asked and job.asked != job.result.inputs for job in self._jobs.values()
-        )
+        return self._running is not None or any(job.is_stale for job in self._jobs.values())
 
     def follow(self) -> None:
         """Take a finished result, and start the next computation whose parameters changed."""
@@ -171,13 +174,12 @@ class Theory:
         now = monotonic()
         for job in self._jobs.values():
             inputs = self._inputs(job.compute)
-            if inputs != job.asked:
+            if repr(inputs) != repr(job.asked):
                 job.asked, job.changed_at = inputs, now
         self._take()
         if self._running is None:
             for job in self._jobs.values():
-                stale = bool(job.asked) and job.asked != job.result.inputs
-                if stale and now - job.changed_at > _SETTLED:
+                if job.is_stale and now - job.changed_at > _SETTLED:
                     self._running = job, job.asked, self._submit(job)
                     return
 
@@ -218,7 +220,8 @@ class Theory:
             return
         job, inputs, future = self._running
         self._running = None
-        done = replace(job.result, inputs=inputs, version=job.result.version + 1)
+        job.answered = repr(inputs)
+        done = replace(job.result, version=job.result.version + 1)
         try:
             job.result = replace(done, value=future.result(), refusal="")
         except StickslipError as error:

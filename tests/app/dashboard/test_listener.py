@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import Parameter
 
 from stickslip_ros.app.dashboard import listener as listener_module
@@ -114,6 +115,17 @@ def test_what_others_set_is_noticed(graph: Graph, observer: ListenerNode) -> Non
     graph.wait_until(lambda: observer.parameters["plant"], "the plant's parameters")
     plant.set_parameters([Parameter("damping", value=0.5)])
     graph.wait_until(lambda: observer.parameters["plant"]["damping"] == 0.5, "the new value")
+
+
+def test_one_value_is_not_all_that_is_known(graph: Graph, observer: ListenerNode) -> None:
+    publisher = observer.create_publisher(ParameterEvent, "/parameter_events", 10)
+    graph.wait_until(publisher.get_subscription_count, "the observer listens")
+    observer.parameters = observer.parameters | {"analyzer": {"window": 8}}
+    for node, name, value in (("plant", "duration", 2.0), ("analyzer", "window", 9)):
+        changed = [Parameter(name, value=value).to_parameter_msg()]
+        publisher.publish(ParameterEvent(node=f"/test/{node}", changed_parameters=changed))
+    graph.wait_until(lambda: observer.parameters["analyzer"].get("window") == 9, "the change")
+    assert observer.parameters["plant"] == {}
 
 
 def test_the_controller_is_switched_off_and_on(graph: Graph, observer: ListenerNode) -> None:

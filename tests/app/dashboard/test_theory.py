@@ -157,6 +157,16 @@ def test_only_what_a_parameter_changes_is_computed_again(listener: Any, theory: 
 
 
 @pytest.mark.process
+def test_values_that_are_received_again_change_nothing(listener: Any, theory: Theory) -> None:
+    settle(theory)
+    unset = {name: float(str(value)) for name, value in PLANT.items() if value != value}
+    assert unset
+    listener.parameters = listener.parameters | {"plant": PLANT | unset}
+    theory.follow()
+    assert not theory.busy
+
+
+@pytest.mark.process
 def test_what_the_theory_does_not_cover_is_said(listener: Any, theory: Theory) -> None:
     listener.parameters["plant"] |= {"stiffness": 0.0}
     settle(theory)
