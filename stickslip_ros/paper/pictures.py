@@ -26,7 +26,7 @@ from stickslip_ros.plots.style import (
     ORANGE,
     SCREEN,
     FigureStyle,
-    round_ticks,
+    finish,
     save,
     styled,
 )
@@ -116,7 +116,7 @@ def _bifurcation(
             )
         handles.append(line)
     style.legend_below(drawn, handles)
-    round_ticks(drawn)
+    finish(drawn)
     return drawn
 
 

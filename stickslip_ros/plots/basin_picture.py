@@ -21,7 +21,7 @@ from stickslip_ros.plots.style import (
     SKY_BLUE,
     YELLOW,
     FigureStyle,
-    round_ticks,
+    finish,
     styled,
 )
 from stickslip_ros.plots.titles import title_of
@@ -109,7 +109,7 @@ def basin_figure(
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
     style.legend_below(figure, handles, most=2)
-    round_ticks(figure)
+    finish(figure)
     return figure
 
 

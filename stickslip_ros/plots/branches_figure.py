@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
+from math import isclose
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from stickslip_ros.plots.style import (
     GREY,
     SCREEN,
     FigureStyle,
-    round_ticks,
+    finish,
     styled,
     text_width,
 )
@@ -30,6 +31,8 @@ _POINT: Any = {"marker": "o", "ms": 5.0, "ls": "", "color": "white", "mec": "bla
 _FOLD: Any = {**_POINT, "marker": "D", "ms": 4.0}
 _NOW: Any = {"color": GREY, "lw": 3.0, "alpha": 0.6, "zorder": 1.0}
 _ONSET: Any = {"color": "black", "lw": 0.8, "ls": DASHES[2], "zorder": 1.5}
+_SAME = 1e-3
+"""Relative distance of two belt speeds below which one mark serves for both."""
 _BORDER: Any = {"color": "black", "lw": 0.5, "ls": DASHES[1], "zorder": 1.5}
 
 
@@ -64,14 +67,17 @@ def branches_figure(
         rest = np.interp(point.belt_speed, *_equilibrium(found))
         axes.plot(point.belt_speed / speed, rest / length, **_POINT)
         handles.append(Line2D([], [], **_POINT, label=f"Hopf point {_at(units, point.belt_speed)}"))
+    onset, own = found.sticking_onset, found.drive.belt_speed
     for fold in found.folds:
+        name = "fold"
+        if onset is not None and isclose(fold, onset, rel_tol=_SAME):
+            name, onset = "fold, onset of sticking", None
         for branch in found.cycles:
             for end in (0, -1):
                 if branch.belt_speeds[end] == fold:
                     ends = branch.least[end] / length, branch.greatest[end] / length
                     axes.plot([fold / speed] * 2, ends, **_FOLD)
-        handles.append(Line2D([], [], **_FOLD, label=f"fold {_at(units, fold)}"))
-    onset, own = found.sticking_onset, found.drive.belt_speed
+        handles.append(Line2D([], [], **_FOLD, label=f"{name} {_at(units, fold)}"))
     if onset is not None:
         axes.axvline(onset / speed, **_ONSET)
         label = f"onset of sticking {_at(units, onset)}"
@@ -84,7 +90,7 @@ def branches_figure(
     axes.set_xlim(min(low, own, 0.0) / speed, max(high, own, 0.0) / speed)
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
-    round_ticks(figure)
+    finish(figure)
     style.legend_below(figure, handles, most=3)
     _name_regions(figure, axes, found, speed)
     return figure

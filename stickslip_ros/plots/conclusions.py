@@ -26,10 +26,7 @@ def draw_conclusions(
 
     `part` has three cells, beside each other or one above another.
     """
-    if found.mean_cycle is not None:
-        _cycle(figure.add_subplot(part[0:2]), found.mean_cycle, units)
-        _residual(figure.add_subplot(part[2]), found.mean_cycle, units)
-    elif found.slips is not None:
+    if found.slips is not None:  # they were asked for
         each = found.slips["each"]
         for column, (name, title, unit) in enumerate(
             (
@@ -40,6 +37,9 @@ def draw_conclusions(
         ):
             values = np.array([value for value in each[name] if value is not None])
             _distribution(figure.add_subplot(part[column]), values, title, unit, units)
+    elif found.mean_cycle is not None:
+        _cycle(figure.add_subplot(part[0:2]), found.mean_cycle, units)
+        _residual(figure.add_subplot(part[2]), found.mean_cycle, units)
 
 
 def _cycle(axes: Axes, mean: MeanCycle, units: Units) -> None:
@@ -51,16 +51,15 @@ def _cycle(axes: Axes, mean: MeanCycle, units: Units) -> None:
     if mean.edges is not None and mean.edge_errors is not None:
         period = mean.cycle.period
         named = zip(("landing", "departure"), mean.edges, mean.edge_errors, strict=True)
-        for name, edge, error in named:
+        for line, (name, edge, error) in enumerate(named):
             at, half = edge % period / second, _CONFIDENCE * error / second
             axes.axvspan(at - half, at + half, color=GREY, alpha=0.6, lw=0.0)
             axes.axvline(at, color="black", lw=0.8, ls="--")
             axes.annotate(
-                f" {name} ± {units.text(_CONFIDENCE * error, 's')}",
-                (at, 0.02 if name == "landing" else 0.1),
-                xycoords=("data", "axes fraction"),
-                fontsize="small",
-            )
+                f"{name} ± {units.text(_CONFIDENCE * error, 's')}", (at, 0.0),
+                (3.0, 3.0 + 11.0 * line), xycoords=("data", "axes fraction"),
+                textcoords="offset points", fontsize="small",
+            )  # fmt: skip
     axes.set_xlabel(time_label)
     axes.set_ylabel(label)
     axes.set_title("mean cycle; edges with 95 % intervals")

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.intervals import QUANTILE
-from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, round_ticks, styled
+from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, finish, styled
 from stickslip_ros.plots.units import SI
 
 _DOTS: Any = {"marker": ".", "ms": 2.0, "ls": "", "alpha": 0.4, "mew": 0.0, "rasterized": True}
@@ -65,7 +65,7 @@ def identification_figure(found: Findings, *, style: FigureStyle = SCREEN) -> Fi
     error = f"{100.0 * found.chosen.error:.4g} %"
     title = f"Identified drive, {names}: law {found.chosen.label}, held-out error {error}"
     style.set_title(figure, title)
-    round_ticks(figure)
+    finish(figure)
     return figure
 
 

@@ -25,6 +25,9 @@ PIXELS = 1000
 LEAST_SPAN = 1e-6
 """Smallest span of an axis, as a share of the largest value on it: less is rounding."""
 
+LEAST_PART = 1e-3
+"""Smallest span of an axis for a part of a motion, as a share of the span of all of it."""
+
 _SHADE = LinearSegmentedColormap.from_list("stick", [to_rgba(GREY, 0.0), to_rgba(GREY, 0.6)])
 
 
@@ -82,10 +85,10 @@ def draw_line(
     axes.plot(time, values / scale, **look)
 
 
-def widened(low: float, high: float) -> tuple[float, float]:
-    """Return limits of an axis that span more than the rounding of its values."""
+def widened(low: float, high: float, least: float = 0.0) -> tuple[float, float]:
+    """Return limits of an axis that span more than the rounding of its values, and `least`."""
     middle = (low + high) / 2.0
-    half = max(high - low, LEAST_SPAN * max(abs(low), abs(high))) / 2.0
+    half = max(high - low, least, LEAST_SPAN * max(abs(low), abs(high))) / 2.0
     return (low, high) if half == (high - low) / 2.0 else (middle - half, middle + half)
 
 

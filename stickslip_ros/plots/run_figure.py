@@ -40,7 +40,7 @@ from stickslip_ros.plots.style import (
     SCREEN,
     SKY_BLUE,
     FigureStyle,
-    round_ticks,
+    finish,
     styled,
 )
 from stickslip_ros.plots.units import Units
@@ -141,7 +141,7 @@ def run_figure(
     if panels.short:
         handles += panels.of_law
     style.legend_below(figure, handles)
-    round_ticks(figure)
+    finish(figure)
     return figure
 
 
@@ -303,6 +303,7 @@ class _Panels:
         drive, reached = self._drive, self._history.relative_speeds
         if drive is None:
             say(axes, "the drive is not known")
+            axes.set(xticks=[], yticks=[])
             return
         at_rest = -drive.belt_speed
         least, largest = reached or (min(at_rest, 0.0), max(at_rest, 0.0))

@@ -1,6 +1,6 @@
 """The figure of several runs: motion and force side by side, all cycles in one panel."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.decimation import intervals, peaks
 from stickslip_ros.plots.panes import (
+    LEAST_PART,
     LEAST_SPAN,
     PIXELS,
     Pane,
@@ -35,7 +36,7 @@ from stickslip_ros.plots.style import (
     SCREEN,
     SKY_BLUE,
     FigureStyle,
-    round_ticks,
+    finish,
     styled,
 )
 from stickslip_ros.plots.units import SI, Units
@@ -93,7 +94,7 @@ def runs_figure(
         for run, look, marker in zip(runs, looks, _MARKERS, strict=False)
     ]
     style.legend_below(figure, handles)
-    round_ticks(figure)
+    finish(figure)
     return figure
 
 
@@ -178,8 +179,10 @@ class _Picture:
                 ],  # where it ends, which is all there is of a slide at rest
                 **look,
             )
-        axes.set_xlim(widened(*axes.get_xlim()))
-        axes.set_ylim(widened(*axes.get_ylim()))
+        length = _span(motion.position for motion in self._motions) / self._length[0]
+        speed = _span(motion.velocity for motion in self._motions) / self._speed[0]
+        axes.set_xlim(widened(*axes.get_xlim(), LEAST_PART * length))
+        axes.set_ylim(widened(*axes.get_ylim(), LEAST_PART * speed))
 
     def cycles(self, amplitude: Axes, stick_fraction: Axes) -> None:
         """Draw amplitude and stick fraction of each cycle over time."""
@@ -208,6 +211,11 @@ class _Picture:
         scale, label = self._units.axis("time", "s", *(motion.time for motion in self._motions))
         for axes in (amplitude, stick_fraction):
             _label_time(axes, scale, label)
+
+
+def _span(columns: Iterable[FloatArray]) -> float:
+    """Return the largest span of a column."""
+    return max((float(np.ptp(column)) for column in columns if len(column)), default=0.0)
 
 
 def _label_time(axes: Axes, scale: float, label: str) -> None:

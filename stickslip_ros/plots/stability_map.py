@@ -23,7 +23,7 @@ from stickslip_ros.plots.style import (
     SCREEN,
     SKY_BLUE,
     FigureStyle,
-    round_ticks,
+    finish,
     styled,
 )
 from stickslip_ros.plots.titles import title_of
@@ -67,7 +67,7 @@ def stability_figure(
     if critical is not None:
         _draw_critical_gains(panels[1], critical, found)
     style.legend_below(figure, handles, most=4)
-    round_ticks(figure)
+    finish(figure)
     return figure
 
 
@@ -85,7 +85,7 @@ def design_figure(found: Design, *, style: FigureStyle = SCREEN) -> Figure:
     forces = found.peak_forces(around)
     handles += _draw_forces(axes, around, forces, found.task.force_limit)
     style.legend_below(figure, handles, most=3)
-    round_ticks(figure)
+    finish(figure)
     return figure
 
 

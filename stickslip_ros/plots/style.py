@@ -168,13 +168,26 @@ def styled(draw: Callable[_P, _R]) -> Callable[_P, _R]:
     return drawn
 
 
-def round_ticks(figure: Figure) -> None:
-    """Let the ticks of all linear axes be whole multiples of 1, 2 or 5 times a power of ten."""
+def finish(figure: Figure) -> None:
+    """Make ticks round and labels no longer than their axes, once all is drawn.
+
+    The ticks of linear axes are whole multiples of 1, 2 or 5 times a power of ten. A vertical label
+    that is longer than its axis is broken into two lines.
+    """
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             locator = axis.get_major_locator()
             if isinstance(locator, AutoLocator):
                 locator.set_params(steps=[1.0, 2.0, 5.0, 10.0])
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        label = axes.yaxis.label
+        words = label.get_text().split(" ")
+        if label.get_window_extent().height > axes.get_window_extent().height and len(words) > 1:
+            lines = [
+                (" ".join(words[:count]), " ".join(words[count:])) for count in range(1, len(words))
+            ]
+            label.set_text("\n".join(min(lines, key=lambda pair: max(map(len, pair)))))
 
 
 def text_width(text: str, points: float) -> float:

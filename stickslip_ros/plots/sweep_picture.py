@@ -25,7 +25,7 @@ from stickslip_ros.plots.style import (
     MANY,
     SCREEN,
     FigureStyle,
-    round_ticks,
+    finish,
     styled,
 )
 from stickslip_ros.plots.titles import title_of
@@ -90,17 +90,17 @@ def diagram_figure(columns: Columns, study: Study, *, style: FigureStyle = SCREE
     (axis,) = grid.axes
     both = grid.carry is Carry.BOTH
     own = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
-    units = own.shortened(terse=style.crowded(8.5, 8.0))
+    units, terse = own.shortened(terse=style.crowded(8.5, 8.0)), own.shortened()
     figure = style.figure(8.5, 8.0, narrow=1.7)
     what = "Bifurcation diagram"
     style.set_title(figure, title_of(what, study.scenario, grid.parameters))
     panels: list[Axes] = list(figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.0, 1.0)))
     section, *lines = panels
     every = np.fromiter(chain.from_iterable(columns.turning_points), dtype=float)
-    length, label = units.axis(units.named("turning points"), "m", every)
+    length, label = terse.axis(terse.named("turning points"), "m", every)
     section.set_ylabel(label)
     scaled = {
-        name: units.axis(title, unit, getattr(columns, name))
+        name: terse.axis(title, unit, getattr(columns, name))
         for name, (title, unit) in _MEASURES.items()
     }
     # Wide markers are drawn below the narrow ones.
@@ -133,7 +133,7 @@ def diagram_figure(columns: Columns, study: Study, *, style: FigureStyle = SCREE
     lines[-1].set_xscale(**_scale(axis))
     lines[-1].margins(x=0.01)
     style.legend_below(figure, handles, most=3)
-    round_ticks(figure)
+    finish(figure)
     return figure
 
 
@@ -201,7 +201,7 @@ def map_figure(
         Line2D([], [], color="black", ls=dashes, label=name) for name, _, dashes in _curves(found)
     ]
     style.legend_below(figure, handles, most=4)
-    round_ticks(figure)
+    finish(figure)
     return figure
 
 

@@ -51,7 +51,9 @@ def test_branches_and_points_are_named(supercritical: BifurcationBranches) -> No
 
 def test_what_is_unstable_is_dashed(subcritical: BifurcationBranches) -> None:
     figure = branches_figure(subcritical, title="it")
-    assert {"pure slip, unstable", "stick-slip, stable", "fold 1.504"} <= set(names(figure))
+    assert {"pure slip, unstable", "stick-slip, stable", "fold, onset of sticking 1.504"} <= set(
+        names(figure)
+    )
     assert regions(figure) == ["stick-slip", "stick-slip or rest", "rest"]
     (legend,) = figure.legends
     for line, name in zip(legend.get_lines(), names(figure), strict=True):

@@ -15,7 +15,7 @@ from stickslip_ros.plots.style import (
     SCREEN,
     STYLES,
     FigureStyle,
-    round_ticks,
+    finish,
     save,
     styled,
     text_width,
@@ -138,10 +138,20 @@ def test_the_width_of_a_text_is_that_of_the_drawn_one() -> None:
     assert text_width(label.get_text(), label.get_size()) == pytest.approx(drawn, rel=0.05)
 
 
+def test_a_label_that_is_longer_than_its_axis_has_two_lines() -> None:
+    figure = Figure((4.0, 4.0))
+    axes = figure.subplots(2, 1, height_ratios=(4.0, 1.0))
+    for each in axes:
+        each.set_ylabel("measured less fitted (µm)")
+    finish(figure)
+    assert axes[0].get_ylabel() == "measured less fitted (µm)"
+    assert axes[1].get_ylabel() == "measured less\nfitted (µm)"
+
+
 def test_ticks_are_round() -> None:
     figure = small_figure()
     (axes,) = figure.axes
     axes.set_xlim(0.08, 0.1)
-    round_ticks(figure)
+    finish(figure)
     steps = np.diff(axes.get_xticks())
     assert f"{steps[0]:.6e}"[:8] in ("1.000000", "2.000000", "5.000000")

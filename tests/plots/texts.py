@@ -12,7 +12,7 @@ _TOUCHING = 0.5
 
 
 def faults(figure: Figure) -> list[str]:
-    """Return a sentence for each text that is cut off by the figure or overlaps another one."""
+    """Return a sentence for each text that is cut off, overlaps another one or exceeds its axis."""
     figure.draw_without_rendering()
     shown = [(text.get_text(), text.get_window_extent()) for text in _texts(figure)]
     whole = figure.bbox
@@ -24,6 +24,12 @@ def faults(figure: Figure) -> list[str]:
         or box.x1 > whole.x1 + 1.0
         or box.y1 > whole.y1 + 1.0
     ]
+    for axes in figure.axes:
+        label = axes.yaxis.label
+        if axes.get_visible() and label.get_visible():
+            room = axes.get_window_extent().height + 1.0
+            if label.get_window_extent().height > room:
+                found.append(f"{label.get_text()!r} is longer than its axis")
     for (name, box), (other, other_box) in combinations(shown, 2):
         both = Bbox.intersection(box, other_box)
         if both is not None and min(both.width, both.height) > _TOUCHING:
