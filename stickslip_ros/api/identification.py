@@ -104,17 +104,28 @@ class Model(Shown):
         written_scenario(self.findings, Path(path))
         return load_scenario(str(path))
 
-    def plot(self) -> "Figure":
+    def plot(self, *, style: str = "screen") -> "Figure":
         """Return the figure that `stickslip identify --plot` draws.
+
+        Parameters
+        ----------
+        style : {"screen", "paper", "paper-double"}
+            What the figure is for: a screen, or one column or two of a journal.
 
         Returns
         -------
         matplotlib.figure.Figure
             Friction curve with its band, residuals, free run.
+
+        Raises
+        ------
+        InvalidInputError
+            If `style` is unknown.
         """
         from stickslip_ros.plots.identification_figure import identification_figure
+        from stickslip_ros.plots.style import style_named
 
-        return shown_in_notebooks(identification_figure(self.findings))
+        return shown_in_notebooks(identification_figure(self.findings, style=style_named(style)))
 
     def _parts(self) -> Parts:
         found = self.findings

@@ -65,18 +65,31 @@ class RecordedRun(Shown):
         """What is missing in the bag, in sentences."""
         return self.report["missing"]
 
-    def plot(self) -> "Figure":
+    def plot(self, *, style: str = "screen") -> "Figure":
         """Return the figure that `stickslip report --plot` draws.
+
+        Parameters
+        ----------
+        style : {"screen", "paper", "paper-double"}
+            What the figure is for: a screen, or one column or two of a journal.
 
         Returns
         -------
         matplotlib.figure.Figure
             Motion, force, phase portrait, cycles and friction law.
+
+        Raises
+        ------
+        InvalidInputError
+            If `style` is unknown.
         """
         from stickslip_ros.plots.recorded_run import recorded_run_figure
+        from stickslip_ros.plots.style import style_named
 
         return shown_in_notebooks(
-            recorded_run_figure(self.path, self.drive, self._history, self.report)
+            recorded_run_figure(
+                self.path, self.drive, self._history, self.report, style=style_named(style)
+            )
         )
 
     def to_pandas(self) -> "DataFrame":

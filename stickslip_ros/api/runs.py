@@ -50,18 +50,31 @@ class Run(Shown):
     _history: RunHistory
     """The data of the figure."""
 
-    def plot(self) -> "Figure":
+    def plot(self, *, style: str = "screen") -> "Figure":
         """Return the figure that `stickslip simulate --plot` draws.
+
+        Parameters
+        ----------
+        style : {"screen", "paper", "paper-double"}
+            What the figure is for: a screen, or one column or two of a journal.
 
         Returns
         -------
         matplotlib.figure.Figure
             Motion, force, phase portrait, cycles and friction law.
+
+        Raises
+        ------
+        InvalidInputError
+            If `style` is unknown.
         """
         from stickslip_ros.plots.simulated_run import simulated_run_figure
+        from stickslip_ros.plots.style import style_named
 
         measures = self.truth or self.measures
-        return shown_in_notebooks(simulated_run_figure(self.scenario, self._history, measures))
+        return shown_in_notebooks(
+            simulated_run_figure(self.scenario, self._history, measures, style=style_named(style))
+        )
 
     def to_pandas(self) -> "DataFrame":
         """Return the trajectory as a table.

@@ -176,13 +176,15 @@ class Sweep(_Result):
         axis, *others = plan.axes
         return {} if others else theory.transitions(self.study, axis)
 
-    def plot(self, colour: "Colour" = "regime") -> "Figure":
+    def plot(self, colour: "Colour" = "regime", *, style: str = "screen") -> "Figure":
         """Return the figure that `stickslip sweep --plot` draws.
 
         Parameters
         ----------
         colour : {"regime", "amplitude", "stick_fraction"}
             What the map of a sweep over two parameters shows.
+        style : {"screen", "paper", "paper-double"}
+            What the figure is for: a screen, or one column or two of a journal.
 
         Returns
         -------
@@ -192,11 +194,14 @@ class Sweep(_Result):
         Raises
         ------
         InvalidInputError
-            If `colour` is unknown, or given for a sweep over one parameter.
+            If `colour` is unknown, or given for a sweep over one parameter, or `style` is unknown.
         """
+        from stickslip_ros.plots.style import style_named
         from stickslip_ros.plots.sweep_picture import sweep_figure
 
-        return shown_in_notebooks(sweep_figure(self.columns, self.study, colour))
+        return shown_in_notebooks(
+            sweep_figure(self.columns, self.study, colour, style=style_named(style))
+        )
 
     def _parts(self) -> Parts:
         yield sweep_table(self.study, self.columns.points)
@@ -215,17 +220,30 @@ class Basin(_Result):
         """The motions that the starts lead to, the one with most starts first."""
         return self.basins.attractors
 
-    def plot(self) -> "Figure":
+    def plot(self, *, style: str = "screen") -> "Figure":
         """Return the figure that `stickslip basin --plot` draws.
+
+        Parameters
+        ----------
+        style : {"screen", "paper", "paper-double"}
+            What the figure is for: a screen, or one column or two of a journal.
 
         Returns
         -------
         matplotlib.figure.Figure
             Which motion each start leads to.
+
+        Raises
+        ------
+        InvalidInputError
+            If `style` is unknown.
         """
         from stickslip_ros.plots.basin_picture import study_figure
+        from stickslip_ros.plots.style import style_named
 
-        return shown_in_notebooks(study_figure(self.columns, self.basins, self.study))
+        return shown_in_notebooks(
+            study_figure(self.columns, self.basins, self.study, style=style_named(style))
+        )
 
     def _values(self) -> dict[str, Any]:
         places = [self.basins.place(point) for point in self.columns.points()]

@@ -47,8 +47,13 @@ class Stability(Shown):
     notes: Mapping[str, str]
     """Why a value does not exist, by its place."""
 
-    def plot(self) -> "Figure":
+    def plot(self, *, style: str = "screen") -> "Figure":
         """Return the figure that `stickslip stability --plot` draws.
+
+        Parameters
+        ----------
+        style : {"screen", "paper", "paper-double"}
+            What the figure is for: a screen, or one column or two of a journal.
 
         Returns
         -------
@@ -60,14 +65,17 @@ class Stability(Shown):
         ------
         InvalidInputError
             If there is no linear sampled loop, or if the theory of limit cycles does not cover a
-            drive without a controller.
+            drive without a controller, or if `style` is unknown.
         """
         reason = stabilities.why_no_figure(self.scenario)
         if reason is not None:
             raise InvalidInputError(f"there is nothing to draw: {reason}")
         from stickslip_ros.plots.scenario_stability import scenario_stability_figure
+        from stickslip_ros.plots.style import style_named
 
-        return shown_in_notebooks(scenario_stability_figure(self.scenario))
+        return shown_in_notebooks(
+            scenario_stability_figure(self.scenario, style=style_named(style))
+        )
 
     def _parts(self) -> Parts:
         found = {name: value for name, value in vars(self).items() if name != "scenario"}
@@ -147,8 +155,13 @@ class Proposal(Shown):
             raise RunError(self._nothing)
         return scenario
 
-    def plot(self) -> "Figure":
+    def plot(self, *, style: str = "screen") -> "Figure":
         """Return the figure that `stickslip design --plot` draws.
+
+        Parameters
+        ----------
+        style : {"screen", "paper", "paper-double"}
+            What the figure is for: a screen, or one column or two of a journal.
 
         Returns
         -------
@@ -157,14 +170,17 @@ class Proposal(Shown):
 
         Raises
         ------
+        InvalidInputError
+            If `style` is unknown.
         RunError
             If there is nothing to propose.
         """
         if self.design.map_around() is None:
             raise RunError(self._nothing)
         from stickslip_ros.plots.stability_map import design_figure
+        from stickslip_ros.plots.style import style_named
 
-        return shown_in_notebooks(design_figure(self.design))
+        return shown_in_notebooks(design_figure(self.design, style=style_named(style)))
 
     def to_pandas(self) -> "DataFrame":
         """Return the checks as a table.

@@ -1,8 +1,9 @@
 """Common style of the figures: lines, fonts and colours, and how figures are saved."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import wraps
+from functools import partial, wraps
 from io import BytesIO
 from itertools import accumulate
 from pathlib import Path
@@ -20,7 +21,8 @@ from matplotlib.textpath import TextToPath
 from matplotlib.ticker import AutoLocator
 from PIL import Image
 
-from stickslip_ros.text import printable
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.text import printable, shown
 
 BLUE, ORANGE, GREEN, SKY_BLUE, GREY = "#0072B2", "#D55E00", "#009E73", "#56B4E9", "#999999"
 """Colours of Okabe and Ito's palette, which is safe for colour-blind readers, and a grey."""
@@ -77,6 +79,8 @@ _PRINTED: dict[str, Any] = {
 }
 """What differs in print."""
 
+_UNBROKEN = "\u00a0"
+
 _MILLIMETRE = 1.0 / 25.4
 
 _REPRODUCIBLE = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
@@ -130,8 +134,11 @@ class FigureStyle:
             return
         points = FontProperties(size=mpl.rcParams["figure.titlesize"]).get_size_in_points()
         letters = round(115.0 * float(figure.get_figwidth()) / points)
-        broken = (fill(printable(line), letters, max_lines=3, placeholder=" ...") for line in lines)
-        figure.suptitle("\n".join(broken), parse_math=False)
+        # A number stays with its unit.
+        joined = (re.sub(r"(?<=\d) (?=\D{1,4}(?:[ ,;]|$))", _UNBROKEN, printable(x)) for x in lines)
+        wrapped = partial(fill, max_lines=3, placeholder=" ...", break_on_hyphens=False)
+        broken = (wrapped(line, letters) for line in joined)
+        figure.suptitle("\n".join(broken).replace(_UNBROKEN, " "), parse_math=False)
 
     def legend_below(self, figure: Figure, handles: Sequence[Artist], most: int = 12) -> None:
         """Set a legend below the panels, in as many columns as fit, at most so many."""
@@ -148,6 +155,16 @@ STYLES = {
     "paper-double": FigureStyle(300.0, 180.0 * _MILLIMETRE),
 }
 """Styles by name: for the screen, and for one column or two of a journal."""
+
+
+def style_named(name: str) -> FigureStyle:
+    """Return a style by its name; raises InvalidInputError for an unknown one."""
+    if name not in STYLES:
+        raise InvalidInputError(
+            f"style = {shown(name)} is refused: must be one of {', '.join(STYLES)}"
+        )
+    return STYLES[name]
+
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")

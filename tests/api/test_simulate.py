@@ -157,6 +157,13 @@ def test_it_plots_twice_and_in_a_notebook() -> None:
     assert one._repr_png_()[:4] == b"\x89PNG"  # pyright: ignore
 
 
+def test_it_plots_for_a_journal() -> None:
+    run = ss.simulate("feed_drive", duration=0.5)
+    assert run.plot(style="paper").get_figwidth() == pytest.approx(85.0 / 25.4)
+    with pytest.raises(InvalidInputError, match="style = 'poster' is refused: must be one of scr"):
+        run.plot(style="poster")
+
+
 def test_pandas_has_the_arrays() -> None:
     run = ss.simulate("feed_drive", duration=0.2)
     frame = run.to_pandas()

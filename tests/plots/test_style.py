@@ -85,6 +85,12 @@ def test_a_title_is_shown_as_it_is_within_the_picture() -> None:
     assert 0.0 < box.x0 < box.x1 < figure.bbox.x1
 
 
+def test_a_number_in_a_title_stays_with_its_unit() -> None:
+    figure = Figure(figsize=(2.0, 2.0))
+    SCREEN.set_title(figure, "frequency 1234567890.15 Hz")  # of which 23 letters fit
+    assert figure.get_suptitle() == "frequency\n1234567890.15 Hz"
+
+
 @styled
 def labelled_figure(*, style: FigureStyle = SCREEN) -> Figure:
     figure = style.figure(8.0, 4.0, narrow=1.5)
