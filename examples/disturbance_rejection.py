@@ -26,10 +26,11 @@ drive = ss.scenario(
 
 figure = Figure(figsize=(8.0, 4.0), layout="constrained")
 axes = figure.subplots()
-for gain in (-2000.0, -3000.0, -6000.0):  # N s/m
+for gain, dashes in ((-2000.0, "-"), (-3000.0, "--"), (-6000.0, "-.")):  # N s/m
     run = ss.simulate(ss.scenario(drive, linear_gain=gain), duration=4.0)
     shown = run.trajectory[run.trajectory.time > 1.9]
-    axes.plot(shown.time, 1e6 * shown.position, lw=0.9, label=f"{gain:.0f} N s/m")
+    position = 1e6 * shown.position
+    axes.plot(shown.time, position, ls=dashes, lw=0.9, label=f"{gain:.0f} N s/m")
 axes.axvspan(2.0, 2.5, color="0.9", zorder=0, label="100 N push the slide")
 axes.set(xlabel="time (s)", ylabel="displacement (µm)")
 axes.legend()

@@ -20,11 +20,16 @@ _BINS = 30
 
 
 def draw_conclusions(
-    figure: Figure, part: GridSpec | GridSpecFromSubplotSpec, found: Conclusions, units: Units
+    figure: Figure,
+    part: GridSpec | GridSpecFromSubplotSpec,
+    found: Conclusions,
+    units: Units,
+    *,
+    short: bool,
 ) -> None:
-    """Draw the mean cycle with its edges, and the distributions over the slips.
+    """Draw the mean cycle with its edges, or the distributions over the slips.
 
-    `part` has three cells, beside each other or one above another.
+    `part` has three cells, beside each other or one above another. Labels may have to be `short`.
     """
     if found.slips is not None:  # they were asked for
         each = found.slips["each"]
@@ -38,12 +43,12 @@ def draw_conclusions(
             values = np.array([value for value in each[name] if value is not None])
             _distribution(figure.add_subplot(part[column]), values, title, unit, units)
     elif found.mean_cycle is not None:
-        _cycle(figure.add_subplot(part[0:2]), found.mean_cycle, units)
+        _cycle(figure.add_subplot(part[0:2]), found.mean_cycle, units, short=short)
         _residual(figure.add_subplot(part[2]), found.mean_cycle, units)
 
 
-def _cycle(axes: Axes, mean: MeanCycle, units: Units) -> None:
-    scale, label = units.axis(units.named("displacement"), "m", mean.position)
+def _cycle(axes: Axes, mean: MeanCycle, units: Units, *, short: bool) -> None:
+    scale, label = units.axis(units.named("displacement", short=short), "m", mean.position)
     second, time_label = units.axis("time within the cycle", "s", mean.phase)
     order = np.argsort(mean.phase)
     axes.plot(mean.phase / second, mean.position / scale, **_RAW, label="measured, all cycles")
@@ -68,7 +73,7 @@ def _cycle(axes: Axes, mean: MeanCycle, units: Units) -> None:
 
 def _residual(axes: Axes, mean: MeanCycle, units: Units) -> None:
     residual = mean.position - mean.fitted
-    scale, label = units.axis("measured less fitted", "m", residual)
+    scale, label = units.axis("residual", "m", residual)
     second, time_label = units.axis("time within the cycle", "s", mean.phase)
     axes.plot(mean.phase / second, residual / scale, **_RAW)
     axes.set_xlabel(time_label)

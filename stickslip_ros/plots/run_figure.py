@@ -104,7 +104,7 @@ def run_figure(
     if history.left_out:
         notes = [*notes, f"not drawn: {history.left_out} samples without an increasing time"]
     style.set_title(figure, title, measures_text(measures, panels.units), *notes)
-    ratios = (3.0, 2.3, 1.4) if panels.short else (3.0, 1.9, 1.2)
+    ratios = (2.8, 2.4, 1.5) if panels.short else (3.0, 1.9, 1.2)
     if style.narrow:
         ratios = (5.2, 4.2, 4.0)
     grid = figure.add_gridspec(rows, 1, height_ratios=ratios[:rows])
@@ -118,7 +118,8 @@ def run_figure(
         cycles = middle.subgridspec(2, 1)
     if rows == 3:
         shape = (3, 1) if style.narrow else (1, 3)
-        draw_conclusions(figure, grid[2].subgridspec(*shape), concluded, panels.units)
+        part = grid[2].subgridspec(*shape)
+        draw_conclusions(figure, part, concluded, panels.units, short=panels.short)
     panels.portrait(figure.add_subplot(left))
     first, second = (figure.add_subplot(part) for part in cycles)
     panels.cycles(first, second)

@@ -24,7 +24,7 @@ from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.plots.panes import LAST_CYCLES
 from stickslip_ros.plots.run_figure import run_figure
 from stickslip_ros.plots.run_history import RunHistory
-from stickslip_ros.plots.style import STYLES, save
+from stickslip_ros.plots.style import STYLES, FigureStyle, save
 from stickslip_ros.samples import SampleColumns
 from tests.physics.drives import FEED_DRIVE, PAPER
 from tests.plots.texts import faults
@@ -449,8 +449,7 @@ def test_friction_with_a_memory_is_drawn_as_its_loop() -> None:
     assert len(speed) > LAST_CYCLES * 60
 
 
-def test_what_was_concluded_of_a_noisy_record_is_shown() -> None:
-    """Raw samples, the fit, and the edges of the stick with their intervals."""
+def noisy_record() -> tuple[RunHistory, SampleMeter]:
     position, velocity, _ = motion(0.04)
     noise = 1e-6 * np.random.default_rng(1).standard_normal(2000)
     stamp, unknown = np.arange(2000) * 1_000_000, np.full(2000, np.nan)
@@ -460,6 +459,12 @@ def test_what_was_concluded_of_a_noisy_record_is_shown() -> None:
     history = RunHistory()
     meter = SampleMeter(20, history, reading=Reading(noisy=True))
     meter.feed(samples)
+    return history, meter
+
+
+def test_what_was_concluded_of_a_noisy_record_is_shown() -> None:
+    """Raw samples, the fit, and the edges of the stick with their intervals."""
+    history, meter = noisy_record()
     figure = run_figure(history, meter.measures(), None, title="")
     rows = len(figure.axes)
     history.take_conclusions(Conclusions(meter.mean_cycle, None))
@@ -471,6 +476,18 @@ def test_what_was_concluded_of_a_noisy_record_is_shown() -> None:
     assert any("departure ±" in label for label in labels)
     raw, fitted = axes.lines[:2]
     assert len(raw.get_xdata()) == len(fitted.get_xdata()) > 1200
+
+
+@pytest.mark.parametrize("style", [*STYLES.values(), FigureStyle(size=(8.0, 7.0))])
+def test_no_text_of_what_was_concluded_is_cut_off_or_overlaps(style: FigureStyle) -> None:
+    history, meter = noisy_record()
+    slips = {"each": {name: [1e-3, 2e-3, 4e-3] for name in ("stick_time", "drop", "slip_time")}}
+    for found in (Conclusions(meter.mean_cycle, None), Conclusions(meter.mean_cycle, slips)):
+        history.take_conclusions(found)
+        figure = run_figure(history, meter.measures(), None, title="it", style=style)
+        assert faults(figure) == []
+        shown = [axes.get_title() for axes in figure.axes]
+        assert ("drop of a slip, 3 slips" in shown) == (found.slips is not None)
 
 
 def switching(at: float, duration: float = 4.0) -> RunHistory:

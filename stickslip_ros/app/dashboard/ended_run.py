@@ -11,8 +11,7 @@ from stickslip_ros.app.dashboard.elements import heading, show_commands
 from stickslip_ros.app.dashboard.listener import ListenerNode
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError
-from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.plots.measure_table import LABELS
+from stickslip_ros.plots.measure_table import LABELS, measure_table
 from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import shipped_scenarios
 from stickslip_ros.scenarios.parameters import PlantParameters
@@ -67,12 +66,12 @@ class EndedRun:
         if self._report:
             plant = self._listener.parameters["plant"]
             units = Units.for_drive(PlantParameters.validated(plant, "plant").as_drive())
+            table = measure_table("", {"": self._report}, {"": units})
+            shown = [LABELS[name][0] for name in _SHOWN]
             with ui.row().classes("gap-x-6 gap-y-1"):
-                for name in _SHOWN:
-                    label, unit = LABELS[name]
-                    value = self._report.get(name)
-                    text = Regime.label(value) if name == "regime" else units.text(value, unit)
-                    ui.label(f"{label}: {text}")
+                for label, text in table.rows:
+                    if label in shown:
+                        ui.label(f"{label}: {text}")
         if self._problem:
             ui.label(self._problem)
         bag = self.bag

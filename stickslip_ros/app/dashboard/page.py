@@ -340,8 +340,10 @@ class _Page:
         trend = analyzer.figures.get("trend") if known else None
         if trend:  # the motion differs from the cycles that the regime is taken from
             self._regime.set_text(f"not steady: {trend}")
+        elif known:
+            self._regime.set_text(look.label)
         else:
-            self._regime.set_text(look.label if known else "not measured")
+            self._regime.set_text("run ended" if self._listener.ended else "not measured")
         colour = GREY if trend else look.colour
         if colour != self._regime_colour:
             self._regime_colour = colour
