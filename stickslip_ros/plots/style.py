@@ -188,8 +188,8 @@ def styled(draw: Callable[_P, _R]) -> Callable[_P, _R]:
 def finish(figure: Figure) -> None:
     """Make ticks round and labels no longer than their axes, once all is drawn.
 
-    The ticks of linear axes are whole multiples of 1, 2 or 5 times a power of ten. A vertical label
-    that is longer than its axis is broken into two lines.
+    The ticks of linear axes are whole multiples of 1, 2 or 5 times a power of ten. A label that is
+    longer than its axis is broken into two lines.
     """
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
@@ -198,13 +198,19 @@ def finish(figure: Figure) -> None:
                 locator.set_params(steps=[1.0, 2.0, 5.0, 10.0])
     figure.draw_without_rendering()
     for axes in figure.axes:
-        label = axes.yaxis.label
-        words = label.get_text().split(" ")
-        if label.get_window_extent().height > axes.get_window_extent().height and len(words) > 1:
-            lines = [
-                (" ".join(words[:count]), " ".join(words[count:])) for count in range(1, len(words))
-            ]
-            label.set_text("\n".join(min(lines, key=lambda pair: max(map(len, pair)))))
+        room = axes.get_window_extent()
+        across, along = axes.xaxis.label, axes.yaxis.label
+        if across.get_window_extent().width > room.width:
+            across.set_text(_in_two_lines(across.get_text()))
+        if along.get_window_extent().height > room.height:
+            along.set_text(_in_two_lines(along.get_text()))
+
+
+def _in_two_lines(text: str) -> str:
+    """Return a text with the break that makes the longer line as short as possible."""
+    words = text.split(" ")
+    breaks = [(" ".join(words[:count]), " ".join(words[count:])) for count in range(1, len(words))]
+    return "\n".join(min(breaks, key=lambda pair: max(map(len, pair)), default=(text,)))
 
 
 def text_width(text: str, points: float) -> float:

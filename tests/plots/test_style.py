@@ -152,6 +152,11 @@ def test_a_label_that_is_longer_than_its_axis_has_two_lines() -> None:
     finish(figure)
     assert axes[0].get_ylabel() == "measured less fitted (µm)"
     assert axes[1].get_ylabel() == "measured less\nfitted (µm)"
+    narrow = Figure((1.5, 4.0))
+    (axes,) = narrow.subplots(1, 1, squeeze=False)[0]
+    axes.set_xlabel("velocity relative to the belt (mm/s)")
+    finish(narrow)
+    assert axes.get_xlabel() == "velocity relative\nto the belt (mm/s)"
 
 
 def test_ticks_are_round() -> None:

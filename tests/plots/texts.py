@@ -25,11 +25,12 @@ def faults(figure: Figure) -> list[str]:
         or box.y1 > whole.y1 + 1.0
     ]
     for axes in figure.axes:
-        label = axes.yaxis.label
-        if axes.get_visible() and label.get_visible():
-            room = axes.get_window_extent().height + 1.0
-            if label.get_window_extent().height > room:
-                found.append(f"{label.get_text()!r} is longer than its axis")
+        room = axes.get_window_extent()
+        across, along = axes.xaxis.label, axes.yaxis.label
+        if axes.get_visible() and along.get_window_extent().height > room.height + 1.0:
+            found.append(f"{along.get_text()!r} is longer than its axis")
+        if axes.get_visible() and across.get_window_extent().width > room.width + 1.0:
+            found.append(f"{across.get_text()!r} is longer than its axis")
     for (name, box), (other, other_box) in combinations(shown, 2):
         both = Bbox.intersection(box, other_box)
         if both is not None and min(both.width, both.height) > _TOUCHING:
