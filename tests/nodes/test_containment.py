@@ -62,8 +62,8 @@ print(json.dumps([sorted(seen), len(states) > 0, force.get_subscription_count()]
 
 SNIFFER = """
 import socket
-link = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(0x0003))
-link.bind(("cable", 0))
+link = socket.socket(socket.AF_PACKET, socket.SOCK_RAW)  # until it is bound, it hears nothing
+link.bind(("cable", 0x0003))
 print("ready", flush=True)
 came, left = 0, []
 while came < 100:
