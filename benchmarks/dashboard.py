@@ -23,13 +23,15 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from statistics import median
+from typing import TYPE_CHECKING
 from urllib.error import URLError
-
-import psutil
 
 from benchmarks.parties import READY_TIMEOUT, ObservedPlant, Slice, closed_loop, party
 from benchmarks.slices import Row, by_turns, compare_rates, lacks, show
 from stickslip_ros.nodes.base.child_process import start_child
+
+if TYPE_CHECKING:
+    from psutil import Process
 
 LOCKSTEP_ROUNDS = 9
 LOCKSTEP_TIME = 3.0
@@ -67,6 +69,7 @@ class Spent:
 
 
 Watch = Callable[[], Spent]
+"""Returns what a dashboard has done and used so far."""
 
 
 @contextmanager
@@ -119,6 +122,8 @@ def dashboard(*, with_page: bool) -> Generator[Callable[[], AbstractContextManag
         os.kill(process.pid, signal.SIGSTOP)
 
         def watch() -> Spent:
+            import psutil
+
             server = psutil.Process(process.pid)
             own = psutil.Process().children(recursive=True)
             return Spent(
@@ -141,7 +146,7 @@ def dashboard(*, with_page: bool) -> Generator[Callable[[], AbstractContextManag
         yield watching
 
 
-def _processor_time(processes: Iterable[psutil.Process]) -> float:
+def _processor_time(processes: Iterable["Process"]) -> float:
     times = [process.cpu_times() for process in processes]
     return sum(each.user + each.system for each in times)
 
@@ -161,8 +166,9 @@ def wait_for_page(url: str) -> None:
 def measure() -> list[Row]:
     if shutil.which("chromium") is None:
         lacks("chromium: sudo apt-get install chromium")
-    if find_spec("playwright") is None:
-        lacks("playwright: pip install playwright")
+    for module in ("playwright", "psutil"):
+        if find_spec(module) is None:
+            lacks(f"{module}: pip install {module}")
     kinds = (SEEN, UNSEEN, NOBODY)
     rows: list[Row] = []
     with ExitStack() as resources:

@@ -31,9 +31,10 @@ _POINT: Any = {"marker": "o", "ms": 5.0, "ls": "", "color": "white", "mec": "bla
 _FOLD: Any = {**_POINT, "marker": "D", "ms": 4.0}
 _NOW: Any = {"color": GREY, "lw": 3.0, "alpha": 0.6, "zorder": 1.0}
 _ONSET: Any = {"color": "black", "lw": 0.8, "ls": DASHES[2], "zorder": 1.5}
+_BORDER: Any = {"color": "black", "lw": 0.5, "ls": DASHES[1], "zorder": 1.5}
+
 _SAME = 1e-3
 """Relative distance of two belt speeds below which one mark serves for both."""
-_BORDER: Any = {"color": "black", "lw": 0.5, "ls": DASHES[1], "zorder": 1.5}
 
 
 @styled

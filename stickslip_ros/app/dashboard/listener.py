@@ -415,10 +415,10 @@ class ListenerNode(PollingNode):
             values = {name: value for name, value in values.items() if name in known}
             for name, value in values.items():
                 before = self.parameters[node].get(name)
-                # Nodes that end take their parameters back.
-                text = f"{value:g}" if isinstance(value, float) else str(value)
-                old = f"{before:g}" if isinstance(before, float) else str(before)
-                if None not in (before, value) and text != old:
+                # Nodes that end take their parameters back. A NaN differs from itself.
+                if None not in (before, value) and repr(before) != repr(value):
+                    text = f"{value:g}" if isinstance(value, float) else str(value)
+                    old = f"{before:g}" if isinstance(before, float) else str(before)
                     self._tell(f"{node}.{name}: {old} to {text}", f"{name} {text}")
             if self.parameters[node]:  # otherwise only these would be known
                 self._know(node, values)

@@ -200,9 +200,10 @@ function drawMotion(motion) {
   if (page.frames % FRAMES_OF_PORTRAIT === 0) drawPortrait(motion, positions, speeds);
 }
 
-function drawPortrait({ lines: { orbit }, labels: [displacement, speed], ...motion }, positions, speeds) {
+function drawPortrait({ lines, labels, equilibrium, belt_speed }, positions, speeds) {
   const { BLUE, GREEN, SKY_BLUE } = page.colours;
-  const { equilibrium, belt_speed } = motion;
+  const [displacement, speed] = labels;
+  const { orbit } = lines;
   setChanged("portrait", {
     xAxis: { name: displacement, ...positions },
     yAxis: { name: speed, ...speeds },
