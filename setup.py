@@ -18,7 +18,7 @@ EXECUTABLES = {
 }
 
 ANALYSIS = ["pandas>=2.2.2", "xarray>=2024.6"]  # pandas: the first built for numpy 2
-DASHBOARD = ["contourpy", "fastapi", "nicegui>=3", "orjson", "uvicorn"]
+DASHBOARD = ["contourpy", "fastapi", "jinja2", "nicegui>=3", "orjson", "uvicorn"]
 
 STUB = '#!/bin/sh\nexec "$(dirname "$0")/../../bin/$(basename "$0")" "$@"\n'
 
@@ -54,6 +54,7 @@ setup(
     package_data={
         NAME: [
             "py.typed",
+            "app/*.sh",
             "app/dashboard/*.css",
             "app/dashboard/*.js",
             "paper/claims/*.toml",
@@ -80,10 +81,12 @@ setup(
         "mcap>=1.5",  # the first whose writer can close a chunk on demand
         "numpy>=2",
         "pillow>=10.1",  # the oldest wheels for 3.12
+        "pint>=0.24.4",  # the first that works with the flexparser of today
         "pydantic>=2.5",  # the first for 3.12; 1, which distributions still ship, has another API
         "pyyaml>=6.0.1",  # the first that builds with the Cython of today
         "rich>=13",
         "scipy>=1.13",  # the first built for numpy 2
+        "typing_extensions>=4.10",  # the oldest that starlette takes; 3.11 has no `override`
         "zstandard>=0.22",  # the oldest wheels for 3.12
     ],
     extras_require={
@@ -113,6 +116,7 @@ setup(
         ],
         # The documentation as a web site (make site).
         "docs": [
+            "griffe-inherited-docstrings",  # overrides without a docstring
             "latex2mathml",  # formulas that need no script in the browser
             "mkdocs-material",
             "mkdocs>=1.6",  # the first that checks the anchors of links

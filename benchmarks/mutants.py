@@ -1,14 +1,17 @@
 """Which changes to the physics does the test suite not detect?
 
-Each mutant is a copy of the checkout with one change below `stickslip_ros/physics`: another sign,
-operator, comparison, number or condition, chosen at random by the seed. The tests that start
-neither a process nor a node run against each mutant, those of the physics first, until one fails.
-The output lists each mutant and the test that caught it. Some mutants that survive are equivalent
-to the original up to rounding.
+`mutants.json` holds 200 mutants. Each names a function of the physics and changes one expression
+in it: another sign, operator, comparison, number or condition. It is found by these, whatever the
+file, so that the same mutants are tried before and after code moves. The tests that start neither
+a process nor a node run against a copy of the checkout with one mutant, those of the physics
+first, until one fails. The output lists each mutant and the test that caught it. Some mutants that
+survive are equivalent to the original up to rounding.
 """
 
 import argparse
 import ast
+import copy
+import json
 import os
 import random
 import shutil
@@ -17,117 +20,175 @@ import sys
 import tempfile
 from collections.abc import Generator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
 CHECKOUT = Path(__file__).parents[1]
-PHYSICS = Path("stickslip_ros/physics")
+PACKAGE = Path("stickslip_ros")
+ROOMS = ("physics", "model", "motion", "measures", "theory")
+FILE = Path(__file__).with_suffix(".json")
 TIERS = (
     ("tests/physics",),
     ("tests/studies", "tests/paper", "tests/plots", "tests/scenarios", "tests/bags", "tests/app"),
 )
 TIMEOUT = 600.0
 
-OPERATORS = {"+": "-", "-": "+", "*": "/", "/": "*", "<": ">=", ">": "<=", "<=": ">", ">=": "<"}
-OPERATORS |= {"is": "is not", "is not": "is", "==": "!=", "!=": "==", "and": "or", "or": "and"}
+OPERATORS: dict[type[ast.AST], type[ast.AST]] = {
+    ast.Add: ast.Sub,
+    ast.Sub: ast.Add,
+    ast.Mult: ast.Div,
+    ast.Div: ast.Mult,
+    ast.Lt: ast.GtE,
+    ast.GtE: ast.Lt,
+    ast.Gt: ast.LtE,
+    ast.LtE: ast.Gt,
+    ast.Is: ast.IsNot,
+    ast.IsNot: ast.Is,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+    ast.And: ast.Or,
+    ast.Or: ast.And,
+}
 
 
 class Mutant(NamedTuple):
-    """A change of one file: the text from byte `start` to `end`, before and after."""
+    """One expression of a function, before and after."""
 
-    file: Path
-    line: int
-    start: int
-    end: int
+    function: str
+    """Qualified name within its file."""
     before: str
     after: str
+    number: int
+    """Which of the equal expressions of the function is changed."""
 
     def __str__(self) -> str:
-        return f"{self.file}:{self.line}: {self.before} -> {self.after}"
+        return f"{self.function}: {self.before} -> {self.after} ({self.number})"
+
+
+class Place(NamedTuple):
+    """An expression in the source."""
+
+    file: Path
+    node: ast.expr
 
 
 def main() -> int:
     """Test the mutants; return 0 whether or not they are caught."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mutants", description=__doc__)
-    parser.add_argument("--count", type=int, default=44, help="number of mutants (default: 44)")
-    parser.add_argument("--seed", type=int, default=0, help="seed that selects them (default: 0)")
+    parser.add_argument("--count", type=int, help="try so many of them, spread over all")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="parallel runs")
+    parser.add_argument("--choose", type=int, metavar="COUNT", help=f"choose those of {FILE.name}")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the choice (default: 0)")
     arguments = parser.parse_args()
-    everything = list(chain.from_iterable(map(mutants_of, sorted(PHYSICS.rglob("*.py")))))
-    chosen = random.Random(arguments.seed).sample(everything, arguments.count)
-    if failure := first_failure(Mutant(chosen[0].file, 0, 0, 0, "", "")):
+    places = expressions()
+    if arguments.choose:
+        chosen = random.Random(arguments.seed).sample(sorted(places), arguments.choose)
+        FILE.write_text(json.dumps([each._asdict() for each in sorted(chosen)], indent=1) + "\n")
+        return 0
+    mutants = [Mutant(**each) for each in json.loads(FILE.read_text(encoding="utf-8"))]
+    if arguments.count:
+        mutants = mutants[:: max(1, len(mutants) // arguments.count)][: arguments.count]
+    for gone in [mutant for mutant in mutants if mutant not in places]:
+        print(f"GONE     {gone}")
+    mutants = [mutant for mutant in mutants if mutant in places]
+    if failure := first_failure(None, ""):
         parser.error(f"without a change {failure}: the tests must pass before mutants are tried")
     caught = 0
     with ThreadPoolExecutor(arguments.workers) as pool:
-        for mutant, failure in zip(chosen, pool.map(first_failure, chosen), strict=True):
+        tried = pool.map(lambda mutant: first_failure(places[mutant], mutant.after), mutants)
+        for mutant, failure in zip(mutants, tried, strict=True):
             print(f"{'caught  ' if failure else 'SURVIVES'} {mutant}  {failure}", flush=True)
             caught += bool(failure)
-    print(f"{caught} of {len(chosen)} caught")
+    print(f"{caught} of {len(mutants)} caught")
     return 0
 
 
-def mutants_of(file: Path) -> Generator[Mutant]:
-    """Return every mutant of a file."""
-    source = (CHECKOUT / file).read_text(encoding="utf-8")
-    starts = [0]
-    for line in source.encode().splitlines(keepends=True):
-        starts.append(starts[-1] + len(line))
+def expressions() -> dict[Mutant, Place]:
+    """Return every mutant whose function and expression are found once, and its place."""
+    found: dict[Mutant, list[Place]] = {}
+    for file in sorted(
+        file for room in ROOMS for file in (CHECKOUT / PACKAGE / room).rglob("*.py")
+    ):
+        for function, definition in functions(ast.parse(file.read_text(encoding="utf-8"))):
+            seen: dict[tuple[str, str], int] = {}
+            for node, mutated in changes(definition):
+                texts = ast.unparse(node), ast.unparse(mutated)
+                number = seen[texts] = seen.get(texts, 0) + 1
+                mutant = Mutant(function, *texts, number)
+                found.setdefault(mutant, []).append(Place(file.relative_to(CHECKOUT), node))
+    return {mutant: places[0] for mutant, places in found.items() if len(places) == 1}
 
-    def place(line: int, column: int) -> int:
-        return starts[line - 1] + column
 
-    def between(one: ast.expr, other: ast.expr) -> Generator[Mutant]:
-        start = place(one.end_lineno or 0, one.end_col_offset or 0)
-        end = place(other.lineno, other.col_offset)
-        text = source.encode()[start:end].decode()
-        if (operator := text.strip("() \n")) in OPERATORS:
-            after = text.replace(operator, OPERATORS[operator])
-            yield Mutant(file, one.end_lineno or 0, start, end, operator, after)
-
-    for node in ast.walk(ast.parse(source)):
+def functions(tree: ast.AST, outer: str = "") -> Generator[tuple[str, ast.AST]]:
+    """Yield the qualified name of each function that is not within another, and the function."""
+    for node in ast.iter_child_nodes(tree):
         match node:
-            case ast.BinOp(left=left, right=right):
-                yield from between(left, right)
-            case ast.Compare(left=left, comparators=[right]):
-                yield from between(left, right)
-            case ast.BoolOp(values=[left, right, *_]):
-                yield from between(left, right)
-            case ast.UnaryOp(op=ast.USub() | ast.Not(), operand=operand):
-                start = place(node.lineno, node.col_offset)
-                end = place(operand.lineno, operand.col_offset)
-                before = source.encode()[start:end].decode()
-                yield Mutant(file, node.lineno, start, end, before, "")
-            case ast.Constant(value=float(value)) if value not in (0.0, float("inf")):
-                start = place(node.lineno, node.col_offset)
-                end = place(node.end_lineno or 0, node.end_col_offset or 0)
-                yield Mutant(file, node.lineno, start, end, str(value), repr(1.01 * value))
+            case ast.ClassDef(name=name):
+                yield from functions(node, f"{outer}{name}.")
+            case ast.FunctionDef(name=name):
+                yield f"{outer}{name}", node
             case _:
                 pass
 
 
-def first_failure(mutant: Mutant) -> str:
-    """Return the first test that fails for the mutant, and how; empty if none fails."""
+def changes(function: ast.AST) -> Generator[tuple[ast.expr, ast.expr]]:
+    """Yield each expression of a function that can be changed, and what it becomes."""
+    within_texts = {
+        part
+        for node in ast.walk(function)
+        if isinstance(node, ast.JoinedStr)
+        for part in ast.walk(node)
+    }
+    for node in ast.walk(function):
+        if node in within_texts:
+            continue
+        match node:
+            case ast.BinOp(op=op) | ast.BoolOp(op=op) if type(op) in OPERATORS:
+                mutated = copy.deepcopy(node)
+                mutated.op = OPERATORS[type(op)]()
+                yield node, mutated
+            case ast.Compare(ops=[op]) if type(op) in OPERATORS:
+                mutated = copy.deepcopy(node)
+                mutated.ops = [OPERATORS[type(op)]()]
+                yield node, mutated
+            case ast.UnaryOp(op=ast.USub() | ast.Not(), operand=operand):
+                yield node, operand
+            case ast.Constant(value=float(value)) if value not in (0.0, float("inf")):
+                yield node, ast.Constant(1.01 * value)
+            case _:
+                pass
+
+
+def first_failure(place: Place | None, after: str) -> str:
+    """Return the first test that fails with a mutant, and how; empty if none fails."""
     with tempfile.TemporaryDirectory() as directory:
-        copy = Path(directory) / "checkout"
+        checkout = Path(directory) / "checkout"
         listing = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
         for name in subprocess.check_output(listing, cwd=CHECKOUT, text=True).split("\0"):
             if (CHECKOUT / name).is_file():
-                (copy / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(CHECKOUT / name, copy / name)
-        text = (copy / mutant.file).read_bytes()
-        changed = text[: mutant.start] + mutant.after.encode() + text[mutant.end :]
-        (copy / mutant.file).write_bytes(changed)
-        return next(filter(None, (failure_of(copy, tests) for tests in TIERS)), "")
+                (checkout / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(CHECKOUT / name, checkout / name)
+        if place is not None:
+            change(checkout / place.file, place.node, after)
+        return next(filter(None, (failure_of(checkout, tests) for tests in TIERS)), "")
 
 
-def failure_of(copy: Path, tests: Sequence[str]) -> str:
+def change(file: Path, node: ast.expr, after: str) -> None:
+    """Write the expression `after` where `node` stands in a file."""
+    lines = file.read_bytes().splitlines(keepends=True)
+    end = node.end_lineno or node.lineno
+    head = b"".join(lines[: node.lineno - 1]) + lines[node.lineno - 1][: node.col_offset]
+    tail = lines[end - 1][node.end_col_offset :] + b"".join(lines[end:])
+    file.write_bytes(head + f"({after})".encode() + tail)
+
+
+def failure_of(checkout: Path, tests: Sequence[str]) -> str:
     """Return the first test of a copy that fails, or that the tests do not finish."""
     pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-m", "not process and not long"]
-    environment = os.environ | {"PYTHONPATH": str(copy), "CI": "true"}
+    environment = os.environ | {"PYTHONPATH": str(checkout), "CI": "true"}
     try:
         done = subprocess.run(
-            [*pytest, *tests], cwd=copy, env=environment, timeout=TIMEOUT, capture_output=True
+            [*pytest, *tests], cwd=checkout, env=environment, timeout=TIMEOUT, capture_output=True
         )
     except subprocess.TimeoutExpired:
         return f"not finished after {TIMEOUT:g} s"

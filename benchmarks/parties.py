@@ -28,11 +28,12 @@ from rclpy.task import Future
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.child_process import start_child
+from stickslip_ros.nodes.base.machine import own_domain
 from stickslip_ros.nodes.base.managed import ManagedNode
+from stickslip_ros.nodes.base.network import domain_variables
 from stickslip_ros.nodes.base.process import spin
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
-from stickslip_ros.running.domain import domain_variables, own_domain
 from stickslip_ros.scenarios.files import DEFAULT_NAMESPACE, load_scenario, parameter_file
 
 T = TypeVar("T")

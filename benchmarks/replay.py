@@ -27,11 +27,12 @@ from stickslip_ros.bags.recorder import QosProfile, Recorder
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
 from stickslip_ros.messages.topics import CONTROL_FORCE, DEEP, JOINT_STATES
 from stickslip_ros.nodes.base.child_process import start_child
+from stickslip_ros.nodes.base.machine import own_domain
+from stickslip_ros.nodes.base.network import domain_variables
 from stickslip_ros.nodes.base.process import spin
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.replaying.player import Message
-from stickslip_ros.running.domain import domain_variables, own_domain
-from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE
+from stickslip_ros.scenarios import DEFAULT_NAMESPACE
 from stickslip_ros.stamps import NANOSECONDS
 
 SAMPLES = 30_000

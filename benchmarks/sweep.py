@@ -29,13 +29,13 @@ from stickslip_ros.studies.columns import write_csv
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.runner import run_here
-from stickslip_ros.studies.settling import SettlingCourse
+from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.sweep import sweep_study
 
 POINTS, SAMPLED_POINTS, ROUNDS = 1000, 3, 5
 MANY_POINTS, MANY_ROUNDS = 20_000, 3
-COURSE = SettlingCourse(transient=100.0)
+COURSE = SettlingOptions(transient=100.0)
 LOW, HIGH = 0.02, 0.6
 PERIOD = 0.01
 GAINS = (2.0, -1.0, -1.0)

@@ -82,7 +82,7 @@ def commands() -> Iterator[str]:
 
 
 def _command(name: str, line: str, example: str) -> Iterator[str]:
-    from stickslip_ros.app.main import command_parser
+    from stickslip_ros.app.commands import command_parser
 
     parser = command_parser(name)
     formatter = parser._get_formatter()
@@ -165,7 +165,7 @@ def numbers() -> Iterator[str]:
         "sampled at 100 Hz: spectral radius": sampled["spectral_radius"],
         "its stable linear gains": sampled["stable_linear_gains"][0],
     }
-    yield table(["quantity", "value"], [[name, _figures(value)] for name, value in rows.items()])
+    yield table(["quantity", "value"], [[name, _values(value)] for name, value in rows.items()])
 
 
 def _complex(pairs: Sequence[Sequence[float]]) -> str:
@@ -177,7 +177,7 @@ def _complex(pairs: Sequence[Sequence[float]]) -> str:
     )
 
 
-def _figures(value: Any) -> str:
+def _values(value: Any) -> str:
     if isinstance(value, str):
         return value
     return ", ".join(f"{v:.5g}" for v in (value if isinstance(value, list | tuple) else [value]))
@@ -373,7 +373,7 @@ BLOCKS: dict[str, Callable[[], Iterator[str]]] = {
 
 
 def filled(page: str) -> str:
-    """Return the text of a page with all of its blocks made anew."""
+    """Return the text of a page with all of its blocks made again."""
 
     def block(match: re.Match[str]) -> str:
         name = match[1]

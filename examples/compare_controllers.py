@@ -22,8 +22,10 @@ WASHOUT = ("washout_controller.linear_gain=-6000.0", "washout_controller.start_a
 
 def run(belt_speed: float, controller: str) -> RunResult:
     """Run the feed drive at a belt speed (m/s) with one of CONTROLLERS."""
-    overrides = (f"plant.belt_speed={belt_speed}", *WASHOUT)
-    with ClosedLoop("feed_drive", *overrides, controller=CONTROLLERS[controller]) as loop:
+    chosen = CONTROLLERS[controller]
+    gains = () if chosen is None else WASHOUT
+    overrides = (f"plant.belt_speed={belt_speed}", *gains)
+    with ClosedLoop("feed_drive", *overrides, controller=chosen) as loop:
         return loop.run(DURATION)
 
 

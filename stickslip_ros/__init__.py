@@ -15,8 +15,6 @@ if is_run(__name__, "stickslip", *NODE_SCRIPTS):
 
 from typing import TYPE_CHECKING, Any  # what takes time comes second
 
-from stickslip_ros.deprecated_names import find_moved_modules
-
 if TYPE_CHECKING:
     from stickslip_ros.api.identification import Model, identify
     from stickslip_ros.api.recordings import RecordedRun, read_bag, read_table
@@ -29,8 +27,6 @@ if TYPE_CHECKING:
     from stickslip_ros.scenarios.files import Scenario
 
     __version__: str
-
-find_moved_modules()
 
 __all__ = [
     "Basin",
@@ -84,5 +80,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return the names of the package, those that are not loaded yet included."""
-    return sorted({*globals(), *__all__})
+    """Return the public names, those that are not loaded yet included."""
+    return sorted(__all__)

@@ -37,3 +37,12 @@ class MessageError(BagError):
 
 class RunError(StickslipError):
     """A run started but failed, for example because a node died or never became ready."""
+
+
+def in_words(error: BaseException) -> str:
+    """Return an exception of the code of others on one line; one of this package as it is."""
+    if isinstance(error, StickslipError):
+        return str(error)
+    from traceback import format_exception_only  # --help needs none
+
+    return " ".join(format_exception_only(error)[-1].split())

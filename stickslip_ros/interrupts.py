@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+from types import FrameType
 
 NODE_SCRIPTS = (
     "plant_node",
@@ -12,6 +13,9 @@ NODE_SCRIPTS = (
     "replay_node",
 )
 """Installed scripts that start a node."""
+
+_IMPORT_TIME = 0.05
+"""Time, s, after which an interrupt amid an import is tried again."""
 
 
 def is_run(package: str, *scripts: str) -> bool:
@@ -28,6 +32,20 @@ def end_quietly_if_interrupted() -> None:
 
 
 def raise_interrupts() -> None:
-    """Let SIGINT raise KeyboardInterrupt again instead of ending this process quietly."""
-    if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+    """Let SIGINT raise KeyboardInterrupt instead of ending this process quietly."""
+    if signal.getsignal(signal.SIGINT) in (signal.SIG_DFL, signal.default_int_handler):
+        signal.signal(signal.SIGINT, _raise_after_import)
+
+
+def _raise_after_import(number: int, frame: FrameType | None) -> None:
+    """Raise KeyboardInterrupt; amid the import of a C extension it would be an ImportError."""
+    while frame is not None and not frame.f_code.co_filename.startswith("<frozen importlib"):
+        frame = frame.f_back
+    if frame is None:
+        raise KeyboardInterrupt
+
+    def interrupt(*_: object) -> None:
+        signal.raise_signal(number)
+
+    signal.signal(signal.SIGALRM, interrupt)
+    signal.setitimer(signal.ITIMER_REAL, _IMPORT_TIME)

@@ -7,7 +7,6 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray, Table
-from stickslip_ros.deprecated_names import Renamed
 
 LARGEST = 1e100
 """Magnitude up to which positions (m) and speeds (m/s) are measured without overflow."""
@@ -67,8 +66,6 @@ class SampleColumns(Table):
     10
     """
 
-    effort = Renamed("friction_force")
-
     stamp: IntArray
     """Stamps, ns."""
     position: FloatArray
@@ -101,12 +98,12 @@ class SampleColumns(Table):
         return cls(stamp, *others.T.copy())
 
     @property
-    def believed(self) -> BoolArray:
+    def is_valid(self) -> BoolArray:
         """Boolean mask of the samples that are measured: finite, up to 1e100 m and m/s."""
-        believed = np.abs(self.position) <= LARGEST
+        is_valid = np.abs(self.position) <= LARGEST
         for column in (self.velocity, self.belt_velocity):
-            believed &= np.abs(column) <= LARGEST
-        return believed
+            is_valid &= np.abs(column) <= LARGEST
+        return is_valid
 
 
 @dataclass(frozen=True, eq=False)

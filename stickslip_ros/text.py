@@ -2,7 +2,9 @@
 
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from difflib import SequenceMatcher
+from math import isfinite
 from typing import Any
 
 _PREFIXES = {1e9: "G", 1e6: "M", 1e3: "k", 1.0: "", 1e-3: "m", 1e-6: "µ", 1e-9: "n"}
@@ -26,7 +28,10 @@ def printable(text: str) -> str:
 
 def shown(value: Any) -> str:
     """Return a value as messages show it; a long one is shortened."""
-    text = repr(value)
+    try:
+        text = repr(value)
+    except Exception:  # a value of the code of others, or a number of more than 4300 digits
+        text = f"an object of class {type(value).__name__}"
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
@@ -34,6 +39,14 @@ def quantity(value: float, unit: str) -> str:
     """Return a rounded value with a suitable prefix and its unit."""
     scale, prefix = prefix_for(value)
     return f"{value / scale:.4g} {prefix}{unit}"
+
+
+def number_in(text: str) -> float:
+    """Return the number that a peer reports as text; 0 if it is none, or no finite one."""
+    with suppress(ValueError, OverflowError):
+        number = int(text) if text.isdecimal() else float(text)
+        return number if isfinite(number) else 0.0
+    return 0.0
 
 
 def prefix_for(largest: float) -> tuple[float, str]:

@@ -1,10 +1,36 @@
-"""Processes that end quietly on SIGINT while they import."""
+"""SIGINT while a process of this package imports."""
 
+import subprocess
+import sys
 from importlib import metadata
+from pathlib import Path
+
+import pytest
 
 from stickslip_ros.interrupts import NODE_SCRIPTS
+
+IMPORTED = """
+import signal, time
+signal.raise_signal(signal.SIGINT)
+time.sleep(0.2)  # the signal is looked at again meanwhile
+"""
 
 
 def test_every_installed_script_is_known() -> None:
     scripts = metadata.distribution("stickslip_ros").entry_points.select(group="console_scripts")
     assert {"stickslip", *NODE_SCRIPTS} == set(scripts.names)
+
+
+@pytest.mark.process
+def test_an_interrupt_amid_an_import_comes_after_it(tmp_path: Path) -> None:
+    """Within the import of a C extension it would be an ImportError."""
+    (tmp_path / "slow.py").write_text(IMPORTED, encoding="utf-8")
+    code = (
+        "import signal; from stickslip_ros.interrupts import raise_interrupts; raise_interrupts()\n"
+        "import slow; print('imported', flush=True); signal.pause()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60
+    )
+    assert done.stdout == "imported\n"
+    assert done.stderr.splitlines()[-1] == "KeyboardInterrupt"

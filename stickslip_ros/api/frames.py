@@ -8,9 +8,7 @@ from stickslip_ros.errors import RunError
 from stickslip_ros.plots.measure_table import LABELS
 from stickslip_ros.plots.units import Units
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.scenarios.keywords import keyword_of
-from stickslip_ros.scenarios.parameter_field import known_parameters
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.scenarios.keywords import described, keyword_of
 from stickslip_ros.versions import versions
 
 
@@ -28,8 +26,7 @@ def of_measure(name: str) -> Quantity:
 
 def of_parameter(parameter: str) -> Quantity:
     """Return label and unit of NODE.PARAMETER."""
-    node, _, name = parameter.partition(".")
-    known = known_parameters(NODE_PARAMETERS[node])[name]
+    known = described(parameter)
     return Quantity(known.meaning.rstrip("."), known.unit or "")
 
 
@@ -47,7 +44,7 @@ def _units(columns: Any, quantities: Mapping[str, Quantity], units: Units) -> di
     }
 
 
-def made_of(scenario: Scenario) -> dict[str, str]:
+def provenance(scenario: Scenario) -> dict[str, str]:
     """Return the attributes of a data set: scenario, overrides and version."""
     return {
         "scenario": scenario.name,

@@ -39,7 +39,7 @@ class Model(Shown):
 
     @property
     def unidentified(self) -> dict[str, str]:
-        """What the recordings do not tell, and what run would, by parameter."""
+        """Reasons why a parameter is not told, and the run that would tell it, by parameter."""
         return {f"plant.{name}": why for name, why in self.findings.unidentified.items()}
 
     @property
@@ -136,7 +136,7 @@ def identify(
     *recordings: Path | str,
     columns: Mapping[str, str] | None = None,
     law: str = AUTO,
-    fixed: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float | str] | None = None,
     start: float = 0.0,
     end: float = float("inf"),
     namespace: str | None = None,
@@ -153,7 +153,7 @@ def identify(
     law : str, optional
         Friction law, or `"auto"`: the one that predicts held-out parts best.
     fixed : mapping, optional
-        Constants that are known, such as `{"plant.mass": 95.0}`, SI units.
+        Constants that are known, such as `{"plant.mass": 95.0}` or `"95kg"`, SI units.
     start, end : float, optional
         Part to use, s from the first sample of each recording.
     namespace : str, optional

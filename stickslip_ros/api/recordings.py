@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,13 +14,11 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags.report import report_of_bag, report_of_table
 from stickslip_ros.physics.loop.trajectory import QUANTITIES
 from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
-from stickslip_ros.physics.measures.observer import RunObserver
 from stickslip_ros.physics.measures.slips import SlipThreshold
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.measure_table import measure_table
+from stickslip_ros.plots.measure_table import measure_table, why_no_cycle
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
-from stickslip_ros.plots.why_no_cycle import why_no_cycle
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.studies.recorded_drive import recorded_drive
@@ -62,7 +61,7 @@ class RecordedRun(Shown):
 
     @property
     def missing(self) -> list[str]:
-        """What is missing in the bag, in sentences."""
+        """Sentences on the parts that are missing in the bag."""
         return self.report["missing"]
 
     def plot(self, *, style: str = "screen") -> "Figure":
@@ -83,7 +82,7 @@ class RecordedRun(Shown):
         InvalidInputError
             If `style` is unknown.
         """
-        from stickslip_ros.plots.recorded_run import recorded_run_figure
+        from stickslip_ros.plots.run_figure import recorded_run_figure
         from stickslip_ros.plots.style import style_named
 
         return shown_in_notebooks(
@@ -192,19 +191,15 @@ def read_bag(
     >>> recorded.measures.regime.value, f"{recorded.measures.amplitude:.2e}"
     ('stick_slip', '3.26e-04')
     """
-
-    def report(observer: RunObserver, take: Callable[[Part], None]) -> dict[str, Any]:
-        return report_of_bag(
-            Path(path),
-            start=start,
-            end=end,
-            namespace=namespace,
-            belt_speed=belt_speed,
-            slips=slips,
-            observer=observer,
-            take=take,
-        )
-
+    report = partial(
+        report_of_bag,
+        Path(path),
+        start=start,
+        end=end,
+        namespace=namespace,
+        belt_speed=belt_speed,
+        slips=slips,
+    )
     return _recorded_run(Path(path), report, recorded_drive(Path(path), namespace))
 
 
@@ -215,6 +210,7 @@ def read_table(
     start: float = 0.0,
     end: float = float("inf"),
     stick_speed: float | None = None,
+    belt_speed: float | None = None,
     slips: SlipThreshold | None = None,
 ) -> RecordedRun:
     """Read a run from a CSV or MAT file, and measure it.
@@ -232,6 +228,8 @@ def read_table(
     stick_speed : float, optional
         Largest relative speed of a slide that sticks, m/s, for samples without noise. By default
         the noise is found from the samples.
+    belt_speed : float, optional
+        Belt velocity, m/s, in place of a column.
     slips : SlipThreshold, optional
         What counts as a slip; by default slips are not looked for.
 
@@ -259,26 +257,21 @@ def read_table(
     >>> run.measures.regime.value, round(1e6 * run.measures.amplitude)
     ('stick_slip', 434)
     """
-
-    def report(observer: RunObserver, take: Callable[[Part], None]) -> dict[str, Any]:
-        return report_of_table(
-            Path(path),
-            columns,
-            start=start,
-            end=end,
-            stick_speed=stick_speed,
-            slips=slips,
-            observer=observer,
-            take=take,
-        )
-
+    report = partial(
+        report_of_table,
+        Path(path),
+        columns,
+        start=start,
+        end=end,
+        stick_speed=stick_speed,
+        belt_speed=belt_speed,
+        slips=slips,
+    )
     return _recorded_run(Path(path), report, None)
 
 
 def _recorded_run(
-    path: Path,
-    report: Callable[[RunObserver, Callable[[Part], None]], dict[str, Any]],
-    drive: Drive | None,
+    path: Path, report: Callable[..., dict[str, Any]], drive: Drive | None
 ) -> RecordedRun:
     """Return the run that a report is made of."""
     history = RunHistory()
@@ -291,7 +284,7 @@ def _recorded_run(
         else:
             forces.append(part)
 
-    made = report(history, take)
+    made = report(observer=history, take=take)
     nothing = np.empty(0)
     stamps = np.empty(0, dtype=np.int64)
     return RecordedRun(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
-from stickslip_ros.api.frames import Quantity, data_frame, data_set, made_of
+from stickslip_ros.api.frames import Quantity, data_frame, data_set, provenance
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.physics.loop.trajectory import (
     MEASURED,
@@ -14,11 +14,11 @@ from stickslip_ros.physics.loop.trajectory import (
     TrajectoryRecorder,
 )
 from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.plots.measure_table import measure_table, told_and_true
+from stickslip_ros.plots.measure_table import measure_table, measured_and_true, why_no_cycle
 from stickslip_ros.plots.run_history import RunHistory
 from stickslip_ros.plots.units import Units
-from stickslip_ros.plots.why_no_cycle import why_no_cycle
 from stickslip_ros.progress import Progress
+from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.studies import simulate as simulation
 
@@ -68,7 +68,7 @@ class Run(Shown):
         InvalidInputError
             If `style` is unknown.
         """
-        from stickslip_ros.plots.simulated_run import simulated_run_figure
+        from stickslip_ros.plots.run_figure import simulated_run_figure
         from stickslip_ros.plots.style import style_named
 
         measures = self.truth or self.measures
@@ -108,7 +108,7 @@ class Run(Shown):
         columns = dict(vars(self.trajectory))
         time = columns.pop("time")
         variables = {name: (("time",), values) for name, values in columns.items()}
-        attrs = made_of(self.scenario)
+        attrs = provenance(self.scenario)
         return data_set(variables, {"time": time}, self._columns, self._units, attrs)
 
     @property
@@ -121,7 +121,7 @@ class Run(Shown):
 
     def _parts(self) -> Parts:
         title = f"{self.scenario.name}, {self.duration:g} {self._units.of_unit('s')}".rstrip()
-        columns = told_and_true(self.measures, self.truth)
+        columns = measured_and_true(self.measures, self.truth)
         yield measure_table(title, columns, dict.fromkeys(columns, self._units))
         drive = self.scenario.plant.as_drive()
         reason = why_no_cycle((self.truth or self.measures).regime, self.duration, drive)
@@ -131,7 +131,7 @@ class Run(Shown):
 
 def simulate(
     scenario: ScenarioLike,
-    duration: float | None = None,
+    duration: float | str | None = None,
     *,
     continuous: bool = False,
     progress: Progress = lambda _: None,
@@ -142,7 +142,7 @@ def simulate(
     ----------
     scenario : Scenario, str or Path
         The scenario, its name or its path.
-    duration : float, optional
+    duration : float or str, optional
         Simulated time, s. By default this is the scenario's own duration, or 200 natural periods.
         It is needed for a drive without a spring and without a duration.
     continuous : bool
@@ -170,7 +170,8 @@ def simulate(
     (10001, 'pure_slip')
     """
     chosen = as_scenario(scenario)
-    length = simulation.default_duration(chosen) if duration is None else float(duration)
+    given = simulation.default_duration(chosen) if duration is None else duration
+    length = number_of("duration", given, "s")
     told = simulation.sensor_meter(chosen)
     history = RunHistory()
     recorder = TrajectoryRecorder(chosen.plant.rate, measured=told is not None)

@@ -16,7 +16,7 @@ def scenario(
     /,
     *overrides: str,
     base: str | Path | None = None,
-    controller: str | None = None,
+    controller: str | None = "scenario",
     **parameters: Any,
 ) -> Scenario:
     """Return a scenario, with some parameters changed.
@@ -31,13 +31,13 @@ def scenario(
     base : str or Path, optional
         Scenario that gives the parameters that the file omits, by its name or path. By default
         this is the one that the section `scenario` of the file names.
-    controller : str, optional
-        Name of the control law in use, such as `"velocity_feedback"`. By default it is the one that
-        the file, or else its base, has a section for.
+    controller : str or None, optional
+        Name of the control law in use, such as `"velocity_feedback"`; None for no control. By
+        default, `"scenario"`, it is the one that the file, or else its base, has a section for.
     **parameters : Any
-        Values in SI units. The keyword is the parameter's name with `_` for each `.`, such as
-        `belt_speed`, `friction_static` or `initial_position`, where only one of plant, analyzer
-        and the controller in use has such a parameter. Keywords act after texts.
+        Values in SI units, or texts with a unit (`"30mm/s"`). The keyword is the parameter's name
+        with `_` for each `.`, such as `belt_speed` or `friction_static`, where only one of plant,
+        analyzer and the controller in use has such a parameter. Keywords act after texts.
 
     Returns
     -------
@@ -60,14 +60,16 @@ def scenario(
     >>> damped.control_law.velocity_gain
     -2000.0
     """
+    law = None if controller == "scenario" else controller
     if not isinstance(name_or_path, Scenario):
         own_base = None if base is None else str(base)
-        chosen = load_scenario(str(name_or_path), base=own_base, controller=controller)
+        chosen = load_scenario(str(name_or_path), base=own_base, controller=law)
     elif base is not None:
         raise InvalidInputError(f"base = {base}: {name_or_path.name} is loaded, and needs no base")
     else:
-        chosen = name_or_path if controller is None else name_or_path.with_controller(controller)
-    texts = [*overrides, *overrides_of(parameters, chosen.nodes)]
+        chosen = name_or_path if law is None else name_or_path.with_controller(law)
+    control = ["plant.expects_control=false"] if controller is None else []
+    texts = [*control, *overrides, *overrides_of(parameters, chosen.nodes)]
     return chosen.overridden(texts) if texts else chosen
 
 

@@ -15,17 +15,18 @@ from stickslip_ros.api.frames import (
     Quantity,
     data_frame,
     data_set,
-    made_of,
     names_of,
     of_measure,
     of_parameter,
+    provenance,
 )
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
+from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.plots.basin_table import basin_table
-from stickslip_ros.plots.sweep_table import sweep_table, units_of
+from stickslip_ros.plots.study_tables import basin_table, sweep_table, units_of
+from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.scenarios.keywords import parameter_of
+from stickslip_ros.scenarios.keywords import described, parameter_of
 from stickslip_ros.studies import transitions as theory
 from stickslip_ros.studies.basin import (
     POSITION,
@@ -36,10 +37,10 @@ from stickslip_ros.studies.basin import (
     default_axes,
 )
 from stickslip_ros.studies.columns import COLUMNS, Columns, compute_columns
-from stickslip_ros.studies.options import BASIN_COUNT, BASIN_COURSE
-from stickslip_ros.studies.plan import Axis, Carry, Grid, RandomSample
+from stickslip_ros.studies.options import BASIN_COUNT, BASIN_OPTIONS
+from stickslip_ros.studies.plan import Axis, Continuation, Grid, ListedAxis, RandomSample
 from stickslip_ros.studies.runner import CountPoints
-from stickslip_ros.studies.settling import SettlingCourse
+from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import MEASURES, Study
 from stickslip_ros.studies.sweep import sweep_study
 from stickslip_ros.text import shown
@@ -49,9 +50,9 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-    from stickslip_ros.plots.sweep_picture import Colour
+    from stickslip_ros.plots.sweep_figure import Colour
 
-Values = tuple[float, float, int] | tuple[float, float, int, str]
+Values = tuple[float | str, float | str, int] | tuple[float | str, float | str, int, str]
 """First and last value, how many, and optionally "log"."""
 
 
@@ -115,7 +116,7 @@ class _Result(Shown):
         if isinstance(plan, Grid):
             dimensions, shape = list(names), list(plan.shape)
             coordinates = {name: axis.values() for name, axis in zip(names, plan.axes, strict=True)}
-            if plan.carried:
+            if plan.continuation:
                 dimensions, shape = ["direction", *dimensions], [len(plan.directions), *shape]
                 coordinates["direction"] = [str(direction) for direction in plan.directions]
         variables = {
@@ -129,7 +130,7 @@ class _Result(Shown):
             points.reshape(*shape, points.shape[1]),
         )
         quantities = self._quantities()
-        attrs = made_of(self.scenario)
+        attrs = provenance(self.scenario)
         return data_set(variables, coordinates, quantities, units_of(self.study), attrs)
 
     def _values(self) -> dict[str, Any]:
@@ -138,7 +139,7 @@ class _Result(Shown):
         found: dict[str, Any] = dict(
             zip(names_of(plan.parameters), columns.values.values(), strict=True)
         )
-        if isinstance(plan, Grid) and plan.carried:
+        if isinstance(plan, Grid) and plan.continuation:
             found["direction"] = [str(plan.direction(number)) for number in range(plan.size)]
         found |= {name: getattr(columns, name) for name in COLUMNS if name != "turning_points"}
         found["regime"] = np.array(
@@ -153,7 +154,7 @@ class _Result(Shown):
             name: of_parameter(parameter)
             for name, parameter in zip(names_of(parameters), parameters, strict=True)
         }
-        if self.study.plan.carried:
+        if self.study.plan.continuation:
             found["direction"] = Quantity("direction in which it is carried on")
         found |= {name: of_measure(name) for name in MEASURES}
         found["steady"] = Quantity("whether the motion has settled")
@@ -197,7 +198,7 @@ class Sweep(_Result):
             If `colour` is unknown, or given for a sweep over one parameter, or `style` is unknown.
         """
         from stickslip_ros.plots.style import style_named
-        from stickslip_ros.plots.sweep_picture import sweep_figure
+        from stickslip_ros.plots.sweep_figure import sweep_figure
 
         return shown_in_notebooks(
             sweep_figure(self.columns, self.study, colour, style=style_named(style))
@@ -238,7 +239,7 @@ class Basin(_Result):
         InvalidInputError
             If `style` is unknown.
         """
-        from stickslip_ros.plots.basin_picture import study_figure
+        from stickslip_ros.plots.basin_figure import study_figure
         from stickslip_ros.plots.style import style_named
 
         return shown_in_notebooks(
@@ -268,7 +269,7 @@ def sweep(
     executor: Executor | None = None,
     journal: Path | None = None,
     progress: CountPoints = lambda _: None,
-    **parameters: Values,
+    **parameters: Values | list[Any] | FloatArray,
 ) -> Sweep:
     """Measure the settled motion of a scenario over the values of one or two parameters.
 
@@ -297,9 +298,9 @@ def sweep(
         File from which a sweep that was interrupted continues.
     progress : callable, optional
         Receives the number of points that are done.
-    **parameters : tuple
+    **parameters : tuple, list or ndarray
         `(first, last, count)` or `(first, last, count, "log")` by keyword as for `scenario`, SI
-        units, ends included.
+        units or texts with a unit, ends included; or a list or an array that rises or falls.
 
     Returns
     -------
@@ -320,7 +321,7 @@ def sweep(
     >>> [regime.value for regime in found.columns.regime[[0, -1]]]
     ['stick_slip', 'pure_slip']
     """
-    if carry is not None and carry not in list(Carry):
+    if carry is not None and carry not in list(Continuation):
         raise InvalidInputError(f"carry = {shown(carry)} is refused: must be up, down or both")
     chosen = as_scenario(scenario)
     study = sweep_study(
@@ -328,12 +329,12 @@ def sweep(
         [
             *map(Axis.parse, axes),
             *(
-                _axis(keyword, parameter_of(keyword, chosen.nodes), given)
+                _axis(keyword, parameter_of(keyword, chosen.nodes), given, listed=True)
                 for keyword, given in parameters.items()
             ),
         ],
-        carry=None if carry is None else Carry(carry),
-        course=_course(SettlingCourse(), transient, cycles),
+        continuation=None if carry is None else Continuation(carry),
+        course=_course(SettlingOptions(), transient, cycles),
         continuous=continuous,
     )
     columns = compute_columns(
@@ -346,8 +347,8 @@ def basin(
     scenario: ScenarioLike,
     /,
     *,
-    position: Values | tuple[float, float] | None = None,
-    velocity: Values | tuple[float, float] | None = None,
+    position: Values | tuple[float | str, float | str] | None = None,
+    velocity: Values | tuple[float | str, float | str] | None = None,
     sample: int | None = None,
     seed: int = 0,
     continuous: bool = False,
@@ -408,7 +409,7 @@ def basin(
         ends = sample is not None and isinstance(given, tuple) and len(given) == 2
         axes.append(_axis(name, parameter, (*given, 2) if ends else given))
     plan = Grid(tuple(axes)) if sample is None else RandomSample(tuple(axes), sample, seed)
-    course = _course(BASIN_COURSE, transient, cycles)
+    course = _course(BASIN_OPTIONS, transient, cycles)
     study = basin_study(chosen, plan, course=course, continuous=continuous)
     columns = compute_columns(
         study, workers=workers, executor=executor, path=journal, progress=progress
@@ -416,20 +417,25 @@ def basin(
     return Basin(study, columns)
 
 
-def _axis(name: str, parameter: str, given: Any) -> Axis:
+def _axis(name: str, parameter: str, given: Any, *, listed: bool = False) -> Axis:
     try:
+        if listed and isinstance(given, list | np.ndarray):
+            values = tuple(number_of(parameter, v, described(parameter).unit) for v in given)
+            return ListedAxis(parameter, values[0], values[-1], len(values), listed=values)
         first, last, count, *spacing = given
         if isinstance(given, str) or spacing not in ([], ["log"]):
             raise ValueError
-        return Axis(parameter, float(first), float(last), index(count), bool(spacing))
-    except (TypeError, ValueError):
+        return Axis(parameter, first, last, index(count), bool(spacing))
+    except (IndexError, TypeError, ValueError):
+        others = "(first, last, count, 'log')" + (", or a list or an array" if listed else "")
         raise InvalidInputError(
-            f"{name} = {shown(given)} is refused: must be (first, last, count) or "
-            "(first, last, count, 'log')"
+            f"{name} = {shown(given)} is refused: must be (first, last, count) or {others}"
         ) from None
 
 
-def _course(course: SettlingCourse, transient: float | None, cycles: int | None) -> SettlingCourse:
+def _course(
+    course: SettlingOptions, transient: float | None, cycles: int | None
+) -> SettlingOptions:
     return replace(
         course,
         transient=course.transient if transient is None else transient,

@@ -8,10 +8,11 @@ from stickslip_ros.api.display import Parts, Shown, shown_in_notebooks
 from stickslip_ros.api.frames import Quantity, data_frame
 from stickslip_ros.api.scenarios import ScenarioLike, as_scenario
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.plots.design_table import CHECKS, design_tables
-from stickslip_ros.plots.stability_table import stability_tables
+from stickslip_ros.physics.model.control import Washout
+from stickslip_ros.plots.study_tables import CHECKS, design_tables, stability_tables
 from stickslip_ros.plots.units import Units
 from stickslip_ros.progress import Progress
+from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.keywords import override
 from stickslip_ros.studies import design as designing
@@ -70,7 +71,7 @@ class Stability(Shown):
         reason = stabilities.why_no_figure(self.scenario)
         if reason is not None:
             raise InvalidInputError(f"there is nothing to draw: {reason}")
-        from stickslip_ros.plots.scenario_stability import scenario_stability_figure
+        from stickslip_ros.plots.stability_figure import scenario_stability_figure
         from stickslip_ros.plots.style import style_named
 
         return shown_in_notebooks(
@@ -120,7 +121,7 @@ class Proposal(Shown):
     """The task, the proposal and its checks."""
 
     @property
-    def controller(self) -> designing.DesignedLaw | None:
+    def controller(self) -> Washout | None:
         """The proposed constants of the controller; None if there are none."""
         return self.design.controller
 
@@ -177,7 +178,7 @@ class Proposal(Shown):
         """
         if self.design.map_around() is None:
             raise RunError(self._nothing)
-        from stickslip_ros.plots.stability_map import design_figure
+        from stickslip_ros.plots.stability_figure import design_figure
         from stickslip_ros.plots.style import style_named
 
         return shown_in_notebooks(design_figure(self.design, style=style_named(style)))
@@ -211,7 +212,7 @@ class Proposal(Shown):
 
 def design(
     scenario: ScenarioLike,
-    belt_speed: float | tuple[float, float] | None = None,
+    belt_speed: float | str | tuple[float | str, float | str] | None = None,
     *,
     force_limit: float | None = None,
     progress: Progress = lambda _: None,
@@ -222,7 +223,7 @@ def design(
     ----------
     scenario : Scenario, str or Path
         The scenario, its name or its path; its gains are not used.
-    belt_speed : float or tuple, optional
+    belt_speed : float, str or tuple, optional
         One belt speed, or lowest and highest, m/s. By default within 10 % of the scenario's.
     force_limit : float, optional
         Largest force, N. By default this is the scenario's.
@@ -259,7 +260,7 @@ def _range(belt_speed: Any) -> tuple[float, float] | None:
         return None
     try:
         low, high = belt_speed if isinstance(belt_speed, tuple | list) else (belt_speed, belt_speed)
-        return float(low), float(high)
+        return number_of("belt_speed", low, "m/s"), number_of("belt_speed", high, "m/s")
     except (TypeError, ValueError):
         raise InvalidInputError(
             f"belt_speed = {shown(belt_speed)} is refused: must be one speed or (lowest, highest)"

@@ -1,21 +1,24 @@
 """Arguments that several commands have."""
 
 import argparse
-import sys
+import os
 import warnings
 from collections.abc import Callable, Collection, Generator
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from math import isfinite
+from math import inf, isfinite, nan, ulp
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.optional_dependencies import interrupts_kept
+from stickslip_ros.app.optional_dependencies import load_matplotlib
+from stickslip_ros.app.output import tell
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
-from stickslip_ros.text import printable, shown
+from stickslip_ros.files import open_regular
+from stickslip_ros.quantities import number_of
+from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
+from stickslip_ros.text import shown
 from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
@@ -29,9 +32,11 @@ DEFAULT_CONTROLLER = "(default: the one that the scenario has a section for)"
 
 _FIGURE_FILES = (".png", ".svg", ".pdf")
 
+_FAR = 10.0
+"""Belt speed, in scales of speed, beyond which it may be in another unit."""
+
 _SMALLEST, _LARGEST = 2, 50
 """Width and height of a figure, inches."""
-_DPI = 20, 600
 _MOST_PIXELS = 2e8
 _STYLES = "screen", "paper", "paper-double"
 """The names of `plots.style.STYLES`; importing that takes long."""
@@ -51,7 +56,7 @@ def add_scenario_file(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NODE.PARAMETER=VALUE",
-        help="override a parameter, as in -p plant.belt_speed=0.2 (SI units; repeatable)",
+        help="override a parameter, as in -p plant.belt_speed=0.2 or 20cm/s (SI units; repeatable)",
     )
     parser.add_argument(
         "--base",
@@ -68,7 +73,13 @@ def add_scenario(parser: argparse.ArgumentParser) -> None:
 
 
 def add_control(parser: argparse.ArgumentParser) -> Any:
-    """Add --no-control; return its group, for options that exclude it."""
+    """Add --yes and --no-control; return the group of this, for options that exclude it."""
+    parser.add_argument(
+        "--yes",
+        action="store_true",
+        help=f"take belt speeds beyond {_FAR:g} times the speed scale of the drive and its "
+        "friction, which are refused otherwise: mm/s, perhaps, in place of m/s",
+    )
     control = parser.add_mutually_exclusive_group()
     control.add_argument("--no-control", action="store_true", help="run without the controller")
     return control
@@ -117,17 +128,14 @@ def columns_of(text: str | None) -> dict[str, str] | None:
     return found
 
 
-def add_part(parser: argparse.ArgumentParser, *, tables: str = "") -> None:
-    """Add the options that say which part of a recording is used, and of which drive.
-
-    `tables` says what the belt speed is for besides bags.
-    """
+def add_part(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say which part of a recording is used, and of which drive."""
     parser.add_argument(
         "--belt-speed",
         type=velocity,
         metavar="V",
-        help=f"belt speed, m/s, for {tables}a bag whose joint states have a single joint, whatever "
-        "its name",
+        help="belt speed, m/s, for a table, in place of its belt velocity, and for a bag whose "
+        "joint states have a single joint, whatever its name",
     )
     parser.add_argument(
         "--from",
@@ -186,7 +194,7 @@ def add_plot(parser: argparse.ArgumentParser, shown: str) -> None:
     add_style(parser)
     parser.add_argument(
         "--dpi",
-        type=_dpi,
+        type=whole("a whole number of dots per inch from {} to {}", 20, 600),
         metavar="N",
         help="dots per inch of the figure (default: 130, in the styles for paper 300)",
     )
@@ -228,7 +236,8 @@ def check_figure(arguments: argparse.Namespace) -> None:
             f"{' '.join(shown[:2])}: would be {size[0] * size[1] * dpi**2:.3g} pixels, and must be "
             f"at most {_MOST_PIXELS:g}"
         )
-    _check_writable("--plot", path)
+    check_writable("--plot", path)
+    load_matplotlib()
 
 
 def write_figure(arguments: argparse.Namespace, draw: "Callable[[FigureStyle], Figure]") -> None:
@@ -267,30 +276,22 @@ def _size(text: str) -> tuple[float, float]:
     return width, height
 
 
-def _dpi(text: str) -> int:
-    if not (text.isascii() and text.isdigit() and _DPI[0] <= int(text) <= _DPI[1]):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a whole number of dots per inch from {_DPI[0]} to {_DPI[1]}"
-        )
-    return int(text)
-
-
 def check_new(option: str, path: Path) -> None:
     """Refuse `path`, given with `option`, where there is a file, or none can be written."""
     if path.exists():
         raise InvalidInputError(f"{option} {path}: exists already; it is not overwritten")
-    _check_writable(option, path)
+    check_writable(option, path)
 
 
-def _check_writable(option: str, path: Path) -> None:
+def check_writable(option: str, path: Path) -> None:
     """Refuse `path`, given with `option`, where no file can be written, and leave it as it is."""
     if not path.absolute().parent.is_dir():
         raise InvalidInputError(f"{option} {path}: there is no directory {path.parent}")
     with writing(option, path):
         if path.exists():
+            open_regular(path).close()
             path.open("ab").close()
-        else:
-            TemporaryFile(dir=path.absolute().parent).close()
+        TemporaryFile(dir=Path(os.path.realpath(path)).parent).close()
 
 
 @contextmanager
@@ -324,10 +325,9 @@ def scenario_of(
     A sentence on standard error names the values that are left to their defaults, except those that
     are `unused` (NODE.PARAMETER). The controller can be `replaced` by one that is no control law.
     """
-    with interrupts_kept():
-        from stickslip_ros.scenarios.files import load_scenario
-        from stickslip_ros.scenarios.parameter_field import known_parameters
-        from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+    from stickslip_ros.scenarios.files import load_scenario
+    from stickslip_ros.scenarios.keywords import described
+
     control = ["plant.expects_control=false"] if arguments.no_control else []
     asked = [*arguments.overrides, *control, *overrides]
     load = partial(
@@ -345,18 +345,37 @@ def scenario_of(
     for full_name in scenario.left_to_defaults:
         if full_name not in unused:
             node, _, name = full_name.partition(".")
-            unit = known_parameters(NODE_PARAMETERS[node])[name].unit or ""
+            unit = described(full_name).unit or ""
             defaults.append(f"{full_name} = {values[node][name]} {unit}".rstrip())
     if defaults:
         sentence = (
             f"{scenario.path} does not give {', '.join(defaults)}: these are the defaults; "
             "--base SCENARIO takes omitted values from another scenario"
         )
-        print(printable(sentence), file=sys.stderr)
+        tell(sentence)
     warning = scenario.plant.friction.as_law().warning()
     if warning is not None:
-        print(printable(f"{scenario.path}: {warning}"), file=sys.stderr)
+        tell(f"{scenario.path}: {warning}")
+    check_speeds(arguments, scenario)
     return scenario
+
+
+def check_speeds(arguments: argparse.Namespace, scenario: "Scenario", *speeds: float) -> None:
+    """Refuse belt speeds (m/s) far beyond the scales of a drive and its law, but for --yes."""
+    from stickslip_ros.plots.units import Units
+    from stickslip_ros.scenarios.parameter_field import known_parameters
+
+    plant, known = scenario.plant, known_parameters(type(scenario.plant))
+    used = [name for name in plant.drive_names() if name.startswith("friction.")]
+    own = [plant.flat()[name] for name in used if known[name].unit == "m/s"]
+    drive = plant.as_drive()
+    fastest, scale = max([drive.fastest_belt, *map(abs, speeds)]), max([drive.speed_scale, *own])
+    if fastest > _FAR * scale and not arguments.yes:
+        shown, limit = Units.for_drive(drive).texts([fastest, scale], "m/s")
+        raise InvalidInputError(
+            f"a belt speed of {shown} is refused: more than {_FAR:g} times {limit}, the scale of "
+            "speed of this drive and its friction; if it is meant, and in m/s, add --yes"
+        )
 
 
 def with_law(
@@ -402,7 +421,7 @@ def law_constants(*needed: str) -> list[str]:
     ]
 
 
-def made_of(scenario: "Scenario") -> dict[str, Any]:
+def provenance(scenario: "Scenario") -> dict[str, Any]:
     """Return what a result was made from, for its JSON."""
     return {
         "scenario": {"name": scenario.name, **scenario.as_dict()},
@@ -427,40 +446,29 @@ def namespace_of(text: str) -> str:
     return namespace
 
 
-def seconds(text: str) -> float:
-    """Parse a time in seconds: finite, zero or more."""
-    return _not_negative(text, "a time in seconds")
+def whole(what: str, least: int, most: int) -> Callable[[str], int]:
+    """Return what parses a whole number; `what` it is has places for the bounds."""
+
+    def parse(text: str) -> int:
+        if not (text.isascii() and text.isdigit() and least <= int(text) <= most):
+            raise argparse.ArgumentTypeError(f"{text!r} is not {what.format(least, most)}")
+        return int(text)
+
+    return parse
 
 
-def speed(text: str) -> float:
-    """Parse a speed in m/s: finite, zero or more."""
-    return _not_negative(text, "a speed in m/s")
-
-
-def length(text: str) -> float:
-    """Parse a length in m: finite, above zero."""
-    value = _not_negative(text, "a length in m")
-    if value == 0.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a length in m above 0")
-    return value
-
-
-def velocity(text: str) -> float:
-    """Parse a velocity in m/s: finite."""
+def _number(what: str, unit: str, least: float, text: str) -> float:
     try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a velocity in m/s")
+        value = number_of(what, text, unit)
+    except InvalidInputError:
+        value = nan
+    if not (isfinite(value) and value >= least):
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not {what}")
     return value
 
 
-def _not_negative(text: str, what: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not (isfinite(value) and value >= 0.0):
-        raise argparse.ArgumentTypeError(f"{text!r} is not {what}, 0 or more")
-    return value
+seconds = partial(_number, "a time in seconds, 0 or more", "s", 0.0)
+speed = partial(_number, "a speed in m/s, 0 or more", "m/s", 0.0)
+length = partial(_number, "a length in m above 0", "m", ulp(0.0))
+velocity = partial(_number, "a velocity in m/s", "m/s", -inf)
+"""Parse what an option is given: a finite number, or one with a unit."""

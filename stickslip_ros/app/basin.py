@@ -12,11 +12,10 @@ from stickslip_ros.app.arguments import (
     scenario_of,
     write_figure,
 )
-from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_table
 from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.studies.options import BASIN_COUNT, BASIN_COURSE
+from stickslip_ros.studies.options import BASIN_COUNT, BASIN_OPTIONS
 
 if TYPE_CHECKING:
     from stickslip_ros.scenarios.files import Scenario
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
 _DESCRIPTION = f"""Find the motion that each initial state leads to, and the share of initial
 states for each motion (basin stability), over a grid or a random sample. An initial state is a
 displacement and a velocity of the slide; the controller is at rest. Each motion is followed
-until it is steady, for at most {BASIN_COURSE.patience} transients."""
+until it is steady, for at most {BASIN_OPTIONS.patience} transients."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,21 +49,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=int, metavar="SEED", help="seed of the random sample, 0 or more (default: 0)"
     )
-    add_running(parser, BASIN_COURSE)
+    add_running(parser, BASIN_OPTIONS)
     add_plot(parser, "the motion that each initial state leads to")
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.plots.basin_table import basin_table
-        from stickslip_ros.studies.basin import Basins, basin_study
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.plots.study_tables import basin_table
+    from stickslip_ros.studies.basin import Basins, basin_study
+
     scenario = scenario_of(arguments)
     study = basin_study(
         scenario,
         _plan(arguments, scenario),
-        course=course_of(arguments, BASIN_COURSE),
+        course=course_of(arguments, BASIN_OPTIONS),
         continuous=arguments.continuous_control,
     )
     check_figure(arguments)
@@ -73,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
         basins = Basins.from_points(journal.points())
         made = {"attractors": [asdict(attractor) for attractor in basins.attractors]}
         if arguments.plot is not None:
-            from stickslip_ros.plots.basin_picture import study_figure
+            from stickslip_ros.plots.basin_figure import study_figure
             from stickslip_ros.studies.columns import Columns
 
             columns = Columns.from_journal(journal)
@@ -81,7 +80,6 @@ def run(arguments: argparse.Namespace) -> int:
         write_results(arguments, journal, {"attractor": basins.place}, made)
         if not arguments.json:
             print_table(*basin_table(study, basins))
-    return 0
 
 
 def _plan(arguments: argparse.Namespace, scenario: "Scenario") -> "Plan":

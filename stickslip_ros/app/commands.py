@@ -1,4 +1,7 @@
-"""The commands by name: the group that `--help` shows them in, and what each does in one line."""
+"""The commands: their names, groups, examples and parsers."""
+
+import argparse
+from importlib import import_module
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "run": ("Run", "run a scenario as ROS 2 nodes, record it and report the results"),
@@ -20,6 +23,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "paper": ("Paper", "reproduce the figures and the claims of the paper"),
     "completion": ("Shell", "print the completion script for bash or zsh"),
 }
+"""Group in the overview, and what a command does, by name; each has a module of its name."""
 
 EXAMPLES: dict[str, str] = {
     "run": "stickslip run feed_drive --duration 10 --dashboard",
@@ -65,3 +69,15 @@ def overview() -> str:
         "A first example: stickslip simulate feed_drive",
     ]
     return "\n\n".join(parts)
+
+
+def command_parser(name: str) -> argparse.ArgumentParser:
+    """Return the parser of a command; only the module of this one is imported."""
+    command = import_module(f"stickslip_ros.app.{name}")
+    example = f"example: {EXAMPLES[name]}" if name in EXAMPLES else None
+    parser = argparse.ArgumentParser(
+        prog=f"stickslip {name}", description=COMMANDS[name][1], epilog=example
+    )
+    command.add_arguments(parser)
+    parser.set_defaults(command=name, run=command.run)
+    return parser

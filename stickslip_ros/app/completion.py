@@ -1,74 +1,15 @@
 """`stickslip completion`: the completion script of a shell."""
 
 import argparse
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from pathlib import Path
 
-from stickslip_ros.app.commands import COMMANDS
-
-ParserOf = Callable[[str], argparse.ArgumentParser]
-"""Returns the parser of a command by its name."""
+from stickslip_ros.app.commands import COMMANDS, command_parser
 
 _FILES = ("BAG", "DIR", "FILE", "OUT")
 """Metavars of files and directories."""
 
 _PARAMETERS = ("NODE.PARAMETER=VALUE", "NODE.PARAMETER=A:B:COUNT")
-
-_SCRIPT = """\
-# Completion of `stickslip` for bash and zsh; `stickslip completion @SHELL@` prints it.
-_stickslip() {
-    local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]}
-    local command=${COMP_WORDS[1]} name= kind= words= options= positional=
-    COMPREPLY=()
-    (( COMP_CWORD == 1 )) && command=COMMAND
-    case $command in
-        COMMAND) options=@COMMANDS@ positional=options ;;
-@COMMAND_CASES@
-        *) return ;;
-    esac
-    # bash splits words at "=", zsh does not: NAME=VALUE is completed from `name` and `word`.
-    if [[ $word == "=" ]]; then
-        name=$before word=
-    elif [[ $before == "=" ]]; then
-        name=${COMP_WORDS[COMP_CWORD-2]}
-    elif [[ $word == *=* ]]; then
-        name=${word%%=*} word=${word#*=}
-    fi
-    if [[ $name == --* ]]; then
-        before=$name
-    elif [[ -n $name ]]; then
-        case $name in
-@VALUE_CASES@
-        esac
-    fi
-    if [[ -z $name || $name == --* ]]; then
-        case "$command $before" in
-@OPTION_CASES@
-            *) [[ $word == -* ]] && kind=options || kind=$positional ;;
-        esac
-    fi
-    case $kind in
-        options) words=$options ;;
-        scenarios) words=@SCENARIOS@ ;;
-        parameters) words=@PARAMETERS@ ;;
-    esac
-    COMPREPLY=($(compgen -W "$words" -- "$word"))
-    if [[ $kind == files || $kind == scenarios ]]; then
-        local IFS=$'\\n'
-        [[ $kind == files ]] && COMPREPLY+=($(compgen -f -- "$word"))
-        [[ $kind == scenarios ]] && COMPREPLY+=(
-            $(compgen -f -X '!*.y*ml' -- "$word") $(compgen -d -- "$word")
-        )
-        compopt -o filenames 2>/dev/null
-    elif [[ $kind == parameters ]]; then
-        compopt -o nospace 2>/dev/null
-    fi
-    if [[ -n $name && ${COMP_WORDS[COMP_CWORD]} == "$name="* ]]; then
-        COMPREPLY=("${COMPREPLY[@]/#/$name=}")
-    fi
-@SPACE@    return 0
-}
-complete@NOSPACE@ -F _stickslip stickslip
-"""
 
 _SPACE_OF_ZSH = """\
     # zsh has no compopt: the space after a word is part of it.
@@ -86,15 +27,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("shell", choices=("bash", "zsh"), help="the shell")
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
     if arguments.shell == "zsh":
         print("autoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit")
-    print(_script(arguments.shell, arguments.parser_of), end="")
-    return 0
+    print(_script(arguments.shell), end="")
 
 
-def _script(shell: str, parser_of: ParserOf) -> str:
+def _script(shell: str) -> str:
     from stickslip_ros.scenarios.files import shipped_scenarios
     from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS, NODE_PARAMETERS
     from stickslip_ros.scenarios.template import own_first
@@ -108,7 +48,7 @@ def _script(shell: str, parser_of: ParserOf) -> str:
         name: ("true", "false") if parameter.kind is bool else parameter.choices
         for name, parameter in parameters.items()
     }
-    of_commands, of_options = _cases(parser_of)
+    of_commands, of_options = _cases()
     parts = {
         "@SHELL@": shell,
         "@SPACE@": _SPACE_OF_ZSH if shell == "zsh" else "",
@@ -125,20 +65,20 @@ def _script(shell: str, parser_of: ParserOf) -> str:
         "@SCENARIOS@": _words(shipped_scenarios()),
         "@PARAMETERS@": _words(f"{name}=" for name in parameters),
     }
-    script = _SCRIPT
+    script = Path(__file__).with_suffix(".sh").read_text(encoding="utf-8")
     for place, text in parts.items():
         script = script.replace(place, text)
     return script
 
 
-def _cases(parser_of: ParserOf) -> tuple[list[str], list[str]]:
+def _cases() -> tuple[list[str], list[str]]:
     """Return the branches of the script for the commands, and for their options with a value."""
     of_commands: list[str] = []
     of_options: list[str] = []
     for name in COMMANDS:
         options: list[str] = []
         positional = ""
-        for action in parser_of(name)._actions:  # pyright: ignore[reportPrivateUsage]
+        for action in command_parser(name)._actions:  # pyright: ignore[reportPrivateUsage]
             completed = _completed(action)
             options += action.option_strings
             if action.option_strings and action.nargs != 0:

@@ -2,19 +2,17 @@
 
 import sys
 
-from stickslip_ros.app.optional_dependencies import loading_ros
-from stickslip_ros.app.output import print_figures
+from stickslip_ros.app.optional_dependencies import load_matplotlib, loading_ros
+from stickslip_ros.app.output import print_values
 from stickslip_ros.app.run import default_bag, record
 from stickslip_ros.bags import Recording
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import StickslipError
-from stickslip_ros.plots.control_coming_on import control_coming_on_figure
-from stickslip_ros.plots.style import save
 from stickslip_ros.scenarios.files import load_scenario
 
 _SCENARIO = "feed_drive"
 _DURATION = 10.0
-_FIGURES = (
+_VALUES = (
     "amplitude",
     "midpoint",
     "stick_fraction",
@@ -30,7 +28,7 @@ def main() -> None:
     """Run the demonstration and exit with its status."""
     try:
         _demonstrate()
-    except StickslipError as error:
+    except (OSError, StickslipError) as error:
         sys.exit(f"demo: {error}")
     except KeyboardInterrupt:
         sys.exit(130)
@@ -41,9 +39,14 @@ def _demonstrate() -> None:
     switched_on = scenario.controller.as_law().start_after
     controller = scenario.controller.node.replace("_", " ")
     bag = default_bag(_SCENARIO)
+    load_matplotlib()
+    from stickslip_ros.plots.controller_comparison import control_switched_on_figure
+    from stickslip_ros.plots.style import save
+
     with loading_ros():
         from stickslip_ros.nodes.base.network import keep_on_this_machine
-    reach = keep_on_this_machine(network=False)
+
+        reach = keep_on_this_machine(network=False)
     print(
         f"{_DURATION:g} s of {_SCENARIO} in lockstep: plant, {controller} and analyzer as "
         f"ROS 2 nodes, {reach}; the controller acts from {switched_on:g} s on"
@@ -55,15 +58,15 @@ def _demonstrate() -> None:
         f"before ({switched_on:g} s)": report_of_bag(bag, end=switched_on),
         f"after ({_DURATION - switched_on:g} s)": report_of_bag(bag, start=switched_on),
     }
-    print_figures(
+    print_values(
         f"{results['samples']} samples, {results['lost_samples']} lost, "
         f"{results['steps_per_second']:.0f} steps per second",
-        {title: {name: part[name] for name in _FIGURES} for title, part in parts.items()},
+        {title: {name: part[name] for name in _VALUES} for title, part in parts.items()},
     )
     figure = bag.with_suffix(".png")
     with Recording(bag) as recording:
         states, forces = recording.joint_states, recording.control_forces
-    save(control_coming_on_figure(states, forces, switched_on, around=(0.5, 1.0)), figure)
+    save(control_switched_on_figure(states, forces, switched_on, around=(0.5, 1.0)), figure)
     print(f"bag:    {bag}\nfigure: {figure}")
 
 

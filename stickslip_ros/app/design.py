@@ -2,7 +2,6 @@
 
 import argparse
 import shlex
-import sys
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
@@ -14,17 +13,18 @@ from stickslip_ros.app.arguments import (
     add_scenario,
     check_figure,
     check_new,
+    check_speeds,
     law_constants,
-    made_of,
+    provenance,
     scenario_of,
     write_figure,
     writing,
 )
-from stickslip_ros.app.optional_dependencies import interrupts_kept
-from stickslip_ros.app.output import print_json, print_parts, progress_bar
+from stickslip_ros.app.output import print_json, print_parts, progress_bar, tell
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.files import written
+from stickslip_ros.quantities import number_of
 from stickslip_ros.studies.options import OWN_SPEED_RANGE
-from stickslip_ros.text import printable
 
 if TYPE_CHECKING:
     from stickslip_ros.studies.design import Design
@@ -57,41 +57,42 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.plots.design_table import design_tables
-        from stickslip_ros.studies.design import Task, design
-    scenario = scenario_of(arguments, unused=law_constants("force_limit", "start_after"))
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.plots.study_tables import design_tables
+    from stickslip_ros.studies.design import Task, design
+
+    proposed = law_constants("force_limit", "start_after")
+    for text in arguments.overrides:
+        if text.partition("=")[0] in proposed:
+            raise InvalidInputError(f"-p {text:.80}: is not used, because a design proposes it")
+    scenario = scenario_of(arguments, unused=proposed)
     task = Task.from_scenario(scenario, _belt_speeds(arguments.belt_speed))
+    check_speeds(arguments, scenario, *task.belt_speeds)
     if arguments.out is not None:
         check_new("--out", arguments.out)
     check_figure(arguments)
     with progress_bar(f"designing for {scenario.name}", 1.0) as progress:
         found = design(task, progress)
     if arguments.json:
-        print_json({**_as_dict(found), **made_of(scenario)})
+        print_json({**_as_dict(found), **provenance(scenario)})
     else:
         print_parts(design_tables(scenario.name, found))
         if found.parameter_file is not None and arguments.out is None:
             print(
                 "--out FILE writes the scenario with these gains, --json prints it: parameter_file"
             )
-    if arguments.out is not None:
-        _write(arguments.out, found)
     if arguments.plot is not None:
         _draw(arguments, found)
-    return 0
+    if arguments.out is not None:
+        _write(arguments.out, found)
 
 
 def _belt_speeds(text: str | None) -> tuple[float, float] | None:
     if text is None:
         return None
-    try:
-        speeds = [float(part) for part in text.split(":")]
-    except ValueError:
-        speeds = []
-    if len(speeds) not in (1, 2):
+    speeds = [number_of("--belt-speed", part, "m/s") for part in text.split(":")]
+    if len(speeds) > 2:
         raise InvalidInputError(f"--belt-speed {text!r}: must be LOW:HIGH, or one speed, in m/s")
     return speeds[0], speeds[-1]
 
@@ -100,14 +101,13 @@ def _write(path: Path, found: "Design") -> None:
     if found.parameter_file is None:
         _report_omitted(f"--out {path}: not written")
         return
-    with writing("--out", path), path.open("x", encoding="utf-8") as file:
+    with writing("--out", path), written(path) as file:
         file.write(found.parameter_file)
-    command = shlex.join(["stickslip", "run", str(path)])
-    print(f"{printable(str(path))} is written: `{printable(command)}` runs it", file=sys.stderr)
+    tell(f"{path} is written: `{shlex.join(['stickslip', 'run', str(path)])}` runs it")
 
 
 def _draw(arguments: argparse.Namespace, found: "Design") -> None:
-    from stickslip_ros.plots.stability_map import design_figure
+    from stickslip_ros.plots.stability_figure import design_figure
 
     if found.map_around() is None:
         _report_omitted(f"--plot {arguments.plot}: not drawn")
@@ -116,11 +116,11 @@ def _draw(arguments: argparse.Namespace, found: "Design") -> None:
 
 
 def _report_omitted(what: str) -> None:
-    print(f"stickslip design: {what}, because there is nothing to propose", file=sys.stderr)
+    tell(f"stickslip design: {what}, because there is nothing to propose")
 
 
 def _as_dict(found: "Design") -> dict[str, Any]:
-    from stickslip_ros.plots.design_table import CONTROLLER, MARGINS, WORST
+    from stickslip_ros.plots.study_tables import CONTROLLER, MARGINS, WORST
 
     controller, slowest, task = found.controller, found.slowest, found.task
     values = asdict(controller) if controller else dict.fromkeys(CONTROLLER)

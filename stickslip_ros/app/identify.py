@@ -2,7 +2,6 @@
 
 import argparse
 import shlex
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,11 +17,8 @@ from stickslip_ros.app.arguments import (
     write_figure,
     writing,
 )
-from stickslip_ros.app.optional_dependencies import interrupts_kept
-from stickslip_ros.app.output import print_json, print_parts, progress_bar
+from stickslip_ros.app.output import print_json, print_parts, progress_bar, tell
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.text import printable
-from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
     from stickslip_ros.identification.findings import Findings
@@ -68,7 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="RECORDING",
         help="predict a recording that is not fitted; can be repeated",
     )
-    add_part(parser, tables="a table, in place of its belt velocity, and for ")
+    add_part(parser)
     parser.add_argument(
         "--out",
         type=Path,
@@ -79,13 +75,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.identification.identify import fixed_of, identify_recordings
-        from stickslip_ros.identification.reading import read_all
-        from stickslip_ros.identification.scenario import curve_files
-        from stickslip_ros.plots.identification_table import identification_tables
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.identification.identify import fixed_of, identify_recordings
+    from stickslip_ros.identification.reading import read_all
+    from stickslip_ros.identification.scenario import curve_files
+    from stickslip_ros.plots.identification_table import identification_tables
+
     columns = columns_of(arguments.columns)
     if arguments.out is not None:
         if arguments.out.suffix not in (".yaml", ".yml"):
@@ -119,16 +115,15 @@ def run(arguments: argparse.Namespace) -> int:
                 checks.append({"recording": name, **found.check(record)})
                 notes += found.notes_on(record)
     if arguments.json:
-        print_json({**as_dict(found, own, checks, notes), "versions": versions()})
+        print_json(as_dict(found, own, checks, notes))
     else:
         print_parts(identification_tables(found, own, checks, notes))
-    if arguments.out is not None:
-        _write(arguments.out, found)
     if arguments.plot is not None:
         from stickslip_ros.plots.identification_figure import identification_figure
 
         write_figure(arguments, lambda style: identification_figure(found, style=style))
-    return 0
+    if arguments.out is not None:
+        _write(arguments.out, found)
 
 
 def _write(path: Path, found: "Findings") -> None:
@@ -136,12 +131,12 @@ def _write(path: Path, found: "Findings") -> None:
 
     with writing("--out", path):
         files = written_scenario(found, path)
-    names = printable(", ".join(map(str, files)))
-    command = printable(shlex.join(["stickslip", "simulate", str(path)]))
+    names = ", ".join(map(str, files))
+    command = shlex.join(["stickslip", "simulate", str(path)])
     moves = (
         "" if found.has_spring else ", which stays at rest until a force or a reference moves it"
     )
-    print(f"{names}: written; `{command}` simulates the drive{moves}", file=sys.stderr)
+    tell(f"{names}: written; `{command}` simulates the drive{moves}")
 
 
 def as_dict(

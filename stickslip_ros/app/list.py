@@ -11,10 +11,8 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app.arguments import add_json
-from stickslip_ros.app.optional_dependencies import interrupts_kept
-from stickslip_ros.app.output import print_json
+from stickslip_ros.app.output import print_json, tell
 from stickslip_ros.text import printable
-from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
     from stickslip_ros.physics.model.control import ControlLaw
@@ -31,18 +29,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.physics.model.control import CONTROL_LAWS
-        from stickslip_ros.physics.model.friction import LAWS
-        from stickslip_ros.scenarios.files import shipped_scenarios
-        from stickslip_ros.scenarios.foreign_laws import CONTROLLERS, FRICTION_LAWS
-        from stickslip_ros.scenarios.friction_parameters import law_parameters
-        from stickslip_ros.scenarios.parameters import controller_node
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.physics.model.control import CONTROL_LAWS
+    from stickslip_ros.physics.model.friction import LAWS
+    from stickslip_ros.scenarios.files import shipped_scenarios
+    from stickslip_ros.scenarios.foreign_laws import CONTROLLERS, FRICTION_LAWS
+    from stickslip_ros.scenarios.friction_parameters import law_parameters
+    from stickslip_ros.scenarios.parameters import controller_node
+
     for kind, family in (("friction law", FRICTION_LAWS), ("control law", CONTROLLERS)):
         for name, reason in family.refused.items():
-            print(printable(f"{kind} {name} is refused: {reason}"), file=sys.stderr)
+            tell(f"{kind} {name} is refused: {reason}")
     scenarios = [_scenario(name, path) for name, path in shipped_scenarios().items()]
     friction_laws = [_law(law, "plant.friction", law_parameters(law)) for law in LAWS.values()]
     control_laws = [
@@ -54,10 +52,9 @@ def run(arguments: argparse.Namespace) -> int:
                 "scenarios": scenarios,
                 "friction_laws": friction_laws,
                 "control_laws": control_laws,
-                "versions": versions(),
             }
         )
-        return 0
+        return
     _print("scenarios", {each["name"]: [each["description"]] for each in scenarios})
     for heading, laws in (
         ("friction laws, plant.friction.law", friction_laws),
@@ -67,7 +64,6 @@ def run(arguments: argparse.Namespace) -> int:
         _print(
             heading, {law["name"]: [law["description"], _short(law["parameters"])] for law in laws}
         )
-    return 0
 
 
 def _print(heading: str, items: dict[str, list[str]]) -> None:

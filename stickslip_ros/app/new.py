@@ -6,8 +6,8 @@ from functools import partial
 from pathlib import Path
 
 from stickslip_ros.app.arguments import add_law, check_new, with_law, writing
-from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.files import written
 from stickslip_ros.text import printable
 
 _ENDINGS = (".yaml", ".yml")
@@ -34,11 +34,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_law(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.scenarios.files import load_scenario
-        from stickslip_ros.scenarios.template import commented_file
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.scenarios.files import load_scenario
+    from stickslip_ros.scenarios.template import commented_file
+
     path: Path = arguments.file
     if path.suffix not in _ENDINGS:
         raise InvalidInputError(f"{path}: must end in {' or '.join(_ENDINGS)}")
@@ -46,7 +46,6 @@ def run(arguments: argparse.Namespace) -> int:
     scenario = with_law(partial(load_scenario, arguments.source), arguments.controller)
     command = printable(shlex.join(["stickslip", "simulate", str(path)]))
     title = f"{path.stem}: a drive with the values of {scenario.name}, to be edited."
-    with writing("FILE", path), path.open("x", encoding="utf-8") as file:
+    with writing("FILE", path), written(path) as file:
         file.write(commented_file(scenario, f"{printable(title)}\n{command}"))
     print(f"{printable(str(path))} is written: `{command}` simulates it")
-    return 0

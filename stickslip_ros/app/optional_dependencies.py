@@ -1,9 +1,11 @@
-"""What only some commands need: ROS, and the packages of the dashboard."""
+"""What only some commands need: ROS, matplotlib, and the packages of the dashboard."""
 
-import signal
+import os
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
+from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 
 from stickslip_ros.errors import RunError
 
@@ -11,12 +13,11 @@ from stickslip_ros.errors import RunError
 @contextmanager
 def loading_ros() -> Generator[None]:
     """Wrap the imports that need ROS; raises RunError if ROS cannot be loaded."""
-    from stickslip_ros.nodes.base.shared_memory import check_shared_memory
+    from stickslip_ros.nodes.base.machine import check_shared_memory
 
     try:
-        with interrupts_kept():
-            check_shared_memory()
-            yield
+        check_shared_memory()
+        yield
     except ModuleNotFoundError as error:
         raise RunError(
             f"running nodes needs ROS 2, of which {error.name} is not installed: "
@@ -24,17 +25,19 @@ def loading_ros() -> Generator[None]:
         ) from None
 
 
-@contextmanager
-def interrupts_kept() -> Generator[None]:
-    """Delay SIGINT: during the import of a C extension it would become an ImportError."""
-    kept: list[int] = []
-    handler = signal.signal(signal.SIGINT, lambda number, _: kept.append(number))
+def load_matplotlib() -> None:
+    """Import matplotlib without the user's settings: no figure depends on them.
+
+    It takes them from the environment and the working directory, and fails if they are wrong.
+    """
+    kept = dict(os.environ)
     try:
-        yield
+        with chdir(Path(__file__).parent):
+            os.environ.update(MPLBACKEND="agg", MATPLOTLIBRC=os.devnull)
+            import_module("matplotlib")
     finally:
-        signal.signal(signal.SIGINT, handler)
-        if kept:
-            signal.raise_signal(signal.SIGINT)
+        os.environ.clear()
+        os.environ.update(kept)
 
 
 def check_dashboard() -> None:

@@ -3,11 +3,13 @@
 import json
 import sys
 from collections.abc import Generator, Iterable, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from time import monotonic
 from typing import TYPE_CHECKING, Any, Protocol
 
 from stickslip_ros.tables import TextTable
 from stickslip_ros.text import printable
+from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -15,6 +17,9 @@ if TYPE_CHECKING:
     from stickslip_ros.plots.units import Units
 
 _ALL_SI: Mapping[str, "Units"] = {}
+
+_JUDGED, _LONG = 3.0, 60.0
+"""Time after which the length of a work is judged, and the length of a long one, s."""
 
 _FRAME = 3
 """Characters that the frame of a column takes, beside one for the whole table."""
@@ -28,9 +33,15 @@ class Progress(Protocol):
         ...
 
 
+def tell(sentence: str) -> None:
+    """Tell a person, if there still is one: a terminal that was closed does not end a command."""
+    with suppress(OSError):
+        print(printable(sentence), file=sys.stderr)
+
+
 def print_json(values: Mapping[str, Any]) -> None:
-    """Print one JSON object, with null for what is not finite."""
-    json.dump(finite(values), sys.stdout, indent=2, allow_nan=False)
+    """Print one JSON object, with null for what is not finite, and the versions in use."""
+    json.dump(finite({**values, "versions": versions()}), sys.stdout, indent=2, allow_nan=False)
     print()
 
 
@@ -45,7 +56,7 @@ def finite(value: Any) -> Any:
     return value
 
 
-def print_figures(
+def print_values(
     title: str, columns: Mapping[str, Mapping[str, Any]], units: Mapping[str, "Units"] = _ALL_SI
 ) -> None:
     """Print values by name, one column for each of `columns`, as `measure_table` has them."""
@@ -70,10 +81,26 @@ def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str
 
 
 @contextmanager
-def progress_bar(label: str, total: float | None) -> Generator[Progress]:
-    """Show progress towards `total` on standard error if that is a terminal."""
+def progress_bar(label: str, total: float | None, advice: str = "") -> Generator[Progress]:
+    """Show progress towards `total` on standard error if that is a terminal.
+
+    A sentence says how long it will take if that is long, with `advice` on what would be quicker.
+    """
+    start: tuple[float, float] | None = None
+    told = False
+
+    def estimate(done: float) -> None:
+        nonlocal start, told
+        start = start or (monotonic(), done)
+        passed, since = monotonic() - start[0], done - start[1]
+        if total is None or told or passed < _JUDGED or since <= 0.0:
+            return
+        told, left = True, passed * (total - done) / since
+        if left > _LONG:
+            tell(f"{label}: about {left / 60.0:.0f} min more{advice}")
+
     if not sys.stderr.isatty():
-        yield lambda done, label=None: None
+        yield lambda done, label=None: estimate(done)
         return
     from rich.console import Console
     from rich.progress import (
@@ -88,9 +115,13 @@ def progress_bar(label: str, total: float | None) -> Generator[Progress]:
     columns = (text, BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(printable(label), total=total)
-        yield lambda done, label=None: bar.update(
-            task, completed=done, description=None if label is None else printable(label)
-        )
+
+        def update(done: float, label: str | None = None) -> None:
+            estimate(done)
+            described = None if label is None else printable(label)
+            bar.update(task, completed=done, description=described)
+
+        yield update
 
 
 def _print_framed(

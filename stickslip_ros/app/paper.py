@@ -5,10 +5,10 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from stickslip_ros.app.arguments import add_json, add_style, writing
-from stickslip_ros.app.optional_dependencies import interrupts_kept
+from stickslip_ros.app.arguments import add_json, add_style, check_writable, writing
+from stickslip_ros.app.optional_dependencies import load_matplotlib
 from stickslip_ros.app.output import print_json, print_table, progress_bar
-from stickslip_ros.versions import versions
+from stickslip_ros.files import written
 
 if TYPE_CHECKING:
     from stickslip_ros.paper.claims import Finding
@@ -31,29 +31,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.paper.figures import NUMBERS
-        from stickslip_ros.paper.report import as_markdown, report, verdict_counts
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.paper.figures import NUMBERS
+    from stickslip_ros.paper.report import as_markdown, report, verdict_counts
+
     out: Path = arguments.out
     folder = out / _REPORT
     with writing("--out", out):
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / _name(NUMBERS[0])).touch()
+    check_writable("--out", folder / _name(NUMBERS[0]))
     figures = _draw_figures(folder, arguments.style)
     findings = _judge(figures)
     found = report(findings, {f"{_REPORT}/{_name(n)}": figures[n] for n in NUMBERS})
     text = json.dumps(found, indent=1, ensure_ascii=False, allow_nan=False)
-    (out / f"{_REPORT}.json").write_text(f"{text}\n", encoding="utf-8")
-    (out / f"{_REPORT}.md").write_text(as_markdown(found), encoding="utf-8")
+    for name, content in ((f"{_REPORT}.json", f"{text}\n"), (f"{_REPORT}.md", as_markdown(found))):
+        with writing("--out", out / name), written(out / name, replace=True) as stream:
+            stream.write(content)
     if arguments.json:
-        print_json({**found, "versions": versions()})
+        print_json(found)
     else:
         rows = [[verdict, str(count)] for verdict, count in verdict_counts(found).items()]
         print_table(f"{len(findings)} claims of the paper", ["verdict", "claims"], rows)
         print(f"report:   {out / _REPORT}.md, {out / _REPORT}.json\nfigures:  {folder}")
-    return 0
 
 
 def _name(number: int) -> str:
@@ -86,16 +86,24 @@ def _draw_figures(folder: Path, style: str | None) -> "dict[int, PaperFigure]":
 
 
 def _draw(number: int, path: Path, style: str | None) -> "PaperFigure":
-    from stickslip_ros.paper.figures import BifurcationFigure, compute_figure
-    from stickslip_ros.paper.pictures import draw_paper_figure
-    from stickslip_ros.paper.transition_marks import transition_marks, unstable_equilibria
+    load_matplotlib()
+    from stickslip_ros.paper.drawing import paper_figure, save_paper_figure
+    from stickslip_ros.paper.figures import (
+        BifurcationFigure,
+        compute_figure,
+        transition_marks,
+        unstable_equilibria,
+    )
     from stickslip_ros.plots.style import STYLES
 
     figure = compute_figure(number)
     marks, unstable = {}, None
     if isinstance(figure, BifurcationFigure):
         marks, unstable = transition_marks(figure), unstable_equilibria(figure)
-    draw_paper_figure(path, figure, marks, unstable, style=STYLES[style or "screen"])
+    look = STYLES[style or "screen"]
+    drawn = paper_figure(figure, marks, unstable, style=look)
+    with writing("--out", path):
+        save_paper_figure(drawn, path, look)
     return figure
 
 

@@ -4,9 +4,7 @@ import argparse
 from pathlib import Path
 
 from stickslip_ros.app.arguments import add_json
-from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_json, print_table, progress_bar
-from stickslip_ros.versions import versions
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,10 +22,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.bags.repair import repair
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.bags.repair import repair
+
     with progress_bar(f"repairing {arguments.bag}", None) as progress:
         repaired = repair(arguments.bag, arguments.out, progress)
     if arguments.json:
@@ -37,12 +35,10 @@ def run(arguments: argparse.Namespace) -> int:
                 "out": str(arguments.out),
                 "messages": dict(repaired.messages),
                 "missing": repaired.missing,
-                "versions": versions(),
             }
         )
-        return 0
+        return
     rows = [[topic, str(count)] for topic, count in sorted(repaired.messages.items())]
     print_table(str(arguments.out), ["topic", "messages"], rows)
     for sentence in repaired.missing or ["nothing was missing"]:
         print(sentence)
-    return 0

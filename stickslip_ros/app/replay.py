@@ -1,15 +1,13 @@
 """`stickslip replay`: a recorded run, published again."""
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.app.arguments import add_network, seconds
 from stickslip_ros.app.optional_dependencies import loading_ros
-from stickslip_ros.app.output import progress_bar
-from stickslip_ros.text import printable
+from stickslip_ros.app.output import progress_bar, tell
 
 DESCRIPTION = (
     "Publish the messages of a bag again, unchanged, under their recorded names and with their "
@@ -77,12 +75,12 @@ def run(arguments: argparse.Namespace) -> int:
     with loading_ros():
         from stickslip_ros.nodes.base.network import keep_on_this_machine
         from stickslip_ros.running.bag_replay import replay_bag
-    reach = keep_on_this_machine(arguments.network)
+
+        reach = keep_on_this_machine(arguments.network)
 
     def offering(topics: Sequence[str]) -> None:
         wait = f"until {', '.join(arguments.wait_for) or 'a node'} reads them"
-        offer = f"{arguments.bag}: {', '.join(topics)}, {reach}, waiting {wait}"
-        print(printable(offer), file=sys.stderr)
+        tell(f"{arguments.bag}: {', '.join(topics)}, {reach}, waiting {wait}")
 
     names = ("rate", "loop", "start", "duration", "topics", "clock", "wait_for")
     parameters = {name: getattr(arguments, name) for name in names} | {"bag": str(arguments.bag)}

@@ -17,12 +17,9 @@ from stickslip_ros.app.arguments import (
     speed,
     write_figure,
 )
-from stickslip_ros.app.optional_dependencies import interrupts_kept
-from stickslip_ros.app.output import print_figures, print_json, print_table
+from stickslip_ros.app.output import print_json, print_table, print_values
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.plots.why_no_cycle import why_no_cycle
 from stickslip_ros.text import printable
-from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
     from stickslip_ros.plots.run_history import RunHistory
@@ -72,16 +69,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.bags.report import report_of_bag, report_of_table
-        from stickslip_ros.bags.table_file import is_table
-        from stickslip_ros.physics.measures.slips import SlipThreshold
-        from stickslip_ros.plots.run_history import RunHistory
-        from stickslip_ros.plots.slip_table import slip_table
-        from stickslip_ros.plots.units import Units
-        from stickslip_ros.studies.recorded_drive import recorded_drive
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.bags.report import report_of_bag, report_of_table
+    from stickslip_ros.bags.table_file import is_table
+    from stickslip_ros.physics.measures.slips import SlipThreshold
+    from stickslip_ros.plots.measure_table import slip_table, why_no_cycle
+    from stickslip_ros.plots.run_history import RunHistory
+    from stickslip_ros.plots.units import Units
+    from stickslip_ros.studies.recorded_drive import recorded_drive
+
     plot: Path | None = arguments.plot
     bags: list[Path] = arguments.bags
     check_figure(arguments)
@@ -96,32 +93,29 @@ def run(arguments: argparse.Namespace) -> int:
     slips = None if arguments.slips is None else SlipThreshold(arguments.slips, arguments.slip_time)
     reports: dict[str, dict[str, Any]] = {}
     for bag in dict.fromkeys(bags):
-        part = {"start": arguments.start, "end": arguments.end}
-        history, stick_speed = histories.get(str(bag)), arguments.stick_speed
-        if is_table(bag):
-            reports[str(bag)] = report_of_table(
-                bag, columns, **part, stick_speed=stick_speed, slips=slips, observer=history
-            )
-            continue
-        reports[str(bag)] = report_of_bag(
-            bag,
-            **part,
-            namespace=arguments.namespace,
-            stick_speed=stick_speed,
-            belt_speed=arguments.belt_speed,
-            slips=slips,
-            observer=history,
+        options: dict[str, Any] = {
+            "start": arguments.start,
+            "end": arguments.end,
+            "stick_speed": arguments.stick_speed,
+            "belt_speed": arguments.belt_speed,
+            "slips": slips,
+            "observer": histories.get(str(bag)),
+        }
+        reports[str(bag)] = (
+            report_of_table(bag, columns, **options)
+            if is_table(bag)
+            else report_of_bag(bag, namespace=arguments.namespace, **options)
         )
     if plot is not None:
         _draw(arguments, histories, reports)
     if arguments.json:
         results = [{**report, "bag": bag} for bag, report in reports.items()]
         result = results[0] if len(results) == 1 else {"reports": results}
-        print_json({**result, "versions": versions()})
-        return 0
+        print_json(result)
+        return
     several = len(reports) > 1
     drives = {str(bag): recorded_drive(bag, arguments.namespace) for bag in bags}
-    print_figures(
+    print_values(
         "" if several else str(bags[0]),
         {bag if several else "": report for bag, report in reports.items()},
         {bag if several else "": Units.for_drive(drive) for bag, drive in drives.items()},
@@ -135,7 +129,6 @@ def run(arguments: argparse.Namespace) -> int:
             sentences += [] if reason is None else [reason]
         for sentence in sentences:
             print(printable(f"{bag}: {sentence}") if several else sentence)
-    return 0
 
 
 def _draw(
@@ -144,7 +137,7 @@ def _draw(
     reports: Mapping[str, Mapping[str, Any]],
 ) -> None:
     from stickslip_ros.physics.measures.cycle_measures import measures_of
-    from stickslip_ros.plots.recorded_run import recorded_run_figure
+    from stickslip_ros.plots.run_figure import recorded_run_figure
     from stickslip_ros.plots.runs_figure import DrawnRun, runs_figure
     from stickslip_ros.studies.recorded_drive import recorded_drive
 

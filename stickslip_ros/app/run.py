@@ -22,21 +22,19 @@ from stickslip_ros.app.arguments import (
     add_scenario_file,
     is_program,
     law_constants,
-    made_of,
     namespace_of,
     naming,
+    provenance,
     scenario_of,
     seconds,
 )
-from stickslip_ros.app.optional_dependencies import check_dashboard, interrupts_kept, loading_ros
-from stickslip_ros.app.output import print_figures, print_json, progress_bar
+from stickslip_ros.app.optional_dependencies import check_dashboard, loading_ros
+from stickslip_ros.app.output import print_json, print_values, progress_bar, tell
 from stickslip_ros.errors import BagError, InvalidInputError, RunError
 from stickslip_ros.installed_packages import find_executable
-from stickslip_ros.plots.why_no_cycle import why_no_cycle
-from stickslip_ros.running.namespace_lock import NamespaceInUseError
-from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE
-from stickslip_ros.scenarios.pace import Pace
-from stickslip_ros.text import printable
+from stickslip_ros.nodes.base.machine import NamespaceInUseError
+from stickslip_ros.scenarios import DEFAULT_NAMESPACE, Pace
+from stickslip_ros.text import number_in
 
 if TYPE_CHECKING:
     from stickslip_ros.scenarios.files import Scenario
@@ -90,9 +88,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.bags.recorder import check_new_bag
-        from stickslip_ros.plots.units import Units
+    from stickslip_ros.bags.recorder import check_new_bag
+    from stickslip_ros.plots.measure_table import why_no_cycle
+    from stickslip_ros.plots.units import Units
+
     overrides: list[str] = []
     if arguments.pace is not None:
         overrides.append(f"plant.pace={arguments.pace}")
@@ -117,28 +116,29 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.dashboard:
         check_dashboard()
     # Before ROS is loaded, which takes a while.
-    _tell(_announcement(scenario, bag, composed=arguments.composed))
+    tell(_announcement(scenario, bag, composed=arguments.composed))
     with loading_ros():
         from stickslip_ros.nodes.base.network import keep_on_this_machine
-    reach = keep_on_this_machine(arguments.network)
-    _tell(f"nodes in {namespace}, {reach}")
-    with _dashboard(namespace) if arguments.dashboard else nullcontext():
+
+        reach = keep_on_this_machine(arguments.network)
+    tell(f"nodes in {namespace}, {reach}")
+    with _dashboard(namespace, bag, scenario) if arguments.dashboard else nullcontext():
         results, interrupted = record(
             scenario, bag, namespace=namespace, composed=arguments.composed, controller=controller
         )
     if arguments.json:
         command = shlex.join([arguments.controller, *arguments.further]) if controller else None
-        print_json({**results, "controller_command": command, **made_of(scenario)})
+        print_json({**results, "controller_command": command, **provenance(scenario)})
     else:
         report, drive = results["report"], scenario.plant.as_drive()
-        print_figures(scenario.name, {"": {**report, **results}}, {"": Units.for_drive(drive)})
+        print_values(scenario.name, {"": {**report, **results}}, {"": Units.for_drive(drive)})
         reason = why_no_cycle(report["regime"], report["duration"], drive)
         if reason is not None:
             print(reason)
     if not results["report"]["complete"]:
         raise RunError(f"the bag {bag} could not be written to its end")
     if interrupted:
-        _tell(f"stickslip run: interrupted: the bag {bag} is closed; the nodes have ended")
+        tell(f"stickslip run: interrupted: the bag {bag} is closed; the nodes have ended")
         return INTERRUPTED
     return 0
 
@@ -186,14 +186,14 @@ def record(
                 composed=composed,
                 controller=controller,
                 on_simulated_time=progress,
-                notify=_tell,
+                notify=tell,
             )
         except NamespaceInUseError as error:
             raise InvalidInputError(f"{error}: give this one another, by --namespace") from None
         except RunError as error:
             raise RunError(f"{error}; {_state_of(bag)}") from None
     try:
-        return _figures(bag, outcome.controller, outcome.plant), outcome.interrupted
+        return _values(bag, outcome.controller, outcome.plant), outcome.interrupted
     except BagError as error:
         if outcome.interrupted:  # before the first sample
             left = f"; {bag} holds nothing" if bag.exists() else ""
@@ -202,12 +202,15 @@ def record(
 
 
 @contextmanager
-def _dashboard(namespace: str) -> Generator[None]:
+def _dashboard(namespace: str, bag: Path, scenario: "Scenario") -> Generator[None]:
     """Serve the page in a process of its own, which has no part in whether the run succeeds."""
     from stickslip_ros.nodes.base.child_process import start_child
+    from stickslip_ros.scenarios.parameter_field import parameters_of
 
     command = "-m", "stickslip_ros.app.main", "dashboard", "--namespace", namespace
-    process = start_child([sys.executable, *command])
+    plant = scenario.plant.flat()
+    named = filter(None, (plant[p.name] for p in parameters_of(type(scenario.plant)) if p.file))
+    process = start_child([sys.executable, *command, *(f"--read={p}" for p in (bag, *named))])
     try:
         yield
     finally:
@@ -257,7 +260,7 @@ def _other_controller(arguments: argparse.Namespace) -> list[str] | None:
     return [] if arguments.external_controller else None
 
 
-def _figures(bag: Path, controller: str | None, plant: Mapping[str, str]) -> dict[str, Any]:
+def _values(bag: Path, controller: str | None, plant: Mapping[str, str]) -> dict[str, Any]:
     from stickslip_ros.bags.report import report_of_bag
 
     report = report_of_bag(bag)
@@ -267,16 +270,10 @@ def _figures(bag: Path, controller: str | None, plant: Mapping[str, str]) -> dic
         "report": report,
         "samples": report["samples"],
         "lost_samples": report["lost_samples"],
-        "late_forces": int(plant.get("late_forces", 0)),
-        "missed_deadlines": int(plant.get("missed_deadlines", 0)),
-        "steps_per_second": float(plant.get("steps_per_second", 0.0)),
+        "late_forces": int(number_in(plant.get("late_forces", ""))),
+        "missed_deadlines": int(number_in(plant.get("missed_deadlines", ""))),
+        "steps_per_second": float(number_in(plant.get("steps_per_second", ""))),
     }
-
-
-def _tell(sentence: str) -> None:
-    """Tell a person, if there still is one: a terminal that was closed does not end a run."""
-    with suppress(OSError):
-        print(printable(sentence), file=sys.stderr)
 
 
 def _state_of(bag: Path) -> str:

@@ -1,9 +1,9 @@
 """`stickslip schema`: the JSON schema of scenario files."""
 
 import argparse
+import json
 
-from stickslip_ros.app.optional_dependencies import interrupts_kept
-from stickslip_ros.app.output import print_json
+from stickslip_ros.app.output import finite
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -14,9 +14,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.scenarios.schema import scenario_schema
-    print_json(scenario_schema())
-    return 0
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.scenarios.schema import scenario_schema
+
+    print(json.dumps(finite(scenario_schema()), indent=2))

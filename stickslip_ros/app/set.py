@@ -4,7 +4,8 @@ import argparse
 from typing import Any
 
 from stickslip_ros.app.arguments import add_namespace, add_network, namespace_of
-from stickslip_ros.app.optional_dependencies import interrupts_kept, loading_ros
+from stickslip_ros.app.optional_dependencies import loading_ros
+from stickslip_ros.app.output import tell
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.text import printable, shown
 
@@ -20,18 +21,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "assignments",
         nargs="+",
         metavar="NODE.PARAMETER=VALUE",
-        help="parameter and value, as in plant.belt_speed=0.03 (SI units)",
+        help="parameter and value, as in plant.belt_speed=0.03 (SI units, or 30mm/s)",
     )
     add_namespace(parser)
     add_network(parser, "reach nodes on other machines, too (default: loopback only)")
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.scenarios.files import parse_override
-        from stickslip_ros.scenarios.parameter_field import known_parameters
-        from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.scenarios.files import parse_override
+    from stickslip_ros.scenarios.parameter_field import known_parameters
+    from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+
     namespace = namespace_of(arguments.namespace)
     given: dict[str, dict[str, Any]] = {}
     for assignment in arguments.assignments:
@@ -43,19 +44,25 @@ def run(arguments: argparse.Namespace) -> int:
         given.setdefault(node, {})[name] = value
     with loading_ros():
         from stickslip_ros.nodes.base.network import keep_on_this_machine
-        from stickslip_ros.running.parameter_client import NodeNotFoundError, set_parameters
-    keep_on_this_machine(arguments.network)
+        from stickslip_ros.running.node_clients import NodeNotFoundError, set_parameters
+
+        keep_on_this_machine(arguments.network)
     try:
-        refusals = set_parameters(namespace, given)
+        answers = set_parameters(namespace, given)
     except NodeNotFoundError as error:
         raise RunError(
             f"{error}: `stickslip run` starts the nodes, --namespace names another namespace"
         ) from None
-    for node, values in given.items():
+    refusals: list[str] = []
+    for node, answer in answers.items():
+        if not answer.successful:
+            refusals.append(answer.reason or "refused without a reason")
+            continue
         known = known_parameters(NODE_PARAMETERS[node])
-        for name, value in values.items() if node not in refusals else ():
+        for name, value in given[node].items():
             set_to = f"{namespace}/{node}: {name} = {shown(value)} {known[name].unit or ''}"
             print(printable(set_to.rstrip()))
+        if answer.reason:
+            tell(answer.reason)
     if refusals:
-        raise InvalidInputError("; ".join(refusals.values()))
-    return 0
+        raise InvalidInputError("; ".join(refusals))

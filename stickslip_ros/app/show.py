@@ -5,10 +5,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from stickslip_ros.app.arguments import add_json, add_law, add_scenario_file, with_law
-from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_json, print_table
 from stickslip_ros.text import printable
-from stickslip_ros.versions import versions
 
 if TYPE_CHECKING:
     from stickslip_ros.scenarios.files import Scenario
@@ -26,13 +24,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.plots.units import Units
-        from stickslip_ros.scenarios.files import load_scenario
-        from stickslip_ros.scenarios.parameter_field import known_parameters
-        from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.plots.units import Units
+    from stickslip_ros.scenarios.files import load_scenario
+    from stickslip_ros.scenarios.parameter_field import known_parameters
+    from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+
     load = partial(
         load_scenario,
         arguments.scenario,
@@ -52,10 +50,9 @@ def run(arguments: argparse.Namespace) -> int:
                 "overrides": list(scenario.overrides),
                 "parameters": found,
                 "other_sections": list(scenario.other_sections),
-                "versions": versions(),
             }
         )
-        return 0
+        return
     print(printable(f"{scenario.name}: {', completed by '.join([str(scenario.path), *bases])}"))
     units = Units.for_drive(scenario.plant.as_drive())
     for node, parameters in found.items():
@@ -70,7 +67,6 @@ def run(arguments: argparse.Namespace) -> int:
         print_table("", [node, "value", "unit", "from"], rows)
     for section in scenario.other_sections:
         print(printable(f"\nsection {section} is for another node"))
-    return 0
 
 
 def _parameters(scenario: "Scenario", node: str) -> dict[str, dict[str, Any]]:

@@ -2,7 +2,7 @@
 
 import argparse
 from collections.abc import Generator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,17 +12,16 @@ from stickslip_ros.app.arguments import (
     add_scenario,
     check_figure,
     check_new,
-    made_of,
     naming,
+    provenance,
     scenario_of,
     seconds,
     write_figure,
     writing,
 )
-from stickslip_ros.app.optional_dependencies import interrupts_kept
-from stickslip_ros.app.output import print_figures, print_json, progress_bar
+from stickslip_ros.app.output import print_json, print_values, progress_bar
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.plots.why_no_cycle import why_no_cycle
+from stickslip_ros.files import written
 from stickslip_ros.studies.options import DEFAULT_PERIODS
 
 if TYPE_CHECKING:
@@ -67,24 +66,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.plots.measure_table import told_and_true
-        from stickslip_ros.plots.run_history import RunHistory
-        from stickslip_ros.plots.units import Units
-        from stickslip_ros.studies.settling import check_continuous
-        from stickslip_ros.studies.simulate import default_duration, sensor_meter, simulate
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.plots.measure_table import measured_and_true, why_no_cycle
+    from stickslip_ros.plots.run_history import RunHistory
+    from stickslip_ros.plots.units import Units
+    from stickslip_ros.studies.settling import check_continuous
+    from stickslip_ros.studies.simulate import default_duration, sensor_meter, simulate
+
     scenario = scenario_of(arguments)
     duration = arguments.duration
     if duration is None:
         duration = default_duration(scenario)
-    plot: Path | None = arguments.plot
     check_figure(arguments)
     if arguments.continuous_control:
         with naming("--continuous-control:"):
             check_continuous(scenario)
-    history = None if plot is None else RunHistory()
+    history = None if arguments.plot is None else RunHistory()
     told = sensor_meter(scenario)
     units = Units.for_drive(scenario.plant.as_drive())
     shown = f"{duration:g} {units.of_unit('s')}".rstrip()
@@ -101,25 +99,24 @@ def run(arguments: argparse.Namespace) -> int:
             recorder=recorder,
             told=told,
         )
-    measures = true if told is None else told.measures()
-    if plot is not None and history is not None:
-        from stickslip_ros.plots.simulated_run import simulated_run_figure
+        if history is not None:
+            from stickslip_ros.plots.run_figure import simulated_run_figure
 
-        write_figure(
-            arguments,
-            lambda style: simulated_run_figure(scenario, history, true, style=style),
-        )
+            write_figure(
+                arguments,
+                lambda style: simulated_run_figure(scenario, history, true, style=style),
+            )
+    measures = true if told is None else told.measures()
     if arguments.json:
         truth = None if told is None else true.as_dict()
-        figures = {**measures.as_dict(), "truth": truth, "duration": duration}
-        print_json({**figures, **made_of(scenario)})
+        values = {**measures.as_dict(), "truth": truth, "duration": duration}
+        print_json({**values, **provenance(scenario)})
     else:
-        columns = told_and_true(measures, None if told is None else true)
-        print_figures(f"{scenario.name}, {shown}", columns, dict.fromkeys(columns, units))
+        columns = measured_and_true(measures, None if told is None else true)
+        print_values(f"{scenario.name}, {shown}", columns, dict.fromkeys(columns, units))
         reason = why_no_cycle(true.regime, duration, scenario.plant.as_drive())
         if reason is not None:
             print(reason)
-    return 0
 
 
 @contextmanager
@@ -141,15 +138,10 @@ def _recorder(
     if out.suffix.lower() != ".csv":
         raise InvalidInputError(f"--out {out}: must end in .csv")
     check_new("--out", out)
-    from stickslip_ros.studies.trajectory_file import TrajectoryFile
+    from stickslip_ros.studies.simulate import TrajectoryFile
 
-    new = out.with_name(f"{out.name}.new")
-    with ExitStack() as stack:
-        stack.enter_context(writing("--out", out))
-        stack.callback(new.unlink, missing_ok=True)
-        with new.open("x", encoding="utf-8", newline="") as stream:
-            yield TrajectoryFile(stream, rate, every, measured=measured)
-        new.replace(out)
+    with writing("--out", out), written(out) as stream:
+        yield TrajectoryFile(stream, rate, every, measured=measured)
 
 
 def _samples(interval: float | None, rate: float) -> int:

@@ -7,11 +7,10 @@ from stickslip_ros.app.arguments import (
     add_plot,
     add_scenario,
     check_figure,
-    made_of,
+    provenance,
     scenario_of,
     write_figure,
 )
-from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_json, print_parts, progress_bar
 from stickslip_ros.errors import InvalidInputError
 
@@ -28,11 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.plots.stability_table import stability_tables
-        from stickslip_ros.studies.stability import stability, why_no_figure
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.plots.study_tables import stability_tables
+    from stickslip_ros.studies.stability import stability, why_no_figure
+
     scenario = scenario_of(arguments)
     check_figure(arguments)
     if arguments.plot is not None:
@@ -43,11 +42,10 @@ def run(arguments: argparse.Namespace) -> int:
         found, notes = stability(scenario)
     if arguments.plot is not None:
         with progress_bar("drawing", None):
-            from stickslip_ros.plots.scenario_stability import scenario_stability_figure
+            from stickslip_ros.plots.stability_figure import scenario_stability_figure
 
             write_figure(arguments, lambda style: scenario_stability_figure(scenario, style=style))
     if arguments.json:
-        print_json({**found, "notes": notes, **made_of(scenario)})
+        print_json({**found, "notes": notes, **provenance(scenario)})
     else:
         print_parts(stability_tables(scenario, found, notes))
-    return 0

@@ -4,16 +4,16 @@ import argparse
 import os
 import sys
 from collections.abc import Generator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stickslip_ros.app.arguments import check_new, made_of, naming, writing
-from stickslip_ros.app.optional_dependencies import interrupts_kept
-from stickslip_ros.app.output import finite, progress_bar
+from stickslip_ros.app.arguments import check_new, naming, provenance, whole, writing
+from stickslip_ros.app.output import finite, progress_bar, tell
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.studies.options import SettlingCourse
+from stickslip_ros.files import written
+from stickslip_ros.studies.options import SettlingOptions
 
 if TYPE_CHECKING:
     from stickslip_ros.studies.columns import ExtraColumns
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _TABLES = (".csv", ".json")
 
 
-def add_running(parser: argparse.ArgumentParser, course: SettlingCourse) -> None:
+def add_running(parser: argparse.ArgumentParser, course: SettlingOptions) -> None:
     """Add how each point is followed (default: `course`), where it is computed, and --out."""
     parser.add_argument(
         "--continuous-control",
@@ -48,7 +48,7 @@ def add_running(parser: argparse.ArgumentParser, course: SettlingCourse) -> None
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
         "--workers",
-        type=_workers,
+        type=whole("a number of processes, from {} to {}", 1, 4 * (os.cpu_count() or 1)),
         default=1,
         metavar="COUNT",
         help="processes on this machine that share the points (default: 1); the results are the "
@@ -65,11 +65,12 @@ def add_running(parser: argparse.ArgumentParser, course: SettlingCourse) -> None
         type=Path,
         metavar="FILE",
         help=f"write a table of all points ({', '.join(_TABLES)}); an existing file is refused. "
-        "If interrupted, the finished points stay in FILE.part, and the same command continues",
+        "If interrupted, the finished points stay in FILE.part, without --out in ~/.cache, and the "
+        "same command continues",
     )
 
 
-def course_of(arguments: argparse.Namespace, default: SettlingCourse) -> SettlingCourse:
+def course_of(arguments: argparse.Namespace, default: SettlingOptions) -> SettlingOptions:
     """Return how each point is followed: as asked for, and otherwise as in `default`."""
     return replace(default, transient=arguments.transient, cycles=arguments.cycles)
 
@@ -77,33 +78,33 @@ def course_of(arguments: argparse.Namespace, default: SettlingCourse) -> Settlin
 @contextmanager
 def computed(arguments: argparse.Namespace, study: "Study", label: str) -> "Generator[Journal]":
     """Compute the missing points of the study, and provide its complete journal."""
-    with interrupts_kept():
-        from stickslip_ros.studies.dask_cluster import DaskError, dask_executor
-        from stickslip_ros.studies.journal import Journal
-        from stickslip_ros.studies.runner import run, run_here
+    from stickslip_ros.studies.journal import Journal, kept_journal
+    from stickslip_ros.studies.runner import DaskError, dask_executor, run, run_here
+
     out: Path | None = arguments.out
     if out is not None:
         if out.suffix.lower() not in _TABLES:
             raise InvalidInputError(f"--out {out}: must end in one of {', '.join(_TABLES)}")
         check_new("--out", out)
-    part = None if out is None else out.with_name(f"{out.name}.part")
-    with Journal(study, part) as journal:
-        kept = "; without --out no point is kept"
+        journal = Journal(study, out.with_name(f"{out.name}.part"))
+    else:
+        journal = kept_journal(study)
+    with journal:
+        kept, part = "; without --out no point is kept", journal.path
         if part is not None:
             kept = f"; they stay in {part}, and the same command continues from there"
+        if journal.count and out is None:
+            tell(f"{journal.count} points are taken from {part}")
         try:
-            with progress_bar(label, study.plan.size) as progress:
+            with progress_bar(label, study.plan.size, _advice(study)) as progress:
                 if arguments.dask is None:
                     run_here(journal, arguments.workers, progress)
                 else:
                     with naming("--dask"), dask_executor(arguments.dask) as (executor, in_flight):
                         run(journal, executor, in_flight=in_flight, progress=progress)
         except KeyboardInterrupt:
-            print(
-                f"stickslip {arguments.command}: {journal.count} of {study.plan.size} points are "
-                f"done{kept}",
-                file=sys.stderr,
-            )
+            done = f"{journal.count} of {study.plan.size} points are done{kept}"
+            tell(f"stickslip {arguments.command}: {done}")
             raise
         except OSError as error:
             raise RunError(f"{part or 'temporary file'}: {error.strerror}{kept}") from None
@@ -114,6 +115,19 @@ def computed(arguments: argparse.Namespace, study: "Study", label: str) -> "Gene
         yield journal
 
 
+def _advice(study: "Study") -> str:
+    """Return what would make a study quicker that simulates every sample of its loop."""
+    from stickslip_ros.studies.settling import check_continuous
+
+    plant = study.scenario.plant
+    if study.continuous or not plant.expects_control:
+        return ""
+    with suppress(InvalidInputError):
+        check_continuous(study.scenario)
+        return "; every sample is simulated: --continuous-control is several times as fast"
+    return ""
+
+
 def write_results(
     arguments: argparse.Namespace,
     journal: "Journal",
@@ -122,41 +136,18 @@ def write_results(
 ) -> None:
     """Write the table of a complete journal to where it was asked for, a file or as JSON.
 
-    As JSON it also holds `made`, which belongs to all points together.
+    As JSON it also holds `made`, which belongs to all points together. The journal need not be kept
+    any more then.
     """
-    from stickslip_ros.studies.columns import write_json
-
-    head = finite({**made_of(journal.study.scenario), **made})
-    if arguments.out is not None:
-        _write_table(arguments.out, journal, further, head)
-    if arguments.json:
-        write_json(sys.stdout, journal, further, head)
-
-
-def _write_table(
-    path: Path, journal: "Journal", further: "ExtraColumns", head: Mapping[str, Any]
-) -> None:
-    """Write the table of a journal, which need not be kept any more then."""
     from stickslip_ros.studies.columns import write_csv, write_json
 
-    new = path.with_name(f"{path.name}.new")
-    with writing("--out", path), new.open("w", encoding="utf-8", newline="") as stream:
-        if path.suffix.lower() == ".csv":
-            write_csv(stream, journal, further)
-        else:
-            write_json(stream, journal, further, head)
-        stream.flush()
-        os.fsync(stream.fileno())
-    new.replace(path)
+    head, out = finite({**provenance(journal.study.scenario), **made}), arguments.out
+    if out is not None:
+        with writing("--out", out), written(out) as stream:
+            if out.suffix.lower() == ".csv":
+                write_csv(stream, journal, further)
+            else:
+                write_json(stream, journal, further, head)
+    if arguments.json:
+        write_json(sys.stdout, journal, further, head)
     journal.discard()
-
-
-def _workers(text: str) -> int:
-    most = 4 * (os.cpu_count() or 1)
-    try:
-        count = int(text)
-    except ValueError:
-        count = 0
-    if not 1 <= count <= most:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of processes, from 1 to {most}")
-    return count

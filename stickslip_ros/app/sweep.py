@@ -8,15 +8,15 @@ from stickslip_ros.app.arguments import (
     add_plot,
     add_scenario,
     check_figure,
+    check_speeds,
     naming,
     scenario_of,
     write_figure,
 )
-from stickslip_ros.app.optional_dependencies import interrupts_kept
 from stickslip_ros.app.output import print_table
 from stickslip_ros.app.study_command import add_running, computed, course_of, write_results
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.studies.options import Carry, SettlingCourse
+from stickslip_ros.studies.options import Continuation, SettlingOptions
 
 if TYPE_CHECKING:
     from stickslip_ros.studies.columns import ExtraColumns
@@ -42,12 +42,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--carry",
-        choices=[str(carry) for carry in Carry],
+        choices=[str(carry) for carry in Continuation],
         help="start each point in the final state of its neighbour, controller included, with the "
         "(last) parameter going up, down or both, which shows hysteresis (default: start every "
         "point in the scenario's initial state)",
     )
-    add_running(parser, SettlingCourse())
+    add_running(parser, SettlingOptions())
     add_plot(parser, "the bifurcation diagram, or the map")
     parser.add_argument(
         "--colour",
@@ -58,22 +58,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Run the command; return the exit status."""
-    with interrupts_kept():
-        from stickslip_ros.plots.sweep_table import sweep_table, units_of
-        from stickslip_ros.studies.plan import Axis, Grid
-        from stickslip_ros.studies.sweep import sweep_study
-        from stickslip_ros.studies.transitions import transitions
+def run(arguments: argparse.Namespace) -> None:
+    """Run the command."""
+    from stickslip_ros.plots.study_tables import sweep_table, units_of
+    from stickslip_ros.studies.plan import Axis, Grid
+    from stickslip_ros.studies.sweep import sweep_study
+    from stickslip_ros.studies.transitions import transitions
+
     with naming("--over"):
         axes = [Axis.parse(text) for text in arguments.over]
     if len(axes) == 1 and arguments.colour != "regime":
         raise InvalidInputError(f"--colour {arguments.colour}: is for maps, of two parameters")
+    scenario = scenario_of(arguments, unused=[axis.parameter for axis in axes])
+    belts = [axis for axis in axes if axis.parameter == "plant.belt_speed"]
+    check_speeds(arguments, scenario, *(end for axis in belts for end in (axis.first, axis.last)))
     study = sweep_study(
-        scenario_of(arguments, unused=[axis.parameter for axis in axes]),
+        scenario,
         axes,
-        carry=None if arguments.carry is None else Carry(arguments.carry),
-        course=course_of(arguments, SettlingCourse()),
+        continuation=None if arguments.carry is None else Continuation(arguments.carry),
+        course=course_of(arguments, SettlingOptions()),
         continuous=arguments.continuous_control,
     )
     check_figure(arguments)
@@ -81,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
     assert isinstance(plan, Grid)
     label = f"sweep of {study.scenario.name}, {plan.size} points"
     further: ExtraColumns = {}
-    if plan.carried:
+    if plan.continuation:
         further = {"direction": lambda point: plan.direction(point.number)}
     with computed(arguments, study, label) as journal:
         if arguments.plot is not None:
@@ -94,11 +97,10 @@ def run(arguments: argparse.Namespace) -> int:
             units = units_of(study)
             for name, values in theory.items():
                 print(f"{name}: {', '.join(units.texts(values, plan.axes[0].unit))}")
-    return 0
 
 
 def _draw(arguments: argparse.Namespace, journal: "Journal") -> None:
-    from stickslip_ros.plots.sweep_picture import sweep_figure
+    from stickslip_ros.plots.sweep_figure import sweep_figure
     from stickslip_ros.studies.columns import Columns
 
     columns = Columns.from_journal(journal)

@@ -1,21 +1,48 @@
-"""The content of a chunk of an MCAP file: messages, as columns, and definitions."""
+"""Records of MCAP, and the content of a chunk of them: messages, as columns, and definitions.
 
+A record is a head of opcode and length, then the fields that belong to the opcode.
+"""
+
+import struct
 from array import array
 from collections import deque
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import suppress
 from copy import copy
-from typing import Any, NamedTuple
+from io import BytesIO
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.bags.compression import ZSTD_MAGIC, unpack_message
-from stickslip_ros.bags.mcap_records import HEAD, DamageError, records_in
 from stickslip_ros.messages.cdr import joined
 
+ParsedT = TypeVar("ParsedT")
+
+HEAD = struct.Struct("<BQ")
+"""Opcode and length of the content."""
+FIELDS: dict[int, tuple[int, ...]] = {
+    Opcode.HEADER: (-4, -4),
+    Opcode.FOOTER: (20,),
+    Opcode.SCHEMA: (2, -4, -4, -4),
+    Opcode.CHANNEL: (4, -4, -4, -4),
+    Opcode.CHUNK: (28, -4, -8),
+    Opcode.MESSAGE_INDEX: (2, -4),
+    Opcode.CHUNK_INDEX: (32, -4, 8, -4, 16),
+    Opcode.ATTACHMENT: (16, -4, -4, -8, 4),
+    Opcode.ATTACHMENT_INDEX: (40, -4, -4),
+    Opcode.STATISTICS: (42, -4),
+    Opcode.METADATA: (-4, -4),
+    Opcode.METADATA_INDEX: (16, -4),
+    Opcode.SUMMARY_OFFSET: (17,),
+    Opcode.DATA_END: (4,),
+}
+"""The fields of a record: a size in bytes or, if negative, the bytes of a size prefix."""
 _MESSAGE = np.dtype("u1, <u8, <u2, <u4, <u8, <u8")
 _MESSAGE.names = "opcode", "length", "channel", "sequence", "log_time", "publish_time"
 """The fields of a message record before the message itself."""
@@ -28,6 +55,36 @@ DEFINITIONS = (Opcode.SCHEMA, Opcode.CHANNEL)
 """Records that define the messages."""
 LARGEST_TABLE = 16 << 20
 """Bytes of the largest record of texts that is parsed: parsing takes many times its size."""
+
+
+class DamageError(Exception):
+    """A record is damaged; used by the modules of bags only."""
+
+
+def records_in(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Yield opcode, and begin and end of the content, of each record in the data.
+
+    Raises DamageError where the data are not a record.
+    """
+    position = 0
+    while position < len(data):
+        try:
+            opcode, length = HEAD.unpack_from(data, position)
+        except struct.error as error:
+            raise DamageError from error
+        begin = position + HEAD.size
+        position = begin + length
+        if opcode == 0 or position > len(data):
+            raise DamageError
+        yield opcode, begin, position
+
+
+def parse(read: Callable[[ReadDataStream], ParsedT], content: bytes) -> ParsedT:
+    """Parse a content with the mcap library; raise DamageError if it fails."""
+    try:
+        return read(ReadDataStream(BytesIO(content)))
+    except (EndOfFile, struct.error, UnicodeDecodeError, OverflowError, ValueError) as error:
+        raise DamageError from error
 
 
 class MessageBlock:

@@ -9,6 +9,8 @@ from pathlib import Path
 from lz4.frame import LZ4FrameDecompressor
 from zstandard import ZstdDecompressor, ZstdError, frame_content_size
 
+from stickslip_ros.files import open_regular
+
 LARGEST = 1 << 28
 """Bytes of the largest chunk or message that is accepted."""
 _PIECE = 4 << 20
@@ -47,7 +49,7 @@ def unpack_file(packed: Path, unpacked: Path) -> None:
     Raises OSError, also before the result takes more than half of the free disk space.
     """
     room = shutil.disk_usage(unpacked.parent).free // 2
-    with packed.open("rb") as source, unpacked.open("wb") as target, suppress(ZstdError):
+    with open_regular(packed) as source, unpacked.open("wb") as target, suppress(ZstdError):
         for piece in ZstdDecompressor().read_to_iter(source, write_size=_PIECE):
             room -= len(piece)
             if room < 0:

@@ -32,18 +32,24 @@ from mcap.writer import MCAP0_MAGIC
 from stickslip_ros.arrays import IntArray
 from stickslip_ros.bags.chunk import (
     DEFINITIONS,
+    FIELDS,
+    HEAD,
     LARGEST_TABLE,
     MESSAGE_LENGTH,
     MESSAGE_SIZE,
     WINDOW,
+    DamageError,
     MessageBlock,
     OpenChunk,
+    ParsedT,
     as_block,
     open_chunk,
+    parse,
+    records_in,
 )
 from stickslip_ros.bags.compression import LARGEST, unpack
-from stickslip_ros.bags.mcap_records import FIELDS, HEAD, DamageError, ParsedT, parse, records_in
 from stickslip_ros.errors import BagError
+from stickslip_ros.files import open_regular
 
 DefinitionT = TypeVar("DefinitionT", Schema, Channel)
 
@@ -100,10 +106,8 @@ class McapFile:
         self._chunked = False
         self._gaps: dict[int, int] = {}
         self._lost: dict[int, int] = {}
-        if path.exists() and not path.is_file():
-            raise BagError(f"the file {path} cannot be opened: it is not a regular file")
         try:
-            self._stream = path.open("rb")
+            self._stream = open_regular(path)
         except OSError as error:
             raise BagError(f"the file {path} cannot be opened: {error.strerror}") from error
         try:

@@ -4,8 +4,8 @@ It describes the finished files. While a bag is recorded, and after a recorder w
 one file more. This distinguishes a bag that was closed properly from others.
 """
 
-import os
 from collections.abc import Iterator, Sequence
+from io import TextIOWrapper
 from itertools import pairwise, takewhile
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ import yaml
 from mcap.records import Channel
 
 from stickslip_ros.bags.mcap_file import McapFile
+from stickslip_ros.files import open_regular, written
 
 METADATA_FILE = "metadata.yaml"
 
@@ -71,17 +72,8 @@ class BagDescription:
         information = _information(
             list(self._topics.values()), self._start, max(0, self._end - self._start), self._files
         )
-        text = _as_yaml({"rosbag2_bagfile_information": information})
-        temporary = directory / f".{METADATA_FILE}.part"
-        try:
-            with temporary.open("w", encoding="utf-8") as file:
-                file.write(text)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, directory / METADATA_FILE)
-        except OSError:
-            temporary.unlink(missing_ok=True)
-            raise
+        with written(directory / METADATA_FILE, replace=True) as file:
+            file.write(_as_yaml({"rosbag2_bagfile_information": information}))
 
 
 def metadata_faults(directory: Path, files: Sequence[Path]) -> list[str]:
@@ -164,9 +156,7 @@ def _information(
 
 def _listed(metadata: Path) -> set[str]:
     """Return the files that a `metadata.yaml` lists."""
-    if metadata.exists() and not metadata.is_file():
-        raise ValueError
-    with metadata.open(encoding="utf-8") as file:
+    with TextIOWrapper(open_regular(metadata), encoding="utf-8") as file:
         text = file.read(_LARGEST + 1)
     if len(text) > _LARGEST:
         raise ValueError

@@ -40,17 +40,15 @@ class QosProfile:
     """QoS that the publisher of a recorded topic offers, also when the bag is played back."""
 
     depth: int
-    history: Literal["keep_last", "keep_all"] = "keep_last"
-    reliability: Literal["reliable", "best_effort"] = "reliable"
     durability: Literal["volatile", "transient_local"] = "volatile"
 
     def to_yaml(self) -> str:
         """Return the profile as rosbag2 stores it with a channel: a YAML list of one profile."""
         unlimited = {"sec": 9223372036, "nsec": 854775807}
         profile = {
-            "history": self.history,
+            "history": "keep_last",
             "depth": self.depth,
-            "reliability": self.reliability,
+            "reliability": "reliable",
             "durability": self.durability,
             "deadline": dict(unlimited),
             "lifespan": dict(unlimited),

@@ -11,12 +11,11 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, IntArray
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.table_file import read_table
+from stickslip_ros.bags.table_file import LONGEST, read_table
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
-from stickslip_ros.physics.measures.observer import Conclusions, RunObserver
-from stickslip_ros.physics.measures.reading import Reading, reading_of
-from stickslip_ros.physics.measures.run_meter import RunMeter
+from stickslip_ros.physics.measures.reading import SampleAssumptions, reading_of
+from stickslip_ros.physics.measures.run_meter import RunAnalysis, RunMeter, RunObserver
 from stickslip_ros.physics.measures.slips import SlipMeter, SlipThreshold
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
@@ -26,8 +25,6 @@ _DEFAULT_WINDOW = 20
 """Cycles to average over for a bag of another recorder."""
 _NOISES = 6.0
 """Least drop of a slip, in standard deviations of the noise, that is not noise."""
-_LONGEST = 9e9
-"""Longest time, s, that stamps can express."""
 
 
 def report_of_bag(
@@ -93,8 +90,7 @@ def report_of_bag(
     >>> report["complete"], report["samples"]
     (True, 2001)
     """
-    if not start < end:
-        raise InvalidInputError(f"the part from {start} s to {end} s is empty")
+    _check_part(start, end)
     with Recording(path, namespace, belt_speed=belt_speed) as recording:
         meter = RunMeter(
             window or _window_at_recording(recording),
@@ -106,7 +102,7 @@ def report_of_bag(
         # Measuring each chunk by itself would take twice as long.
         for block in recording.blocks(least=20_000):
             if recording.velocity_estimated and meter.motion.reading.noisy is None:
-                meter.motion.reading = Reading(noisy=True)
+                meter.motion.reading = SampleAssumptions(noisy=True)
             run.feed(*block)
         run.finish()
         missing = recording.missing
@@ -120,12 +116,10 @@ def report_of_bag(
                 + f" that can be read; its topics are: {topics or 'none'}"
                 + "".join(f"; {sentence}" for sentence in missing)
             )
-    if run.measured == 0:
-        before = "" if end == float("inf") else f" and before {end:g} s"
-        raise InvalidInputError(f"{path} holds no samples from {start:g} s on{before}")
+    report = run.report(path)
     if not run.has_states:
         missing.append("the bag holds no joint states: the motion is unknown")
-    return {**run.report(), "complete": not missing, "missing": missing}
+    return {**report, "complete": not missing, "missing": missing}
 
 
 def report_of_table(
@@ -136,58 +130,31 @@ def report_of_table(
     end: float = float("inf"),
     window: int = _DEFAULT_WINDOW,
     stick_speed: float | None = None,
+    belt_speed: float | None = None,
     slips: SlipThreshold | None = None,
     observer: RunObserver | None = None,
     take: Callable[[SampleColumns | ForceColumns], None] = lambda _: None,
 ) -> dict[str, Any]:
     """Return measures and counts of a CSV or MAT file, as `report_of_bag` does.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    columns : mapping, optional
-        What its columns are, see `read_table`.
-    start, end : float
-        Part that is measured, s from the first sample.
-    window : int
-        Number of whole cycles at the end of the part over which the measures are averaged.
-    stick_speed : float or None
-        Largest relative speed of a slide that sticks, m/s, for samples without noise. By default
-        the noise is found from the samples.
-    slips : SlipThreshold or None
-        What counts as a slip; None: slips are not looked for.
-    observer : RunObserver or None
-        Receives the samples and cycles of the part.
-    take : callable, optional
-        Receives samples and forces.
-
-    Returns
-    -------
-    dict
-        As `report_of_bag`; the notes also say what the table does not have.
-
-    Raises
-    ------
-    BagError
-        If the file cannot be read.
-    InvalidInputError
-        If a column is not there, or the part is empty.
+    Without `stick_speed`, m/s, the noise is found from the samples. For `columns` and `belt_speed`
+    see `read_table`. `take` receives samples and forces. The notes also say what the table lacks.
     """
-    if not start < end:
-        raise InvalidInputError(f"the part from {start} s to {end} s is empty")
-    table = read_table(path, columns)
-    reading = table.reading if stick_speed is None else Reading(stick_speed)
+    _check_part(start, end)
+    table = read_table(path, columns, belt_speed)
+    reading = table.reading if stick_speed is None else SampleAssumptions(stick_speed)
     meter = RunMeter(window, observer=observer, reading=reading)
     run = _RunReader(meter, start, end, observer, take, slips)
     run.feed(table.samples, table.forces, table.forces[:0])
     run.finish()
-    if run.measured == 0:
-        before = "" if end == float("inf") else f" and before {end:g} s"
-        raise InvalidInputError(f"{path} holds no samples from {start:g} s on{before}")
-    report = run.report()
+    report = run.report(path)
     notes = [*table.notes, *report["notes"]]
     return {**report, "notes": notes, "complete": True, "missing": []}
+
+
+def _check_part(start: float, end: float) -> None:
+    if not start < end:
+        raise InvalidInputError(f"the part from {start} s to {end} s is empty")
 
 
 class _RunReader:
@@ -203,6 +170,7 @@ class _RunReader:
         slips: SlipThreshold | None,
     ) -> None:
         self.meter = meter
+        self._ends = f"from {start:g} s on" + ("" if end == inf else f" and before {end:g} s")
         self._slips = None if slips is None else SlipMeter(slips)
         self._last_stamp = -1
         self._belt_speed = 0.0
@@ -210,11 +178,10 @@ class _RunReader:
         self.first: int | None = None
         """Stamp from which the instants count, ns, once it is known."""
         self.has_states = False
-        self.measured = 0
-        """Number of joint states and forces in the part."""
+        self._measured = 0
         self._start, self._end = (
-            round(min(instant, _LONGEST) * NANOSECONDS)
-            for instant in (start if start > 0.0 else -_LONGEST, end)
+            round(min(instant, LONGEST) * NANOSECONDS)
+            for instant in (start if start > 0.0 else -LONGEST, end)
         )
         self._early: list[tuple[ForceColumns, ForceColumns]] = []
 
@@ -223,7 +190,7 @@ class _RunReader:
             self.has_states = True
             first = self._begin(int(states.stamp[0])) if self.first is None else self.first
             part = states[self._part(states.stamp, first)]
-            self.measured += len(part)
+            self._measured += len(part)
             self.meter.motion.feed(part)
             self._find_slips(part)
             self._take(part)
@@ -242,8 +209,10 @@ class _RunReader:
         self._begin_without_states()
         self.meter.finish()
 
-    def report(self) -> dict[str, Any]:
+    def report(self, path: Path) -> dict[str, Any]:
         """Return the measures and counts, and the slips if they were looked for."""
+        if self._measured == 0:
+            raise InvalidInputError(f"{path} holds no samples {self._ends}")
         report, slips = self.meter.report(), None
         notes = report["notes"]
         if self._slips is not None:
@@ -256,13 +225,13 @@ class _RunReader:
                     f"positions, {quantity(noise, 'm')}: some slips are noise",
                 ]
         if self._observer is not None:
-            self._observer.take_conclusions(Conclusions(self.meter.motion.mean_cycle, slips))
+            self._observer.take_conclusions(RunAnalysis(self.meter.motion.mean_cycle, slips))
         return {**report, "notes": notes, "slips": slips}
 
     def _find_slips(self, part: SampleColumns) -> None:
         if self._slips is None or len(part) == 0:
             return
-        part = part[part.believed]
+        part = part[part.is_valid]
         if len(part) == 0:
             return
         self._belt_speed = float(part.belt_velocity[-1])
@@ -287,7 +256,7 @@ class _RunReader:
 
     def _feed_forces(self, forces: ForceColumns, dropped: ForceColumns, first: int) -> None:
         forces, dropped = (each[self._part(each.stamp, first)] for each in (forces, dropped))
-        self.measured += len(forces)
+        self._measured += len(forces)
         self.meter.feed_forces(forces, dropped)
         self._take(forces)
 
@@ -296,16 +265,16 @@ class _RunReader:
         return (since >= self._start) & (since < self._end)
 
 
-def reading_at_recording(recording: Recording, given: float | None = None) -> Reading:
+def reading_at_recording(recording: Recording, given: float | None = None) -> SampleAssumptions:
     """Return how the samples of a recording are to be read, with a stick speed that is `given`."""
     if given is not None:
-        return Reading(given)
+        return SampleAssumptions(given)
     analyzer = recording.metadata("stickslip_ros/analyzer") or {}
     plant = recording.metadata("stickslip_ros/plant") or {}
     with suppress(KeyError, ValueError):
         given = float(analyzer["stick_speed"])
         if 0.0 <= given < inf:
-            return Reading(given)
+            return SampleAssumptions(given)
     known: dict[str, Any] = {}
     for name, text in plant.items():
         with suppress(RecursionError, ValueError):

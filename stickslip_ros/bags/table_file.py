@@ -1,17 +1,25 @@
 """Recordings of machines as tables: CSV files, and MAT files of MATLAB."""
 
 import csv
-from collections.abc import Mapping
+import os
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
+from io import TextIOWrapper
+from itertools import islice
+from math import nan
 from pathlib import Path
-from typing import Any, cast
+from typing import BinaryIO
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.bags.compression import LARGEST as LARGEST_FILE
+from stickslip_ros.bags.mat_file import vectors_of
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.physics.measures.reading import UNKNOWN, Reading
-from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.files import open_regular
+from stickslip_ros.physics.measures.reading import UNKNOWN, SampleAssumptions
+from stickslip_ros.samples import LARGEST, ForceColumns, SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 from stickslip_ros.text import did_you_mean, must_be_one_of, shown
 
@@ -30,6 +38,9 @@ QUANTITIES = (
 )
 """What a table may have of a run; time and position it must have."""
 
+LONGEST = 9e9
+"""Longest time, s, that stamps can express."""
+
 _OWN = {
     "time": ("time",),
     "position": ("measured_position", "position"),
@@ -40,8 +51,11 @@ _OWN = {
 }
 """Columns of the files that `stickslip simulate --out` writes; the first one that exists."""
 
-_LONGEST = 9e9
-"""Longest time, s, that stamps can express."""
+_MOST_NUMBERS, _MOST_COLUMNS, _LONGEST_LINE = 1 << 24, 10_000, 1 << 20
+"""Numbers and columns of a table, and characters of a line, that are read."""
+
+_LONGEST_LIST = 1000
+"""Characters of the longest list of columns in a message."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +66,7 @@ class TableRecording:
     """The motion; time zero is the stamp 0."""
     forces: ForceColumns
     """Control force at each sample; empty if the table has none."""
-    reading: Reading
+    reading: SampleAssumptions
     """How the samples are to be read, as far as the table tells."""
     notes: tuple[str, ...]
     """Sentences on what the table does not have."""
@@ -63,32 +77,17 @@ def is_table(path: Path) -> bool:
     return path.suffix.lower() in TABLE_SUFFIXES
 
 
-def read_table(path: Path, columns: Mapping[str, str] | None = None) -> TableRecording:
+def read_table(
+    path: Path, columns: Mapping[str, str] | None = None, belt_speed: float | None = None
+) -> TableRecording:
     r"""Read a recording from a CSV or MAT file.
 
-    A velocity that is not given is the difference of the positions beside each sample. A belt
-    whose velocity is not given is at rest.
-
-    Parameters
-    ----------
-    path : Path
-        A CSV file whose first line has the names of its columns, separated by commas, semicolons or
-        tabs; or a MAT file, version 7 or older, with a variable for each column.
-    columns : mapping, optional
-        For each of `QUANTITIES`: the name of a column, a number, or a product of them such as
-        `vir*35.15065`; SI units. By default the file is one of `stickslip simulate --out`.
-
-    Returns
-    -------
-    TableRecording
-        Samples and forces.
-
-    Raises
-    ------
-    BagError
-        If the file cannot be read.
-    InvalidInputError
-        If a column is not there, or the quantities do not make a recording.
+    A CSV file begins with the names of its columns, separated by commas, semicolons or tabs; a MAT
+    file, version 7 or older, has a variable for each column. `columns` has, for some of
+    `QUANTITIES`, the name of a column, a number, or a product of them such as `vir*35.15065`, in SI
+    units; by default the file is one of `stickslip simulate --out`. A `belt_speed` is in place of a
+    column. A velocity that is not given is the difference of the positions beside each sample. A
+    belt whose velocity is not given is at rest.
 
     Examples
     --------
@@ -102,54 +101,59 @@ def read_table(path: Path, columns: Mapping[str, str] | None = None) -> TableRec
     >>> recording.samples.position.tolist()
     [1e-06, 3e-06]
     """
-    return _recording(path, quantities_of(path, table_of(path), columns))
+    return _recording(path, quantities_of(path, table_of(path), columns, belt_speed))
 
 
 def quantities_of(
-    path: Path, table: Mapping[str, FloatArray], columns: Mapping[str, str] | None = None
+    path: Path,
+    table: Mapping[str, FloatArray],
+    columns: Mapping[str, str] | None = None,
+    belt_speed: float | None = None,
 ) -> dict[str, FloatArray]:
-    """Return the quantities that a table has, as arrays of shape (rows,).
+    """Return the quantities that a table of the file `path` has, as arrays of shape (rows,).
 
-    Parameters
-    ----------
-    path : Path
-        The file that the table was read from.
-    table : mapping
-        Its columns, see `table_of`.
-    columns : mapping, optional
-        As for `read_table`.
-
-    Returns
-    -------
-    dict
-        Values by quantity, SI units, without the rows whose time is not finite.
-
-    Raises
-    ------
-    InvalidInputError
-        If a column is not there, or time or position is not given.
+    The arguments are those of `read_table`. Rows whose time is not finite are left out. Values
+    that a measure would overflow with are NaN (above 1e100) or zero (below 1e-100).
     """
     if columns is None:
         columns = own_columns(path, table)
+    if belt_speed is not None:
+        columns = {**columns, "belt_velocity": repr(float(belt_speed))}
     for name in columns:
         if name not in QUANTITIES:
             raise InvalidInputError(f"column {name} is refused: {must_be_one_of(name, QUANTITIES)}")
     lacking = [name for name in ("time", "position") if name not in columns]
     if lacking:
         raise InvalidInputError(f"{path}: no column is given for {' and '.join(lacking)}")
-    values = {name: _value(path, table, text) for name, text in columns.items()}
+    with np.errstate(over="ignore", invalid="ignore"):
+        values = {name: _value(path, table, text) for name, text in columns.items()}
     time = values["time"]
     if time.ndim == 0:
         raise InvalidInputError(f"{path}: time = {columns['time']} must be a column")
     known = np.isfinite(time)
     if not known.any():
         raise InvalidInputError(f"{path}: no time is a finite number")
-    return {name: np.broadcast_to(each, time.shape)[known] for name, each in values.items()}
+    for name, each in values.items():
+        if name != "time":
+            size = np.abs(each)
+            each = np.where(size <= LARGEST, each, nan) * (size >= 1.0 / LARGEST)
+        values[name] = np.broadcast_to(each, time.shape)[known]
+    return values
 
 
 def table_of(path: Path) -> dict[str, FloatArray]:
     """Return the columns of a CSV or MAT file, and single numbers, by name; raises BagError."""
-    return _read_mat(path) if path.suffix.lower() == ".mat" else _read_csv(path)
+    try:
+        with open_regular(path) as stream:
+            if os.fstat(stream.fileno()).st_size > LARGEST_FILE:
+                raise ValueError(f"it has more than {LARGEST_FILE} bytes")
+            if path.suffix.lower() == ".mat":
+                return _read_mat(stream)
+            with TextIOWrapper(stream, encoding="utf-8-sig") as file:
+                return _read_csv(file)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error).strip().partition(";")[0]
+        raise BagError(f"{path}: the file cannot be read: {reason}") from None
 
 
 def has_columns(table: Mapping[str, FloatArray], text: str) -> bool:
@@ -171,15 +175,16 @@ def _is_number(text: str) -> bool:
 
 def stamps_of(path: Path, time: FloatArray) -> IntArray:
     """Return times, s, as stamps, ns, from the first one; InvalidInputError if they are too far."""
-    since = time - time[0]
-    if np.abs(since).max() > _LONGEST:
-        raise InvalidInputError(f"{path}: the times differ by more than {_LONGEST:g} s")
+    with np.errstate(over="ignore"):
+        since = time - time[0]
+    if np.abs(since).max() > LONGEST:
+        raise InvalidInputError(f"{path}: the times differ by more than {LONGEST:g} s")
     return np.rint(since * NANOSECONDS).astype(np.int64)
 
 
 def _recording(path: Path, found: Mapping[str, FloatArray]) -> TableRecording:
+    stamp = stamps_of(path, found["time"])
     time = found["time"] - found["time"][0]
-    stamp = stamps_of(path, time)
     notes: list[str] = []
     position = found["position"]
     if "velocity" not in found:
@@ -200,7 +205,7 @@ def _recording(path: Path, found: Mapping[str, FloatArray]) -> TableRecording:
     if "force" in found:
         forces = ForceColumns(stamp, found["force"])
     # Differences of positions never have exactly the speed of the belt.
-    reading = UNKNOWN if velocity is not None else Reading(noisy=True)
+    reading = UNKNOWN if velocity is not None else SampleAssumptions(noisy=True)
     return TableRecording(samples, forces, reading, tuple(notes))
 
 
@@ -225,8 +230,9 @@ def own_columns(path: Path, table: Mapping[str, FloatArray]) -> dict[str, str]:
     }
     if not own["time"] or not own["position"]:
         raise InvalidInputError(
-            f"{path} has the columns {', '.join(table)}, and not those of `stickslip simulate "
-            "--out`: say what they are, as in --columns time=t,position=x,force=u*2.5"
+            f"{path} has the columns {', '.join(table)[:_LONGEST_LIST]}, and not those of "
+            "`stickslip simulate --out`: say what they are, as in --columns "
+            "time=t,position=x,force=u*2.5"
         )
     return {quantity: name for quantity, name in own.items() if name}
 
@@ -240,60 +246,55 @@ def _value(path: Path, table: Mapping[str, FloatArray], text: str) -> FloatArray
         elif _is_number(factor):
             value = value * float(factor)
         else:
-            known = f"has {', '.join(table)}"
+            known = f"has {', '.join(table)[:_LONGEST_LIST]}"
             hint = did_you_mean(factor, table, known)
             raise InvalidInputError(f"{path} has no column {shown(factor)}; {hint}")
     return value
 
 
-def _read_csv(path: Path) -> dict[str, FloatArray]:
+def _read_csv(file: TextIOWrapper) -> dict[str, FloatArray]:
+    def lines() -> Iterator[str]:
+        """Return all lines that are not empty; of one that is too long a part."""
+        file.seek(0)
+        return filter(str.strip, iter(partial(file.readline, _LONGEST_LINE), ""))
+
+    heading, first, *_ = *islice(lines(), 2), "", ""
+    if not first:
+        raise ValueError("it has no rows" if heading else "it is empty")
+    separator = max(",;\t", key=heading.count)
+    names = [name.strip() for name in next(csv.reader([heading], delimiter=separator), [])]
+    if not 2 <= len(names) <= _MOST_COLUMNS or len({*names}) < len(names):
+        raise ValueError(
+            f"its first line must have the names of 2 to {_MOST_COLUMNS} columns, all different"
+        )
+    if (count := first.count(separator) + 1) != len(names):
+        raise ValueError(f"it has {count} columns and {len(names)} names for them")
+    load = partial(np.loadtxt, delimiter=separator, comments=None, ndmin=2)
+    most = _MOST_NUMBERS // len(names)
+    rows = lines()
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            heading, rest = file.readline(), file.readline()
-        if not heading:
-            raise BagError(f"{path}: the file is empty")
-        if not rest:
-            raise BagError(f"{path}: the file has no rows")
-        separator = max(",;\t", key=heading.count)
-        names = [name.strip() for name in next(csv.reader([heading], delimiter=separator), [])]
-        if len(names) < 2 or len({*names}) < len(names):
-            raise BagError(
-                f"{path}: the first line must have the names of the columns, all different"
-            )
-        options: Any = {"delimiter": separator, "encoding": "utf-8-sig", "comments": None}
-        try:
-            rows = np.loadtxt(path, skiprows=1, ndmin=2, **options)
-        except ValueError:  # it has empty cells, which take ten times as long
-            rows = np.genfromtxt(path, skip_header=1, **options)
-            rows = rows.reshape(-1, rows.shape[-1] if rows.ndim > 1 else max(rows.size, 1))
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error).strip().partition("\n")[0]
-        raise BagError(f"{path}: the file cannot be read: {reason}") from None
-    if rows.shape[1] != len(names):
-        raise BagError(f"{path} has {rows.shape[1]} columns and {len(names)} names for them")
-    return dict(zip(names, rows.T.copy(), strict=True))
+        table = load(islice(rows, 1, most + 1))
+    except ValueError:  # some cells are no numbers: that takes longer
+        rows = lines()
+        table = load(islice(rows, 1, most + 1), converters=_number)
+    if next(rows, None) is not None:
+        raise ValueError(f"it has more than {_MOST_NUMBERS} numbers")
+    return dict(zip(names, table.T.copy(), strict=True))
 
 
-def _read_mat(path: Path) -> dict[str, FloatArray]:
-    from scipy.io import loadmat  # takes as long to import as a small report
-
+def _number(cell: str) -> float:
+    """Return the number in a cell, NaN if there is none."""
     try:
-        with path.open("rb") as file:
-            found: Any = loadmat(file, squeeze_me=True)
-    except NotImplementedError:
-        raise BagError(
-            f"{path}: a MAT file of version 7.3 is refused: save it with the option -v7"
-        ) from None
-    except Exception as error:
-        reason = getattr(error, "strerror", None) or str(error).strip().partition("\n")[0]
-        raise BagError(f"{path}: the file cannot be read: {reason}") from None
-    table = {
-        name: np.atleast_1d(np.asarray(values)).astype(float)
-        for name, values in cast(dict[str, Any], found).items()
-        if not name.startswith("__") and np.asarray(values).dtype.kind in "biuf"
-    }
-    columns = {name: values for name, values in table.items() if values.ndim == 1}
-    length = max((len(values) for values in columns.values()), default=0)
+        return float(cell)
+    except ValueError:
+        return nan
+
+
+def _read_mat(stream: BinaryIO) -> dict[str, FloatArray]:
+    columns = vectors_of(stream, _MOST_NUMBERS)
+    if not columns:
+        raise ValueError("it has no column")
+    length = max(map(len, columns.values()))
     # A single number is a constant, such as the gain of an amplifier.
     return {
         name: values if len(values) == length else values.reshape(())

@@ -19,11 +19,11 @@ from stickslip_ros.identification.curves import (
 )
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.free_runs import adjusted
-from stickslip_ros.identification.models import DELAY
+from stickslip_ros.identification.friction_models import DELAY
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
 
-_RESOLVED = 0.9
+_RESOLVED_ERROR_RATIO = 0.9
 """Share of the error to which a delay or a memory must lower it to be believed."""
 _DELAYS = np.arange(-1.0, 4.01, 0.25)
 """Delays that are tried, periods."""
@@ -99,7 +99,7 @@ class AxisTask:
             delay = tried[int(np.argmin(errors))] * period
             found = self._candidate(self._rows(delay), curve, delay)
             fit = found.fit
-        return found if found.error < _RESOLVED * plain.error else plain
+        return found if found.error < _RESOLVED_ERROR_RATIO * plain.error else plain
 
     def _with_memory(self, static: Candidate, *, asked: bool) -> Candidate:
         """Return the fit whose friction follows the curve of another over a path."""
@@ -119,11 +119,10 @@ class AxisTask:
             error(factor * best)
         nearest = min(tried.values(), key=lambda each: float(each.residual @ each.residual))
         found = self._as_candidate(nearest, static.delay)
-        if asked or found.error < _RESOLVED * static.error:
+        if asked or found.error < _RESOLVED_ERROR_RATIO * static.error:
             return found
-        remark = (
-            f"predicts better by less than {1.0 - _RESOLVED:.0%}: not resolved by filtered rows"
-        )
+        share = f"{1.0 - _RESOLVED_ERROR_RATIO:.0%}"
+        remark = f"predicts better by less than {share}: not resolved by filtered rows"
         return replace(found, remark=remark)
 
     def _candidate(self, rows: Rows, curve: Curve, delay: float | None) -> Candidate:

@@ -22,7 +22,7 @@ from stickslip_ros.physics.model.friction import (
     Table,
 )
 
-_LEAST = 0.01
+_LEAST_FRICTION = 0.01
 """Least friction of bristles at a speed, as a share of the largest."""
 POINTS = 40
 """Points that stand for a curve."""
@@ -86,6 +86,6 @@ def law_of(fit: Regression, direction: int, normal_force: float) -> FrictionLaw:
     tables = (table_of(fit, number, normal_force) for number in range(len(fit.rows.directions)))
     mean = float(np.mean([max(size for _, size in each) for each in tables]))
     # Bristles need friction to deflect.
-    points = tuple((speed, max(size, _LEAST * mean)) for speed, size in points)
+    points = tuple((speed, max(size, _LEAST_FRICTION * mean)) for speed, size in points)
     stiffness = mean / fit.curve.deflection
     return LuGre(Table(points), bristle_stiffness=stiffness, bristle_damping=0.0)

@@ -13,7 +13,7 @@ from stickslip_ros.identification.regression import Regression
 
 _SIGNIFICANT = 3.0
 """Standard errors by which a model must predict better to be preferred to a simpler one."""
-_WORTH = 0.01
+_LEAST_GAIN = 0.01
 """Share of the error by which it must be better besides."""
 
 
@@ -52,7 +52,7 @@ class Candidate:
     by_direction: bool = False
     """Whether a law on a spring has constants of its own in each direction."""
     remark: str = ""
-    """What the model was not allowed, or why it is out of the choice."""
+    """Restriction of the model, or reason why it is out of the choice."""
 
     @property
     def label(self) -> str:
@@ -62,7 +62,8 @@ class Candidate:
     @property
     def error(self) -> float:
         """Root mean square of the held-out error, as a share of the scale."""
-        return sqrt(float(np.mean(self.held_out))) / self.scale if len(self.held_out) else inf
+        known = len(self.held_out) and self.scale > 0.0
+        return sqrt(float(np.mean(self.held_out))) / self.scale if known else inf
 
 
 def better_by(better: Candidate, worse: Candidate) -> float:
@@ -74,7 +75,7 @@ def better_by(better: Candidate, worse: Candidate) -> float:
     """
     if len(better.held_out) != len(worse.held_out):
         return copysign(inf, worse.error - better.error)
-    if worse.error < (1.0 + _WORTH) * better.error:
+    if worse.error < (1.0 + _LEAST_GAIN) * better.error:
         return 0.0
     tiny = np.finfo(float).tiny
     ratios = np.log(np.maximum(worse.held_out, tiny) / np.maximum(better.held_out, tiny))

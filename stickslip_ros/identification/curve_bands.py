@@ -7,7 +7,7 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.axis_drive import POINTS, table_speeds
-from stickslip_ros.identification.intervals import carried
+from stickslip_ros.identification.intervals import propagated
 from stickslip_ros.identification.refinement import Refinement
 from stickslip_ros.identification.regression import Regression
 
@@ -28,21 +28,9 @@ class Friction:
 
 
 def friction_of(fit: Regression | Refinement, sign: float, fastest: float) -> Friction:
-    """Return the friction curve of a fit.
+    """Return the friction curve of a fit, from rest to the fastest recorded speed |v_r|, m/s.
 
-    Parameters
-    ----------
-    fit : Regression or Refinement
-        The fit.
-    sign : float
-        Direction of the slip, 1 or -1; of an axis one that its rows have.
-    fastest : float
-        Fastest recorded speed |v_r|, m/s.
-
-    Returns
-    -------
-    Friction
-        The curve, from rest to the fastest speed.
+    `sign` is the direction of the slip, 1 or -1; of an axis one that its rows have.
     """
     if isinstance(fit, Refinement):
         return _of_trajectories(fit, sign, fastest)
@@ -78,4 +66,4 @@ def _of_trajectories(fit: Refinement, sign: float, fastest: float) -> Friction:
 
 
 def _band(by: FloatArray, covariance: FloatArray) -> FloatArray:
-    return np.sqrt(np.maximum(np.diag(carried(by, covariance)), 0.0))
+    return np.sqrt(np.maximum(np.diag(propagated(by, covariance)), 0.0))

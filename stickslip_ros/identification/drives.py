@@ -14,50 +14,51 @@ from stickslip_ros.identification.curves import Curve
 from stickslip_ros.identification.filtered import filtered
 from stickslip_ros.identification.friction_models import (
     DAHL,
+    DELAY,
     EXPONENTIAL,
     LUGRE,
     MEMORY_MODELS,
     STATIC_MODELS,
     DirectionalModel,
     FrictionModel,
+    Model,
     TableModel,
 )
-from stickslip_ros.identification.models import DELAY, Model
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.refinement import Refinement, refine, restarted
 from stickslip_ros.identification.regression import LINEAR, Regression, Rows, regress
 from stickslip_ros.identification.trajectories import Trajectories, segments_of
 from stickslip_ros.identification.trajectory import Predictor
 
-_SHORT, _LONG = 1.25, 5.0
+_SHORT_SEGMENT, _LONG_SEGMENT = 1.25, 5.0
 """Length of the segments in natural periods: of the search, and of the fit."""
 _FIRST_STEPS, _STEPS, _FINALISTS = 5, 100, 2
 """Steps of the search from each start, steps from the best ones, and their number."""
-_BETTER = 0.8
+_RESTART_LOSS_RATIO = 0.8
 """Other starts of segments must lower the squared error to this share, or the search ends."""
-_WHITE = 0.3
+_WHITE_CORRELATION = 0.3
 """Correlation of successive errors up to which they are noise: rounding leaves some."""
 _SHAPES = (0.1, 0.3, 0.8)
 """Shapes from which the search starts, besides that of the regression: shares of the speeds."""
-POOR = 0.1
+POOR_ERROR = 0.1
 """Error, as a share of the motion, from which a model does not describe it."""
-_MEMORY = 0.5
+_MISSING_INPUT_ERROR = 0.5
 """Such an error, from which a memory is not tried: an input is missing."""
-_HOPELESS = 4.0
+_HOPELESS_LOSS_RATIO = 4.0
 """A model whose squared error is larger than that of the best one by this factor is not fitted
 further."""
-_RISE = 0.3
+_RISE_SHARE = 0.3
 """Rise of static friction from which the search starts, as a share of the kinetic one."""
-_FAR = 100.0
+_GIVEN_UP_LOSS_RATIO = 100.0
 """A law whose squared error after the first steps is larger than LuGre's by this factor is given
 up."""
-_STIFF = (10.0, 100.0)
+_STIFFNESS_RATIOS = (10.0, 100.0)
 """Stiffnesses of bristles from which the search starts, in stiffnesses of the spring."""
-_DAMPED = 0.03
+_DAMPING_RATIO = 0.03
 """Damping of the bristles from which the search starts, as a share of the critical one."""
-_WORTH, _SURE = 0.05, 4.0
+_OPTIONAL_GAIN, _OPTIONAL_ERRORS = 0.05, 4.0
 """Share of the squared error, and standard errors, for which one more constant is searched."""
-_KEPT = 3.0
+_ZERO_ERRORS = 3.0
 """Standard errors by which such a constant must differ from zero."""
 AUTO = "auto"
 """Law that stands for the one that predicts held-out parts best."""
@@ -113,7 +114,7 @@ class DriveTask:
         """Natural period by the regression, s, within what the records can have."""
         natural = 2.0 * pi * sqrt(self.constants["mass"] / self.constants["stiffness"])
         shortest = 20.0 * self.records[0].period
-        longest = max(record.duration for record in self.records) / _LONG
+        longest = max(record.duration for record in self.records) / _LONG_SEGMENT
         return max(min(natural, longest), shortest)
 
     def searched(
@@ -122,7 +123,9 @@ class DriveTask:
         """Return a model fitted to short segments, from several starts, or from a LuGre one."""
         model = Model(friction)
         if like is not None:
-            return self._nearest(model, [friction.like(like.values)], _FAR * _loss(like))
+            return self._nearest(
+                model, [friction.like(like.values)], _GIVEN_UP_LOSS_RATIO * _loss(like)
+            )
         starts = [model.start(each) for each in self._regressions(friction, thorough)]
         # A curve that does not suit the friction may leave none to them.
         unfit = [{name for name in self.free if not each[name] > 0.0} for each in starts]
@@ -133,9 +136,9 @@ class DriveTask:
         if friction.memory:
             starts = [
                 {**_falling(each), "bristle_stiffness": stiffness}
-                | {"bristle_damping": _DAMPED * sqrt(stiffness * each["mass"])}
+                | {"bristle_damping": _DAMPING_RATIO * sqrt(stiffness * each["mass"])}
                 for each in starts
-                for stiffness in (factor * each["stiffness"] for factor in _STIFF)
+                for stiffness in (factor * each["stiffness"] for factor in _STIFFNESS_RATIOS)
             ]
         return self._nearest(model, starts)
 
@@ -161,7 +164,7 @@ class DriveTask:
         self, model: Model, starts: Sequence[Mapping[str, float]], most: float = inf
     ) -> Refinement:
         """Return the best search; errors that are noise, or a larger loss than `most`, end it."""
-        short = self._trajectories(model, _SHORT * self.period)
+        short = self._trajectories(model, _SHORT_SEGMENT * self.period)
         names = self._names(model)
         tried: list[Refinement] = []
         for values in starts:
@@ -172,7 +175,7 @@ class DriveTask:
         for near in sorted(tried, key=_loss)[:_FINALISTS]:
             fit = self._settled(near)
             if not is_white(fit):
-                fit = self._with_optional(fit, least_share=_WORTH)
+                fit = self._with_optional(fit, least_share=_OPTIONAL_GAIN)
             finished.append(fit)
             if is_white(fit):
                 break
@@ -184,7 +187,7 @@ class DriveTask:
         while near.has_outliers:
             starts = restarted(near).starts
             other = refine(near.task, near.free, near.values, starts, most=_STEPS)
-            if _loss(other) > _BETTER * _loss(near):
+            if _loss(other) > _RESTART_LOSS_RATIO * _loss(near):
                 break
             near = other
         return near
@@ -198,14 +201,14 @@ class DriveTask:
             if name in self.fixed or name in fit.free:
                 continue
             errors, share = fit.gain(name)
-            if abs(errors) < _SURE or share < least_share:
+            if abs(errors) < _OPTIONAL_ERRORS or share < least_share:
                 continue
             more = refine(fit.task, [*fit.free, name], fit.values, fit.starts, most=_STEPS)
             if _loss(more) >= _loss(fit):
                 continue
             place = len(fit.free)
             error = sqrt(max(more.covariance[place, place], 0.0))
-            if abs(more.values[name]) > _KEPT * error:
+            if abs(more.values[name]) > _ZERO_ERRORS * error:
                 fit = more
                 continue
             # It was not needed, but may have led the others out of a local minimum.
@@ -217,7 +220,7 @@ class DriveTask:
     def finished(self, near: Refinement) -> Candidate:
         """Return a fit to long segments, with the constants that the records ask for."""
         model = near.task.model
-        task = self._trajectories(model, _LONG * self.period)
+        task = self._trajectories(model, _LONG_SEGMENT * self.period)
         # Measured starts are too rough for motions that grow over a segment.
         begun = refine(task, (), near.values)
         fit = self._settled(replace(begun, free=near.free))
@@ -287,7 +290,7 @@ def drive_candidates(task: DriveTask, law: str, progress: Callable[[str], None])
         progress(f"{friction.law} by direction")
         found.append(task.searched(DirectionalModel(friction)))
     # A memory changes the motion near sticking: it does not explain an input that is missing.
-    near = not found or (law == AUTO and min(map(_share, found)) < _MEMORY)
+    near = not found or (law == AUTO and min(map(_share, found)) < _MISSING_INPUT_ERROR)
     if near and not any(map(is_white, found)):
         bristles: Refinement | None = None
         for friction in MEMORY_MODELS:
@@ -304,7 +307,9 @@ def drive_candidates(task: DriveTask, law: str, progress: Callable[[str], None])
         found.append(task.searched(task.table))
     least = min(map(_loss, found))
     return [
-        task.finished(each) if _loss(each) <= _HOPELESS * least else task.unfinished(each)
+        task.finished(each)
+        if _loss(each) <= _HOPELESS_LOSS_RATIO * least
+        else task.unfinished(each)
         for each in found
     ]
 
@@ -313,12 +318,12 @@ def _falling(values: Mapping[str, float]) -> Mapping[str, float]:
     """Return coordinates with a static friction above that of slip, which bristles may hide."""
     if "rise" not in values:
         return values
-    return {**values, "rise": max(values["rise"], _RISE * values["kinetic"])}
+    return {**values, "rise": max(values["rise"], _RISE_SHARE * values["kinetic"])}
 
 
 def is_white(fit: Refinement) -> bool:
     """Return whether the errors of a fit are noise, as far as their successive ones tell."""
-    return abs(fit.correlation) < _WHITE
+    return abs(fit.correlation) < _WHITE_CORRELATION
 
 
 def _share(fit: Refinement) -> float:

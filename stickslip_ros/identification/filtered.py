@@ -63,20 +63,8 @@ class Filtered:
 def filtered(record: Record, *, decimated: bool, delay: float | None = None) -> Filtered:
     """Return the filtered columns of a record, without both ends.
 
-    Parameters
-    ----------
-    record : Record
-        Samples.
-    decimated : bool
-        Whether rows are decimated; for motions whose friction changes slowly.
-    delay : float, optional
-        Time from a sample until its force acts, s. By default the force at a sample is the one
-        that answers it.
-
-    Returns
-    -------
-    Filtered
-        The columns.
+    Rows are decimated for motions whose friction changes slowly. `delay` is the time from a sample
+    until its force acts, s; by default the force at a sample is the one that answers it.
     """
     from scipy.signal import butter, filtfilt  # takes long to import
 

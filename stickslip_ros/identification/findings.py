@@ -1,4 +1,4 @@
-"""What was identified: constants with intervals, the friction curve, and what it predicts."""
+"""The identified model: constants with intervals, the friction curve, and its predictions."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,10 +11,10 @@ from stickslip_ros.arrays import FloatArray, rms
 from stickslip_ros.identification.axis_drive import axis_drive, law_of
 from stickslip_ros.identification.candidates import Candidate, Estimate, better_by
 from stickslip_ros.identification.curve_bands import Friction, friction_of
-from stickslip_ros.identification.drives import POOR
+from stickslip_ros.identification.drives import POOR_ERROR
 from stickslip_ros.identification.filtered import START, Filtered, filtered
-from stickslip_ros.identification.intervals import carried
-from stickslip_ros.identification.models import DELAY, numbers_of
+from stickslip_ros.identification.friction_models import DELAY, numbers_of
+from stickslip_ros.identification.intervals import propagated
 from stickslip_ros.identification.record import FEWEST, Record
 from stickslip_ros.identification.refinement import Refinement, refine, restarted
 from stickslip_ros.identification.regression import Regression, directions_of
@@ -24,19 +24,19 @@ from stickslip_ros.identification.trajectory import Predictor, delayed, free_run
 from stickslip_ros.physics.model.drive import Drive
 
 _RELATIVE_STEP = 1e-5
-_STILL = 0.02
+_STILL_SPEED = 0.02
 """Share of the fastest speed below which a slide may stick."""
-_VAGUE = 0.5
+_VAGUE_ERROR = 0.5
 """Standard error, as a share of the value, from which a constant counts as not told."""
-_USED = 0.6
+_USED_SHARE = 0.6
 """Share of the samples below which the fit says that it used some of them only."""
-_FEW_MISSING = 1e-3
+_MISSING_SHARE = 1e-3
 """Share of missing samples up to which nothing is said."""
 _SPEEDS_OF_MACHINES = 1e-6, 20.0
 """Fastest speeds that a machine may have, m/s; others are in another unit."""
-_DIFFERENT = 0.05
+_FRICTION_DIFFERENCE = 0.05
 """Difference of friction at any speed, as a share of the largest, by which two laws differ."""
-_CORRELATED = 0.95
+_NAMED_CORRELATION = 0.95
 """Correlation from which two constants are named together."""
 _BY_DIRECTION = "it merges with friction by direction, and is taken as 0"
 CHECKED = (
@@ -46,30 +46,12 @@ CHECKED = (
     "position_error",
     "closed_loop_force_error",
 )
-"""What a model predicts of a recording."""
-
-
-@dataclass(frozen=True, eq=False)
-class ForceErrors:
-    """Measured and modelled forces on filtered rows, arrays of shape (rows,)."""
-
-    time: FloatArray
-    """Time from the first sample, s."""
-    position: FloatArray
-    """Displacement, m."""
-    relative_speed: FloatArray
-    """Velocity less that of the belt, m/s."""
-    friction: FloatArray
-    """Size of the measured friction with the sign of the slip: what the other forces leave, N."""
-    force_error: FloatArray
-    """Known force less that of the model, N."""
-    force: FloatArray
-    """Known force, N."""
+"""Errors of the prediction of a recording."""
 
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """What a model leaves of what it was fitted to, arrays of shape (rows,)."""
+    """Errors that a model leaves in its record, arrays of shape (rows,)."""
 
     time: FloatArray
     """Time from the first sample, s."""
@@ -82,11 +64,21 @@ class Residuals:
 
 
 @dataclass(frozen=True, eq=False)
+class ForceErrors(Residuals):
+    """Measured and modelled forces on filtered rows; the error is one of forces, N."""
+
+    friction: FloatArray
+    """Size of the measured friction with the sign of the slip: what the other forces leave, N."""
+    force: FloatArray
+    """Known force, N."""
+
+
+@dataclass(frozen=True, eq=False)
 class Findings:
     """The model that was chosen, and what the recordings tell of it."""
 
     records: Sequence[Record]
-    """What it was fitted to."""
+    """Records to which it was fitted."""
     candidates: Sequence[Candidate]
     """All laws that competed."""
     chosen: Candidate
@@ -99,14 +91,14 @@ class Findings:
     """Constants that were given."""
     servo: Servo | None
     """The position controller in the first record that has one."""
-    _runs: dict[int, tuple[Record, FloatArray]] = field(
-        default_factory=dict[int, tuple[Record, FloatArray]], init=False, repr=False
+    _runs: dict[Record, FloatArray] = field(
+        default_factory=dict[Record, FloatArray], init=False, repr=False
     )
-    """Free runs so far, each with its record, by the record's identity."""
-    _errors_in_segments: dict[int, tuple[Record, Residuals]] = field(
-        default_factory=dict[int, tuple[Record, Residuals]], init=False, repr=False
+    """Free runs so far."""
+    _errors_in_segments: dict[Record, Residuals] = field(
+        default_factory=dict[Record, Residuals], init=False, repr=False
     )
-    """The same of position errors in segments."""
+    """Position errors in segments so far."""
 
     def behind(self, candidate: Candidate) -> float:
         """Return by how many standard errors a law predicts held-out parts worse than the best."""
@@ -148,7 +140,7 @@ class Findings:
             for second in range(first):
                 product = errors[first] * errors[second]
                 share = covariance[first, second] / product if product > 0.0 else 0.0
-                if isfinite(share) and abs(share) > _CORRELATED:
+                if isfinite(share) and abs(share) > _NAMED_CORRELATION:
                     found.append((names[second], one, float(share)))
         return found
 
@@ -189,7 +181,7 @@ class Findings:
     def notes(self) -> Sequence[str]:
         """Sentences on what makes the model doubtful."""
         found: list[str] = []
-        if self.chosen.error >= POOR:
+        if self.chosen.error >= POOR_ERROR:
             found.append(
                 f"the model does not describe the recordings: its error is {self.chosen.error:.0%} "
                 "of what it predicts; an input may be missing (a disturbance, the velocity of the "
@@ -200,7 +192,7 @@ class Findings:
         if isinstance(fit, Refinement):
             samples = sum(segment.count for segment in fit.task.segments)
             used = samples / sum(len(each.position) for each in self.records)
-            if used < _USED:
+            if used < _USED_SHARE:
                 found.append(
                     f"{used:.0%} of the samples were used, in parts over the whole length: the "
                     "recordings are long; choose a part by --from and --to"
@@ -218,7 +210,7 @@ class Findings:
         for name in dict.fromkeys(record.name for record in self.records):
             own = [record for record in self.records if record.name == name]
             missing = float(np.mean(np.concatenate([record.lost for record in own])))
-            if missing > _FEW_MISSING:
+            if missing > _MISSING_SHARE:
                 used = ", and not fitted" if self.has_spring else ""
                 found.append(
                     f"{100.0 * missing:.2g} % of the samples of {name} are missing: they are "
@@ -239,7 +231,7 @@ class Findings:
 
     @cached_property
     def unidentified(self) -> Mapping[str, str]:
-        """What the recordings cannot tell, and what run would, by parameter of the plant."""
+        """Reasons why a parameter of the plant is not told, and the run that would tell it."""
         found: dict[str, str] = {}
         if "normal_force" not in self.fixed:
             found["normal_force"] = (
@@ -252,7 +244,7 @@ class Findings:
             found |= self._merged_at_one_belt_speed()
             if not self.stuck and self.law not in ("coulomb", "dahl"):
                 found["friction.static"] = (
-                    "the slide never stuck: it is the curve extended to rest; run below "
+                    "no record shows sticking: it is the curve extended to rest; run below "
                     f"{1e3 * self.slowest:.3g} mm/s"
                 )
         if self._rivals:
@@ -262,7 +254,7 @@ class Findings:
                 f"run with relative speeds from rest to {1e3 * self._fastest:.3g} mm/s"
             )
         for name, estimate in self.fitted.items():
-            if estimate.standard_error < _VAGUE * abs(estimate.value) or name in found:
+            if estimate.standard_error < _VAGUE_ERROR * abs(estimate.value) or name in found:
                 continue
             sure = f"{estimate.value:.4g} has a standard error of {estimate.standard_error:.2g}"
             if isinf(estimate.standard_error):
@@ -284,7 +276,7 @@ class Findings:
             for number, sign in enumerate(self.directions):
                 own, other = self.friction(number), friction_of(each.fit, sign, self._fastest)
                 away = np.abs(np.interp(own.speed, other.speed, other.force) - own.force)
-                if float(away.max()) > _DIFFERENT * float(own.force.max()):
+                if float(away.max()) > _FRICTION_DIFFERENCE * float(own.force.max()):
                     found.append(each.label)
                     break
         return found
@@ -300,7 +292,7 @@ class Findings:
             if both
             else "it merges with the static friction of a single direction, and is taken as 0; run "
             "in both directions",
-            "friction.static": "the axis hardly ever stuck: it is the curve at its slowest steady "
+            "friction.static": "no row at rest is fitted: it is the curve at its slowest steady "
             f"speed extended to rest; run below {1e3 * self.slowest:.3g} mm/s",
         }
         if self.law == "coulomb":  # its static coefficient is that of slip
@@ -344,12 +336,18 @@ class Findings:
     def slowest(self) -> float:
         """Slowest speed |v_r| that was recorded for long, m/s."""
         speeds = np.concatenate(self._speeds)
-        return float(np.quantile(speeds[speeds > _STILL * float(speeds.max())], 0.02))
+        return float(np.quantile(speeds[speeds > _STILL_SPEED * float(speeds.max())], 0.02))
 
     @property
     def stuck(self) -> bool:
-        """Whether the slide stuck in a record."""
-        return any(np.mean(each > _STILL * each.max()) < 0.98 for each in self._speeds)
+        """Whether the slide stuck in a record; the filter blurs short sticking, noise the rest."""
+        raw = (
+            np.abs(np.diff(each.position) / each.period - each.belt_velocity[1:])
+            for each in self.records
+        )
+        return any(
+            np.mean(each > _STILL_SPEED * each.max()) < 0.98 for each in (*self._speeds, *raw)
+        )
 
     @cached_property
     def directions(self) -> Sequence[float]:
@@ -365,18 +363,7 @@ class Findings:
         )
 
     def friction(self, direction: int = 0) -> Friction:
-        """Return the friction curve over the recorded speeds, with its standard error.
-
-        Parameters
-        ----------
-        direction : int, optional
-            Number of the direction in `directions`.
-
-        Returns
-        -------
-        Friction
-            The curve.
-        """
+        """Return the friction curve over the recorded speeds, in one of `directions`."""
         return friction_of(self.chosen.fit, self.directions[direction], self._fastest)
 
     @property
@@ -397,17 +384,9 @@ class Findings:
         return axis_drive(fit, self.normal_force, belt)
 
     def errors(self, record: Record | None = None) -> ForceErrors:
-        """Return measured and modelled forces on the filtered rows of a record.
+        """Return measured and modelled forces on the filtered rows of a record, or of the first.
 
-        Parameters
-        ----------
-        record : Record, optional
-            By default the first one of those that were fitted.
-
-        Returns
-        -------
-        ForceErrors
-            The rows; of a drive on a spring those where it slips.
+        Of a drive on a spring these are the rows where it slips.
         """
         record = self.records[0] if record is None else record
         fit, spring = self.chosen.fit, self.has_spring
@@ -431,16 +410,15 @@ class Findings:
             terms = replace(type(fit.rows).of([columns]), directions=fit.rows.directions)
             error = replace(fit, rows=terms).residual
             friction = -terms.friction_terms(fit.curve, fit.shapes) @ fit.values[len(fit.free) :]
-        return ForceErrors(
-            rows(columns.time), rows(columns.position), speed, error - friction, error, force
-        )
+        time, position = rows(columns.time), rows(columns.position)
+        return ForceErrors(time, position, speed, error, error - friction, force)
 
     def force_error(self, record: Record) -> float | None:
         """Return the rms of F - F_model over that of F, on filtered rows; None without a force."""
         if not record.held_force.any():
             return None
         found = self.errors(record)
-        return rms(found.force_error) / rms(found.force) if len(found.force) else None
+        return rms(found.error) / rms(found.force) if len(found.force) else None
 
     def free_run(self, record: Record) -> FloatArray:
         """Return the positions that the model runs through, with the recorded force, no feedback.
@@ -448,10 +426,9 @@ class Findings:
         The velocity at the start is the one that fits best. A drive on a spring starts where the
         slide is fast relative to the belt, at the position that fits best, too; NaN before.
         """
-        key = id(record)
-        if key not in self._runs:
-            self._runs[key] = record, self._free_run(record)
-        return self._runs[key][1]
+        if record not in self._runs:
+            self._runs[record] = self._free_run(record)
+        return self._runs[record]
 
     def _free_run(self, record: Record) -> FloatArray:
         fit = self.chosen.fit
@@ -475,16 +452,12 @@ class Findings:
         The model of an axis is fitted to the forces, and has no segments.
         """
         record = self.records[0]
-        if self.has_spring:
-            return self._in_segments(record)
-        found = self.errors(record)
-        return Residuals(found.time, found.position, found.relative_speed, found.force_error)
+        return self._in_segments(record) if self.has_spring else self.errors(record)
 
     def _in_segments(self, record: Record) -> Residuals:
-        key = id(record)
-        if key not in self._errors_in_segments:
-            self._errors_in_segments[key] = record, self._found_in_segments(record)
-        return self._errors_in_segments[key][1]
+        if record not in self._errors_in_segments:
+            self._errors_in_segments[record] = self._found_in_segments(record)
+        return self._errors_in_segments[record]
 
     def _found_in_segments(self, record: Record) -> Residuals:
         from scipy.signal import savgol_filter
@@ -541,7 +514,7 @@ class Findings:
 def _usual(belt: FloatArray) -> float:
     """Return the median speed of a belt where it moves, in its more frequent direction."""
     size = np.abs(belt)
-    moving = belt[size > _STILL * float(size.max())]
+    moving = belt[size > _STILL_SPEED * float(size.max())]
     if not len(moving):
         return 0.0
     sign = 1.0 if np.mean(moving > 0.0) >= 0.5 else -1.0
@@ -581,4 +554,4 @@ def _propagated(
     fitted = np.abs(linear).sum(axis=1) > 0.0
     names = [name for name, used in zip(base, fitted, strict=True) if used]
     values = np.array([base[name] for name in names])
-    return names, values, carried(linear[fitted], covariance)
+    return names, values, propagated(linear[fitted], covariance)

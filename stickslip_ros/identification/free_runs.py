@@ -11,7 +11,7 @@ from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import Regression, solve, system
 from stickslip_ros.identification.trajectory import Predictor, delayed, free_run
 
-_FAR = 1e3
+_UNBOUNDED_ERROR = 1e3
 """Error of a free run that is not bounded, in units of that of the regression."""
 _STEPS = 3
 _FREE_WEIGHT = 1.4
@@ -23,21 +23,8 @@ _STEP = 1e-4
 def adjusted(fit: Regression, records: Sequence[Record], delay: float) -> Regression:
     """Return a regression whose forces fit, and whose free run through each record, too.
 
-    The sum of both mean squares is least, each in units of what the regression leaves.
-
-    Parameters
-    ----------
-    fit : Regression
-        The regression.
-    records : sequence of Record
-        What it was fitted to.
-    delay : float
-        Time from a sample until its force acts, s.
-
-    Returns
-    -------
-    Regression
-        With other values and shapes.
+    The sum of both mean squares is least, each in units of what the regression leaves. `records`
+    are those that it was fitted to; `delay` is the time from a sample until its force acts, s.
     """
     from scipy.optimize import least_squares
 
@@ -89,7 +76,7 @@ class _FreeRuns:
             measured = each.record.position
             positions.append(each.positions(drive, 0, len(measured), float(measured[0]), speed))
         errors = np.concatenate(positions) - self._measured
-        errors = np.nan_to_num(errors, nan=_FAR / self._weights[1])
+        errors = np.nan_to_num(errors, nan=_UNBOUNDED_ERROR / self._weights[1])
         return np.concatenate([own.residual * self._weights[0], errors * self._weights[1]])
 
     def linear(self) -> FloatArray:

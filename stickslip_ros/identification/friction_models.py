@@ -1,13 +1,16 @@
-"""Friction laws as they are searched: coordinates in newtons whose bounds are simple."""
+"""Drives as they are searched: friction by coordinates in newtons whose bounds are simple."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from math import exp, inf
+from dataclasses import dataclass
+from math import exp, inf, sqrt
 from typing import Any
 
 import numpy as np
+from typing_extensions import override
 
 from stickslip_ros.arrays import rms
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.curves import (
     CoulombCurve,
     Curve,
@@ -16,27 +19,30 @@ from stickslip_ros.identification.curves import (
     StribeckCurve,
 )
 from stickslip_ros.identification.regression import Regression
+from stickslip_ros.physics.model.constants import constants_of
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import (
     LAWS,
-    Coulomb,
+    CurveFollower,
     Directional,
-    Exponential,
     FrictionLaw,
-    Stribeck,
     Table,
 )
 
 Values = Mapping[str, float]
 """Values of coordinates by name, SI units."""
 
-_TINY = 1e-9
+_LEAST_SHARE = 1e-9
 """Smallest constant that must be above zero, as a share of the friction or of other forces."""
-_WIDE = 30.0
-"""Viscous friction up to which is searched, in static friction at the fastest speed."""
-_STIFFEST = 3000.0
+_SEARCH_FACTOR = 30.0
+"""Factor by which the search may leave the mass and the stiffness that it starts from; viscous
+friction up to which it goes, in static friction at the fastest speed."""
+_LARGEST_STIFFNESS = 3000.0
 """Largest stiffness of the bristles, in stiffnesses of the spring."""
-_SLOWEST, _FASTEST = 0.01, 10.0
+_SLOWEST_SHAPE, _FASTEST_SHAPE = 0.01, 10.0
 """Shapes of a curve that records may tell, in fastest speeds."""
+DELAY = "force_delay"
+"""Name of the constant that is not one of the drive: the time until a force acts, s."""
 REVERSE = "reverse."
 """Start of the names of coordinates of backward slip where both directions have their own."""
 
@@ -54,6 +60,8 @@ class FrictionModel(ABC):
     """Its curve in steady slip, for the regression."""
     coordinates: Sequence[str]
     """Names of the coordinates."""
+    smallest: str
+    """Coordinate of the smallest friction."""
     memory: Sequence[str] = ()
     """Coordinates of the memory of the law."""
     by_differences: Sequence[str] = ()
@@ -63,35 +71,38 @@ class FrictionModel(ABC):
     def start(self, fit: Regression, direction: int) -> dict[str, float]:
         """Return the coordinates that a regression gives in a direction of its rows."""
 
-    @abstractmethod
     def static_force(self, values: Values) -> float:
         """Return the static friction, N."""
+        rise = values["rise"] if "rise" in self.coordinates else 0.0
+        return values[self.smallest] + rise
 
-    @abstractmethod
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
         """Return the law of coordinates."""
+        kind: Any = LAWS[self.law]
+        own = {"static": self.static_force(values) / normal_force}
+        for name in self.coordinates:
+            if name != "rise":
+                own[name] = values[name] / (1.0 if name.endswith("_speed") else normal_force)
+        return kind(**own)
 
     def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
-        """Return the smallest and the largest value of a coordinate in the search.
+        """Return the smallest and the largest value of a coordinate in the search from `values` on.
 
-        Parameters
-        ----------
-        name : str
-            Coordinate.
-        values : mapping
-            Coordinates at the start of the search.
-        fastest : float
-            Fastest speed relative to the belt in the records, m/s: what friction does at a
-            hundredth of it or far above it, they do not tell.
+        The fastest speed is that relative to the belt in the records, m/s: what friction does at a
+        hundredth of it or far above it, they do not tell.
         """
         if name == "viscous":
             rate = self.static_force(values) / fastest
-            return -_WIDE * rate, _WIDE * rate
+            return -_SEARCH_FACTOR * rate, _SEARCH_FACTOR * rate
+        if name == "bristle_stiffness":
+            return values["stiffness"], _LARGEST_STIFFNESS * values["stiffness"]
+        if name == "bristle_damping":
+            return 0.0, _LARGEST_STIFFNESS * self.static_force(values) / fastest
         if name.endswith("_speed"):
-            return _SLOWEST * fastest, _FASTEST * fastest
+            return _SLOWEST_SHAPE * fastest, _FASTEST_SHAPE * fastest
         if name == "rise":
             return 0.0, inf
-        return _TINY * self.static_force(values), inf
+        return _LEAST_SHARE * self.static_force(values), inf
 
     def like(self, values: Values) -> dict[str, float]:
         """Return coordinates like those of a LuGre model."""
@@ -120,23 +131,14 @@ class CoulombModel(FrictionModel):
     law = "coulomb"
     curve: Curve = CoulombCurve()
     coordinates: Sequence[str] = ("static", "viscous")
+    smallest = "static"
 
+    @override
     def start(self, fit: Regression, direction: int) -> dict[str, float]:
-        """Return static and viscous friction."""
         static, viscous = fit.forces(direction).tolist()
         static = max(static, _least_force(fit))
         # A law without viscous friction has other equations, not a derivative by it.
-        return {"static": static, "viscous": viscous or _TINY * static}
-
-    def static_force(self, values: Values) -> float:
-        """Return the static friction, N."""
-        return values["static"]
-
-    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        """Return the law of coordinates."""
-        return Coulomb(
-            static=values["static"] / normal_force, viscous=values["viscous"] / normal_force
-        )
+        return {"static": static, "viscous": viscous or _LEAST_SHARE * static}
 
 
 class StribeckModel(FrictionModel):
@@ -145,24 +147,13 @@ class StribeckModel(FrictionModel):
     law = "stribeck"
     curve: Curve = StribeckCurve()
     coordinates: Sequence[str] = ("minimum", "rise", "minimum_speed")
+    smallest = "minimum"
 
+    @override
     def start(self, fit: Regression, direction: int) -> dict[str, float]:
-        """Return the smallest friction, the rise to rest and the speed of the minimum."""
         static, drop = fit.forces(direction).tolist()
         smaller, rise = _split(static, drop, _least_force(fit))
         return {"minimum": smaller, "rise": rise, "minimum_speed": float(fit.shapes[direction])}
-
-    def static_force(self, values: Values) -> float:
-        """Return the static friction, N."""
-        return values["minimum"] + values["rise"]
-
-    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        """Return the law of coordinates."""
-        return Stribeck(
-            static=self.static_force(values) / normal_force,
-            minimum=values["minimum"] / normal_force,
-            minimum_speed=values["minimum_speed"],
-        )
 
 
 class ExponentialModel(FrictionModel):
@@ -171,54 +162,31 @@ class ExponentialModel(FrictionModel):
     law = "exponential"
     curve: Curve = ExponentialCurve()
     coordinates: Sequence[str] = ("kinetic", "rise", "decay_speed", "viscous")
+    smallest = "kinetic"
 
+    @override
     def start(self, fit: Regression, direction: int) -> dict[str, float]:
-        """Return kinetic friction, the rise to rest, the decay speed and viscous friction."""
         kinetic, drop, viscous = fit.forces(direction).tolist()
         smaller, rise = _split(kinetic + drop, drop, _least_force(fit))
         return {
             "kinetic": smaller,
             "rise": rise,
             "decay_speed": float(fit.shapes[direction]),
-            "viscous": viscous or _TINY * smaller,
+            "viscous": viscous or _LEAST_SHARE * smaller,
         }
 
-    def static_force(self, values: Values) -> float:
-        """Return the static friction, N."""
-        return values["kinetic"] + values["rise"]
-
-    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        """Return the law of coordinates."""
-        return Exponential(
-            static=self.static_force(values) / normal_force,
-            kinetic=values["kinetic"] / normal_force,
-            decay_speed=values["decay_speed"],
-            viscous=values["viscous"] / normal_force,
-        )
-
+    @override
     def straightens(self, free: Sequence[str]) -> bool:
-        """Return whether all constants of the curve are free."""
         return {*ExponentialModel.coordinates} <= {*free}
 
+    @override
     def to_search(self, values: Values, fastest: float) -> dict[str, float]:
         """Return the coordinates in which the fit of an exponential curve is nearly linear.
 
         Records that hardly tell the decay speed from viscous friction have a long curved valley of
         good fits. It is straight where friction is given by forces: `kinetic` is replaced by that
-        at the fastest speed, `viscous` by that at rest, and `rise` by how far the force at a third
-        of the fastest speed is below the straight line between them.
-
-        Parameters
-        ----------
-        values : mapping
-            Coordinates.
-        fastest : float
-            Fastest speed relative to the belt, m/s.
-
-        Returns
-        -------
-        dict
-            Coordinates of the search by the names of those that they replace.
+        at the fastest speed, m/s, `viscous` by that at rest, and `rise` by how far the force at a
+        third of the fastest speed is below the straight line between them.
         """
         decay = values["decay_speed"]
         sag = values["rise"] * _sag(decay, fastest / 3.0, fastest)
@@ -226,14 +194,15 @@ class ExponentialModel(FrictionModel):
         end += values["viscous"] * fastest
         return {**values, "viscous": self.static_force(values), "kinetic": end, "rise": sag}
 
+    @override
     def from_search(self, found: Values, fastest: float) -> dict[str, float]:
-        """Return the coordinates of `to_search`, which may be ones that the law refuses."""
         decay = found["decay_speed"]
         rise = found["rise"] / _sag(decay, fastest / 3.0, fastest)
         kinetic = found["viscous"] - rise
         viscous = (found["kinetic"] - kinetic - rise * exp(-fastest / decay)) / fastest
         return {**found, "viscous": viscous, "kinetic": kinetic, "rise": rise}
 
+    @override
     def free_bounds(self, name: str) -> tuple[float, float] | None:
         """Return the bounds of the forces at the fastest speed and at rest."""
         return {"kinetic": (-inf, inf), "viscous": (0.0, inf)}.get(name)
@@ -246,19 +215,11 @@ class BristleModel(ExponentialModel):
         self.law, self.memory, self.by_differences = law, memory, by_differences
         self.coordinates = (*ExponentialModel.coordinates, *memory)
 
-    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
-        """Return the bounds of a coordinate; see `FrictionModel.bounds`."""
-        if name == "bristle_stiffness":
-            return values["stiffness"], _STIFFEST * values["stiffness"]
-        if name == "bristle_damping":
-            return 0.0, _STIFFEST * self.static_force(values) / fastest
-        return super().bounds(name, values, fastest)
-
+    @override
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        """Return the law of coordinates."""
         kind: Any = LAWS[self.law]
         own = {name: values[name] / normal_force for name in self.memory}
-        return kind(super().friction(values, normal_force), **own)
+        return kind(EXPONENTIAL.friction(values, normal_force), **own)
 
 
 class DahlModel(CoulombModel):
@@ -268,30 +229,21 @@ class DahlModel(CoulombModel):
     coordinates: Sequence[str] = ("static", "bristle_stiffness")
     memory: Sequence[str] = ("bristle_stiffness",)
 
-    def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
-        """Return the bounds of a coordinate; see `FrictionModel.bounds`."""
-        if name == "bristle_stiffness":
-            return values["stiffness"], _STIFFEST * values["stiffness"]
-        return super().bounds(name, values, fastest)
-
+    @override
     def start(self, fit: Regression, direction: int) -> dict[str, float]:
-        """Return the static friction."""
         return {"static": super().start(fit, direction)["static"]}
 
+    @override
     def like(self, values: Values) -> dict[str, float]:
         """Return the static friction that is the kinetic one of LuGre."""
         return {**values, "static": values["kinetic"]}
-
-    def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        """Return the law of coordinates."""
-        kind: Any = LAWS[self.law]
-        return kind(**{name: values[name] / normal_force for name in self.coordinates})
 
 
 class TableModel(FrictionModel):
     """Friction without a law: forces at given speeds."""
 
     law = "table"
+    smallest = "force_0"
 
     def __init__(self, speeds: Sequence[float]) -> None:
         """Take the speeds of the points, m/s, from 0."""
@@ -301,18 +253,14 @@ class TableModel(FrictionModel):
         # The polynomials of the pieces are made from them.
         self.by_differences = self.coordinates
 
+    @override
     def start(self, fit: Regression, direction: int) -> dict[str, float]:
-        """Return the forces at the points."""
         forces = np.cumsum(fit.forces(direction))
         forces = np.maximum(forces, 1e-3 * float(np.abs(forces).max()))
         return dict(zip(self.coordinates, forces.tolist(), strict=True))
 
-    def static_force(self, values: Values) -> float:
-        """Return the force at rest, N."""
-        return values["force_0"]
-
+    @override
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        """Return the law of coordinates."""
         sizes = [values[name] / normal_force for name in self.coordinates]
         return Table(tuple(zip(self.speeds, sizes, strict=True)))
 
@@ -326,23 +274,25 @@ class DirectionalModel(FrictionModel):
         self.coordinates = _in_both(own.coordinates)
         self.by_differences = _in_both(own.by_differences)
 
+    @override
     def start(self, fit: Regression, direction: int) -> dict[str, float]:
         """Return the coordinates of both directions."""
         both = [self.own.start(fit, each) for each in (0, 1)]
         return {**both[0], **{REVERSE + name: value for name, value in both[1].items()}}
 
+    @override
     def static_force(self, values: Values) -> float:
         """Return the larger static friction, N."""
         return max(self.own.static_force(each) for each in _by_direction(values))
 
+    @override
     def friction(self, values: Values, normal_force: float) -> FrictionLaw:
-        """Return the law of coordinates."""
         return Directional(
             *(self.own.friction(each, normal_force) for each in _by_direction(values))
         )
 
+    @override
     def bounds(self, name: str, values: Values, fastest: float) -> tuple[float, float]:
-        """Return the bounds of a coordinate; see `FrictionModel.bounds`."""
         forward, reverse = _by_direction(values)
         of = reverse if name.startswith(REVERSE) else forward
         return self.own.bounds(name.removeprefix(REVERSE), of, fastest)
@@ -366,7 +316,7 @@ def _least_force(fit: Regression) -> float:
     """Return the smallest friction from which a search starts, N, by the other forces."""
     columns = fit.rows.columns
     others = sum(abs(value) * rms(columns[name]) for name, value in fit.constants.items())
-    return _TINY * others if others > 0.0 else _TINY
+    return _LEAST_SHARE * others if others > 0.0 else _LEAST_SHARE
 
 
 def _split(static: float, drop: float, smallest: float) -> tuple[float, float]:
@@ -396,3 +346,74 @@ MEMORY_MODELS: Sequence[FrictionModel] = (
     BristleModel("maxwell_slip", ("bristle_stiffness",)),
 )
 """Models with a memory. Those after LuGre are searched from what LuGre gives."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A drive on a spring, with the coordinates that are searched."""
+
+    friction: FrictionModel
+    """Its friction law."""
+
+    def start(self, fit: Regression) -> dict[str, float]:
+        """Return the coordinates that a regression gives."""
+        last = len(fit.rows.directions) - 1
+        return {**fit.constants, **self.friction.start(fit, last)}
+
+    def by_differences(self, names: Sequence[str]) -> Sequence[str]:
+        """Return those of these coordinates by which a motion has no derivatives of its own."""
+        return [name for name in names if name in (DELAY, *self.friction.by_differences)]
+
+    def bounds(self, name: str, values: Mapping[str, float], fastest: float) -> tuple[float, float]:
+        """Return the bounds of a coordinate in the search; see `FrictionModel.bounds`."""
+        if name in ("mass", "stiffness"):
+            return values[name] / _SEARCH_FACTOR, values[name] * _SEARCH_FACTOR
+        if name == DELAY:
+            longest = sqrt(values["mass"] / values["stiffness"])
+            return -longest, longest
+        if name in ("damping", "bias_force"):
+            return (0.0 if name == "damping" else -inf), inf
+        return self.friction.bounds(name, values, fastest)
+
+    def constants(self, values: Mapping[str, float], normal_force: float) -> dict[str, float]:
+        """Return the parameters of the plant by flat name that coordinates stand for.
+
+        A table has none.
+        """
+        own = {*self.friction.coordinates, DELAY}
+        found = {name: value for name, value in values.items() if name not in own}
+        law = self.friction.friction(values, normal_force)
+        groups = {"friction.": law}
+        if isinstance(law, Directional):
+            groups = {"friction.": law.forward, "friction.reverse.": law.reverse}
+        for group, each in groups.items():
+            found |= {group + name: value for name, value in numbers_of(each).items()}
+        return found
+
+    def drive(
+        self, values: Mapping[str, float], normal_force: float, belt_speed: float = 0.0
+    ) -> Drive:
+        """Return the drive of coordinates; raises InvalidInputError if there is none."""
+        friction = self.friction.friction(values, normal_force)
+        refusal = friction.refusal()
+        if refusal is not None:
+            raise InvalidInputError(refusal)
+        return Drive(
+            mass=values["mass"],
+            damping=values["damping"],
+            stiffness=values["stiffness"],
+            normal_force=normal_force,
+            belt_speed=belt_speed,
+            friction=friction,
+            bias_force=values["bias_force"],
+        )
+
+
+def numbers_of(law: FrictionLaw) -> dict[str, float]:
+    """Return the constants of a law that are one number, those of the curve that it follows too."""
+    if isinstance(law, Table):
+        return {}
+    own = {name: getattr(law, name) for name in constants_of(type(law))}
+    if isinstance(law, CurveFollower):
+        own |= numbers_of(law.curve)
+    return {name: value for name, value in own.items() if isinstance(value, int | float)}

@@ -8,12 +8,13 @@ from stickslip_ros.identification.axes import AXIS_LAWS, AxisTask
 from stickslip_ros.identification.candidates import choose
 from stickslip_ros.identification.drives import AUTO, DRIVE_LAWS, DriveTask, drive_candidates
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.friction_models import MEMORY_MODELS, STATIC_MODELS
-from stickslip_ros.identification.models import DELAY
+from stickslip_ros.identification.friction_models import DELAY, MEMORY_MODELS, STATIC_MODELS
 from stickslip_ros.identification.reading import ReadRecords
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import LINEAR
 from stickslip_ros.identification.servo import servo_of
+from stickslip_ros.quantities import number_of
+from stickslip_ros.scenarios.keywords import described
 from stickslip_ros.text import must_be_one_of
 
 LAWS = (AUTO, *dict.fromkeys([*AXIS_LAWS, *DRIVE_LAWS]))
@@ -21,6 +22,7 @@ LAWS = (AUTO, *dict.fromkeys([*AXIS_LAWS, *DRIVE_LAWS]))
 _FRICTION = ("static", "minimum", "minimum_speed", "kinetic", "decay_speed", "viscous")
 FIXABLE = (*LINEAR, "normal_force", DELAY, *(f"friction.{name}" for name in _FRICTION))
 """Constants that can be given, by parameter of the plant."""
+_UNITS = {f"plant.{name}": described(f"plant.{name}").unit for name in FIXABLE}
 _DELAYS = -1.0, 20.0
 """Delays that can be given, sample periods."""
 _SAME_PERIOD = 0.01
@@ -30,31 +32,13 @@ _SAME_PERIOD = 0.01
 def identify_recordings(
     read: Sequence[ReadRecords],
     law: str,
-    fixed: Mapping[str, float],
+    fixed: Mapping[str, float | str],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Findings:
-    """Identify a drive from recordings.
+    """Identify a drive from recordings of one machine, as `identify` does from their records.
 
-    Parameters
-    ----------
-    read : sequence of ReadRecords
-        Recordings of one machine.
-    law : str
-        Friction law, or `AUTO`.
-    fixed : mapping
-        Constants that are known, by NODE.PARAMETER.
-    progress : callable, optional
-        As for `identify`.
-
-    Returns
-    -------
-    Findings
-        The model.
-
-    Raises
-    ------
-    InvalidInputError
-        If an argument is not allowed, or the recordings cannot tell a model.
+    `fixed` has the known constants by NODE.PARAMETER. Raises InvalidInputError if an argument is
+    not allowed, or the recordings cannot tell a model.
     """
     if not read:
         raise InvalidInputError("no recording is given: must be at least one")
@@ -62,10 +46,9 @@ def identify_recordings(
     for each in read:
         known |= each.known
     for target, value in fixed.items():
-        node, _, name = target.partition(".")
-        if node != "plant" or not name:
+        if target not in _UNITS:
             raise InvalidInputError(f"{target} is refused: {_allowed(target)}")
-        known[name] = float(value)
+        known[target.removeprefix("plant.")] = number_of(target, value, _UNITS[target])
     return identify([record for each in read for record in each.records], law, known, progress)
 
 
@@ -77,15 +60,14 @@ def fixed_of(texts: Sequence[str]) -> dict[str, float]:
     found: dict[str, float] = {}
     for text in texts:
         name, equals, value = text.partition("=")
-        try:
-            if not equals or name.strip() in found:
-                raise ValueError
-            found[name.strip()] = float(value)
-        except ValueError:
+        if not equals or name.strip() in found:
             raise InvalidInputError(
                 f"--fix {text}: must be plant.PARAMETER=VALUE, each parameter once, as in "
                 "plant.mass=95"
-            ) from None
+            )
+        if name.strip() not in _UNITS:
+            raise InvalidInputError(f"{name} is refused: {_allowed(name.strip())}")
+        found[name.strip()] = number_of(name.strip(), value, _UNITS[name.strip()])
     return found
 
 
@@ -95,31 +77,12 @@ def identify(
     fixed: Mapping[str, float] | None = None,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Findings:
-    """Identify a drive.
+    """Identify a drive from records of one machine, with one of `LAWS`.
 
     A belt that is at rest in all records means an axis that no spring holds, unless a stiffness is
-    given: then, and on a belt that moves, the slide is on a spring.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        Records of one machine.
-    law : str, optional
-        Friction law, one of `LAWS`.
-    fixed : mapping, optional
-        Constants that are known, by parameter of the plant, of `FIXABLE`.
-    progress : callable, optional
-        Called with the name of each law before it is fitted.
-
-    Returns
-    -------
-    Findings
-        The model.
-
-    Raises
-    ------
-    InvalidInputError
-        If a name or a value is not allowed, or the records cannot tell a model.
+    given: then, and on a belt that moves, the slide is on a spring. `fixed` has the known
+    constants, of `FIXABLE`. `progress` receives the name of each law before it is fitted. Raises
+    InvalidInputError if a name or a value is not allowed, or the records cannot tell a model.
     """
     fixed = {} if fixed is None else fixed
     for name, value in fixed.items():

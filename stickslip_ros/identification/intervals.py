@@ -18,24 +18,12 @@ _PART = 1e-6
 def block_covariance(jacobian: FloatArray, residual: FloatArray, lost: int = 0) -> FloatArray:
     """Return the covariance of a least-squares fit to a series whose errors may be coloured.
 
-    It is the jackknife over blocks of time, to first order (A. C. Cameron, D. L. Miller,
-    A practitioner's guide to cluster-robust inference, Journal of Human Resources 50(2), 2015):
-    errors may be correlated within a block. No variance is below that with independent errors.
-
-    Parameters
-    ----------
-    jacobian : array of shape (rows, parameters)
-        Derivatives of the model; rows follow one another in time.
-    residual : array of shape (rows,)
-        Errors.
-    lost : int, optional
-        Number of further values that were fitted.
-
-    Returns
-    -------
-    array of shape (parameters, parameters)
-        Covariance. The variance of what the rows do not tell is infinite, its covariances are 0;
-        see `carried`.
+    It is the jackknife over blocks of time, to first order (A. C. Cameron, D. L. Miller, A
+    practitioner's guide to cluster-robust inference, Journal of Human Resources 50(2), 2015):
+    errors may be correlated within a block. No variance is below that with independent errors. The
+    jacobian has the shape (rows, parameters), its rows follow one another in time; `lost` further
+    values were fitted. The variance of what the rows do not tell is infinite, its covariances are
+    0; see `propagated`.
     """
     scale = np.linalg.norm(jacobian, axis=0)
     scale[scale == 0.0] = 1.0
@@ -70,20 +58,11 @@ def _untold(product: FloatArray) -> BoolArray:
     return np.any(np.abs(axes[:, lost]) > _PART, axis=1)
 
 
-def carried(linear: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Return the covariance of what depends linearly on values with a covariance.
+def propagated(linear: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the covariance of results that depend linearly on values with a covariance.
 
-    Parameters
-    ----------
-    linear : array of shape (results, values)
-        Derivatives of the results.
-    covariance : array of shape (values, values)
-        Covariance, with infinite variances of values that are not told.
-
-    Returns
-    -------
-    array of shape (results, results)
-        Covariance. The variance of what depends on such a value is infinite.
+    `linear` has the derivatives of the results, shape (results, values). The variance of what
+    depends on a value with an infinite variance is infinite.
     """
     told = np.isfinite(np.diag(covariance))
     own = linear[:, told]

@@ -20,7 +20,7 @@ from stickslip_ros.bags.table_file import (
     table_of,
 )
 from stickslip_ros.errors import BagError, InvalidInputError
-from stickslip_ros.identification.models import DELAY
+from stickslip_ros.identification.friction_models import DELAY
 from stickslip_ros.identification.record import FEWEST, Record, evenly_spaced
 from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.samples import ForceColumns
@@ -46,31 +46,10 @@ class ReadRecords(NamedTuple):
 def read_all(
     paths: Sequence[Path], columns: Mapping[str, str] | None = None, **options: Any
 ) -> dict[Path, ReadRecords]:
-    """Return what several recordings of one machine have for identification.
+    """Return what several recordings of one machine have for identification, by path.
 
     What identification can do without, such as a disturbance, may be a column of some tables only:
-    it is left out where a table lacks it.
-
-    Parameters
-    ----------
-    paths : sequence of Path
-        Recordings.
-    columns : mapping, optional
-        Columns of tables, as for `read_table`.
-    **options : Any
-        As for `read_records`.
-
-    Returns
-    -------
-    dict
-        Records by path.
-
-    Raises
-    ------
-    BagError
-        If a recording cannot be read.
-    InvalidInputError
-        If one lacks what identification needs.
+    it is left out where a table lacks it. Options and errors are those of `read_records`.
     """
     tables = {path: table_of(path) for path in paths if is_table(path)}
     lacking = {
@@ -88,7 +67,7 @@ def read_all(
         if columns is not None and path in tables:
             absent = lacking[path] - nowhere
             own = {name: text for name, text in columns.items() if name not in absent}
-        found[path] = _read(path, tables.get(path), own, **options)
+        found[path] = read_records(path, own, table=tables.get(path), **options)
     return found
 
 
@@ -100,51 +79,18 @@ def read_records(
     end: float = inf,
     namespace: str | None = None,
     belt_speed: float | None = None,
+    table: Table | None = None,
 ) -> ReadRecords:
-    """Return what a recording has for identification.
+    """Return what a bag, or a CSV or MAT file, has for identification.
 
-    Parameters
-    ----------
-    path : Path
-        A bag, or a CSV or MAT file.
-    columns : mapping, optional
-        Columns of a table, as for `read_table`.
-    start, end : float, optional
-        Part to use, s from the first sample.
-    namespace : str, optional
-        ROS namespace of the drive, if a bag holds several.
-    belt_speed : float, optional
-        Belt speed, m/s: in place of the column of a table, and of a bag whose joint states have a
-        single joint.
-
-    Returns
-    -------
-    ReadRecords
-        A record for each part without a longer gap.
-
-    Raises
-    ------
-    BagError
-        If the recording cannot be read.
-    InvalidInputError
-        If it lacks what identification needs.
+    The part that is used is from `start` to `end`, s from the first sample. Each part without a
+    longer gap is a record. `columns` are those for `read_table`, `table` is what was read already.
+    `namespace` is that of the drive, if a bag holds several. `belt_speed`, m/s, is in place of the
+    column of a table, and of a bag whose joint states have a single joint. Raises BagError if the
+    recording cannot be read, and InvalidInputError if it lacks what identification needs.
     """
-    table = table_of(path) if is_table(path) else None
-    return _read(
-        path, table, columns, start=start, end=end, namespace=namespace, belt_speed=belt_speed
-    )
-
-
-def _read(
-    path: Path,
-    table: Table | None,
-    columns: Mapping[str, str] | None,
-    *,
-    start: float = 0.0,
-    end: float = inf,
-    namespace: str | None = None,
-    belt_speed: float | None = None,
-) -> ReadRecords:
+    if table is None and is_table(path):
+        table = table_of(path)
     if table is not None:
         stamp, found = _of_table(path, table, columns, belt_speed)
         known: Mapping[str, float] = {}
@@ -163,11 +109,9 @@ def _of_table(
     path: Path, table: Table, columns: Mapping[str, str] | None, belt_speed: float | None
 ) -> tuple[IntArray, dict[str, FloatArray]]:
     columns = own_columns(path, table) if columns is None else columns
-    found = quantities_of(path, table, columns)
+    found = quantities_of(path, table, columns, belt_speed)
     time = found.pop("time")
     belt = found.get("belt_velocity", np.full(len(time), 0.0))
-    if belt_speed is not None:
-        belt = np.full(len(time), belt_speed)
     optional = ("force", "disturbance", "reference", "velocity")
     used = {name: found[name] for name in optional if name in found}
     used |= {"position": found["position"], "belt_velocity": belt}
@@ -186,7 +130,7 @@ def _of_bag(
 ) -> tuple[IntArray, dict[str, FloatArray], dict[str, float]]:
     with Recording(path, namespace, belt_speed=belt_speed) as recording:
         states = recording.joint_states
-        states = states[states.believed]
+        states = states[states.is_valid]
         if len(states) == 0:
             raise BagError(f"the bag {path} holds no joint states: the motion is unknown")
         forces, disturbances = recording.control_forces, recording.applied_disturbances

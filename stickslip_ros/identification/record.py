@@ -16,26 +16,26 @@ FEWEST = 500
 """Fewest samples of a record."""
 _LONGEST_GAP = 3.5
 """Longest distance of samples, in periods, that is bridged."""
-_SLOW = 1.5
+_INDEPENDENT_SPEED = 1.5
 """Steps of the encoder between samples from which rounding errors are independent."""
-_TURNING = 0.1
+_TURNING_CHANGE = 0.1
 """Change of the speed in a sample, steps of the encoder per sample, at a turning point."""
-_FEW = 0.2
+_TURNING_SHARE = 0.2
 """Share of samples up to which turning points are left out."""
-_LONGEST_DIFFERENCE, _SAME = 8, 1e-6
+_LONGEST_DIFFERENCE, _DIFFERENCE_ERROR = 8, 1e-6
 """Samples over which a velocity may be a difference of positions; its error, in the largest one."""
-_SMOOTHED = 11
+_SMOOTHED_SAMPLES = 11
 """Samples over which a speed is found."""
-_REST = 20
+_REST_SAMPLES = 20
 """Successive samples of the same position from which the slide is at rest."""
 _FEWEST_VALUES = 10
 """Fewest different positions of a slide that moves."""
-_NEAR = 0.75
+_MISSING_DISTANCE = 0.75
 """Distance of a sample, in periods, from which it counts as missing."""
-_UNEVEN, _USUAL = 0.25, 0.6
+_STEP_TOLERANCE, _EVEN_SHARE = 0.25, 0.6
 """Largest difference of a time step from the period, as a share of it; share of the steps, at
 least, that are so near."""
-_DITHERED = 0.5
+_DITHER_NOISE = 0.5
 """Noise, in steps of the encoder, from which rounding errors are independent; rounding has 0.29."""
 
 
@@ -53,7 +53,7 @@ class Record:
     """
 
     name: str
-    """What it was read from."""
+    """Name of the recording."""
     period: float
     """Sample period, s."""
     position: FloatArray
@@ -121,21 +121,21 @@ class Record:
         from scipy.signal import savgol_filter
 
         position, step = self.position, self.resolution
-        if step == 0.0 or white_noise(position) > _DITHERED * step:
+        if step == 0.0 or white_noise(position) > _DITHER_NOISE * step:
             return np.ones(len(position))
         speed, change = (
-            np.abs(np.asarray(savgol_filter(position, _SMOOTHED, 3, deriv=order))) / step
+            np.abs(np.asarray(savgol_filter(position, _SMOOTHED_SAMPLES, 3, deriv=order))) / step
             for order in (1, 2)
         )
-        counts = 1.0 / np.clip(speed / _SLOW, 1e-3, 1.0)
+        counts = 1.0 / np.clip(speed / _INDEPENDENT_SPEED, 1e-3, 1.0)
         changes = np.flatnonzero(np.diff(position)) + 1
         lengths = np.diff([0, *changes.tolist(), len(position)])
-        resting = np.repeat(lengths >= _REST, lengths)
+        resting = np.repeat(lengths >= _REST_SAMPLES, lengths)
         if resting.any():
             _, place, times = np.unique(position[resting], return_inverse=True, return_counts=True)
             counts[resting] = times[place]
-        turning = (speed < _SLOW) & (change > _TURNING)
-        if np.mean(turning) < _FEW:
+        turning = (speed < _INDEPENDENT_SPEED) & (change > _TURNING_CHANGE)
+        if np.mean(turning) < _TURNING_SHARE:
             counts[turning] = np.inf
         return 1.0 / np.sqrt(counts)
 
@@ -186,27 +186,11 @@ class Record:
 def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) -> list[Record]:
     """Return records with even spacing from samples whose clock may jitter and have gaps.
 
-    Parameters
-    ----------
-    name : str
-        What the samples were read from.
-    stamp : array of shape (samples,)
-        Stamps, ns.
-    columns : dict
-        Columns of `Record` by name. Samples of which one is not finite count as missing; only the
-        reference may be. Velocities are left out if they are differences of the positions, or if
-        less than half of them are finite.
-
-    Returns
-    -------
-    list of Record
-        A record for each part without a longer gap. Positions between samples are interpolated,
-        forces are held.
-
-    Raises
-    ------
-    InvalidInputError
-        If no part is long enough, or the clock is not even up to gaps and jitter.
+    Stamps are in ns, columns are those of `Record`. Samples of which one is not finite count as
+    missing; only the reference may be. Velocities are left out if they are differences of the
+    positions, or if less than half of them are finite. Each part without a longer gap is a record:
+    positions between samples are interpolated, forces are held. Raises InvalidInputError if no part
+    is long enough, or the clock is not even up to gaps and jitter.
     """
     columns = dict(columns)
     velocity = columns.get("velocity")
@@ -227,7 +211,7 @@ def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) ->
     # Where every other sample is missing, half of the steps are double.
     usual = float(np.quantile(steps, 0.5, method="lower"))
     # Stamps are whole nanoseconds; the mean of the usual steps is the period.
-    period = float(np.mean(steps[np.abs(steps - usual) <= _UNEVEN * usual]))
+    period = float(np.mean(steps[np.abs(steps - usual) <= _STEP_TOLERANCE * usual]))
     breaks = np.flatnonzero(steps > _LONGEST_GAP * period) + 1
     records: list[Record] = []
     parts = np.split(np.arange(len(time)), breaks)
@@ -248,7 +232,7 @@ def evenly_spaced(name: str, stamp: IntArray, columns: dict[str, FloatArray]) ->
                 found[each] = np.interp(even, own, values[rows])
         if "velocity" in found and _is_difference(found["velocity"], found["position"], period):
             del found["velocity"]
-        far = _distances(even, own) > _NEAR * period
+        far = _distances(even, own) > _MISSING_DISTANCE * period
         records.append(
             Record(name, period, **found, missing=far if far.any() else None, left_out=left_out)
         )
@@ -266,8 +250,8 @@ def _check_clock(name: str, stamp: IntArray) -> None:
         return
     forward = steps[steps > 0.0]
     usual = float(np.median(forward)) if len(forward) else 0.0
-    near = np.abs(forward - usual) <= _UNEVEN * usual
-    if float(steps.min()) < 0.0 or not len(forward) or float(np.mean(near)) < _USUAL:
+    near = np.abs(forward - usual) <= _STEP_TOLERANCE * usual
+    if float(steps.min()) < 0.0 or not len(forward) or float(np.mean(near)) < _EVEN_SHARE:
         raise InvalidInputError(
             f"{name}: the time steps are from {steps.min():.4g} s to {steps.max():.4g} s: they "
             "must be even up to gaps"
@@ -282,7 +266,7 @@ def _distances(times: FloatArray, samples: FloatArray) -> FloatArray:
 
 def _is_difference(velocity: FloatArray, position: FloatArray, period: float) -> bool:
     """Return whether velocities are made from the positions, over some samples or centrally."""
-    allowed = _SAME * float(np.abs(velocity).max())
+    allowed = _DIFFERENCE_ERROR * float(np.abs(velocity).max())
     for span in range(1, _LONGEST_DIFFERENCE + 1):
         differences = (position[span:] - position[:-span]) / (span * period)
         for late in {span, span // 2}:

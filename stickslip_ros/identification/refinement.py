@@ -11,27 +11,27 @@ from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.identification.intervals import block_covariance
 from stickslip_ros.identification.trajectories import Trajectories
 
-_ALONE = 1e-5
+_OWN_SHARE = 1e-5
 """Least share of a derivative that is not one of the others, for a coordinate that can be told."""
-_INSIDE = 1e-9
+_BOUND_DISTANCE = 1e-9
 """Distance of the start of a search from its bounds, as a share of the value."""
 _STEP = 1e-6
 """Step of the differences of coordinates, as a share of the value."""
 _RANK = 1e-9
 """Share of the largest singular value below which the start of a segment is not told."""
-_ROUGHLY, _SETTLED = 0.03, 1e-6
+_ROUGH_TOLERANCE, _FINAL_TOLERANCE = 0.03, 1e-6
 """Starts are good enough if better ones would lower the squared error by less than this share:
 while the constants change, and at their end."""
-_SHORTEST = 1e-3
+_SHORTEST_STEP = 1e-3
 """A start whose steps are shortened below this share of a full one is not changed further."""
 _START_STEPS = 8
 """Largest number of steps of the starts for one set of constants."""
-_WORSE = 9.0
+_OUTLIER_LOSS_RATIO = 9.0
 """The start of a segment is doubted if its squared error is larger than that of the median one by
 this factor."""
-_LEAST_CYCLE, _REPEATED = 20, 0.65
+_SHORTEST_CYCLE, _REPEATED_CORRELATION = 20, 0.65
 """Samples of a cycle at least, and correlation of errors from which cycles are alike."""
-_UNLIKE = 0.3
+_UNLIKE_CORRELATION = 0.3
 """Correlation below which errors have become unlike before they repeat."""
 _KICKS = (0.0, 0.5, -0.5, 2.0, -2.0)
 """Changes of the velocity at such a start, in errors of position per period."""
@@ -84,7 +84,7 @@ class Refinement:
     def has_outliers(self) -> bool:
         """Whether most of the error is that of a few segments: their starts may be wrong."""
         losses = self.losses
-        worse = losses > _WORSE * np.median(losses)
+        worse = losses > _OUTLIER_LOSS_RATIO * np.median(losses)
         return float(losses[worse].sum()) > 0.5 * float(losses.sum())
 
     @property
@@ -123,7 +123,7 @@ class Refinement:
         alone = _without_starts(self.task, self.by_start, column)[:, 0]
         alone -= basis @ (basis.T @ alone)
         size = float(alone @ alone)
-        if size <= (_ALONE * float(np.linalg.norm(column))) ** 2:
+        if size <= (_OWN_SHARE * float(np.linalg.norm(column))) ** 2:
             return 0.0, 0.0
         rest = self.residual - basis @ (basis.T @ self.residual)
         error = np.sqrt(block_covariance(alone[:, None], rest, self._lost)[0, 0])
@@ -144,13 +144,13 @@ def repetition_of(errors: FloatArray) -> int | None:
     if not len(found) or not found[0] > 0.0:
         return None
     shares = found / found[0]
-    unlike = np.flatnonzero(shares < _UNLIKE)
+    unlike = np.flatnonzero(shares < _UNLIKE_CORRELATION)
     if not len(unlike):
         return None
-    start = max(_LEAST_CYCLE, int(unlike[0]))
+    start = max(_SHORTEST_CYCLE, int(unlike[0]))
     later = shares[start:]
     peaks = np.flatnonzero((later[1:-1] >= later[:-2]) & (later[1:-1] >= later[2:])) + 1
-    if not len(peaks) or float(later[peaks].max()) < _REPEATED:
+    if not len(peaks) or float(later[peaks].max()) < _REPEATED_CORRELATION:
         return None
     return int(peaks[np.argmax(later[peaks])]) + start
 
@@ -163,29 +163,13 @@ def refine(
     *,
     most: int = 30,
 ) -> Refinement:
-    """Fit coordinates and the states at the starts of the segments.
+    """Fit the coordinates in `free`, if any, and the states at the starts of the segments.
 
     The starts follow the coordinates (variable projection, G. H. Golub, V. Pereyra, The
     differentiation of pseudo-inverses and nonlinear least squares problems whose variables
-    separate, SIAM Journal on Numerical Analysis 10(2), 1973).
-
-    Parameters
-    ----------
-    task : Trajectories
-        Model and segments.
-    free : sequence of str
-        Coordinates to fit; with none, only the starts are fitted.
-    values : mapping
-        All coordinates at the start of the search.
-    starts : array of shape (segments, 2), optional
-        States at the start of the search. By default the measured ones.
-    most : int, optional
-        Largest number of steps.
-
-    Returns
-    -------
-    Refinement
-        The nearest trajectories.
+    separate, SIAM Journal on Numerical Analysis 10(2), 1973). The search begins at all coordinates
+    in `values` and at states of shape (segments, 2), by default the measured ones; it takes `most`
+    steps at most.
     """
     from scipy.optimize import least_squares
 
@@ -194,7 +178,7 @@ def refine(
     if len(free):
         bounds = fit.bounds()
         # No more than a part of narrow bounds that the start is far away from.
-        least = np.minimum(_INSIDE * np.abs(best), 0.25 * (bounds[1] - bounds[0]))
+        least = np.minimum(_BOUND_DISTANCE * np.abs(best), 0.25 * (bounds[1] - bounds[0]))
         inside = least * np.array([[1.0], [-1.0]])
         solve: Any = least_squares  # its types know no function for jac
         best = solve(
@@ -313,11 +297,11 @@ class _Projection:
         if self._best is not None and found.loss > 4.0 * self._best.loss:
             kept = self._errors(point, self._best.starts)
             found = min(found, kept, key=lambda each: each.loss)
-        return self._improved(point, found, _ROUGHLY)
+        return self._improved(point, found, _ROUGH_TOLERANCE)
 
     def finished(self, point: FloatArray) -> _Errors:
         """Return the errors at a point, at the best starts."""
-        return self._improved(point, self.at(point), _SETTLED)
+        return self._improved(point, self.at(point), _FINAL_TOLERANCE)
 
     def kicked(self, point: FloatArray) -> _Errors:
         """Return the errors at a point, at the best starts that kicks of the measured ones give."""
@@ -326,7 +310,7 @@ class _Projection:
         rough = np.sqrt(np.median(means)) / self._task.predictors[0].record.period
         for kick in _KICKS:
             starts = self._task.starts + np.array([0.0, kick * rough])
-            other = self._improved(point, self._errors(point, starts), _SETTLED)
+            other = self._improved(point, self._errors(point, starts), _FINAL_TOLERANCE)
             found, _ = self._better(found, other)
         return found
 
@@ -353,7 +337,10 @@ class _Projection:
             left = self._losses(
                 _without_starts(self._task, found.by_start, found.residual[:, None])[:, 0]
             )
-            if float(np.sum((squares - left) * (share >= _SHORTEST))) <= tolerance * found.loss:
+            if (
+                float(np.sum((squares - left) * (share >= _SHORTEST_STEP)))
+                <= tolerance * found.loss
+            ):
                 break
             steps = share[:, None] * _steps(self._task, found.by_start, found.residual)
             other = self._errors(point, found.starts - steps)

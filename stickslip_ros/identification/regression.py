@@ -12,7 +12,7 @@ from stickslip_ros.identification.curves import Curve, followed
 from stickslip_ros.identification.filtered import Filtered
 from stickslip_ros.identification.intervals import BLOCKS, block_covariance
 
-_SHARE = 0.05
+_DIRECTION_SHARE = 0.05
 """Least share of the rows of a direction that has a curve of its own."""
 _FASTEST_SHAPE = 4.0
 """Largest shape of a curve that is sought, in fastest speeds."""
@@ -26,7 +26,7 @@ class Rows:
 
     parts: Sequence[Filtered]
     columns: Mapping[str, FloatArray]
-    """What each of `LINEAR` is multiplied with."""
+    """Factor of each of `LINEAR`."""
     force: FloatArray
     """Known forces, N."""
     block: IntArray
@@ -96,7 +96,7 @@ class Rows:
 def directions_of(relative: FloatArray) -> Sequence[float]:
     """Return the signs of relative speeds that are not rare: 1, -1 or both; none at rest."""
     counts = {sign: np.count_nonzero(relative * sign > 0.0) for sign in (1.0, -1.0)}
-    return [sign for sign, count in counts.items() if count > _SHARE * len(relative)]
+    return [sign for sign, count in counts.items() if count > _DIRECTION_SHARE * len(relative)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,23 +198,9 @@ def regress(
 ) -> Regression:
     """Fit the equation m a + c v + k x - bias + sgn(v_r) F(|v_r|) = u to rows.
 
-    Parameters
-    ----------
-    rows : Rows
-        Rows of the equation.
-    curve : Curve
-        Friction curve F, with forces of its own in each direction of the rows.
-    free : sequence of str
-        Constants of `LINEAR` that are fitted.
-    fixed : mapping
-        Values of the others.
-    shape : float, optional
-        Shape of the curve, m/s. By default it is fitted, in each direction.
-
-    Returns
-    -------
-    Regression
-        The best fit.
+    The curve F has forces of its own in each direction of the rows. `free` are the constants of
+    `LINEAR` that are fitted, `fixed` has the others. The shape of the curve, m/s, is fitted in each
+    direction unless it is given.
     """
     if not curve.shaped:
         return _solved(rows, curve, free, fixed, np.empty(0))

@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.files import written
 from stickslip_ros.identification.findings import Findings
-from stickslip_ros.identification.models import numbers_of
+from stickslip_ros.identification.friction_models import numbers_of
 from stickslip_ros.identification.refinement import Refinement
 from stickslip_ros.physics.model.friction import CurveFollower, Directional, FrictionLaw, Table
 from stickslip_ros.scenarios.files import Scenario, load_scenario
@@ -22,57 +22,38 @@ def curve_files(path: Path) -> tuple[Path, Path]:
 
 
 def written_scenario(found: Findings, path: Path) -> list[Path]:
-    """Write a scenario with the identified drive, and the files of its friction curves.
+    """Write a scenario with the identified drive, and its friction curves beside it.
 
     An axis is held by the position controller of the recording, if it was found; a drive on a
-    spring has a washout controller without gains, for `stickslip design`.
-
-    Parameters
-    ----------
-    found : Findings
-        The model.
-    path : Path
-        Scenario file; must not exist. Curves are written beside it.
-
-    Returns
-    -------
-    list of Path
-        The files that were written.
-
-    Raises
-    ------
-    OSError
-        If a file cannot be written or exists.
+    spring has a washout controller without gains, for `stickslip design`. Returns the files that
+    were written; raises OSError if one exists or cannot be written.
     """
     laws = {"friction.": found.drive.friction}
     if isinstance(found.drive.friction, Directional):
         both = found.drive.friction
         laws = {"friction.": both.forward, "friction.reverse.": both.reverse}
-    written: list[Path] = []
+    curves: list[Path] = []
     files: dict[str, str] = {}
     try:
         for group, law in laws.items():
             curve = law.curve if isinstance(law, CurveFollower) else law
             if isinstance(curve, Table):
                 file = curve_files(path)["reverse" in group]
-                _write_new(file, "".join(f"{w!r},{size!r}\n" for w, size in curve.points))
-                written.append(file)
+                with written(file) as stream:
+                    stream.writelines(f"{w!r},{size!r}\n" for w, size in curve.points)
+                curves.append(file)
                 files[f"plant.{group}file"] = str(file.absolute())
         # A scenario reads its curves: it can only be made when they are written.
         text = commented_file(_scenario(found, laws, files), _heading(found, path))
-        for file in written:
+        for file in curves:
             text = text.replace(str(file.absolute()), file.name)
-        _write_new(path, text)
-    except (OSError, InvalidInputError):
-        for file in written:
+        with written(path) as stream:
+            stream.write(text)
+    except BaseException:
+        for file in curves:
             file.unlink(missing_ok=True)
         raise
-    return [path, *written]
-
-
-def _write_new(path: Path, text: str) -> None:
-    with path.open("x", encoding="utf-8") as stream:
-        stream.write(text)
+    return [path, *curves]
 
 
 def _scenario(found: Findings, laws: dict[str, FrictionLaw], files: dict[str, str]) -> Scenario:

@@ -15,18 +15,18 @@ from stickslip_ros.physics.motion.motion import Motion
 
 _LONGEST_DIFFERENCE = 8
 """Most samples over which the controller's velocity may be a difference."""
-_EXPLAINED = 0.02
+_LARGEST_ERROR = 0.02
 """Largest error of a controller that is believed, as a share of its force."""
-_SATURATED = 5
+_LIMIT_SAMPLES = 5
 """Samples at the largest force from which on it counts as a limit."""
-_BELOW_LIMIT = 0.98
+_FREE_SHARE = 0.98
 """Share of the largest force up to which forces are those of the gains."""
 _TRIMS = 10
 """Number of fits, each without the outliers of the one before."""
-_USED, _OUTLIER = 0.7, 4.0
+_INLIER_SHARE, _OUTLIER_RATIO = 0.7, 4.0
 """This share of the samples at least must be no outliers. An outlier has an error that is larger by
 this factor than the errors of so many samples."""
-_ADDED = 10.0
+_ADDED_FORCE_RATIO = 10.0
 """Size of a force that was added to the command, in largest errors of the controller."""
 
 
@@ -61,22 +61,15 @@ class Servo:
         assert record.force is not None
         rest = record.force - self.forces(record)
         rest[: self.difference_samples] = 0.0
-        clear = np.abs(rest) > _ADDED * self.error
-        return np.where(clear & (np.mean(clear) < 1.0 - _USED), rest, 0.0)
+        clear = np.abs(rest) > _ADDED_FORCE_RATIO * self.error
+        return np.where(clear & (np.mean(clear) < 1.0 - _INLIER_SHARE), rest, 0.0)
 
 
 def servo_of(record: Record) -> Servo | None:
     """Return the controller whose forces a record has; None if it has no such controller.
 
-    Parameters
-    ----------
-    record : Record
-        Positions, references and forces; samples without a finite reference are left out.
-
-    Returns
-    -------
-    Servo or None
-        Gains from linear least squares, for the difference that explains most.
+    Gains are from linear least squares, for the difference that explains most, over the samples
+    with a finite reference.
     """
     if record.reference is None or record.force is None or not record.force.any():
         return None
@@ -86,8 +79,8 @@ def servo_of(record: Record) -> Servo | None:
     force, error = record.force, record.reference - record.position
     largest = float(np.abs(force).max())
     at_limit = np.count_nonzero(np.abs(force) >= (1.0 - 1e-9) * largest)
-    limit = largest if at_limit >= _SATURATED else inf
-    free = known & (np.abs(force) < _BELOW_LIMIT * largest)
+    limit = largest if at_limit >= _LIMIT_SAMPLES else inf
+    free = known & (np.abs(force) < _FREE_SHARE * largest)
     free[:START] = False
     best: tuple[float, Servo] | None = None
     for span in range(1, _LONGEST_DIFFERENCE + 1):
@@ -97,15 +90,15 @@ def servo_of(record: Record) -> Servo | None:
             gains = np.linalg.lstsq(terms[used], force[used], rcond=None)[0]
             left = np.abs(force - terms @ gains)
             # Forces that were added to the command are none of the controller's.
-            used = free & (left <= _OUTLIER * float(np.quantile(left[free], _USED)))
+            used = free & (left <= _OUTLIER_RATIO * float(np.quantile(left[free], _INLIER_SHARE)))
         left, scale = left[used], float(np.sqrt(np.mean(force[used] ** 2)))
         share = float(np.sqrt(np.mean(left**2))) / scale
-        if np.count_nonzero(used) > _USED * np.count_nonzero(free) and (
+        if np.count_nonzero(used) > _INLIER_SHARE * np.count_nonzero(free) and (
             best is None or share < best[0]
         ):
             servo = Servo(float(gains[0]), float(gains[1]), span, limit, float(left.max()))
             best = share, servo
-    return best[1] if best is not None and best[0] < _EXPLAINED else None
+    return best[1] if best is not None and best[0] < _LARGEST_ERROR else None
 
 
 def _differences(record: Record, span: int) -> FloatArray:
@@ -119,25 +112,10 @@ def _differences(record: Record, span: int) -> FloatArray:
 def closed_loop(
     record: Record, drive: Drive, servo: Servo, delay: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return positions and forces of a drive that the controller leads along the reference.
+    """Return positions, m, and forces, N, of a drive that the servo leads along the reference.
 
-    It starts from the measured state of the record.
-
-    Parameters
-    ----------
-    record : Record
-        Reference, and the first samples.
-    drive : Drive
-        The model; its belt is that of the record.
-    servo : Servo
-        The controller.
-    delay : float
-        Time from a sample until its force acts, s; a force cannot act before it.
-
-    Returns
-    -------
-    tuple of array of shape (samples,)
-        Positions, m, and control forces, N.
+    It starts from the measured state of the record and has the record's belt. `delay` is the time
+    from a sample until its force acts, s; a force cannot act before it.
     """
     assert record.reference is not None
     span, period = servo.difference_samples, record.period

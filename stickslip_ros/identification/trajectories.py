@@ -10,20 +10,19 @@ import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
 from stickslip_ros.errors import InvalidInputError, RunError
-from stickslip_ros.identification.friction_models import REVERSE
-from stickslip_ros.identification.models import DELAY, Model
+from stickslip_ros.identification.friction_models import DELAY, REVERSE, Model
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.trajectory import Predictor, Segment, steady_memory
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_in_units import in_units_of
 from stickslip_ros.physics.model.drive_system import MEMORY
 from stickslip_ros.physics.model.plain_drive import drive_system
+from stickslip_ros.physics.model.scaled_drive import in_units_of
 
 _STEP = 1e-4
 """Step, as a share of the value, of constants that are linear in the coordinates."""
 _MOTION_STEP = 1e-5
 """Step, as a share of the value, of what a motion has no derivatives by."""
-_UNBOUNDED = 10.0
+_UNBOUNDED_ERROR = 10.0
 """Error of a motion that is not bounded, in spans of the record."""
 
 
@@ -199,7 +198,7 @@ class Trajectories:
                 yield predictor, segments, starts[own]
 
     def _bounded(self, outputs: FloatArray) -> FloatArray:
-        span = _UNBOUNDED * float(np.ptp(self.measured))
+        span = _UNBOUNDED_ERROR * float(np.ptp(self.measured))
         low, high = self.measured - span, self.measured + span
         return np.where(np.isfinite(outputs), np.clip(outputs, low, high), high)
 
@@ -234,23 +233,11 @@ class Trajectories:
 
 
 def segments_of(records: Sequence[Record], length: float) -> tuple[list[Segment], FloatArray]:
-    """Return segments of records about as long as asked, and the measured state at their starts.
+    """Return segments of about a length, s, and the measured states at their starts, m and m/s.
 
-    They start where the slide is fastest relative to the belt: a slide that sticks has no velocity
-    of its own, and friction with a memory is that of steady slip there.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        The records.
-    length : float
-        Length of a segment, s.
-
-    Returns
-    -------
-    list of Segment, array of shape (segments, 2)
-        Segments that follow each other up to the end of each record; position, m, and velocity,
-        m/s.
+    They follow each other up to the end of each record, and start where the slide is fastest
+    relative to the belt: a slide that sticks has no velocity of its own, and friction with a memory
+    is that of steady slip there. States have the shape (segments, 2).
     """
     from scipy.signal import savgol_filter
 

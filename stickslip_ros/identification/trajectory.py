@@ -17,9 +17,9 @@ from stickslip_ros.physics.motion.parametric_motion import ParametricMotion
 
 _FIRST = 20
 """Samples from which the velocity at the start is found."""
-_FAR = 1e300
+_UNBOUNDED_LOSS = 1e300
 """Squared error of a motion that is not bounded, m^2."""
-_REACHES, _NEARER, _NEARLY = 14, 0.25, 0.05
+_REACHES, _REACH_RATIO, _END_TOLERANCE = 14, 0.25, 0.05
 """Reaches within which the velocity at the start is sought, at most; ratio of one to the one
 before; share of the squared error by which both ends of the last one may be worse."""
 _TOLERANCE = 1e-6
@@ -60,23 +60,11 @@ class Predictor:
         velocity: float,
         delay: float = 0.0,
     ) -> FloatArray:
-        """Return the positions at samples from `start` on.
+        """Return positions, m, at `count` samples from `start` on; NaN once unbounded.
 
-        Parameters
-        ----------
-        drive : Drive
-            The model; its belt is that of the record.
-        start, count : int
-            First sample, and number of samples.
-        position, velocity : float
-            State at the first sample, m and m/s.
-        delay : float, optional
-            Time from a sample until its force acts, s, between minus one and several periods.
-
-        Returns
-        -------
-        array of shape (count,)
-            Positions, m; NaN from where the motion is unbounded.
+        The motion starts from a position, m, and a velocity, m/s, on the belt of the record.
+        `delay` is the time from a sample until its force acts, s, from minus one to several
+        periods.
         """
         motion = Motion(self.with_belt(drive, start, count), position, velocity)
         found = np.full(count, np.nan)
@@ -206,21 +194,8 @@ def delayed(record: Record, delay: float) -> Record:
 def free_run(record: Record, drive: Drive, delay: float = 0.0) -> tuple[float, FloatArray]:
     """Return the motion of a drive through a whole record, with its force and without feedback.
 
-    It starts at the measured position with the velocity that fits best.
-
-    Parameters
-    ----------
-    record : Record
-        The record.
-    drive : Drive
-        The model.
-    delay : float, optional
-        Time from a sample until its force acts, s.
-
-    Returns
-    -------
-    tuple of float and array of shape (samples,)
-        Velocity at the start, m/s, and positions, m.
+    It starts at the measured position with the velocity that fits best, m/s, which is returned
+    before the positions, m. `delay` is the time from a sample until its force acts, s.
     """
     predictor = Predictor(record)
     count, start = len(record.position), float(record.position[0])
@@ -232,7 +207,7 @@ def free_run(record: Record, drive: Drive, delay: float = 0.0) -> tuple[float, F
     def run(velocity: float) -> tuple[float, FloatArray]:
         found = predictor.positions(drive, 0, count, start, velocity, delay)
         loss = float(np.mean((found - record.position) ** 2))
-        return loss if isfinite(loss) else _FAR, found
+        return loss if isfinite(loss) else _UNBOUNDED_LOSS, found
 
     tried = {slope: run(slope)}
     best, reach = slope, spread
@@ -242,13 +217,13 @@ def free_run(record: Record, drive: Drive, delay: float = 0.0) -> tuple[float, F
             tried[speed] = run(speed)
         low, middle, high = (tried[best + sign * reach][0] for sign in (-1.0, 0.0, 1.0))
         bend = low - 2.0 * middle + high
-        if reach > 0.0 and bend > 0.0 and max(low, high) < _FAR:
+        if reach > 0.0 and bend > 0.0 and max(low, high) < _UNBOUNDED_LOSS:
             lowest = best + 0.5 * reach * (low - high) / bend
             tried[lowest] = run(lowest)
         best = min(tried, key=lambda speed: tried[speed][0])
-        if max(low, high) <= (1.0 + _NEARLY) * tried[best][0]:
+        if max(low, high) <= (1.0 + _END_TOLERANCE) * tried[best][0]:
             break
-        reach *= _NEARER
+        reach *= _REACH_RATIO
     return best, tried[best][1]
 
 

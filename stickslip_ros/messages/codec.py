@@ -33,15 +33,8 @@ _JOINT_STATE_FRAME = _name("")
 _JOINT_STATE_SLIDE = struct.pack("<I", 2) + _name(SLIDE)
 _JOINT_STATE_BELT = _name(BELT)
 _REFERENCE_JOINT = _JOINT_STATE_FRAME + bytes(3) + struct.pack("<I", 1) + _name(SLIDE) + bytes(2)
-_JOINT_STATE_CONSTANTS = (
-    LITTLE_ENDIAN,
-    _JOINT_STATE_FRAME,
-    _JOINT_STATE_SLIDE,
-    _JOINT_STATE_BELT,
-    2,
-    2,
-    2,
-)
+_JOINTS = (_JOINT_STATE_FRAME, _JOINT_STATE_SLIDE, _JOINT_STATE_BELT)
+_JOINT_STATE_CONSTANTS = (LITTLE_ENDIAN, *_JOINTS, 2, 2, 2)
 # The components of the wrench other than force.x are zero when packed and skipped when unpacked.
 _WRENCH = struct.Struct("<4s iI 10s6x d40x")
 _WRENCH_FRAME = _name(SLIDE)
@@ -66,9 +59,7 @@ def pack_joint_state(
             LITTLE_ENDIAN,
             stamp // NANOSECONDS,
             stamp % NANOSECONDS,
-            _JOINT_STATE_FRAME,
-            _JOINT_STATE_SLIDE,
-            _JOINT_STATE_BELT,
+            *_JOINTS,
             2,
             *position,
             2,

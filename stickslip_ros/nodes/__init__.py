@@ -4,7 +4,7 @@ import sys
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.interrupts import NODE_SCRIPTS, is_run
-from stickslip_ros.nodes.base.shared_memory import check_shared_memory
+from stickslip_ros.nodes.base.machine import check_shared_memory
 
 if is_run(__name__, *NODE_SCRIPTS):
     try:

@@ -38,12 +38,11 @@ from stickslip_ros.messages.topics import (
     STICK_FRACTION,
     Topic,
 )
-from stickslip_ros.nodes.base.duplicate_publishers import duplicate_publishers
 from stickslip_ros.nodes.base.managed import ERROR, OK, Diagnosis, ManagedNode, diagnosis
-from stickslip_ros.nodes.base.polling import waiting_messages
 from stickslip_ros.nodes.base.process import run_node
-from stickslip_ros.nodes.base.ros_topics import qos_profile
+from stickslip_ros.nodes.base.ros_topics import qos_profile, waiting_messages
 from stickslip_ros.nodes.base.service_call import ServiceCall, parameters_call
+from stickslip_ros.physics.measures.cycle_measures import trend_text
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.scenarios.curve_file import CURVES, Pairs, read_pairs
 from stickslip_ros.scenarios.parameter_field import known_parameters
@@ -153,12 +152,12 @@ class AnalyzerNode(ManagedNode[AnalyzerParameters]):
             return OK, "", bag
         report = self._meter.report(quick=True)
         counts = {name: report[name] for name in ("regime", "steady", "samples", "lost_samples")}
-        counts["trend"] = report["trend"] or ""
+        counts["trend"] = trend_text(report)
         notes = {"notes": "; ".join(report["notes"])}
         figures = {**counts, **self.dropped.figures, **notes, **bag}
         if self._bag_failure:
             return ERROR, self._bag_failure, figures
-        complaints = [self.dropped.complaint, *duplicate_publishers(self, *RECORDED_TOPICS)]
+        complaints = [self.dropped.complaint, *self.duplicate_publishers(*RECORDED_TOPICS)]
         if report["lost_samples"]:
             complaints.append("samples were lost")
         return diagnosis(complaints, figures)

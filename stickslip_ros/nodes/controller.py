@@ -5,19 +5,17 @@ parameters; `stickslip list` prints the laws and `docs/parameters.md` their para
 """
 
 import sys
-from math import isfinite
 from typing import Any
 
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 
-from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.messages.codec import pack_reference, pack_wrench
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
-from stickslip_ros.nodes.base.duplicate_publishers import duplicate_publishers
 from stickslip_ros.nodes.base.managed import OK, Diagnosis, ManagedNode, diagnosis
+from stickslip_ros.nodes.base.parameters import first_line
 from stickslip_ros.nodes.base.process import run_node
-from stickslip_ros.nodes.base.ros_errors import first_line
 from stickslip_ros.physics.loop.controller import ReferenceSource
 from stickslip_ros.physics.loop.reference import ReferenceKind
 from stickslip_ros.samples import LARGEST, NO_REFERENCE, Reference, Sample
@@ -40,9 +38,8 @@ class ControllerNode(ManagedNode[ControllerParameters]):
         super().__init__(controller_node(law), CONTROLLER_PARAMETERS[law], **options)
 
     def connect(self) -> None:
-        """Publish forces; subscribe to the newest joint state and reference only."""
+        """Publish forces; subscribe to the newest reference only."""
         self._force = self.read_last = self.advertise(CONTROL_FORCE)
-        self.subscribe(JOINT_STATES, self._on_joint_state, depth=1)
         kind = self.parameters.as_reference().kind
         self._given = NO_REFERENCE
         self._reference = None
@@ -52,10 +49,16 @@ class ControllerNode(ManagedNode[ControllerParameters]):
             self._reference = self.advertise(REFERENCE)
 
     def start(self) -> None:
-        """Start the law on the next joint state."""
+        """Start the law on the next joint state: a plant takes one that listens for ready."""
         self._controller = self.parameters.as_controller()
         self._controller.follows = self._followed()
         self._answered = 0
+        self._states = self.subscribe(JOINT_STATES, self._on_joint_state, depth=1)
+
+    def stop(self) -> None:
+        """Listen no more, and stop once the forces sent have arrived."""
+        self.release(self._states)
+        super().stop()
 
     def apply_parameters(self) -> None:
         """Use new constants from the next joint state on."""
@@ -68,7 +71,7 @@ class ControllerNode(ManagedNode[ControllerParameters]):
         if not self.active:
             return OK, "", {}
         return diagnosis(
-            [self.dropped.complaint, *duplicate_publishers(self, JOINT_STATES, REFERENCE)],
+            [self.dropped.complaint, *self.duplicate_publishers(JOINT_STATES, REFERENCE)],
             {"answered": self._answered, **self.dropped.figures},
         )
 
@@ -85,11 +88,13 @@ class ControllerNode(ManagedNode[ControllerParameters]):
             )
             return
         controller = self._controller
-        force = controller.answer(sample)
+        try:
+            force = controller.answer(sample)
+        except RunError as error:
+            self.dropped.add(f"a joint state stamped {stamp} ns: {error}")
+            return
         if force is None:
             self.dropped.add(f"a joint state stamped {stamp} ns, not later than the last one")
-        elif not isfinite(force):
-            self.dropped.add(f"to the velocity {velocity} m/s the force would be {force} N")
         else:
             if self._reference is not None:
                 self._reference.publish(pack_reference(stamp, controller.reference))

@@ -1,4 +1,4 @@
-"""Pace a node from sample to sample, by the clock, by answers, or by a recorder."""
+"""Pace a node by the clock, or by answers and a recorder, and check its timing."""
 
 import ctypes
 import gc
@@ -22,6 +22,9 @@ _LONG_WAIT = 0.05
 """Wait, s, above which the wait must be interruptible."""
 
 NO_FORCE = "no control force arrives: continuing without"
+
+_CHECKS = 10
+"""Number of checks of the timing over which shares are computed."""
 
 
 class Sleeper:
@@ -313,3 +316,42 @@ def _be_prompt() -> None:
         ctypes.CDLL(None).prctl(29, 1)  # PR_SET_TIMERSLACK
     sys.setswitchinterval(1e-4)
     gc.freeze()  # objects made by imports take tens of ms to traverse
+
+
+class TimingMonitor:
+    """Checks the counts of late forces and samples of a segment regularly, and reports problems."""
+
+    def __init__(self) -> None:
+        self._counts = deque([(0, 0, 0)], maxlen=_CHECKS + 1)
+
+    def check(
+        self, samples: int, late_forces: int, missed_deadlines: int, *, controlled: bool
+    ) -> str:
+        """Return a complaint about the last calls, or an empty string.
+
+        Without a controller, expected or not, no force can be late.
+        """
+        counts = samples, late_forces, missed_deadlines
+        if not controlled:  # only forces after its return count
+            self._counts = deque(
+                ((n, late_forces, missed) for n, _, missed in self._counts), maxlen=_CHECKS + 1
+            )
+        before = self._counts[0]
+        self._counts.append(counts)
+        number, late, missed = (now - then for now, then in zip(counts, before, strict=True))
+        if number < 100:  # too few for a meaningful share
+            return ""
+        found = [
+            f"{100.0 * count / number:.2g} % of the latest {what}"
+            for count, what in (
+                (late, "forces came late (the last one was held)"),
+                (missed, "samples missed their deadlines"),
+            )
+            if count > 0.01 * number
+        ]
+        if not found:
+            return ""
+        return (
+            f"{' and '.join(found)}: lower rate or real_time_factor, close other busy programs, "
+            "or set pace to lockstep"
+        )

@@ -22,12 +22,18 @@ from stickslip_ros.messages.topics import (
     RECORDED,
     TRUE_JOINT_STATES,
 )
-from stickslip_ros.nodes.base.duplicate_publishers import duplicate_publishers
-from stickslip_ros.nodes.base.managed import ERROR, OK, Diagnosis, ManagedNode, diagnosis
-from stickslip_ros.nodes.base.plant_keys import FAILURE, FINISHED, NEWEST_STAMP
+from stickslip_ros.nodes.base.managed import (
+    ERROR,
+    FAILURE,
+    FINISHED,
+    NEWEST_STAMP,
+    OK,
+    Diagnosis,
+    ManagedNode,
+    diagnosis,
+)
 from stickslip_ros.nodes.base.process import run_node
-from stickslip_ros.nodes.lateness_warning import Punctuality
-from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer
+from stickslip_ros.nodes.pacing import NO_FORCE, LockstepPacer, RealtimePacer, TimingMonitor
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, Verdict
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.samples import Sample
@@ -72,7 +78,7 @@ class PlantNode(ManagedNode[PlantParameters]):
 
     def start(self) -> None:
         """Start a segment: sample 0 now, the following ones as the pacer advances."""
-        self._punctuality = Punctuality()
+        self._timing = TimingMonitor()
         if self._disturbance:  # the recorder of the new segment has not received it
             self._disturbance = nan
         parameters = self.parameters
@@ -162,7 +168,7 @@ class PlantNode(ManagedNode[PlantParameters]):
         if self.parameters.expects_control and not controlled:
             complaints.append(NO_FORCE)
         complaints.append(
-            self._punctuality.look(
+            self._timing.check(
                 loop.sample_number + 1,
                 loop.late_forces,
                 pacer.missed_deadlines,
@@ -170,7 +176,7 @@ class PlantNode(ManagedNode[PlantParameters]):
             )
         )
         complaints.append(self.dropped.complaint)
-        complaints += duplicate_publishers(self, CONTROL_FORCE, DISTURBANCE_FORCE)
+        complaints += self.duplicate_publishers(CONTROL_FORCE, DISTURBANCE_FORCE)
         return diagnosis(complaints, figures)
 
     def _publish(self, sample: Sample) -> None:

@@ -18,7 +18,15 @@ from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, FrictionLaw, Linear, Stribeck
 from stickslip_ros.progress import Progress
-from stickslip_ros.studies.bifurcation import BifurcationDiagram, bifurcation_diagram
+from stickslip_ros.studies.settling import ControlledDrive
+from stickslip_ros.studies.sweep import BifurcationDiagram, bifurcation_diagram
+from stickslip_ros.studies.transitions import (
+    HOPF_POINT,
+    STICKING_LIMIT,
+    hopf_margin,
+    sign_changes,
+    stick_margin,
+)
 
 STRIBECK = Stribeck(static=0.4, minimum=0.25, minimum_speed=0.5)
 """The paper's friction law with the paper's constants."""
@@ -108,6 +116,33 @@ def bifurcation_drives(number: int, points: int = POINTS) -> tuple[FloatArray, l
 def bifurcation_drive(number: int, value: float) -> Drive:
     """Return the drive of bifurcation diagram `number` for one value of its parameter."""
     return _BIFURCATIONS[number].drive(value)
+
+
+def transition_marks(figure: BifurcationFigure) -> dict[str, float]:
+    """Return the values of the parameter at the transitions that the diagram shows, by name."""
+
+    def case(value: float) -> ControlledDrive:
+        return ControlledDrive(bifurcation_drive(figure.number, value))
+
+    margins: dict[str, Callable[[float], float]] = {
+        HOPF_POINT: lambda value: hopf_margin(case(value)),
+        STICKING_LIMIT: lambda value: stick_margin(case(value)),
+    }
+    found: dict[str, float] = {}
+    for name, margin in margins.items():
+        if values := list(sign_changes(margin, figure.values.tolist())):
+            found[name] = values[-1]
+    return found
+
+
+def unstable_equilibria(figure: BifurcationFigure) -> FloatArray:
+    """Return the displacement of the unstable equilibrium for each drive, NaN if it is stable."""
+    return np.array(
+        [
+            drive.equilibrium_position if hopf_margin(ControlledDrive(drive)) < 0.0 else np.nan
+            for drive in figure.diagram.drives
+        ]
+    )
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """The report on the paper: every claim with its verdict, and the figures, as JSON and Markdown."""
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -8,7 +9,7 @@ from typing import Any
 
 from stickslip_ros.paper.claims import CHAPTERS, Finding, Verdict
 from stickslip_ros.paper.figures import BifurcationFigure, PaperFigure
-from stickslip_ros.studies.bifurcation import COURSE
+from stickslip_ros.studies.sweep import DIAGRAM_OPTIONS
 
 Report = Mapping[str, Any]
 """The report as in JSON: `claims` and `figures`, each a list of objects."""
@@ -20,27 +21,28 @@ _HEAD = """\
 with Stribeck friction, finds the feed speed below which self-excited vibration occurs, and
 suppresses the vibration with a washout filter. This page compares every number, formula and
 statement of that paper with the results of its own equations. `stickslip paper --out docs`
-computes and writes this page, the figures, and `reproduction.json`, which has the same findings in
-full precision.
+computes and writes this page, the figures, and `reproduction.json`, which has the findings in full
+precision, the differences, and all of the evidence.
 
 Nothing in the column *computed* comes from the paper. The values are for a drive with mass,
-stiffness and normal force of one, for which SI and dimensionless values are the same, with
-mu_s = 0.4, mu_m = 0.25, v_m = 0.5 and beta = 0.01 in eq. 5 (a damping coefficient 2 beta of 0.02),
-unless a line gives others. A number holds if the computed value, rounded to the last printed digit,
-is equal to it. A correction is a stated change of the calculation that gives the printed number or
-makes a formula correct.
+stiffness and normal force of one, mu_s = 0.4, mu_m = 0.25, v_m = 0.5 and beta = 0.01 in eq. 5 (a
+damping coefficient 2 beta of 0.02), unless a line gives others. A number holds if the computed
+value, rounded to the last printed digit, is equal to it. A correction is a stated change of the
+calculation that gives the printed number or makes a formula correct.
 """
 
 _FIGURES = """\
 ## The figures
 
 These are the paper's figures 2 to 13, computed from the equations. Parameter values that the paper
-does not print are chosen to show the behaviour that its text describes. The figures show them; all
-others are beta = 0.01, stiffness 1, mu_s = 0.4, mu_m = 0.25 and v_m = 0.5. Everything is
-dimensionless and starts from rest at X = 0. Figure 1 is a drawing of the model.
+does not print are chosen to show the behaviour that its text describes. Everything is dimensionless
+and starts from rest at X = 0. Figure 1 is a drawing of the model.
 """
 
-_COLUMNS = ("", "claim", "printed", "computed", "difference", "verdict")
+_TOLD_BY_THE_VERDICT = ("the same", "something else")
+"""What is computed for a formula."""
+
+_COLUMNS = ("", "claim", "printed", "computed", "verdict")
 
 
 def report(findings: Mapping[str, Finding], figures: Mapping[str, PaperFigure]) -> Report:
@@ -79,37 +81,29 @@ def as_markdown(report: Report) -> str:
     """Return the report as a page."""
     counts = [(verdict, str(count)) for verdict, count in verdict_counts(report).items()]
     parts = [_HEAD, _table([("verdict", "claims"), ("---", "---:"), *counts])]
-    failing = (claim for claim in report["claims"] if claim["verdict"] == Verdict.FAILS)
-    parts.append(
-        "These claims do not hold; the tables below give the evidence:\n\n"
-        + "".join(map(_line, failing))
-    )
     for title, claims in groupby(report["claims"], key=lambda claim: claim["chapter"]):
         rows = [_COLUMNS, ["---"] * len(_COLUMNS), *map(_cells, claims)]
         parts.append(f"## {title}\n\n{_table(rows)}")
     parts.append(_FIGURES)
     for figure in report["figures"]:
         number, caption = figure["number"], figure["caption"]
-        picture = f"![Figure {number}]({figure['picture']})"
-        parts.append(f"### Figure {number}\n\n{caption}\n\n{picture}\n")
+        parts.append(f"![Figure {number}: {caption}]({figure['picture']})\n")
     return "\n".join(parts)
-
-
-def _line(claim: Mapping[str, Any]) -> str:
-    printed = f" (printed: {_shown(claim['printed'])})" if claim["printed"] is not None else ""
-    return f"- {claim['place']}: {claim['statement']}{printed}\n"
 
 
 def _cells(claim: Mapping[str, Any]) -> list[str]:
     verdict = f"**{claim['verdict']}**"
     return [
-        claim["place"],
+        claim["place"].replace("section ", "§"),
         claim["statement"],
         _shown(claim["printed"]),
-        _shown(claim["computed"]),
-        _shown(claim["difference"], digits=2),
-        f"{verdict}: {claim['remark']}" if claim["remark"] else verdict,
+        "" if claim["computed"] in _TOLD_BY_THE_VERDICT else _shown(claim["computed"]),
+        verdict if claim["verdict"] == Verdict.HOLDS else f"{verdict}: {_first_sentence(claim)}",
     ]
+
+
+def _first_sentence(claim: Mapping[str, Any]) -> str:
+    return re.split(r"(?<!eq)(?<!Fig)\. (?=[A-Z\d])", claim["remark"])[0].rstrip(".") + "."
 
 
 def _table(rows: Sequence[Sequence[str]]) -> str:
@@ -117,18 +111,18 @@ def _table(rows: Sequence[Sequence[str]]) -> str:
     return "".join(f"| {' | '.join(row)} |\n" for row in cells)
 
 
-def _shown(value: float | str | None, digits: int = 6) -> str:
+def _shown(value: float | str | None) -> str:
     if value is None:
         return ""
-    return value if isinstance(value, str) else f"{value:.{digits}g}"
+    return value if isinstance(value, str) else f"{value:.6g}"
 
 
 def _caption(figure: PaperFigure) -> str:
     if isinstance(figure, BifurcationFigure):
         start, end = figure.values[[0, -1]]
         return (
-            f"{figure.title}. Turning points of the motion from rest after {COURSE.transient:g} "
-            f"natural periods, for {len(figure.values)} values of the {figure.parameter} from "
-            f"{start:g} to {end:g}."
+            f"{figure.title}. Turning points of the motion from rest after "
+            f"{DIAGRAM_OPTIONS.transient:g} natural periods, for {len(figure.values)} values of "
+            f"the {figure.parameter} from {start:g} to {end:g}."
         )
     return f"{figure.title}."

@@ -14,9 +14,9 @@ from stickslip_ros.plots.style import BLUE, GREEN, ORANGE, SCREEN, FigureStyle, 
 from stickslip_ros.plots.units import SI
 
 _DOTS: Any = {"marker": ".", "ms": 2.0, "ls": "", "alpha": 0.4, "mew": 0.0, "rasterized": True}
-_MOST = 0.995
+_SHOWN_SHARE = 0.995
 """Share of the dots that the vertical axis shows at least."""
-_WIDEST = 100.0
+_LARGEST_BAND = 100.0
 """Largest band that is drawn, in largest forces."""
 _NAMES = {1.0: "forward slip", -1.0: "backward slip"}
 
@@ -25,19 +25,9 @@ _NAMES = {1.0: "forward slip", -1.0: "backward slip"}
 def identification_figure(found: Findings, *, style: FigureStyle = SCREEN) -> Figure:
     """Return the figure of what was found.
 
-    Parameters
-    ----------
-    found : Findings
-        The model.
-    style : FigureStyle, optional
-        What the figure is for, by default a screen.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Friction curve with its 95 % band and what was measured; residuals over speed, position and
-        time, of the forces of an axis, and of the positions in segments of a drive on a spring; and
-        the run without feedback beside the measured positions, with their difference.
+    It has the friction curve with its 95 % band and what was measured; residuals over speed,
+    position and time, of the forces of an axis, and of the positions in segments of a drive on a
+    spring; and the run without feedback beside the measured positions, with their difference.
     """
     figure = style.figure(10.0, 9.0, narrow=2.6)
     narrow = style.narrow
@@ -73,7 +63,7 @@ def _friction(axes: Axes, found: Findings) -> None:
     errors = found.errors()
     curves = [found.friction(number) for number in range(len(found.directions))]
     sizes = [np.abs(errors.friction), *(curve.force for curve in curves)]
-    top = max(float(np.quantile(each, _MOST)) for each in sizes if len(each))
+    top = max(float(np.quantile(each, _SHOWN_SHARE)) for each in sizes if len(each))
     scale, label = SI.axis("friction force", "N", np.array([top]))
     fastest = max(float(curve.speed[-1]) for curve in curves)
     speed_scale, speed_label = SI.axis(
@@ -91,8 +81,8 @@ def _friction(axes: Axes, found: Findings) -> None:
         speed, force = curve.speed / speed_scale, curve.force / scale
         axes.plot(speed, force, color=colour, lw=1.5, label="fitted")
         band = QUANTILE * curve.standard_error / scale
-        # What is not told has a band that is not finite.
-        band = np.minimum(band, _WIDEST * top / scale)
+        # What is not identified has a band that is not finite.
+        band = np.minimum(band, _LARGEST_BAND * top / scale)
         limits = force - band, force + band
         axes.fill_between(speed, *limits, color=colour, alpha=0.3, lw=0.0, label="95 % band")
     axes.set_xlabel(speed_label)

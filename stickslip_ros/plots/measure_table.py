@@ -1,9 +1,11 @@
-"""The table of measures: their labels and units, side by side for several runs."""
+"""The tables of measures: those of runs side by side, those of slips, and why there are none."""
 
 from collections.abc import Mapping
+from math import inf
 from typing import Any
 
-from stickslip_ros.physics.measures.cycle_measures import Measures, Regime, with_trend
+from stickslip_ros.physics.measures.cycle_measures import Measures, Regime, trend_text
+from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.units import NOISE, SI, Units
 from stickslip_ros.tables import TextTable
 
@@ -49,8 +51,21 @@ _SAME_SCALE = {
 
 _ALL_SI: Mapping[str, Units] = {}
 
+_SLIPS = {
+    "stick_time": ("time of sticking", "s"),
+    "drop": ("drop", "m"),
+    "slip_time": ("time of slipping", "s"),
+    "stick_velocity": ("velocity while sticking", "m/s"),
+}
+"""Label and unit of each measure of slips."""
 
-def told_and_true(measures: Measures, truth: Measures | None) -> dict[str, dict[str, Any]]:
+_DISTRIBUTION = ("mean", "standard_error", "q05", "median", "q95")
+
+_LARGEST_RATIO = 10.0
+"""Ratio of belt speed and Hopf speed beyond which the unit is probably wrong."""
+
+
+def measured_and_true(measures: Measures, truth: Measures | None) -> dict[str, dict[str, Any]]:
     """Return the columns of a simulated run: with a sensor also those of the motion itself."""
     if truth is None:
         return {"": measures.as_dict()}
@@ -68,7 +83,7 @@ def measure_table(
     rows = {
         name: [label, *_row(name, unit, columns, units)]
         for name, (label, unit) in LABELS.items()
-        if any(name in figures for figures in columns.values())
+        if any(name in values for values in columns.values())
     }
     _tell_apart(rows, columns)
     return TextTable(title, ["", *columns], list(rows.values()))
@@ -77,13 +92,13 @@ def measure_table(
 def _tell_apart(rows: dict[str, list[str]], columns: Mapping[str, Mapping[str, Any]]) -> None:
     """Omit the force that acted if it is unknown or equals the sent one, and drops without any."""
     for sent, (applied, label) in _SENT.items():
-        known = [figures.get(applied) is not None for figures in columns.values()]
+        known = [values.get(applied) is not None for values in columns.values()]
         cells = zip(known, rows.get(sent, [])[1:], rows.get(applied, [])[1:], strict=False)
         if any(is_known and of_sent != of_applied for is_known, of_sent, of_applied in cells):
             rows[sent][0] = label
         else:
             rows.pop(applied, None)
-    if not any(figures.get("dropped_forces") for figures in columns.values()):
+    if not any(values.get("dropped_forces") for values in columns.values()):
         rows.pop("dropped_forces", None)
 
 
@@ -94,19 +109,53 @@ def _row(
     cells: dict[str, str] = {}
     for shown_in in {units.get(column, SI) for column in columns}:
         own = [column for column in columns if units.get(column, SI) == shown_in]
-        values = [_shown(name, columns[column]) for column in own]
+        values = [_shown(name, columns[column], shown_in) for column in own]
         others = [columns[column].get(_SAME_SCALE.get(name, "")) for column in own]
         largest = max((abs(value) for value in others if value is not None), default=0.0)
         cells |= zip(own, shown_in.texts(values, unit, largest=largest), strict=True)
     return [cells[column] for column in columns]
 
 
-def _shown(name: str, figures: Mapping[str, Any]) -> Any:
+def _shown(name: str, values: Mapping[str, Any], units: Units) -> Any:
     """Return the value to print; for a regime also whether it is steady."""
-    value = figures.get(name)
+    value = values.get(name)
     if name == "regime":
-        return with_trend(Regime.label(value), figures.get("trend"))
+        trend = trend_text(values, units.text)
+        return f"{Regime.label(value)}{trend and f', not steady: {trend}'}"
     if name == "velocity_amplitude" and value is not None:
-        amplitude, midpoint = figures.get("amplitude") or 0.0, figures.get("midpoint") or 0.0
+        amplitude, midpoint = values.get("amplitude") or 0.0, values.get("midpoint") or 0.0
         return 0.0 if amplitude <= NOISE * abs(midpoint) else value  # what is left is rounding
     return value
+
+
+def slip_table(slips: Mapping[str, Any], units: Units) -> TextTable:
+    """Return the table of the distributions that `SlipMeter.report` has."""
+    regime = Regime.label(slips["regime"])
+    title = f"{slips['count']} slips of more than {units.text(slips['least_drop'], 'm')}: {regime}"
+    rows = [
+        [label, *(units.text(slips[name][column], unit) for column in _DISTRIBUTION)]
+        for name, (label, unit) in _SLIPS.items()
+        if slips[name] is not None
+    ]
+    if slips["belt_speed"]:
+        rows.append(["belt speed", units.text(slips["belt_speed"], "m/s"), "", "", "", ""])
+    return TextTable(title, ["", "mean", "standard error", "5 %", "median", "95 %"], rows)
+
+
+def why_no_cycle(regime: str | None, duration: float, drive: Drive | None) -> str | None:
+    """Return why a motion over `duration` (s) has no regime; None if it has one."""
+    if regime is not None:
+        return None
+    from stickslip_ros.studies.stability import hopf_distance, hopf_ratio  # it takes long
+
+    units = Units.for_drive(drive)
+    said = f"no whole cycle was completed in {duration:g} {units.of_unit('s')}".rstrip()
+    if drive is None:
+        return said
+    period = drive.natural_period
+    if duration < 3.0 * period < inf:
+        return f"{said}: the natural period is {units.text(period, 's')}, so run it for longer"
+    ratio = hopf_ratio(drive)
+    if ratio is not None and not 1.0 / _LARGEST_RATIO < ratio < _LARGEST_RATIO:
+        return f"{said}: the slide has neither turned back nor settled; {hopf_distance(drive)}"
+    return f"{said}: the slide has neither turned back twice nor settled; run it for longer"

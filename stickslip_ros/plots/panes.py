@@ -1,4 +1,4 @@
-"""Panels over time: a part of a run, its traces with every peak, and when the slide sticks."""
+"""Panels of a run: a part of it over time, and conclusions from a noisy record of it."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Self
@@ -6,14 +6,18 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, to_rgba
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec, GridSpecFromSubplotSpec
 
-from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.cycle_measures import Measures, with_trend
+from stickslip_ros.arrays import FloatArray, IntArray
+from stickslip_ros.physics.measures.cycle_fit import MeanCycle
+from stickslip_ros.physics.measures.cycle_measures import Measures, trend_text
+from stickslip_ros.physics.measures.run_meter import RunAnalysis
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.decimation import intervals, peaks
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.run_history import DrawnMotion
-from stickslip_ros.plots.style import GREY
+from stickslip_ros.plots.style import BLUE, GREY, ORANGE
 from stickslip_ros.plots.units import Units
 
 LAST_CYCLES = 5
@@ -29,6 +33,14 @@ LEAST_PART = 1e-3
 """Smallest span of an axis for a part of a motion, as a share of the span of all of it."""
 
 _SHADE = LinearSegmentedColormap.from_list("stick", [to_rgba(GREY, 0.0), to_rgba(GREY, 0.6)])
+
+_RAW: Any = {"color": BLUE, "marker": ".", "ms": 2.0, "ls": "", "alpha": 0.5, "mew": 0.0}
+_FITTED: Any = {"color": ORANGE, "lw": 1.2}
+_CONFIDENCE = 1.96
+"""Half of a 95 % interval, in standard errors."""
+_ALIKE = 1e-9
+"""Relative spread of slips below which they are shown as equal."""
+_BINS = 30
 
 
 class Pane(NamedTuple):
@@ -51,7 +63,8 @@ class Pane(NamedTuple):
 
 def measures_text(measures: Measures, units: Units) -> str:
     """Return regime, amplitude, frequency and stick fraction as a line of text."""
-    found = [with_trend(REGIMES[measures.regime].label, measures.trend)]
+    trend = trend_text(vars(measures), units.text)
+    found = [f"{REGIMES[measures.regime].label}{trend and f', not steady: {trend}'}"]
     for name, value, unit in (
         ("amplitude", measures.amplitude, "m"),
         ("frequency", measures.frequency, "Hz"),
@@ -98,6 +111,12 @@ def broken(gap: float, time: FloatArray, *columns: FloatArray) -> list[FloatArra
     return [np.insert(column, behind, np.nan) for column in (time, *columns)]
 
 
+def cycle_rows(time: FloatArray, *columns: FloatArray) -> IntArray:
+    """Return the rows of the cycles to draw: in each pixel column all peaks."""
+    span = float(time[-1] - time[0]) if len(time) else 0.0
+    return peaks(intervals(time, span / PIXELS or 1.0), *columns)
+
+
 def shade(axes: Axes, pane: Pane) -> None:
     """Shade each pixel column of a pane by the share of time in which the slide sticks."""
     bottom, top = axes.get_ylim()
@@ -113,6 +132,90 @@ def shade(axes: Axes, pane: Pane) -> None:
         axes.set_ylim(bottom, top)
 
 
+def label_time(axes: Axes, time: tuple[float, str]) -> None:
+    """Label a horizontal axis in s with `time`, the divisor and the label of `Units.axis`."""
+    scale, label = time
+    axes.set_xlabel(label)
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value / scale:.10g}")
+
+
 def say(axes: Axes, why: str) -> None:
     """Write in a panel why it is empty."""
     axes.text(0.5, 0.5, why, ha="center", va="center", transform=axes.transAxes)
+
+
+def draw_conclusions(
+    figure: Figure,
+    part: GridSpec | GridSpecFromSubplotSpec,
+    found: RunAnalysis,
+    units: Units,
+    *,
+    short: bool,
+) -> None:
+    """Draw the mean cycle with its edges, or the distributions over the slips.
+
+    `part` has three cells, beside each other or one above another. Labels may have to be `short`.
+    """
+    if found.slips is not None:  # they were asked for
+        each = found.slips["each"]
+        for column, (name, title, unit) in enumerate(
+            (
+                ("stick_time", "time of sticking", "s"),
+                ("drop", "drop of a slip", "m"),
+                ("slip_time", "time of slipping", "s"),
+            )
+        ):
+            values = np.array([value for value in each[name] if value is not None])
+            _distribution(figure.add_subplot(part[column]), values, title, unit, units)
+    elif found.mean_cycle is not None:
+        _cycle(figure.add_subplot(part[0:2]), found.mean_cycle, units, short=short)
+        _residual(figure.add_subplot(part[2]), found.mean_cycle, units)
+
+
+def _cycle(axes: Axes, mean: MeanCycle, units: Units, *, short: bool) -> None:
+    scale, label = units.axis(units.named("displacement", short=short), "m", mean.position)
+    second, time_label = units.axis("time within the cycle", "s", mean.phase)
+    order = np.argsort(mean.phase)
+    axes.plot(mean.phase / second, mean.position / scale, **_RAW, label="measured, all cycles")
+    axes.plot(mean.phase[order] / second, mean.fitted[order] / scale, **_FITTED, label="fitted")
+    if mean.edges is not None and mean.edge_errors is not None:
+        period = mean.cycle.period
+        named = zip(("landing", "departure"), mean.edges, mean.edge_errors, strict=True)
+        for line, (name, edge, error) in enumerate(named):
+            at, half = edge % period / second, _CONFIDENCE * error / second
+            axes.axvspan(at - half, at + half, color=GREY, alpha=0.6, lw=0.0)
+            axes.axvline(at, color="black", lw=0.8, ls="--")
+            axes.annotate(
+                f"{name} ± {units.text(_CONFIDENCE * error, 's')}", (at, 0.0),
+                (3.0, 3.0 + 11.0 * line), xycoords=("data", "axes fraction"),
+                textcoords="offset points", fontsize="small",
+            )  # fmt: skip
+    axes.set_xlabel(time_label)
+    axes.set_ylabel(label)
+    axes.set_title("mean cycle; edges with 95 % intervals")
+    axes.legend(loc="upper right", fontsize="small")
+
+
+def _residual(axes: Axes, mean: MeanCycle, units: Units) -> None:
+    residual = mean.position - mean.fitted
+    scale, label = units.axis("residual", "m", residual)
+    second, time_label = units.axis("time within the cycle", "s", mean.phase)
+    axes.plot(mean.phase / second, residual / scale, **_RAW)
+    axes.set_xlabel(time_label)
+    axes.set_ylabel(label)
+    axes.set_title(f"noise {units.text(mean.noise, 'm')}")
+
+
+def _distribution(axes: Axes, values: np.ndarray, title: str, unit: str, units: Units) -> None:
+    scale, label = units.axis(title, unit, values)
+    if len(values):
+        shown = values / scale
+        low, high = shown.min(), shown.max()
+        if high - low < _ALIKE * high:  # too close for bins of their own
+            low, high = low - 0.5, high + 0.5
+        axes.hist(shown, bins=_BINS, range=(low, high), color=BLUE)
+        axes.axvline(float(np.median(values)) / scale, color=ORANGE, lw=1.2, label="median")
+        axes.legend(fontsize="small")
+    axes.set_xlabel(label)
+    axes.set_ylabel("slips")
+    axes.set_title(f"{title}, {len(values)} slips")

@@ -11,7 +11,7 @@ from matplotlib.path import Path
 
 from stickslip_ros.arrays import BoolArray, FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.plots.style import BLUE, GREEN, GREY, LIGHT_GREY, MANY, ORANGE
+from stickslip_ros.plots.style import BLUE, GREEN, GREY, LIGHT_GREY, MANY, ORANGE, SKY_BLUE, YELLOW
 
 INK = "#333333"
 """Colour of hatches, visible on every colour except black."""
@@ -33,8 +33,10 @@ REGIMES: Mapping[Regime | None, Look] = {
         (Regime.STICK_SLIP, ORANGE, "o", ""),
         (Regime.PURE_SLIP, BLUE, "^", "..."),
         (Regime.EQUILIBRIUM, GREEN, "s", "///"),
+        (Regime.HELD, SKY_BLUE, "v", "---"),
         (Regime.STUCK, GREY, "D", "xxx"),
         (Regime.UNBOUNDED, "black", "X", ""),
+        (Regime.UNDERSAMPLED, YELLOW, "p", "+++"),
         (None, LIGHT_GREY, "P", "\\\\\\"),
     )
 }

@@ -1,7 +1,8 @@
 """Figure of a run: motion, force, phase portrait, cycles and friction law."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,17 +14,19 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.measures.cycle_measures import Measures
+from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
+from stickslip_ros.physics.model.disturbance import DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.conclusions import draw_conclusions
-from stickslip_ros.plots.decimation import intervals, peaks
 from stickslip_ros.plots.panes import (
     LEAST_SPAN,
     PIXELS,
     Pane,
     broken,
+    cycle_rows,
+    draw_conclusions,
     draw_line,
     end_duration,
+    label_time,
     measures_text,
     say,
     shade,
@@ -42,8 +45,10 @@ from stickslip_ros.plots.style import (
     FigureStyle,
     finish,
     styled,
+    title_of,
 )
 from stickslip_ros.plots.units import Units
+from stickslip_ros.scenarios.files import Scenario
 
 _MOTION: Any = {"color": BLUE, "lw": 1.0}
 _BELT: Any = {"color": "black", "lw": 1.0, "ls": "--", "zorder": 2.5}
@@ -146,6 +151,36 @@ def run_figure(
     return figure
 
 
+def simulated_run_figure(
+    scenario: Scenario, history: RunHistory, measures: Measures, *, style: FigureStyle = SCREEN
+) -> Figure:
+    """Return the figure of a simulated run of a scenario."""
+    disturbed = scenario.plant.disturbance.kind is not DisturbanceKind.NONE
+    title = title_of("Simulated run", scenario)
+    force = f"{_CONTROL_ONLY} and disturbance" if disturbed else _CONTROL_ONLY
+    drive = scenario.plant.as_drive()
+    return run_figure(history, measures, drive, title=title, force=force, style=style)
+
+
+def recorded_run_figure(
+    bag: Path,
+    drive: Drive | None,
+    history: RunHistory,
+    report: Mapping[str, Any],
+    *,
+    style: FigureStyle = SCREEN,
+) -> Figure:
+    """Return the figure of a recorded run, with what the `report` of its bag notes.
+
+    `drive` is None if the bag does not hold its parameters.
+    """
+    notes = [*report["missing"], *report["notes"]]
+    if drive is None:
+        notes.append("it is not recorded what drive it was: no equilibrium, no friction law")
+    title = f"Recorded run, {bag}"
+    return run_figure(history, measures_of(report), drive, title=title, notes=notes, style=style)
+
+
 class _Panels:
     """The panels of the figure, with their common units and data."""
 
@@ -225,9 +260,7 @@ class _Panels:
         return [Pane(self._first_force, rows, at - before, at + after)]
 
     def _label_time(self, axes: Axes, pane: Pane) -> None:
-        scale, label = self.units.axis("time", "s", pane.start, pane.end)
-        axes.set_xlabel(label)
-        axes.xaxis.set_major_formatter(lambda value, _: f"{value / scale:.10g}")
+        label_time(axes, self.units.axis("time", "s", pane.start, pane.end))
         axes.set_xlim(pane.start, pane.end)
 
     def _draw_motion(self, position: Axes, velocity: Axes, pane: Pane) -> None:
@@ -275,8 +308,7 @@ class _Panels:
         scale, label = self.units.axis("amplitude", "m", columns[0])
         if not len(time):
             say(amplitude, "no cycle was completed")
-        span = float(time[-1] - time[0]) if len(time) else 0.0
-        rows = peaks(intervals(time, span / PIXELS or 1.0), *columns)
+        rows = cycle_rows(time, *columns)
         farthest = float(np.abs(self._history.motion.position).max(initial=0.0)) / scale
         for axes, values, least in (
             (amplitude, columns[0] / scale, LEAST_SPAN * farthest),

@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
-from stickslip_ros.physics.measures.observer import Conclusions, MeasuredMotion
+from stickslip_ros.physics.measures.run_meter import RunAnalysis
+from stickslip_ros.physics.measures.sample_meter import MeasuredMotion
 from stickslip_ros.physics.measures.sampling_grid import LONGEST_GAP
 from stickslip_ros.plots.decimation import Trace
 from stickslip_ros.samples import LARGEST
@@ -51,7 +52,7 @@ class RunHistory:
         """Force (N) that was requested and did not act, as far as known."""
         self.switched_on: float | None = None
         """Time of the first force that is not zero, s; None as long as there is none."""
-        self.conclusions = Conclusions(None, None)
+        self.conclusions = RunAnalysis(None, None)
         """What was concluded from a record."""
         self._motion, self._cycles = Trace(4), Trace(2)
         self._first: list[DrawnMotion] = []
@@ -91,7 +92,7 @@ class RunHistory:
         time, amplitude, stick_fraction = self._cycles.columns()
         return time, amplitude, stick_fraction
 
-    def take_conclusions(self, conclusions: Conclusions) -> None:
+    def take_conclusions(self, conclusions: RunAnalysis) -> None:
         """Keep what was concluded."""
         self.conclusions = conclusions
 

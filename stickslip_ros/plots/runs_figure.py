@@ -11,15 +11,15 @@ from matplotlib.lines import Line2D
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.plots.decimation import intervals, peaks
 from stickslip_ros.plots.panes import (
     LEAST_PART,
     LEAST_SPAN,
-    PIXELS,
     Pane,
     broken,
+    cycle_rows,
     draw_line,
     end_duration,
+    label_time,
     measures_text,
     say,
     shade,
@@ -38,6 +38,7 @@ from stickslip_ros.plots.style import (
     FigureStyle,
     finish,
     styled,
+    wrapped,
 )
 from stickslip_ros.plots.units import SI, Units
 
@@ -72,7 +73,7 @@ def runs_figure(
     count = len(runs)
     figure = style.figure(12.0, 9.0, wide=0.95, narrow=0.9 * count + 1.4)
     style.set_title(figure, "Runs compared, " + "; ".join(run.name for run in runs), *notes)
-    picture = _Picture(runs, looks, short=style.crowded(12.0, 9.0))
+    drawing = _Panels(runs, looks, short=style.crowded(12.0, 9.0))
     ratios = (0.9 * count, 1.3) if style.narrow else (1.3, 1.0)
     above, below = figure.add_gridspec(2, 1, height_ratios=ratios)
     if style.narrow:
@@ -85,10 +86,10 @@ def runs_figure(
     else:
         panels = above.subgridspec(2, count).subplots(sharex=True, sharey="row", squeeze=False)
         left, middle, right = below.subgridspec(1, 3)
-    picture.over_time(panels)
-    picture.portrait(figure.add_subplot(left))
+    drawing.over_time(figure, panels)
+    drawing.portrait(figure.add_subplot(left))
     amplitude = figure.add_subplot(middle)
-    picture.cycles(amplitude, figure.add_subplot(right, sharex=amplitude))
+    drawing.cycles(amplitude, figure.add_subplot(right, sharex=amplitude))
     handles = [
         Line2D([], [], marker=marker, ms=4.0, label=run.name, **look)
         for run, look, marker in zip(runs, looks, _MARKERS, strict=False)
@@ -98,8 +99,8 @@ def runs_figure(
     return figure
 
 
-class _Picture:
-    """What the panels have in common, and each of them."""
+class _Panels:
+    """The panels of the figure, with their common units and data."""
 
     def __init__(
         self, runs: Sequence[DrawnRun], looks: Sequence[dict[str, Any]], *, short: bool
@@ -116,7 +117,7 @@ class _Picture:
             self._units.named("velocity", short=short), "m/s", *(m.velocity for m in motions)
         )
 
-    def over_time(self, panels: Any) -> None:
+    def over_time(self, figure: Figure, panels: Any) -> None:
         """Draw displacement and force of each run in its own column."""
         forces = [run.history.control.columns() for run in self._runs]
         newton, force_label = self._units.axis(
@@ -126,7 +127,8 @@ class _Picture:
             Pane.covering(run.name, motion, force[0])
             for run, motion, force in zip(self._runs, self._motions, forces, strict=True)
         ]
-        scale, time_label = self._units.axis("time", "s", *(pane.end for pane in panes))
+        time = self._units.axis("time", "s", *(pane.end for pane in panes))
+        columns = panels[0, 0].get_subplotspec().get_gridspec().ncols
         for (position, force), run, look, pane, trace in zip(
             panels.T, self._runs, self._looks, panes, forces, strict=True
         ):
@@ -138,12 +140,10 @@ class _Picture:
             draw_line(
                 force, pane, trace, newton, history.control_gap, drawstyle="steps-post", **solid
             )
-            position.set_title(
-                f"{pane.title}\n{measures_text(run.measures, self._units)}",
-                fontsize="small",
-                wrap=True,
-            )
-            _label_time(force, scale, time_label)
+            lines = pane.title, measures_text(run.measures, self._units)
+            title = wrapped(lines, 0.9 * figure.get_figwidth() / columns, "small")
+            position.set_title(title, fontsize="small", parse_math=False)
+            label_time(force, time)
             if not len(rows.time):
                 say(position, "no motion recorded")
         for row, label in zip(panels, (self._length[1], force_label), strict=True):
@@ -187,17 +187,16 @@ class _Picture:
     def cycles(self, amplitude: Axes, stick_fraction: Axes) -> None:
         """Draw amplitude and stick fraction of each cycle over time."""
         all_cycles = [run.history.cycles for run in self._runs]
-        scale, label = self._units.axis("amplitude", "m", *(c[1] for c in all_cycles))
+        scale, y_label = self._units.axis("amplitude", "m", *(c[1] for c in all_cycles))
         amplitude.set_title("amplitude of each cycle")
-        amplitude.set_ylabel(label)
+        amplitude.set_ylabel(y_label)
         stick_fraction.set_title("stick fraction of each cycle")
         stick_fraction.set_ylabel("stick fraction")
         if not any(len(time) for time, *_ in all_cycles):
             say(amplitude, "no cycle was completed")
         largest = [0.0, 0.0]
         for (time, *columns), look, marker in zip(all_cycles, self._looks, _MARKERS, strict=False):
-            span = float(time[-1] - time[0]) if len(time) else 0.0
-            rows = peaks(intervals(time, span / PIXELS or 1.0), *columns)
+            rows = cycle_rows(time, *columns)
             values: tuple[FloatArray, FloatArray] = (columns[0] / scale, columns[1])
             for number, axes in enumerate((amplitude, stick_fraction)):
                 every = max(1, len(rows) // 12)
@@ -208,16 +207,11 @@ class _Picture:
         farthest = max(float(np.abs(m.position).max(initial=0.0)) for m in self._motions) / scale
         amplitude.set_ylim(0.0, max(1.1 * largest[0], LEAST_SPAN * farthest) or 1.0)
         stick_fraction.set_ylim(0.0, 1.1 * largest[1] or 1.0)
-        scale, label = self._units.axis("time", "s", *(motion.time for motion in self._motions))
+        axis = self._units.axis("time", "s", *(motion.time for motion in self._motions))
         for axes in (amplitude, stick_fraction):
-            _label_time(axes, scale, label)
+            label_time(axes, axis)
 
 
 def _span(columns: Iterable[FloatArray]) -> float:
     """Return the largest span of a column."""
     return max((float(np.ptp(column)) for column in columns if len(column)), default=0.0)
-
-
-def _label_time(axes: Axes, scale: float, label: str) -> None:
-    axes.set_xlabel(label)
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value / scale:.10g}")

@@ -1,7 +1,7 @@
 """Common style of the figures: lines, fonts and colours, and how figures are saved."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial, wraps
 from io import BytesIO
@@ -22,6 +22,8 @@ from matplotlib.ticker import AutoLocator
 from PIL import Image
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.files import written
+from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.text import printable, shown
 
 BLUE, ORANGE, GREEN, SKY_BLUE, GREY = "#0072B2", "#D55E00", "#009E73", "#56B4E9", "#999999"
@@ -77,19 +79,19 @@ _PRINTED: dict[str, Any] = {
     "figure.constrained_layout.h_pad": 0.03,
     "figure.constrained_layout.w_pad": 0.03,
 }
-"""What differs in print."""
+"""Settings that differ in print."""
 
 _UNBROKEN = "\u00a0"
 
 _MILLIMETRE = 1.0 / 25.4
 
-_REPRODUCIBLE = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+_REPRODUCIBLE = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """Metadata to omit by file type, so that the same figure gives the same file."""
 
 
 @dataclass(frozen=True)
 class FigureStyle:
-    """What a figure is drawn for: its size, its fonts, and whether it has a title."""
+    """Size, resolution and layout of a figure, for a screen or for print."""
 
     dots_per_inch: float = 130.0
     """Dots per inch of a PNG."""
@@ -132,13 +134,8 @@ class FigureStyle:
         """Set the title of a figure to `lines`; long lines are wrapped, and cut after three."""
         if not self.titled:
             return
-        points = FontProperties(size=mpl.rcParams["figure.titlesize"]).get_size_in_points()
-        letters = round(115.0 * float(figure.get_figwidth()) / points)
-        # A number stays with its unit.
-        joined = (re.sub(r"(?<=\d) (?=\D{1,4}(?:[ ,;]|$))", _UNBROKEN, printable(x)) for x in lines)
-        wrapped = partial(fill, max_lines=3, placeholder=" ...", break_on_hyphens=False)
-        broken = (wrapped(line, letters) for line in joined)
-        figure.suptitle("\n".join(broken).replace(_UNBROKEN, " "), parse_math=False)
+        text = wrapped(lines, float(figure.get_figwidth()), mpl.rcParams["figure.titlesize"])
+        figure.suptitle(text, parse_math=False)
 
     def legend_below(self, figure: Figure, handles: Sequence[Artist], most: int = 12) -> None:
         """Set a legend below the panels, in as many columns as fit, at most so many."""
@@ -185,6 +182,18 @@ def styled(draw: Callable[_P, _R]) -> Callable[_P, _R]:
     return drawn
 
 
+def title_of(what: str, scenario: Scenario, varied: Collection[str] = ()) -> str:
+    """Return the title of what is shown of a scenario, such as a bifurcation diagram.
+
+    It contains the overrides of the scenario, except of the parameters that are `varied`.
+    """
+    known = (*varied, "plant.expects_control")
+    fixed = [text for text in scenario.overrides if text.partition("=")[0] not in known]
+    law = scenario.control_law
+    control = "no control" if law is None else f"{law.name} control"
+    return ", ".join([what, " ".join([scenario.name, *fixed]), control])
+
+
 def finish(figure: Figure) -> None:
     """Make ticks round and labels no longer than their axes, once all is drawn.
 
@@ -211,6 +220,15 @@ def _in_two_lines(text: str) -> str:
     words = text.split(" ")
     breaks = [(" ".join(words[:count]), " ".join(words[count:])) for count in range(1, len(words))]
     return "\n".join(min(breaks, key=lambda pair: max(map(len, pair)), default=(text,)))
+
+
+def wrapped(lines: Iterable[str], width: float, size: float | str) -> str:
+    """Return lines in a font of that size, wrapped to a width (inches) and cut after three."""
+    letters = round(115.0 * width / FontProperties(size=size).get_size_in_points())
+    # A number stays with its unit.
+    joined = (re.sub(r"(?<=\d) (?=\D{1,4}(?:[ ,;]|$))", _UNBROKEN, printable(x)) for x in lines)
+    wrap = partial(fill, max_lines=3, placeholder=" ...", break_on_hyphens=False)
+    return "\n".join(wrap(line, letters) for line in joined).replace(_UNBROKEN, " ")
 
 
 def text_width(text: str, points: float) -> float:
@@ -249,18 +267,19 @@ def save(
     Vector formats keep text as text. A limited number of `colours` makes a PNG, to be kept with the
     sources, a third as large. Raises OSError if the file cannot be written.
     """
-    ending = path.suffix.lower()
+    kind = path.suffix[1:].lower()
+    drawn = BytesIO()
     with rc_context():
         _use_style(SCREEN)
-        if ending == ".png" and colours is not None:
-            buffer = BytesIO()
-            figure.savefig(buffer, format="png", dpi=dots_per_inch)
-            with Image.open(buffer) as image:
-                # This method, unlike the usual one, keeps colours that few points have.
-                few = image.convert("RGB").quantize(colours, Image.Quantize.MAXCOVERAGE)
-            few.save(path, optimize=True)
-        else:
-            figure.savefig(path, dpi=dots_per_inch, metadata=_REPRODUCIBLE.get(ending))
+        figure.savefig(drawn, format=kind, dpi=dots_per_inch, metadata=_REPRODUCIBLE.get(kind))
+    if kind == "png" and colours is not None:
+        with Image.open(drawn) as image:
+            # This method, unlike the usual one, keeps colours that few points have.
+            few = image.convert("RGB").quantize(colours, Image.Quantize.MAXCOVERAGE)
+        drawn = BytesIO()
+        few.save(drawn, format="png", optimize=True)
+    with written(path, replace=True) as stream:
+        stream.buffer.write(drawn.getvalue())
 
 
 def _use_style(style: FigureStyle) -> None:

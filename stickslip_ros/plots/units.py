@@ -15,8 +15,8 @@ from stickslip_ros.text import prefix_for
 NOISE = 1e-9
 """Share of the largest value below which a value is rounding error and shown as 0."""
 
-_PREFIXED = ("kg",)
-"""Units that have a prefix of their own."""
+_TAKES_PREFIX = re.compile(r"(?!kg\b)[A-Za-z]+\b(?!\^)")
+"""Start of a unit that a prefix can precede: no number, no power, and no kg, which has one."""
 
 _SYMBOLS = {
     "displacement": ("x", "X"),
@@ -62,7 +62,7 @@ _PARAMETERS = {
     "washout_controller.linear_gain": "linear gain",
     "washout_controller.cubic_gain": "cubic gain",
 }
-"""What figures and the page call a parameter."""
+"""Names of parameters in figures and on the page."""
 
 _SCALES = {"plant.mass", "plant.stiffness", "plant.normal_force"}
 
@@ -117,9 +117,9 @@ class Units:
         """
         arrays = [np.asarray(value, dtype=float) for value in values]
         largest = max((float(np.nanmax(np.abs(a), initial=0.0)) for a in arrays), default=0.0)
-        if self.dimensionless or not unit or (unit == "s" and largest >= 1.0):
+        if self.dimensionless or (unit == "s" and largest >= 1.0):
             return 1.0, self.label(name, unit)
-        scale, prefix = prefix_for(largest)
+        scale, prefix = _prefix_of(unit, largest)
         return scale, self.label(name, prefix + unit)
 
     def of_unit(self, unit: str) -> str:
@@ -135,8 +135,8 @@ class Units:
     ) -> list[str]:
         """Return values as texts with their unit, all with the prefix of the largest.
 
-        A unit that starts with a number, such as 1/s, gets no prefix, nor does kg, which has one;
-        None is "-", and what is infinite "unbounded". A value below
+        A unit that starts with a number or a power, such as 1/s, gets no prefix, nor does kg; None
+        is "-", and what is infinite "unbounded". A value below
         1e-9 of the largest, or of a given `largest`, is shown as 0.
         """
         unit = self.of_unit(unit)
@@ -144,9 +144,7 @@ class Units:
         found = max(sizes, default=0.0)
         least = NOISE * max(found, largest)
         values = [0.0 if isinstance(v, float) and abs(v) < least else v for v in values]
-        scale, prefix = prefix_for(found if found >= least else 0.0)
-        if not unit[:1].isalpha() or unit in _PREFIXED:
-            scale, prefix = 1.0, ""
+        scale, prefix = _prefix_of(unit, found if found >= least else 0.0)
         return [_text(value, scale, f" {prefix}{unit}".rstrip(), digits) for value in values]
 
 
@@ -164,6 +162,10 @@ def typeset(text: str) -> str:
         return f"${symbol}$"
 
     return _SYMBOL.sub(formula, text)
+
+
+def _prefix_of(unit: str, largest: float) -> tuple[float, str]:
+    return prefix_for(largest) if _TAKES_PREFIX.match(unit) else (1.0, "")
 
 
 def _text(value: Any, scale: float, unit: str, digits: int) -> str:

@@ -21,12 +21,11 @@ from rclpy.task import Future
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.nodes.base.child_process import GUARD_TIMEOUT, how_it_ended, start_child
+from stickslip_ros.nodes.base.machine import lock_namespace
 from stickslip_ros.nodes.base.process import ROS_ARGUMENTS, initialise, stop_on_signals
 from stickslip_ros.nodes.base.service_call import ServiceCall
 from stickslip_ros.running.controller_search import ControllerSearch
-from stickslip_ros.running.lifecycle_client import ACTIVE, NEXT_TRANSITION, LifecycleClient
-from stickslip_ros.running.loop_nodes import node_parameters
-from stickslip_ros.running.namespace_lock import lock_namespace
+from stickslip_ros.running.node_clients import ACTIVE, NEXT_TRANSITION, LifecycleClient
 from stickslip_ros.running.run_monitor import Notify, OnSimulatedTime, RunMonitor
 from stickslip_ros.running.spinner import Spinner
 from stickslip_ros.scenarios.files import Scenario, parameter_file
@@ -50,6 +49,22 @@ class RunOutcome:
     """The plant's last values, as in its diagnostics."""
     controller: str | None
     """Full name of the node that was the controller."""
+
+
+def node_parameters(scenario: Scenario, bag: Path) -> dict[str, dict[str, Any]]:
+    """Return the parameters of the nodes that a scenario needs, in the order of activation.
+
+    The nodes do not activate themselves, and record to `bag`.
+    """
+    values = scenario.as_dict()
+    values["analyzer"]["bag"] = str(bag)
+    # The analyzer may know the parameters of the plant of a short run only at its end.
+    reading = scenario.reading
+    if reading.stick_speed and not reading.noisy:
+        values["analyzer"]["stick_speed"] = reading.stick_speed
+    controllers = [scenario.controller.node] if scenario.plant.expects_control else []
+    nodes = ["analyzer", *controllers, "plant"]
+    return {node: {**values[node], "autostart": False} for node in nodes}
 
 
 def run_nodes(
@@ -114,7 +129,7 @@ class _Supervisor:
         self._monitor = RunMonitor(
             self._node, fail=self._fail, notify=notify, on_simulated_time=on_simulated_time
         )
-        self._node.create_timer(_WATCH_PERIOD, self._watch_processes)
+        self._node.create_timer(_WATCH_PERIOD, self._watch_processes, clock=self._spinner.clock)
 
     def run(self, bag: Path, composed: bool) -> RunOutcome:
         parameters = node_parameters(self._scenario, bag)

@@ -36,11 +36,13 @@ class ControllerSearch:
     def controllers(self) -> list[str]:
         """Return the full names of the nodes that read joint_states and publish control_force.
 
-        Their types and quality of service match those of the plant.
+        Their types and quality of service match those of the plant. A managed node that publishes
+        may read only once it is active.
         """
         readers = self._observer.get_subscriptions_info_by_topic(JOINT_STATES.name)
         writers = self._observer.get_publishers_info_by_topic(CONTROL_FORCE.name)
-        return sorted(_named(filterfalse(_misfit, readers)) & _named(filterfalse(_misfit, writers)))
+        reads, writes = (_named(filterfalse(_misfit, ends)) for ends in (readers, writers))
+        return sorted(writes & {*reads, *self.managed()})
 
     def managed(self) -> list[str]:
         """Return the full names of all managed (lifecycle) nodes but ours."""

@@ -7,11 +7,11 @@ from rclpy.node import Node
 from std_msgs.msg import Header
 
 from stickslip_ros.messages.topics import DIAGNOSTICS, RECORDED
-from stickslip_ros.nodes.base.managed import STATE
-from stickslip_ros.nodes.base.plant_keys import FAILURE, FINISHED, NEWEST_STAMP
+from stickslip_ros.nodes.base.managed import FAILURE, FINISHED, NEWEST_STAMP, STATE
 from stickslip_ros.nodes.base.ros_topics import qos_profile
-from stickslip_ros.running.lifecycle_client import ACTIVE, NEXT_TRANSITION
+from stickslip_ros.running.node_clients import ACTIVE, NEXT_TRANSITION
 from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.text import number_in
 
 OnSimulatedTime = Callable[[float], None]
 """Called repeatedly with the simulated time so far, s."""
@@ -54,7 +54,7 @@ class RunMonitor:
     @property
     def unrecorded(self) -> float:
         """Time from the newest sample that the analyzer has received to the plant's last, s."""
-        return (int(self.plant.get(NEWEST_STAMP, 0)) - self.newest_recorded) * 1e-9
+        return (number_in(self.plant.get(NEWEST_STAMP, "")) - self.newest_recorded) * 1e-9
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:

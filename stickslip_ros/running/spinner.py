@@ -5,15 +5,16 @@ from collections.abc import Callable
 from math import inf
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
+from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from rclpy.task import Future
 
 from stickslip_ros.nodes.base.process import spin
 from stickslip_ros.nodes.base.service_call import ServiceCall
+from stickslip_ros.nodes.base.steady_clock import steady_clock
 
 
 class Spinner:
@@ -24,10 +25,11 @@ class Spinner:
         self.is_cut_short: Callable[[], bool] = lambda: False
         """Whether to stop waiting now."""
         self._nodes: list[Node] = []
-        self._clock = Clock(clock_type=ClockType.STEADY_TIME)
 
     def add(self, node: Node) -> None:
         """Add a node; `close` destroys it."""
+        if not self._nodes:
+            self.clock = steady_clock(node)
         self._nodes.append(node)
         self.executor.add_node(node)
 
@@ -46,7 +48,7 @@ class Spinner:
                 due.set_result(None)
 
         # The executor's own timeouts do not count while there are callbacks to run.
-        timer = self._nodes[0].create_timer(period, look, clock=self._clock)
+        timer = self._nodes[0].create_timer(period, look, clock=self.clock)
         try:
             while not self.is_cut_short():
                 if condition():
@@ -77,5 +79,12 @@ class Spinner:
         """Destroy the nodes."""
         for node in reversed(self._nodes):
             self.executor.remove_node(node)
-            node.destroy_node()
+            destroy(node)
         self.executor.shutdown()
+
+
+def destroy(node: Node) -> None:
+    """Destroy a node, and the state machine of a managed one: it would keep the middleware's."""
+    node.destroy_node()
+    if isinstance(node, LifecycleNode):
+        node._state_machine.destroy_when_not_in_use()  # pyright: ignore[reportPrivateUsage]

@@ -13,6 +13,7 @@ from rclpy.task import Future
 
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.base.child_process import how_it_ended, start_child
+from stickslip_ros.running.spinner import destroy
 
 _END_TIMEOUT = 5.0
 
@@ -79,7 +80,7 @@ class ControllerThread:
                 f"the controller {self.node.get_name()} is still in a callback, {_END_TIMEOUT:g} s "
                 "after the request to end: its thread continues"
             )
-        self.node.destroy_node()
+        destroy(self.node)
 
     def _run(self) -> None:
         try:

@@ -1,1 +1,14 @@
-"""Parameters of the nodes, and the files that set them."""
+"""Parameters of the nodes, and the scenario files that give their values."""
+
+from enum import StrEnum
+
+DEFAULT_NAMESPACE = "/feed_drive"
+LONGEST_NAMESPACE = 200
+"""Characters of a namespace with which all topic and service names are short enough for ROS."""
+
+
+class Pace(StrEnum):
+    """What the plant waits for between samples: the clock, or the answer to the last sample."""
+
+    REALTIME = "realtime"
+    LOCKSTEP = "lockstep"

@@ -1,9 +1,11 @@
 """The parameters of the courses of a run: belt, load, disturbance and reference."""
 
+from collections.abc import Collection, Iterator
 from math import inf
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from pydantic import PrivateAttr, ValidationInfo, model_validator
+from typing_extensions import override
 
 from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
 from stickslip_ros.physics.model.constants import constants_of
@@ -14,20 +16,16 @@ from stickslip_ros.scenarios.curve_file import Pairs, read_curve
 from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field
 from stickslip_ros.scenarios.validation import ParameterGroup
 
+_USED: dict[str, Collection[str]] = {
+    **{kind: constants_of(course) for kind, course in COURSES.items()},
+    CourseKind.IMPULSE: ("amplitude", "start"),
+    CourseKind.TABLE: ("file",),
+}
+"""The parameters that each kind of course uses."""
 
-class CourseParameters(ParameterGroup):
-    """Course over the time since the first sample."""
 
-    part: ClassVar[str]
-    """Name of the group in the parameters."""
-
-    kind: CourseKind = field(
-        CourseKind.NONE,
-        "Time course: none, step, impulse (one sample long), ramp, sine, trapezoid or table.",
-        choices=CourseKind,
-        strict=False,
-        fixed=Fixed.ACTIVE,
-    )
+class _AnyCourse(ParameterGroup):
+    kind: Any = ""
     amplitude: float = field(0.0, "Amplitude of the course.")
     start: float = field(0.0, "Simulated time at which the course starts.", "s", ge=0.0, le=1e9)
     duration: float = field(
@@ -43,6 +41,29 @@ class CourseParameters(ParameterGroup):
         "Hz",
         ge=SMALLEST,
         le=1e9,
+    )
+
+    @override
+    def not_used(self) -> Iterator[tuple[str, str]]:
+        kinds: Any = type(self.kind)
+        for name in type(self).model_fields:
+            users = [kind for kind in kinds if name in _USED.get(kind, ())]
+            if name != "kind" and self.kind not in users:
+                yield name, f"by the kind {self.kind}; kinds that use it: {', '.join(users)}"
+
+
+class CourseParameters(_AnyCourse):
+    """Course over the time since the first sample."""
+
+    part: ClassVar[str]
+    """Name of the group in the parameters."""
+
+    kind: CourseKind = field(
+        CourseKind.NONE,
+        "Time course: none, step, impulse (one sample long), ramp, sine, trapezoid or table.",
+        choices=CourseKind,
+        strict=False,
+        fixed=Fixed.ACTIVE,
     )
     file: str = field(
         "",
@@ -62,7 +83,7 @@ class CourseParameters(ParameterGroup):
                     f"{self.part}.file = '' is refused: must be the path of a CSV file for a table"
                 )
             points = read_curve(f"{self.part}.file", self.file, _refusal, info.context)
-            self._table = _as_table(points)
+            self._curves[self.file], self._table = points, _as_table(points)
             return self
         refusal = self.as_course(1.0).refusal()
         if refusal is not None:
@@ -112,7 +133,7 @@ class DisturbanceParameters(CourseParameters):
     amplitude: float = field(0.0, "Amplitude of the disturbance.", "N")
 
 
-class ReferenceParameters(ParameterGroup):
+class ReferenceParameters(_AnyCourse):
     """Reference that the controller follows."""
 
     kind: ReferenceKind = field(
@@ -123,21 +144,6 @@ class ReferenceParameters(ParameterGroup):
         fixed=Fixed.CONFIGURED,
     )
     amplitude: float = field(0.0, "Largest displacement of the course.", "m")
-    start: float = field(0.0, "Simulated time at which the course starts.", "s", ge=0.0, le=1e9)
-    duration: float = field(
-        float("inf"),
-        "Duration of the course; of a ramp, the time of its rise.",
-        "s",
-        ge=0.0,
-        allow_inf_nan=True,
-    )
-    frequency: float = field(
-        1.0,
-        "Frequency of the sine; one over the time of each rise and fall of the trapezoid.",
-        "Hz",
-        ge=SMALLEST,
-        le=1e9,
-    )
 
     @model_validator(mode="after")
     def _course_is_possible(self) -> Self:

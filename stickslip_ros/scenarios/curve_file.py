@@ -1,12 +1,11 @@
 """Reading a measured curve: a CSV file of pairs of numbers."""
 
-from collections.abc import Callable, Mapping
-from functools import lru_cache
+from collections.abc import Callable
 from pathlib import Path
-from stat import S_ISREG
 from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.files import open_regular
 from stickslip_ros.scenarios.parameter_field import LARGEST
 from stickslip_ros.text import shown
 
@@ -23,38 +22,24 @@ def read_curve(
     name: str,
     path: str,
     refusal: Callable[[Pairs], str | None],
-    known: Mapping[str, Pairs] | None = None,
+    known: dict[str, Pairs] | None = None,
 ) -> Pairs:
     """Return the pairs of numbers in the file of a parameter; see `read_pairs`.
 
-    A file whose pairs are `known`, by path, is not read. Raises ValueError, as a validator does,
-    with a sentence that names the parameter: if the file cannot be read, or if there is a `refusal`
-    of its pairs.
+    A file whose pairs are `known`, by path, is not read, and one that is read is known then. Raises
+    ValueError, as a validator does, with a sentence that names the parameter: if the file cannot be
+    read, or if there is a `refusal` of its pairs.
     """
+    known = {} if known is None else known
     try:
-        if known is not None and path in known:
-            why = refusal(known[path])
-            if why is not None:
-                raise InvalidInputError(why)
-            return known[path]
-        about = Path(path).stat()
-        # Studies ask for the same file for each of their cases.
-        return _checked(path, about.st_mtime_ns, about.st_size, refusal)
+        if path not in known:
+            known[path] = read_pairs(path)
+        reason = refusal(known[path])
     except InvalidInputError as error:
         reason = str(error)
-    except (OSError, ValueError) as error:  # ValueError: a path with a null character
-        reason = f"the file cannot be read: {getattr(error, 'strerror', None) or error}"
-    raise ValueError(f"{name} = {shown(path)} is refused: {reason}")
-
-
-@lru_cache(maxsize=64)
-def _checked(path: str, changed: int, size: int, refusal: Callable[[Pairs], str | None]) -> Pairs:
-    """Return the pairs of a file that was last changed then."""
-    pairs = read_pairs(path)
-    why = refusal(pairs)
-    if why is not None:
-        raise InvalidInputError(why)
-    return pairs
+    if reason is not None:
+        raise ValueError(f"{name} = {shown(path)} is refused: {reason}")
+    return known[path]
 
 
 def read_pairs(path: str) -> Pairs:
@@ -88,26 +73,23 @@ def as_pairs(values: Any) -> Pairs:
 
 def _text(path: Path) -> str:
     try:
-        about = path.stat()
-        if not S_ISREG(about.st_mode):
-            raise InvalidInputError("must be a regular file")
-        if about.st_size > _LARGEST_FILE:
-            raise InvalidInputError(
-                f"the file has {about.st_size} bytes: must have at most {_LARGEST_FILE}"
-            )
-        with path.open("rb") as file:
-            return file.read(_LARGEST_FILE).decode("utf-8-sig")
+        with open_regular(path) as file:
+            data = file.read(_LARGEST_FILE + 1)
+        if len(data) > _LARGEST_FILE:
+            raise InvalidInputError(f"the file must have at most {_LARGEST_FILE} bytes")
+        return data.decode("utf-8-sig")
     except (OSError, ValueError) as error:  # ValueError: not UTF-8, or a path with a null character
-        reason = getattr(error, "strerror", None) or "it is not UTF-8 text"
+        reason = getattr(error, "strerror", None) or error
+        if isinstance(error, UnicodeError):
+            reason = "it is not UTF-8 text"
         raise InvalidInputError(f"the file cannot be read: {reason}") from None
 
 
 def _pair(number: int, line: str) -> tuple[float, float]:
     values = [_number(cell) for cell in line.split(",")]
     if len(values) != 2 or values[0] is None or values[1] is None:
-        raise InvalidInputError(
-            f"line {number} is {shown(line.strip())}: must be two numbers with a comma between"
-        )
+        # Another file may have named this one: what is in it stays there.
+        raise InvalidInputError(f"line {number} must be two numbers with a comma between")
     return values[0], values[1]
 
 

@@ -1,6 +1,7 @@
 """Scenarios: ROS parameter files, loaded by name or path, with overrides."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -8,11 +9,14 @@ from typing import Any, Self
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.installed_packages import prefixes
-from stickslip_ros.physics.measures.reading import Reading
+from stickslip_ros.physics.measures.cycle_measures import CycleMeter
+from stickslip_ros.physics.measures.drift import resolved
+from stickslip_ros.physics.measures.reading import SampleAssumptions, varies
 from stickslip_ros.physics.model.control import ControlLaw
-from stickslip_ros.scenarios import ros_yaml
+from stickslip_ros.quantities import QUANTITY, number_of
+from stickslip_ros.scenarios import DEFAULT_NAMESPACE, ros_yaml
 from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
-from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE
+from stickslip_ros.scenarios.keywords import described
 from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
@@ -23,7 +27,8 @@ from stickslip_ros.scenarios.parameters import (
     PlantParameters,
     controller_node,
 )
-from stickslip_ros.scenarios.sections import PARAMETERS_KEY, ScenarioFile, read_file
+from stickslip_ros.scenarios.ros_yaml import PARAMETERS_KEY, LineError
+from stickslip_ros.scenarios.sections import ScenarioFile, read_file
 from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.tables import TextTable
 from stickslip_ros.text import did_you_mean
@@ -98,10 +103,26 @@ class Scenario:
         return self.controller.as_law() if self.plant.expects_control else None
 
     @property
-    def reading(self) -> Reading:
+    def reading(self) -> SampleAssumptions:
         """How the samples of the plant are to be read."""
         plant = self.plant
-        return self.analyzer.reading_of(plant.flat(), plant.as_drive().fastest_belt)
+        found = self.analyzer.reading_of(plant.flat(), plant.as_drive().fastest_belt)
+        follows = plant.expects_control and varies(self.controller.flat())
+        return found._replace(varies=found.varies or follows)
+
+    def cycle_meter(self, cycles: int) -> CycleMeter:
+        """Return what measures the motion itself.
+
+        Parameters
+        ----------
+        cycles : int
+            Number of the last cycles.
+        """
+        meter, reading = CycleMeter(cycles), self.reading
+        meter.drift.resolution = step = self.plant.as_sensor().position_resolution
+        meter.drift.judged = not reading.varies
+        meter.within = max(resolved(step), reading.within)
+        return meter
 
     @property
     def nodes(self) -> tuple[str, ...]:
@@ -136,6 +157,21 @@ class Scenario:
         """
         return {node: getattr(self, node).flat() for node in self.nodes}
 
+    def unused(self) -> dict[str, str]:
+        """Return why parameters have no effect, by NODE.PARAMETER; defaults are not listed."""
+        found = {
+            f"{node}.{name}": f"{node}.{why}"
+            for node in self.nodes
+            for name, why in getattr(self, node).unused().items()
+        }
+        if not self.plant.expects_control:
+            known = known_parameters(type(self.controller))
+            for name, value in self.controller.flat().items():
+                if [value] != [known[name].default]:
+                    name = f"{self.controller.node}.{name}"
+                    found[name] = f"{name} is not used with plant.expects_control = False"
+        return found
+
     def changed(self, values: Mapping[str, Any]) -> Self:
         """Return the scenario with other values of some parameters.
 
@@ -154,16 +190,7 @@ class Scenario:
         InvalidInputError
             If a value is out of bounds or not compatible with the others.
         """
-        by_node: dict[str, dict[str, Any]] = {}
-        for target, value in values.items():
-            node, _, parameter = target.partition(".")
-            by_node.setdefault(node, {})[parameter] = value
-        return self._replaced(
-            {
-                node: self._parameters_of(node).changed(_absolute(node, new, Path()), node)
-                for node, new in by_node.items()
-            }
-        )
+        return self._changed(values, {})
 
     def overridden(self, overrides: Sequence[str]) -> Self:
         """Return the scenario with further overrides.
@@ -181,26 +208,21 @@ class Scenario:
         Raises
         ------
         InvalidInputError
-            If a name is unknown, or a value is not allowed.
+            If a name is unknown, a value is not allowed, or a parameter has no effect.
         """
-        by_node: dict[str, dict[str, Any]] = {}
-        texts: dict[str, str] = {}
+        given: dict[str, Any] = {}
+        sources: dict[str, str] = {}
         for override in overrides:
             node, parameter, value = parse_override(override)
-            by_node.setdefault(node, {})[parameter] = value
-            texts[node] = f"{texts.get(node, '')} {override:.80}"
-        changed = self._replaced(
-            {
-                node: self._parameters_of(node).changed(
-                    _absolute(node, new, Path()), f"{self.path} with{texts[node]}, {node}"
-                )
-                for node, new in by_node.items()
-            }
-        )
-        given = {f"{node}.{name}" for node, new in by_node.items() for name in new}
+            given[f"{node}.{parameter}"] = value
+            sources[node] = f"{sources.get(node, f'{self.path} with')} {override:.80}"
+        changed = self._changed(given, {node: f"{each}, {node}" for node, each in sources.items()})
+        for reason in (why for name, why in changed.unused().items() if name in given):
+            raise InvalidInputError(reason)
+        last = {text.partition("=")[0]: text for text in (*self.overrides, *overrides)}
         return replace(
             changed,
-            overrides=(*self.overrides, *overrides),
+            overrides=tuple(last.values()),
             sources={**self.sources, **dict.fromkeys(given, OVERRIDE)},
         )
 
@@ -211,7 +233,7 @@ class Scenario:
         ----------
         law : str
             Name of the control law. Its parameters are those of the scenario file; the others have
-            their defaults.
+            their defaults, except that a force limit follows.
 
         Returns
         -------
@@ -235,7 +257,17 @@ class Scenario:
             controller=controller,
             other_controllers=others,
             overrides=tuple(overrides),
-        )
+        ).with_force_limit()
+
+    def with_force_limit(self) -> Self:
+        """Return the scenario with the force limit of another controller, unless it has its own."""
+        own = f"{self.controller.node}.force_limit"
+        for other in self.other_controllers.values():
+            name = f"{other.node}.force_limit"
+            if name in self.sources and own not in self.sources:
+                sources = {**self.sources, own: self.sources[name]}
+                return replace(self.changed({own: other.as_law().force_limit}), sources=sources)
+        return self
 
     def _parameters_of(self, node: str) -> ParameterGroup:
         """Return the parameters of a node; refuse those of a controller that is not in use."""
@@ -245,10 +277,18 @@ class Scenario:
             )
         return getattr(self, node)
 
-    def _replaced(self, nodes: Mapping[str, Any]) -> Self:
-        """Return the scenario with other parameters of some nodes."""
+    def _changed(self, values: Mapping[str, Any], sources: Mapping[str, str]) -> Self:
+        """Return the scenario with other values; `sources` names their source by node."""
+        by_node: dict[str, dict[str, Any]] = {}
+        for target, value in values.items():
+            node, _, parameter = target.partition(".")
+            by_node.setdefault(node, {})[parameter] = value
         own = self.controller.node
-        changes = {"controller" if node == own else node: each for node, each in nodes.items()}
+        changes: dict[str, Any] = {}
+        for node, new in by_node.items():
+            absolute, source = _absolute(node, new, Path()), sources.get(node, node)
+            changed = self._parameters_of(node).changed(absolute, source)
+            changes["controller" if node == own else node] = changed
         return replace(self, **changes)
 
     def __repr__(self) -> str:
@@ -267,7 +307,7 @@ class Scenario:
         rows: list[list[str]] = []
         for full_name in shown:
             node, _, name = full_name.partition(".")
-            value, known = self._flat[node][name], known_parameters(NODE_PARAMETERS[node])[name]
+            value, known = self._flat[node][name], described(full_name)
             text = f"{value:.10g}" if isinstance(value, float) else str(value)
             text = known.unset if text == "nan" else text
             unit = "" if dimensionless else known.unit or ""
@@ -362,25 +402,29 @@ def load_scenario(
     path = _find(name_or_path)
     files = [read_file(path, namespace)]
     below = _path_of_base(files[0]) if base is None else _find(base)
+    given = [path] if base is None else [path, below]
     while below is not None:
         if any(below.samefile(file.path) for file in files):
             raise InvalidInputError(f"{path}: base {below} leads back to itself")
-        files.append(read_file(below, namespace))
-        below = _path_of_base(files[-1])
+        with _contents_kept(below, given):
+            files.append(read_file(below, namespace))
+            below = _path_of_base(files[-1])
     law = _law_in_use(files, namespace) if controller is None else known_law(controller)
     values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
     sources: dict[str, str] = {}
     other_sections: list[str] = []
 
-    def set_value(source: str, folder: Path, node: str, name: str, value: Any) -> None:
-        values[node][name] = _absolute(node, {name: value}, folder)[name]
-        sources[f"{node}.{name}"] = source
+    def set_value(file: ScenarioFile, node: str, name: str, value: Any) -> None:
+        values[node][name] = _absolute(node, {name: value}, file.path.parent)[name]
+        sources[f"{node}.{name}"] = FILE if file is files[0] else BASE
+        if file.path not in given:
+            NODE_PARAMETERS[node].check_bounds(name, value)
 
     for file in files[::-1]:
-        source = FILE if file is files[0] else BASE
-        other_sections = file.apply(
-            partial(set_value, source, file.path.parent), namespace, other_nodes=other_nodes
-        )
+        with _contents_kept(file.path, given):
+            other_sections = file.apply(
+                partial(set_value, file), namespace, other_nodes=other_nodes
+            )
     models: dict[str, Any] = {
         node: NODE_PARAMETERS[node].validated(parameters, f"{path}, {node}")
         for node, parameters in values.items()
@@ -402,7 +446,26 @@ def load_scenario(
         },
         bases=tuple(file.path for file in files[1:]),
     )
+    for name, why in scenario.unused().items():
+        if name.startswith("plant.") and sources.get(name) == FILE:
+            raise InvalidInputError(f"{path}: {why}")
+    scenario = scenario if controller is None else scenario.with_force_limit()
     return scenario.overridden(overrides) if overrides else scenario
+
+
+@contextmanager
+def _contents_kept(path: Path, given: Sequence[Path | None]) -> Generator[None]:
+    """Keep what is in a file out of messages unless it is `given`: another one may name any."""
+    try:
+        yield
+    except InvalidInputError as error:
+        if path in given:
+            raise
+        place = f" at line {error.line}" if isinstance(error, LineError) else ""
+        raise InvalidInputError(
+            f"base {path} of {given[0]} is refused{place}: must be a scenario file; "
+            f"`stickslip simulate {path}` says why"
+        ) from None
 
 
 def _absolute(node: str, values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
@@ -458,7 +521,7 @@ def _find(name_or_path: str) -> Path:
     path = Path(name_or_path)
     name = name_or_path.removesuffix(".yaml")
     given_as_file = "/" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
-    if given_as_file and path.is_file():
+    if given_as_file and path.exists():
         return path
     if "/" in name_or_path:
         raise InvalidInputError(f"no scenario file {name_or_path}")
@@ -477,7 +540,7 @@ def _path_of_base(file: ScenarioFile) -> Path | None:
     if file.base is None:
         return None
     beside = file.path.parent / file.base
-    if beside.suffix in (".yaml", ".yml") and beside.is_file():
+    if beside.suffix in (".yaml", ".yml") and beside.exists():
         return beside
     try:
         return _find(file.base)
@@ -499,7 +562,10 @@ def parse_override(override: str) -> tuple[str, str, Any]:
     ]
     given = f"{override:.80}"
     if equals and target in known:
-        return node, parameter, ros_yaml.parse(text, f"{given}: the value")
+        value, its = ros_yaml.parse(text, f"{given}: the value"), described(target)
+        if its.kind is float and isinstance(value, str) and QUANTITY.fullmatch(value):
+            value = number_of(target, value, its.unit)
+        return node, parameter, value
     if not equals or not parameter:
         meant = did_you_mean(target, known, "as in plant.belt_speed=0.2")
         raise InvalidInputError(f"{given}: must be NODE.PARAMETER=VALUE; {meant}")

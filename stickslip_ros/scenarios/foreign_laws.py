@@ -1,16 +1,17 @@
 """The laws of other installed packages, found by their entry points."""
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, is_dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
 from importlib.metadata import Distribution, EntryPoint, distributions
 from inspect import isabstract
 from math import inf, isinf
 from typing import Any, Generic, TypeVar, cast
 
-from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.errors import InvalidInputError, in_words
 from stickslip_ros.physics.model.constants import Constant, constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.physics.model.friction import LAWS, CurveFollower, FrictionLaw
+from stickslip_ros.scenarios.law_trial import try_control_law, try_friction_law
 from stickslip_ros.scenarios.parameter_field import LARGEST, SMALLEST
 from stickslip_ros.scenarios.validation import ParameterGroup
 
@@ -31,6 +32,8 @@ class LawFamily(Generic[_Law]):
     """Names that no constant can have."""
     one_namespace: bool
     """Whether all laws have their constants in one group of parameters."""
+    trial: Callable[..., None]
+    """Tries a law, on request also with symbols for its constants; raises anything."""
     refused: dict[str, str] = field(default_factory=dict[str, str])
     """Reason of the refusal of each law of another package that is refused, by name."""
 
@@ -50,7 +53,7 @@ class LawFamily(Generic[_Law]):
         try:
             law = entry.load()
         except (Exception, SystemExit) as error:  # the code of others: anything
-            raise InvalidInputError(f"cannot be imported: {_in_words(error)}") from None
+            raise InvalidInputError(f"cannot be imported: {in_words(error)}") from None
         if not (isinstance(law, type) and issubclass(law, self.base)):
             raise InvalidInputError(f"is no class derived from {self.base.__name__}")
         return law
@@ -79,11 +82,32 @@ class LawFamily(Generic[_Law]):
         for constant in constants.values():
             self._check_constant(constant)
         try:
-            law().refusal()
-        except Exception as error:
-            raise InvalidInputError(
-                f"cannot be made from its defaults: {_in_words(error)}"
-            ) from None
+            made = law()
+            if made.refusal() is None:
+                self.trial(made, symbols=True)
+        except (Exception, SystemExit) as error:
+            raise InvalidInputError(f"fails with its defaults: {in_words(error)}") from None
+
+    def made(self, make: Callable[[], _Law], *kinds: type[_Law]) -> _Law:
+        """Return a law of these classes with its constants; those of other packages are tried.
+
+        Raises ValueError with the reason if the constants do not fit together.
+        """
+        given = ""
+        try:
+            law = make()
+            foreign = not all(kind.__module__.startswith("stickslip_ros.") for kind in kinds)
+            if foreign:
+                values = (f"{each.name} = {getattr(law, each.name)}" for each in fields(law))
+                given = f" with {', '.join(values)}"
+            refusal = law.refusal()
+            if foreign and refusal is None:
+                self.trial(law)
+        except (Exception, SystemExit) as error:
+            raise ValueError(f"law {kinds[0].name}{given} fails: {in_words(error)}") from None
+        if refusal is not None:
+            raise ValueError(refusal)
+        return law
 
     def _check_constant(self, constant: Constant) -> None:
         name, default = constant.name, constant.default
@@ -123,6 +147,7 @@ FRICTION_LAWS = LawFamily(
     LAWS,
     reserved={"law", "curve", "as_law", "file", "reverse", *dir(ParameterGroup)},
     one_namespace=True,
+    trial=try_friction_law,
 )
 CONTROLLERS = LawFamily(
     "stickslip_ros.control_laws",
@@ -134,6 +159,7 @@ CONTROLLERS = LawFamily(
         *dir(ParameterGroup),
     },
     one_namespace=False,
+    trial=try_control_law,
 )  # fmt: skip
 
 
@@ -170,7 +196,3 @@ def _one_for_all(constant: Constant) -> Mapping[str, str]:
 
 def _place(law: type) -> str:
     return f"{law.__module__}.{law.__qualname__}"
-
-
-def _in_words(error: BaseException) -> str:
-    return f"{type(error).__name__}: {error}".removesuffix(": ")

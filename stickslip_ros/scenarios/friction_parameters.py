@@ -1,7 +1,7 @@
 """The parameters of the friction of the plant: its law and the constants of each law."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from math import isnan, nan
 from typing import Annotated, Any, Self
@@ -24,10 +24,9 @@ from stickslip_ros.physics.model.friction import (
     FrictionLaw,
     Table,
 )
-from stickslip_ros.scenarios.constant_field import field_of
 from stickslip_ros.scenarios.curve_file import Pairs, read_curve
 from stickslip_ros.scenarios.foreign_laws import FRICTION_LAWS, add_laws_of_other_packages
-from stickslip_ros.scenarios.parameter_field import Fixed, field
+from stickslip_ros.scenarios.parameter_field import Fixed, field, field_of, known_parameters
 from stickslip_ros.scenarios.validation import ParameterGroup, refused
 from stickslip_ros.text import shown
 
@@ -67,7 +66,7 @@ def _constants_of_laws(*, reverse: bool = False) -> dict[str, Any]:
         for name, constant in constants_of(law).items():
             if isinstance(constant.default, tuple):
                 continue
-            if reverse and (constant.whole or name in law.undirected):
+            if reverse and (constant.whole or name in law.direction_independent):
                 continue
             constants.setdefault(name, constant)
             laws.setdefault(name, []).append(law.name)
@@ -143,20 +142,24 @@ class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_l
                     f"friction.file = {shown(self.file)} is refused: must be the path of a CSV "
                     f"file for law {kind.name}"
                 )
-        law = self._made(self._constants(self, "friction", info.context))
+        forward = self._constants(self, "friction", info.context)
         reverse = self._constants(self.reverse, "friction.reverse", info.context)
-        if reverse:
-            law = Directional(law, self._made(reverse, law))
-        refusal = law.refusal()
-        if refusal is not None:
+
+        def make() -> FrictionLaw:
+            law = self._made(dict(forward))
+            return Directional(law, self._made(reverse, law)) if reverse else law
+
+        try:
+            self._law = FRICTION_LAWS.made(make, *self._kinds())
+        except ValueError as refusal:
 
             def parameter(match: re.Match[str]) -> str:
                 own = "reverse." if match[1] and match[2] in reverse else ""
                 return f"friction.{own}{match[2]} = "
 
             names = "|".join(name for kind in self._kinds() for name in kind.constants())
-            raise ValueError(re.sub(rf"\b(reverse\.)?({names}) = ", parameter, refusal))
-        self._law = law
+            text = re.sub(rf"\b(reverse\.)?({names}) = ", parameter, str(refusal))
+            raise ValueError(text) from None
         return self
 
     def as_law(self) -> FrictionLaw:
@@ -177,6 +180,18 @@ class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_l
         }
         own = [name for name in self._parameters() if name not in simple]
         return [*own, *(f"reverse.{name}" for name in self._given(self.reverse))]
+
+    def not_used(self) -> Iterator[tuple[str, str]]:
+        """Yield the parameters that the law does not use; see `ParameterGroup.not_used`."""
+        law = " with the curve ".join(kind.name for kind in self._kinds())
+        used = ("law", *self._parameters())
+        for name in known_parameters(type(self)):
+            own = name.removeprefix("reverse.")
+            if own not in used:
+                users = ", ".join(
+                    kind.name for kind in LAWS.values() if own in law_parameters(kind)
+                )
+                yield name, f"by the law {law}; laws that use it: {users}"
 
     def _kinds(self) -> list[type[FrictionLaw]]:
         """Return the law, and the one that it follows if it follows one."""
@@ -207,13 +222,14 @@ class Friction(create_model("_Constants", __base__=_ChosenLaw, **_constants_of_l
         self,
         group: "Friction | ReverseFriction",
         prefix: str,
-        curves: Mapping[str, Pairs] | None,
+        curves: dict[str, Pairs] | None,
     ) -> dict[str, Any]:
         """Return the constants of the law that a group gives, those of a table from its file."""
         values = self._given(group)
         if "file" in values:
             path = values.pop("file")
             values["points"] = read_curve(f"{prefix}.file", path, _refusal, curves)
+            self._curves[path] = values["points"]
         return values
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios import ros_yaml
-from stickslip_ros.scenarios.parameter_field import known_parameters
+from stickslip_ros.scenarios.parameter_field import Parameter, known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from stickslip_ros.text import did_you_mean
 
@@ -15,6 +15,12 @@ from stickslip_ros.text import did_you_mean
 def keyword_of(parameter: str) -> str:
     """Return the keyword for NODE.PARAMETER: its flat name with underscores for dots."""
     return parameter.partition(".")[2].replace(".", "_")
+
+
+def described(parameter: str) -> Parameter:
+    """Return the description of NODE.PARAMETER."""
+    node, _, name = parameter.partition(".")
+    return known_parameters(NODE_PARAMETERS[node])[name]
 
 
 def parameter_of(keyword: str, nodes: Sequence[str]) -> str:

@@ -4,11 +4,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
-from math import isnan
+from math import ceil, inf, isinf, isnan
 from typing import Any
 
 from pydantic import BaseModel, Field
 from pydantic.fields import FieldInfo
+
+from stickslip_ros.physics.model.constants import Constant
 
 SMALLEST, LARGEST = 1e-30, 1e30
 """Magnitudes, in SI units, between which no product or power in the physics overflows."""
@@ -59,6 +61,30 @@ def field(
     if isinstance(default, float) and "allow_inf_nan" not in bounds:
         bounds = {"ge": -LARGEST, "le": LARGEST} | bounds
     return Field(default, description=meaning, json_schema_extra=extra, **bounds)
+
+
+def field_of(constant: Constant, laws: list[str] | None = None, fixed: Fixed = Fixed.NEVER) -> Any:
+    """Return type and description of a parameter for a constant, for some `laws` only."""
+    meaning = constant.meaning
+    if laws:
+        meaning = f"{meaning.removesuffix('.')} ({', '.join(laws)})."
+    least = max(constant.at_least, SMALLEST if constant.positive else -inf)
+    bounds: dict[str, Any] = {} if least == -inf else {"ge": least}
+    default: Any = constant.default
+    if isinstance(default, StrEnum):
+        kind = type(default)
+        return kind, field(default, meaning, choices=kind, strict=False, fixed=fixed)
+    if constant.whole:
+        bounds = {bound: ceil(value) for bound, value in bounds.items()}
+        return int, field(int(default), meaning, constant.unit, fixed=fixed, **bounds)
+    if isnan(default):
+        limits: dict[str, Any] = {"ge": -LARGEST, "le": LARGEST} | bounds
+        return float, field(
+            default, meaning, constant.unit, unset="as forward", allow_inf_nan=True, **limits
+        )
+    if isinf(default):
+        bounds["allow_inf_nan"] = True
+    return float, field(float(default), meaning, constant.unit, fixed=fixed, **bounds)
 
 
 @dataclass(frozen=True)

@@ -5,18 +5,18 @@ models. The nested field `friction.static` is the ROS parameter of that name.
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
 from math import isinf, pi, sqrt
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import create_model, model_validator
+from typing_extensions import override
 
-from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.reference import ReferenceCourse
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
-from stickslip_ros.physics.measures.reading import Reading, reading_of
+from stickslip_ros.physics.measures.reading import SampleAssumptions, reading_of
 from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
@@ -24,16 +24,16 @@ from stickslip_ros.physics.model.courses import CourseKind
 from stickslip_ros.physics.model.disturbance import Disturbance
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.sensor import Sensor
-from stickslip_ros.scenarios.constant_field import field_of, group_of
+from stickslip_ros.scenarios import Pace
 from stickslip_ros.scenarios.course_parameters import (
     BeltParameters,
     DisturbanceParameters,
     LoadParameters,
     ReferenceParameters,
 )
+from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
 from stickslip_ros.scenarios.friction_parameters import Friction
-from stickslip_ros.scenarios.pace import Pace
-from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field
+from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field, field_of
 from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import shown
 
@@ -79,7 +79,14 @@ class NodeParameters(ParameterGroup):
         return self
 
 
-class SensorParameters(group_of(Sensor, Fixed.ACTIVE)):
+def _group_of(part: type, fixed: Fixed) -> type[ParameterGroup]:
+    """Return the parameters for the constants of a part of the plant."""
+    constants = constants_of(part).items()
+    described: dict[str, Any] = {name: field_of(each, fixed=fixed) for name, each in constants}
+    return create_model(part.__name__, __base__=ParameterGroup, **described)
+
+
+class SensorParameters(_group_of(Sensor, Fixed.ACTIVE)):
     """Constants of the sensor."""
 
     @model_validator(mode="after")
@@ -90,8 +97,13 @@ class SensorParameters(group_of(Sensor, Fixed.ACTIVE)):
             raise ValueError(f"sensor.{refusal}")
         return self
 
+    @override
+    def not_used(self) -> Iterator[tuple[str, str]]:
+        if not Sensor(**dict(self)).spans:
+            yield "difference_samples", "by the velocity exact; difference uses it"
 
-class ActuatorParameters(group_of(Actuator, Fixed.NEVER)):
+
+class ActuatorParameters(_group_of(Actuator, Fixed.NEVER)):
     """Constants of the actuator."""
 
 
@@ -214,6 +226,12 @@ class PlantParameters(NodeParameters):
             )
         return self
 
+    @override
+    def not_used(self) -> Iterator[tuple[str, str]]:
+        if self.pace is Pace.LOCKSTEP:
+            yield "real_time_factor", "by the pace lockstep; realtime uses it"
+        yield from super().not_used()
+
     @property
     def last_sample(self) -> int | None:
         """Number of the sample at which the plant pauses; None without `duration`."""
@@ -297,12 +315,8 @@ class ControllerParameters(NodeParameters):
     @model_validator(mode="after")
     def _constants_fit_together(self) -> Self:
         """Refuse constants that the law refuses."""
-        refusal = self.as_law().refusal()
-        if refusal is not None:
-            raise ValueError(refusal)
+        CONTROLLERS.made(self.as_law, CONTROL_LAWS[self.law])
         return self
-
-    as_washout: ClassVar[Renamed] = Renamed("as_law")
 
     @property
     def node(self) -> str:
@@ -404,7 +418,7 @@ class AnalyzerParameters(NodeParameters):
         """The stick speed, m/s; None if it is automatic."""
         return None if self.stick_speed < 0.0 else self.stick_speed
 
-    def reading_of(self, plant: Mapping[str, Any], fastest_belt: float = 0.0) -> Reading:
+    def reading_of(self, plant: Mapping[str, Any], fastest_belt: float = 0.0) -> SampleAssumptions:
         """Return how samples of a plant are to be read."""
         return reading_of(plant, fastest_belt, given=self.given_stick_speed)
 

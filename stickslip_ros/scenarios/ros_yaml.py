@@ -1,48 +1,70 @@
-"""YAML as ROS reads it, which differs from PyYAML in some scalars."""
+"""YAML as ROS reads it, which differs from YAML 1.1 in scalars, tags and keys."""
 
 import re
+from collections.abc import Iterator
+from itertools import takewhile
 from math import inf
+from pathlib import Path
 from sys import float_info
-from typing import Any, ClassVar
+from typing import Any
 
 import yaml
 
 from stickslip_ros.errors import InvalidInputError
 
-_BOOLEANS = [
-    spelling
-    for word in ("true", "false", "yes", "no", "on", "off", "y", "n")
-    for spelling in (word, word.capitalize(), word.upper())
-]
-_SCALARS = {
-    "bool": "|".join(_BOOLEANS),
-    "int": r"[-+]?(0|[1-9][0-9]*|0[0-7]+|0x[0-9a-fA-F]+)",
-    "float": r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?"
-    r"|[-+]?\.?(inf|Inf|INF)|[-+]?\.?(nan|NaN|NAN)",
-    "null": "~|null|Null|NULL|",
-}
-_NUMBER = re.compile(f"(?:{_SCALARS['int']}|{_SCALARS['float']})")
+PARAMETERS_KEY = "ros__parameters"
+Entry = tuple[tuple[str, ...], int, Any]
+"""Keys, line and value."""
+
+_TRUE = {"true", "True", "TRUE", "yes", "Yes", "YES", "on", "On", "ON", "y", "Y"}
+_FALSE = {"false", "False", "FALSE", "no", "No", "NO", "off", "Off", "OFF", "n", "N"}
+_WHOLE = re.compile(r"(?ai)\s*[-+]?(?:(0x)[0-9a-f]+|(0)[0-7]*|[1-9][0-9]{0,18})")
+_NOT_FINITE = re.compile(
+    r"(?a)\s*[-+]?(?i:inf|infinity|nan|nan\(\w*\))|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)"
+)
+# ROS uses libyaml: with it, there is no difference in what a scalar is.
+_LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)
+
+
+class LineError(InvalidInputError):
+    """A line of a file is refused."""
+
+    def __init__(self, source: Path | str, line: int, reason: str) -> None:
+        super().__init__(f"{source}, line {line}: {reason}")
+        self.line = line
+
+
+def entries(text: str, source: str) -> Iterator[Entry]:
+    """Yield the scalars, lists and empty mappings in a YAML text.
+
+    Raises LineError, naming `source`, for what ROS does not read. As in ROS, there are no aliases,
+    with which a small file could expand without bound.
+    """
+    parsed = yaml.parse(text.encode(errors="surrogatepass"), _LOADER)
+    # Documents and their ends do not matter, as in ROS.
+    events = (each for each in parsed if isinstance(each, yaml.NodeEvent | yaml.CollectionEndEvent))
+    try:
+        for event in events:
+            yield from _entries(events, event, ())
+    except RecursionError:
+        raise InvalidInputError(f"{source} cannot be read: it is nested too deeply") from None
+    except yaml.MarkedYAMLError as error:
+        mark: Any = error.problem_mark
+        raise LineError(source, mark.line + 1, f"is not YAML for ROS: {error.problem}") from None
+    except yaml.YAMLError:
+        raise InvalidInputError(f"{source} is not YAML: a character is not allowed") from None
 
 
 def parse(text: str, source: str) -> Any:
-    """Parse YAML; raise InvalidInputError, naming `source`, if it is invalid."""
-    try:
-        return yaml.load(text, Loader=_RosLoader)
-    except yaml.YAMLError as error:
-        reason = " ".join(str(error).split())
-        raise InvalidInputError(f"{source} is not YAML: {reason}") from None
-    except RecursionError:
-        raise InvalidInputError(f"{source} cannot be read: it is nested too deeply") from None
-    except (ArithmeticError, AttributeError, LookupError, ValueError):
-        raise InvalidInputError(
-            f"{source} is not YAML: a tag (!!) does not match its value"
-        ) from None
+    """Return the value in a YAML text, None for an empty one; raise as `entries` does."""
+    found = {".".join(keys): value for keys, _, value in entries(text, source)}
+    return found.get("", found or None)
 
 
 def number_in(text: str) -> float | None:
     """Return the number that ROS reads in a text; None if it is not a number."""
-    value = yaml.load(text, Loader=_RosLoader) if _NUMBER.fullmatch(text) else None
-    return value if isinstance(value, int | float) else None
+    value = _read(text)
+    return None if isinstance(value, bool | str) else value
 
 
 def dump(values: Any) -> str:
@@ -50,47 +72,66 @@ def dump(values: Any) -> str:
     return yaml.dump(values, Dumper=_QuotingDumper, sort_keys=False)
 
 
-class _RosLoader(yaml.SafeLoader):
-    """Loader that reads scalars as rcl does: 1e3 is a number, and there are no dates.
+def _entries(events: Iterator[Any], event: Any, keys: tuple[str, ...]) -> Iterator[Entry]:
+    """Yield what is in the value that `event` begins."""
+    line = event.start_mark.line + 1
+    inner = takewhile(lambda each: not isinstance(each, yaml.CollectionEndEvent), events)
+    if isinstance(event, yaml.MappingStartEvent):
+        names: list[str] = []
+        for key in inner:
+            if PARAMETERS_KEY in names:  # ROS would lose count of the names of nodes
+                raise _problem(key, f"there must be nothing beside {PARAMETERS_KEY}")
+            names.append(_text(key))
+            yield from _entries(events, next(events), (*keys, names[-1]))
+        if not names:
+            yield keys, line, {}
+    elif isinstance(event, yaml.SequenceStartEvent):
+        values = [_scalar(item) for item in inner]
+        if len({type(value) for value in values}) > 1:
+            raise _problem(event, "the values of a list must be of one type")
+        yield keys, line, values
+    else:
+        yield keys, line, _scalar(event)
 
-    Like rcl it refuses aliases, with which a small file could expand without bound.
-    """
 
-    bool_values: ClassVar[dict[str, bool]] = {**yaml.SafeLoader.bool_values, "y": True, "n": False}
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        if self.check_event(yaml.AliasEvent):
-            event = self.peek_event()
-            raise yaml.YAMLError(f"aliases are not supported, line {event.start_mark.line + 1}")
-        return super().compose_node(parent, index)
+def _scalar(event: Any) -> bool | float | str:
+    text = _text(event)
+    is_text = event.style in ("'", '"') or event.tag == "tag:yaml.org,2002:str"
+    return text if is_text else _read(text)
 
 
-def _whole_number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int | float | str:
-    """Return an integer, beyond 64 bits a float, and beyond floats the text."""
+def _text(event: Any) -> str:
+    """Return the text of a key or scalar."""
+    if not isinstance(event, yaml.ScalarEvent):
+        raise _problem(event, "must be a scalar, and aliases are not supported")
+    if "\0" in event.value or (not event.value and event.style not in ("'", '"')):
+        raise _problem(event, "a value is missing, or has a null character")
+    return event.value
+
+
+def _read(text: str) -> bool | float | str:
+    """Return what ROS reads in a scalar without quotes: what C reads, if it is a number."""
+    if text in _TRUE or text in _FALSE:
+        return text in _TRUE
+    if _NOT_FINITE.fullmatch(text):
+        return float(text.replace(".", "").partition("(")[0])
+    if whole := _WHOLE.fullmatch(text):
+        value = int(text, 16 if whole[1] else 8 if whole[2] else 10)
+        if -(2**63) <= value < 2**63:
+            return value
+    hexadecimal = "x" in text.lower()
     try:
-        value = loader.construct_yaml_int(node)
-        return value if -(2**63) <= value < 2**63 else float(value)
-    except (ValueError, OverflowError):
-        return str(node.value)
+        value = float.fromhex(text) if hexadecimal else float(text)
+    except (OverflowError, ValueError):
+        return text
+    digits = text.lower().partition("p" if hexadecimal else "e")[0]
+    in_range = float_info.min <= abs(value) < inf or not digits.strip("+-.0x")
+    as_in_c = text.isascii() and "_" not in text and not text[-1].isspace()
+    return value if in_range and as_in_c else text
 
 
-def _number(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> float | str:
-    """Return a float, or the text of one that overflows or underflows."""
-    text: str = node.value.lower()
-    value = float(loader.construct_yaml_float(node))
-    zero = not text.partition("e")[0].strip("+-.0")
-    if zero or text.endswith(("inf", "nan")) or float_info.min <= abs(value) < inf:
-        return value
-    return str(node.value)
-
-
-_RosLoader.add_constructor("tag:yaml.org,2002:int", _whole_number)
-_RosLoader.add_constructor("tag:yaml.org,2002:float", _number)
-_RosLoader.yaml_implicit_resolvers = {}
-for _tag, _pattern in _SCALARS.items():
-    _RosLoader.add_implicit_resolver(
-        f"tag:yaml.org,2002:{_tag}", re.compile(f"^(?:{_pattern})$"), None
-    )
+def _problem(event: Any, problem: str) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=event.start_mark)
 
 
 class _QuotingDumper(yaml.SafeDumper):

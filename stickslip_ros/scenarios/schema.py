@@ -6,7 +6,8 @@ from typing import Any
 
 from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
-from stickslip_ros.scenarios.sections import BASE_SECTION, PARAMETERS_KEY
+from stickslip_ros.scenarios.ros_yaml import PARAMETERS_KEY
+from stickslip_ros.scenarios.sections import BASE_SECTION
 
 _TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 

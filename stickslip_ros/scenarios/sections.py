@@ -1,19 +1,21 @@
 """Reading a scenario file: sections of node name patterns, each with parameters."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import chain
+from collections.abc import Callable, Mapping
+from io import TextIOWrapper
+from itertools import chain, takewhile
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.files import open_regular
 from stickslip_ros.scenarios import ros_yaml
 from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
-from stickslip_ros.scenarios.validation import flattened
+from stickslip_ros.scenarios.ros_yaml import PARAMETERS_KEY, LineError
 from stickslip_ros.text import did_you_mean, shown
 
-PARAMETERS_KEY = "ros__parameters"
+_PATTERN = re.compile(r"(/(\*\*?|[A-Za-z_]\w*))+", re.ASCII)
 _LARGEST = 1_000_000
 """Largest number of characters in a scenario file."""
 BASE_SECTION = "scenario"
@@ -48,22 +50,33 @@ class ScenarioFile(NamedTuple):
         and, unless `other_nodes` is set, for an unknown node.
         """
         other_sections: list[str] = []
-        prefix = namespace.rstrip("/")
         for pattern, parameters in self.sections:
-            nodes = [
-                node for node in NODE_PARAMETERS if section_matches(pattern, f"{prefix}/{node}")
-            ]
-            if nodes:
-                _apply(set_value, self.path, pattern, parameters, nodes)
-            elif other_nodes:
-                other_sections.append(pattern)
-            else:
+            known = {
+                node: known_parameters(model)
+                for node, model in NODE_PARAMETERS.items()
+                if section_matches(pattern, f"{namespace.rstrip('/')}/{node}")
+            }
+            if not known and not other_nodes:
                 node = pattern.rpartition("/")[2]
                 every = f"the nodes in namespace {namespace} are {', '.join(NODE_PARAMETERS)}"
                 raise InvalidInputError(
                     f"{self.path}: section {pattern} matches no node; "
                     + did_you_mean(node, NODE_PARAMETERS.keys() - {node}, every)
                 )
+            if not known:
+                other_sections.append(pattern)
+                continue
+            for name, value in parameters.items():
+                takers = [node for node in known if len(known) == 1 or name in known[node]]
+                if not takers:
+                    raise InvalidInputError(
+                        f"{self.path}: section {pattern}: no node has a parameter {name:.80}; "
+                        + did_you_mean(
+                            name, {*chain(*known.values())}, "docs/parameters.md lists all"
+                        )
+                    )
+                for node in takers:
+                    set_value(node, name, value)
         return other_sections
 
 
@@ -74,10 +87,16 @@ def read_file(path: Path, namespace: str) -> ScenarioFile:
     """
     sections: list[tuple[str, Mapping[str, Any]]] = []
     base: str | None = None
-    for pattern, parameters in _sections(path):
+    for name, parameters in _sections(path).items():
+        pattern = f"/{name.removeprefix('/')}"
         own = section_matches(pattern, f"{namespace.rstrip('/')}/{BASE_SECTION}")
         if own and pattern.endswith(f"/{BASE_SECTION}"):
-            base = _base_of(path, pattern, parameters)
+            base = parameters.get("base")
+            if len(parameters) != 1 or not isinstance(base, str) or not base:
+                raise InvalidInputError(
+                    f"{path}: section {pattern}: {shown(parameters)} is refused: must be base, the "
+                    "name or the path of a scenario"
+                )
         else:
             sections.append((pattern, parameters))
     return ScenarioFile(path, sections, base)
@@ -90,68 +109,45 @@ def section_matches(pattern: str, node: str) -> bool:
     return re.fullmatch(expression, node) is not None
 
 
-def _base_of(path: Path, pattern: str, parameters: Mapping[str, Any]) -> str:
-    for name in parameters:
-        if name != "base":
-            raise InvalidInputError(
-                f"{path}: section {pattern}: unknown parameter {name:.80}; the only one is base"
-            )
-    base = parameters.get("base")
-    if not isinstance(base, str) or not base:
-        raise InvalidInputError(
-            f"{path}: section {pattern}: base = {shown(base)} is refused: must be the name or the "
-            "path of a scenario"
-        )
-    return base
+def _sections(path: Path) -> Mapping[str, Mapping[str, Any]]:
+    """Return node name patterns, each with its parameters by flat name, combined as ROS does.
 
-
-def _apply(
-    set_value: SetValue,
-    path: Path,
-    pattern: str,
-    parameters: Mapping[str, Any],
-    nodes: Sequence[str],
-) -> None:
-    """Pass the parameters of a section to `set_value` for the nodes that it matches."""
-    known = {node: known_parameters(NODE_PARAMETERS[node]) for node in nodes}
-    for name, value in parameters.items():
-        takers = [node for node in nodes if len(nodes) == 1 or name in known[node]]
-        if not takers:
-            raise InvalidInputError(
-                f"{path}: section {pattern}: no node has a parameter {name:.80}; "
-                + did_you_mean(name, {*chain(*known.values())}, "docs/parameters.md lists all")
-            )
-        for node in takers:
-            set_value(node, name, value)
-
-
-def _sections(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the node name pattern and the parameters by flat name of each section."""
+    A pattern that occurs again has the place of its first section; with or without / at its
+    beginning, it is another one.
+    """
     try:
-        with path.open(encoding="utf-8") as file:
+        with TextIOWrapper(open_regular(path), encoding="utf-8", newline="") as file:
             text = file.read(_LARGEST + 1)
     except (OSError, UnicodeDecodeError) as error:
-        raise InvalidInputError(f"cannot read scenario {path}: {error}") from None
+        reason = getattr(error, "strerror", None) or error
+        raise InvalidInputError(f"cannot read scenario {path}: {reason}") from None
     if len(text) > _LARGEST:
-        raise InvalidInputError(
-            f"cannot read scenario {path}: it is longer than {_LARGEST} characters"
-        )
-    yield from _walk(ros_yaml.parse(text, str(path)), "", path)
-
-
-def _walk(tree: Any, name: str, path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    if not isinstance(tree, dict) or not tree:
-        raise InvalidInputError(
-            f"{path}: expected node names with {PARAMETERS_KEY} below, found {tree!r:.60} "
-            f"at {name or 'the top'}"
-        )
-    for key, below in cast(dict[Any, Any], tree).items():
-        if key != PARAMETERS_KEY:
-            yield from _walk(below, f"{name}/{str(key).strip('/')}", path)
-        elif isinstance(below, dict):
-            yield name, dict(flattened(cast(dict[Any, Any], below)))
-        else:
-            raise InvalidInputError(f"{path}: {name}: {PARAMETERS_KEY} must be names and values")
+        raise InvalidInputError(f"scenario {path} is longer than {_LARGEST} characters")
+    sections: dict[str, dict[str, Any]] = {}
+    lines: dict[tuple[str, str], int] = {}
+    for keys, line, value in ros_yaml.entries(text, str(path)):
+        depth = keys.index(PARAMETERS_KEY) if PARAMETERS_KEY in keys else len(keys)
+        nodes, names = keys[:depth], keys[depth + 1 :]
+        pattern, name = "/".join(nodes), ".".join(names)
+        reason = None
+        if nodes == keys:
+            found = f"found {value!r:.60} at {'/'.join(keys) or 'the top'}"
+            reason = f"expected node names with {PARAMETERS_KEY} below, {found}"
+        elif (value == {}) == bool(names) or value == [] or "" in keys:
+            reason = f"{pattern}: {PARAMETERS_KEY} must be names and values"
+        elif not _PATTERN.fullmatch(f"/{pattern.removeprefix('/')}") or "/" in "".join(nodes[1:]):
+            reason = f"{pattern}: must be names of nodes as in /**/plant, with no / in an inner one"
+        elif "." in "".join(names[1:-1]):
+            reason = f"{pattern}: {name}: the name of an inner group must have no ."
+        elif (pattern, name) in lines and name:
+            reason = f"{pattern}: {name} is already on line {lines[pattern, name]}"
+        if reason is not None:
+            raise LineError(path, line, reason)
+        lines[pattern, name] = line
+        sections.setdefault(pattern, {}).update({name: value} if names else {})
+    if not sections:
+        raise InvalidInputError(f"{path}: expected node names with {PARAMETERS_KEY} below")
+    return sections
 
 
 def leading_comment(path: Path) -> str:
@@ -159,11 +155,7 @@ def leading_comment(path: Path) -> str:
 
     Empty for a file without one.
     """
-    comment: list[str] = []
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for line in file:
-            if not line.startswith("#"):
-                break
-            comment.append(line.strip("# \n"))
-    sentence, _, _ = " ".join(comment).partition(". ")
-    return sentence.rstrip(".")
+    with TextIOWrapper(open_regular(path), encoding="utf-8", errors="replace") as file:
+        lines = takewhile(lambda line: line.startswith("#"), file)
+        comment = " ".join(line.strip("# \n") for line in lines)
+    return comment.partition(". ")[0].rstrip(".")

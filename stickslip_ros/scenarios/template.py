@@ -7,7 +7,7 @@ from stickslip_ros.scenarios import ros_yaml
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameter_field import Parameter, parameters_of
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, NodeParameters
-from stickslip_ros.scenarios.sections import PARAMETERS_KEY
+from stickslip_ros.scenarios.ros_yaml import PARAMETERS_KEY
 
 _WIDTH = 100
 
@@ -15,14 +15,18 @@ _WIDTH = 100
 def commented_file(scenario: Scenario, heading: str) -> str:
     """Return the text of a scenario file with every parameter of every node of the scenario.
 
-    A comment above each parameter gives its meaning, its unit and what is allowed. `heading` is
-    the comment at the top, line by line.
+    A comment above each parameter gives its meaning, its unit and what is allowed. What the
+    scenario's laws and settings do not use has its default. `heading` is the comment at the top,
+    line by line.
     """
     lines = [part for line in heading.splitlines() for part in _comment(line, "")]
-    values = scenario.as_dict()
-    for node, own in values.items():
+    unused = scenario.unused()
+    for node, own in scenario.as_dict().items():
+        parameters = own_first(NODE_PARAMETERS[node])
+        if node == "plant":  # whose values would be refused
+            own |= {p.name: p.default for p in parameters if f"plant.{p.name}" in unused}
         lines += ["", f"/**/{node}:", f"  {PARAMETERS_KEY}:"]
-        lines += _section(own_first(NODE_PARAMETERS[node]), own)
+        lines += _section(parameters, own)
     return "\n".join(lines) + "\n"
 
 

@@ -3,9 +3,10 @@
 from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from math import inf
-from typing import Any, Self, cast
+from operator import attrgetter
+from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, PrivateAttr, ValidationError
 from pydantic_core import PydanticCustomError
 
 from stickslip_ros.errors import InvalidInputError
@@ -37,6 +38,9 @@ class ParameterGroup(BaseModel):
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, validate_default=True
     )
 
+    _curves: dict[str, Pairs] = PrivateAttr(default_factory=dict[str, Pairs])
+    """Pairs in the files of this group, by path."""
+
     @classmethod
     def validated(
         cls, values: Mapping[str, Any], source: str, curves: Mapping[str, Pairs] | None = None
@@ -51,7 +55,8 @@ class ParameterGroup(BaseModel):
     def changed(self, values: Mapping[str, Any], source: str) -> Self:
         """Return the parameters with others given by flat name; see `validated`.
 
-        The groups in which nothing changes are not validated again.
+        The groups in which nothing changes are not validated again, and only files that are given
+        are read.
         """
         names = {name.partition(".")[0] for name in values}
         kept: dict[str, Any] = {}
@@ -63,7 +68,16 @@ class ParameterGroup(BaseModel):
                 given |= {f"{name}.{inner}": value for inner, value in each.flat().items()}
             else:
                 kept[name] = each
-        return self._validated({**given, **values}, kept, source)
+        curves = {path: each for path, each in self.curves().items() if path not in values.values()}
+        return self._validated({**given, **values}, kept, source, curves)
+
+    def curves(self) -> dict[str, Pairs]:
+        """Return the pairs in the files that these parameters were made from, by path."""
+        found = dict(self._curves)
+        for _, each in self:
+            if isinstance(each, ParameterGroup):
+                found |= each.curves()
+        return found
 
     @classmethod
     def _validated(
@@ -81,7 +95,7 @@ class ParameterGroup(BaseModel):
                     f"{did_you_mean(name, known, f'known are {by_group(known)}')}"
                 )
         try:
-            return cls.model_validate({**kept, **_nested(values)}, context=curves)
+            return cls.model_validate({**kept, **_nested(values)}, context=dict(curves or {}))
         except ValidationError as error:
             raise InvalidInputError(f"{source}: {_explain(cls, error, values)}") from None
 
@@ -91,16 +105,34 @@ class ParameterGroup(BaseModel):
 
         Raises InvalidInputError that names parameter, value and what is allowed.
         """
+        if name not in known_parameters(cls):
+            raise InvalidInputError(f"unknown parameter {name:.80}")
         try:
             cls.model_validate(_nested({name: value}))
         except ValidationError as error:
-            if any(".".join(map(str, detail["loc"])) == name for detail in error.errors()):
+            place = tuple(name.split("."))
+            if any(detail["loc"][: len(place)] == place for detail in error.errors()):
                 raise InvalidInputError(_explain(cls, error, {name: value})) from None
 
     def flat(self) -> dict[str, Any]:
         """Return the values by flat name, as plain Python types."""
-        values = flattened(self.model_dump(mode="python"))
+        values = ((name, attrgetter(name)(self)) for name in known_parameters(type(self)))
         return {name: str(value) if isinstance(value, StrEnum) else value for name, value in values}
+
+    def unused(self) -> dict[str, str]:
+        """Return why parameters have no effect, by flat name, of those not at their defaults."""
+        values, known = self.flat(), known_parameters(type(self))
+        return {
+            name: f"{name} is not used {why}"
+            for name, why in self.not_used()
+            if [values[name]] != [known[name].default]  # of lists, a nan equals itself
+        }
+
+    def not_used(self) -> Iterator[tuple[str, str]]:
+        """Yield the parameters that have no effect beside the others, each with the reason."""
+        for group, each in self:
+            if isinstance(each, ParameterGroup):
+                yield from ((f"{group}.{name}", why) for name, why in each.not_used())
 
 
 def _explain(model: type[BaseModel], error: ValidationError, values: Mapping[str, Any]) -> str:
@@ -143,12 +175,3 @@ def _nested(values: Mapping[str, Any]) -> dict[str, Any]:
             group = group.setdefault(each, {})
         group[last] = value
     return nested
-
-
-def flattened(values: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield nested values by flat name, such as friction.static."""
-    for name, value in values.items():
-        if isinstance(value, dict):
-            yield from flattened(cast(dict[Any, Any], value), f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value

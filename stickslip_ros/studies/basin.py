@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Self
 
-from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.options import BASIN_COURSE, SettlingCourse
+from stickslip_ros.studies.options import BASIN_OPTIONS, SettlingOptions
 from stickslip_ros.studies.plan import Axis, Plan
 from stickslip_ros.studies.settling import CYCLES
 from stickslip_ros.studies.study import Point, Study
@@ -36,8 +35,6 @@ class Attractor:
     """Basin stability: the share of the starts that lead to it, 0 to 1."""
     standard_error: float = 0.0
     """Of the share S of n random starts, sqrt(S (1 - S) / n); usually smaller on a grid."""
-
-    of = Renamed("from_point")
 
     @classmethod
     def from_point(cls, point: Point) -> Self:
@@ -89,8 +86,6 @@ class Basins:
     """Index in `attractors` of each attractor in `found`."""
     found: tuple[Attractor, ...]
     """The attractors in the order in which they were found."""
-
-    of = Renamed("from_points")
 
     @classmethod
     def from_points(cls, points: Iterable[Point]) -> Self:
@@ -145,7 +140,7 @@ def basin_study(
     scenario: Scenario,
     plan: Plan,
     *,
-    course: SettlingCourse | None = None,
+    course: SettlingOptions | None = None,
     continuous: bool = False,
 ) -> Study:
     """Return the study of the starts in a plan.
@@ -158,7 +153,7 @@ def basin_study(
         The scenario; all parameters but the initial state apply.
     plan : Grid or RandomSample
         The starts, over `plant.initial.position` (m) and `plant.initial.velocity` (m/s).
-    course : SettlingCourse, optional
+    course : SettlingOptions, optional
         How long each motion is followed; by default transients of 50 natural periods, at most 80
         of them.
     continuous : bool
@@ -172,7 +167,7 @@ def basin_study(
     Raises
     ------
     InvalidInputError
-        If the plan is over other parameters or is carried on, or no start is valid.
+        If the plan is over other parameters or has a continuation, or no start is valid.
 
     Examples
     --------
@@ -188,11 +183,11 @@ def basin_study(
     >>> [(str(each.regime), each.share) for each in basins.attractors]
     [('stick_slip', 1.0)]
     """
-    if set(plan.parameters) != {POSITION, VELOCITY} or plan.carried:
+    if set(plan.parameters) != {POSITION, VELOCITY} or plan.continuation:
         raise InvalidInputError(
             f"a basin is over {POSITION} and {VELOCITY}, not {', '.join(plan.parameters)}"
         )
-    study = Study(scenario, plan, course or BASIN_COURSE, continuous)
+    study = Study(scenario, plan, course or BASIN_OPTIONS, continuous)
     study.check()
     return study
 

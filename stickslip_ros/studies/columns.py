@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.measures.cycle_measures import Measures
 from stickslip_ros.studies.journal import Journal
 from stickslip_ros.studies.plan import Grid, Plan
@@ -60,9 +59,7 @@ class Columns:
     turning_points: tuple[tuple[float, ...], ...]
     """Poincare section x' = 0 of each point, m."""
     reason: npt.NDArray[np.object_]
-    """Why a point has no cycle to measure, in words, or None."""
-
-    of = Renamed("from_journal")
+    """Why a point has no cycle to measure, or how it drifts, in words, or None."""
 
     @classmethod
     def from_journal(cls, journal: Journal) -> Self:
@@ -197,20 +194,20 @@ def write_csv(stream: TextIO, journal: Journal, further: ExtraColumns) -> None:
 
 
 def write_json(
-    stream: TextIO, journal: Journal, further: ExtraColumns, made_of: Mapping[str, Any]
+    stream: TextIO, journal: Journal, further: ExtraColumns, provenance: Mapping[str, Any]
 ) -> None:
     """Write one object: the parameters, their values, and an array for each column.
 
     For a grid, `values` has a list for each axis, and the arrays are row-major over the axes; if
-    the grid is carried on, the direction is the slowest index. Otherwise `values` has the
-    parameters' values of each point. The entries of `made_of`, ready for JSON, are added. The
+    it has a continuation, the direction is the slowest index. Otherwise `values` has the
+    parameters' values of each point. The entries of `provenance`, ready for JSON, are added. The
     arrays pass through temporary files, so that memory holds one piece of the study only.
     """
     study = journal.study
     plan = study.plan
     how = {name: found for name, found in study.as_dict().items() if name != "scenario"}
     stream.write("{\n")
-    for name, value in {**made_of, **how, "parameters": plan.parameters}.items():
+    for name, value in {**provenance, **how, "parameters": plan.parameters}.items():
         stream.write(f' "{name}": {json.dumps(value, allow_nan=False)},\n')
     makers: dict[str, Callable[[Point], Any]] = dict(further)
     if isinstance(plan, Grid):

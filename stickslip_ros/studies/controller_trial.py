@@ -1,6 +1,6 @@
-"""Trials of a control law: simulated vibrations while the control is switched on."""
+"""Trials of a controller: simulated vibrations while the control is switched on."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -13,7 +13,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.loop.controller import Controller, answer
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
-from stickslip_ros.physics.model.control import ControlLaw, WashoutGains
+from stickslip_ros.physics.model.control import Washout, WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Measure, Sensor
 from stickslip_ros.physics.motion import Motion, RecordedMotion
@@ -24,6 +24,10 @@ from stickslip_ros.stamps import NANOSECONDS
 
 FILTER_SETTLED = 5.0
 """Time after which the start of the filter of eq. 17 no longer matters, in 1/d."""
+_PHASES = 4
+"""Phases of a vibration at which the control is switched on, besides the worst one."""
+_PERIODS_AT_REST = 100.0
+"""Natural periods over which the loop is observed at its equilibrium."""
 
 
 @dataclass(frozen=True)
@@ -55,17 +59,9 @@ class Vibration:
         """Whether the drive vibrates without control."""
         return self.period is not None
 
-    def filtered(self, corner_frequency: float) -> FloatArray:
-        """Return the output of a settled filter of eq. 17 for the velocity, m/s.
-
-        `corner_frequency` is in rad/s. The whole cycles are treated as a periodic sequence, and
-        the filter's response is applied to each harmonic.
-        """
-        count = len(self.velocity)
-        if count == 0:
-            return self.velocity
-        forward, differences = self._harmonics
-        return np.fft.irfft(differences / (forward - np.exp(-corner_frequency / self.rate)), count)
+    def peak_speed(self, corner_frequency: float) -> float:
+        """Return the largest output, m/s, of the filter with a cutoff frequency in rad/s."""
+        return float(np.abs(self._filtered(corner_frequency)).max(initial=0.0))
 
     def peak_force(self, gains: WashoutGains) -> float:
         """Return the largest force, N, of a controller activated at the worst phase."""
@@ -76,7 +72,19 @@ class Vibration:
         return int(np.argmax(np.abs(self._force(gains))))
 
     def _force(self, gains: WashoutGains) -> FloatArray:
-        return gains.force(self.filtered(gains.corner_frequency))
+        return gains.force(self._filtered(gains.corner_frequency))
+
+    def _filtered(self, corner_frequency: float) -> FloatArray:
+        """Return the output of a settled filter of eq. 17 for the velocity, m/s.
+
+        The whole cycles are treated as a periodic sequence, and the filter's response is applied
+        to each harmonic.
+        """
+        count = len(self.velocity)
+        if count == 0:
+            return self.velocity
+        forward, differences = self._harmonics
+        return np.fft.irfft(differences / (forward - np.exp(-corner_frequency / self.rate)), count)
 
     @cached_property
     def _harmonics(self) -> tuple[Any, Any]:
@@ -100,7 +108,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Rest:
-    """What noise and rounding leave at the equilibrium under control; SI units."""
+    """Motion and force that noise and rounding leave at the equilibrium; SI units."""
 
     amplitude: float
     """Half the range of the displacement, m."""
@@ -111,7 +119,7 @@ class Rest:
 
 
 @dataclass(frozen=True)
-class _Going(Sensor):
+class _Started(Sensor):
     """A sensor that measures already."""
 
     measure: Measure | None = None
@@ -120,14 +128,13 @@ class _Going(Sensor):
         return self.measure
 
 
+@dataclass(frozen=True)
 class Bench:
-    """Trials at one sampling rate with one delay of the force."""
+    """Trials at one sampling rate (Hz) with one delay of the force (s)."""
 
-    def __init__(self, rate: float, force_delay: float, sensor: Sensor = EXACT_SENSOR) -> None:
-        """Prepare trials at `rate` (Hz) with `force_delay` (s)."""
-        self._rate = rate
-        self._force_delay = force_delay
-        self._sensor = sensor
+    rate: float
+    force_delay: float
+    sensor: Sensor = EXACT_SENSOR
 
     def vibration(self, drive: Drive) -> Vibration:
         """Return the vibration of `drive`, the largest if there are several.
@@ -146,84 +153,77 @@ class Bench:
             motion.advance(300 * drive.natural_period)
             found, before = _measured(motion, loading), amplitude
         if found.period is None:
-            return Vibration(drive, self._rate, found.regime, None, np.empty(0), np.empty(0))
+            return Vibration(drive, self.rate, found.regime, None, np.empty(0), np.empty(0))
         # The fewest cycles that last nearly a whole number of samples, or else the nearest of all.
-        lengths = np.arange(1, 13) * (found.period * self._rate)
+        lengths = np.arange(1, 13) * (found.period * self.rate)
         counts = np.maximum(np.rint(lengths), 1.0)
         misses = np.abs(counts / lengths - 1.0)
-        samples = int(counts[np.argmax(misses <= max(1e-4, misses.min()))])
         states: list[tuple[float, float]] = []
-        for _ in range(samples):
+        for _ in range(int(counts[np.argmax(misses <= max(1e-4, misses.min()))])):
             states.append((motion.position, motion.velocity))
-            motion.advance(1.0 / self._rate)
-        motion.take_breakpoints()
+            motion.advance(1.0 / self.rate)
         position, velocity = np.array(states).T
-        return Vibration(drive, self._rate, found.regime, found.period, position, velocity)
+        return Vibration(drive, self.rate, found.regime, found.period, position, velocity)
 
-    def catch(
-        self,
-        vibration: Vibration,
-        law: ControlLaw,
-        settling: float,
-        worst: int,
-        phases: int,
-        patience: float,
-    ) -> Iterator[Outcome]:
-        """Activate the control, its state settled, at `phases` phases of a vibration.
+    def catch(self, vibration: Vibration, law: Washout, patience: float) -> Outcome:
+        """Return the worst outcome of control, its filter settled, that catches a vibration.
 
-        The state settles in `settling` (s). One more trial activates the control at the sample
-        `worst` of the vibration, for example where this gives the largest force. The vibration has
+        It is activated at several phases, and where its force is largest. The vibration has
         `patience` (s) to settle. The force is not limited.
         """
-        count = len(vibration.velocity)
         assert vibration.period is not None
+        drive, count = vibration.drive, len(vibration.velocity)
         controller = Controller(replace(law, force_limit=inf, start_after=0.0))
-        settled = ceil(settling * self._rate / count) * count
-        cycle = vibration.period * self._rate
-        rows = {int(phase * cycle / phases) for phase in range(phases)}
-        due = {settled + row for row in rows | {worst}}
+        settled = ceil(FILTER_SETTLED / law.corner_frequency * self.rate / count) * count
+        cycle = vibration.period * self.rate
+        rows = {int(phase * cycle / _PHASES) for phase in range(_PHASES)}
+        due = {settled + row for row in rows | {vibration.worst_sample(law.gains)}}
         columns = zip(vibration.position.tolist(), vibration.velocity.tolist(), strict=True)
-        states, drive = list(columns), vibration.drive
-        measure = self._measure([])
+        states, measure = list(columns), self._measure([])
+        peak = slowest = 0.0
         for number in range(max(due) + 1):
             row = number % count
             stamp, start = self._stamp(number), states[row]
             if number in due:
-                before = [states[(row - back) % count] for back in range(self._sensor.spans, 0, -1)]
+                before = [states[(row - back) % count] for back in range(self.sensor.spans, 0, -1)]
                 trial = copy(controller), self._measure(before)
-                yield self._run(drive, *trial, stamp, start, patience, vibration.size)
+                found = self._run(Motion(drive, *start), *trial, stamp, patience, vibration.size)
+                peak = max(peak, found.peak_force)
+                if found.settling_time is None:
+                    return replace(found, peak_force=peak)
+                slowest = max(slowest, found.settling_time)
             told = start if measure is None else measure(number, *start)
             controller.answer(_sample(drive, stamp, *told))
+        return Outcome(peak, slowest, grows=False)
 
-    def throw(self, drive: Drive, law: ControlLaw, speed: float, patience: float) -> list[Outcome]:
-        """Start the slide from its equilibrium at `speed` (m/s) in either direction.
+    def returns(self, drive: Drive, law: Washout, speed: float) -> bool:
+        """Return whether the slide returns when it starts from its equilibrium at `speed` (m/s).
 
-        Each start is tried with a law that saw the slide at rest before, and with one that starts
-        with the slide.
+        It starts in either direction, with a law that saw it at rest before, and with one that
+        starts with it.
         """
-        outcomes: list[Outcome] = []
-        rest = drive.equilibrium_position
+        rest, patience = drive.equilibrium_position, 20.0 * drive.natural_period
         for velocity in (speed, -speed):
             for resting in (True, False):
                 controller = Controller(replace(law, start_after=0.0))
                 if resting:
                     controller.answer(_sample(drive, self._stamp(0), rest, 0.0))
-                start = rest, velocity
-                trial = controller, self._measure([(rest, 0.0)] * self._sensor.spans * resting)
-                stamp = self._stamp(1)
-                outcomes.append(self._run(drive, *trial, stamp, start, patience, speed))
-        return outcomes
+                measure = self._measure([(rest, 0.0)] * self.sensor.spans * resting)
+                motion = Motion(drive, rest, velocity)
+                if self._run(motion, controller, measure, self._stamp(1), patience, speed).grows:
+                    return False
+        return True
 
-    def rest(self, drive: Drive, law: ControlLaw, settling: float, duration: float) -> Rest:
-        """Return what is left at the equilibrium over `duration` (s), after `settling` (s)."""
+    def rest(self, drive: Drive, law: Washout, settling: float) -> Rest:
+        """Return what is left at the equilibrium after `settling` (s)."""
         # Exactly at the equilibrium rounding would hide that it is unstable without control.
         offset = SETTLED * abs(drive.belt_speed) / drive.angular_frequency
         motion = Motion(drive, drive.equilibrium_position + offset, 0.0)
-        loop = self._loop(motion, self._sensor, self._stamp(0))
+        loop = self._loop(motion, self.sensor, self._stamp(0))
         controller = Controller(replace(law, start_after=0.0))
-        settled, samples = ceil(settling * self._rate), ceil(duration * self._rate)
+        settled = ceil(settling * self.rate)
         rows: list[tuple[float, float]] = []
-        for number in range(settled + samples):
+        for number in range(settled + ceil(_PERIODS_AT_REST * drive.natural_period * self.rate)):
             force = answer(loop, controller)
             if number >= settled:
                 rows.append((loop.true_sample.position, force))
@@ -234,36 +234,34 @@ class Bench:
 
     def _measure(self, before: Sequence[tuple[float, float]]) -> Measure | None:
         """Return what measures, after it has measured these positions and velocities."""
-        measure = self._sensor.start(1.0 / self._rate)
+        measure = self.sensor.start(1.0 / self.rate)
         if measure is not None:
             for number, state in enumerate(before):
                 measure(number, *state)
         return measure
 
     def _loop(self, motion: Motion, sensor: Sensor, stamp: int) -> SampledLoop:
-        delay = self._force_delay
-        return SampledLoop(motion, self._rate, stamp, force_delay=delay, sensor=sensor)
+        delay = self.force_delay
+        return SampledLoop(motion, self.rate, stamp, force_delay=delay, sensor=sensor)
 
     def _stamp(self, number: int) -> int:
-        return LOCKSTEP_START + round(number * NANOSECONDS / self._rate)
+        return LOCKSTEP_START + round(number * NANOSECONDS / self.rate)
 
     def _run(
         self,
-        drive: Drive,
+        motion: Motion,
         controller: Controller,
         measure: Measure | None,
         stamp: int,
-        start: tuple[float, float],
         patience: float,
         size: float,
     ) -> Outcome:
         """Run the loop until the distance has stayed small for a natural period, or `patience`."""
-        motion = Motion(drive, *start)
-        loop = self._loop(motion, _Going(measure=measure), stamp)
+        loop, drive = self._loop(motion, _Started(measure=measure), stamp), motion.drive
         omega, equilibrium = drive.angular_frequency, drive.equilibrium_position
-        calm = ceil((drive.natural_period + self._force_delay) * self._rate)
+        calm = ceil((drive.natural_period + self.force_delay) * self.rate)
         peak, last, recent = 0.0, 0, 0.0
-        samples = max(ceil(patience * self._rate), calm)
+        samples = max(ceil(patience * self.rate), calm)
         while True:
             sample, number = loop.true_sample, loop.sample_number
             distance = hypot(omega * (sample.position - equilibrium), sample.velocity)
@@ -275,12 +273,9 @@ class Bench:
                 break
             peak = max(peak, abs(answer(loop, controller)))
             loop.advance()
-        settled = loop.sample_number - last > calm and not loop.unbounded
-        return Outcome(
-            peak,
-            last / self._rate if settled else None,
-            loop.unbounded or (not settled and recent >= size),
-        )
+        settled = number - last > calm and not loop.unbounded
+        grows = loop.unbounded or (not settled and recent >= size)
+        return Outcome(peak, last / self.rate if settled else None, grows)
 
 
 def _measured(motion: RecordedMotion, loading: float) -> Measures:

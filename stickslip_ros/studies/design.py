@@ -4,7 +4,7 @@ The proposal comes from the linear sampled loop and from the vibration without c
 checked by simulation of the drive, sampled, held and delayed as between the nodes.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import copysign, inf, isinf, sqrt
 
@@ -12,26 +12,57 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Regime
-from stickslip_ros.physics.model.control import WashoutGains
-from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
+from stickslip_ros.physics.model.control import Washout, WashoutGains
+from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.theory.linear_sampled_loop import (
+    LinearSampledLoop,
+    settling_time,
+    why_no_linear_loop,
+)
 from stickslip_ros.physics.theory.stability_map import StabilityMap
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario, parameter_file
 from stickslip_ros.scenarios.keywords import override
 from stickslip_ros.scenarios.parameters import controller_node
-from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench, Vibration
-from stickslip_ros.studies.design_checks import (
-    Check,
-    check_at_speed,
-    failure_of,
-    throw_from_high_speeds,
+from stickslip_ros.studies.controller_trial import FILTER_SETTLED, Bench, Outcome, Rest, Vibration
+from stickslip_ros.studies.design_search import (
+    CUBIC_SHARES,
+    RESERVE,
+    Candidates,
+    Margins,
+    Task,
+    little_margin,
+    margins,
+    rounded,
 )
-from stickslip_ros.studies.design_margins import Margins, little_margin, margins
-from stickslip_ros.studies.design_search import CUBIC_SHARES, RESERVE, Candidates, rounded
-from stickslip_ros.studies.design_task import DesignedLaw, Task
+from stickslip_ros.studies.stability import number_text
 
 _SHARE_OF_VIBRATIONS = 0.1
 """Approximate share of the work that goes into the vibrations without control."""
+_THROWN_SPEEDS = 3.0, 30.0, 300.0
+"""Speeds with which the slide must return to equilibrium, in the speed scale of the drive."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """Predicted and simulated behaviour of a proposal at one belt speed; SI units."""
+
+    belt_speed: float
+    """Belt speed, m/s."""
+    vibrates: bool
+    """Whether the drive vibrates without control."""
+    decay_rate: float
+    """Decay rate of a small deviation, 1/s."""
+    predicted_settling_time: float
+    """Predicted 1 % settling time of a small deviation, s."""
+    settling_time: float | None
+    """Simulated 1 % settling time of the vibration at the worst phase, s; None without it."""
+    predicted_peak_force: float
+    """Predicted peak force when the control is activated at the worst phase, N."""
+    peak_force: float | None
+    """Simulated peak force at the worst phase, N; None without vibration."""
+    rest: Rest | None = None
+    """Motion and force that noise and rounding leave at rest, simulated; None without them."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +71,7 @@ class Design:
 
     task: Task
     """The task."""
-    controller: DesignedLaw | None = None
+    controller: Washout | None = None
     """The proposed controller; None if no gains meet the task."""
     remark: str | None = None
     """Why there is no proposal, or a caution about it."""
@@ -78,8 +109,7 @@ class Design:
         if self.controller is None:
             return None
         if self.scenario is None:
-            node = controller_node(self.controller.name)
-            return parameter_file({node: self._constants})
+            return parameter_file({controller_node(self.controller.name): self._constants})
         nodes = self.scenario.as_dict()
         del nodes["analyzer"]["bag"]
         return parameter_file(nodes)
@@ -91,13 +121,7 @@ class Design:
         return {name: getattr(self.controller, name) for name in names}
 
     def map_around(self) -> StabilityMap | None:
-        """Return the stability map of the slowest loop around the proposal.
-
-        Returns
-        -------
-        StabilityMap or None
-            None without a proposal.
-        """
+        """Return the stability map of the slowest loop around the proposal; None without one."""
         if self.slowest is None or self.controller is None:
             return None
         return StabilityMap.around(self.slowest, self.controller.gains)
@@ -122,15 +146,11 @@ class Design:
         forces = np.zeros((len(around.corner_frequencies), len(around.linear_gains)))
         for row, corner_frequency in enumerate(around.corner_frequencies.tolist()):
             for vibration in self.vibrations:
-                speeds = np.linspace(0.0, _largest(vibration.filtered(corner_frequency)), 50)
+                speeds = np.linspace(0.0, vibration.peak_speed(corner_frequency), 50)
                 gains = WashoutGains(corner_frequency, linear, around.gains.cubic)
                 force = np.abs(gains.force(speeds)).max(axis=1)
                 forces[row] = np.maximum(forces[row], force)
         return forces
-
-
-def _largest(values: FloatArray) -> float:
-    return float(np.abs(values).max(initial=0.0))
 
 
 def design(task: Task, progress: Progress = lambda _: None) -> Design:
@@ -167,7 +187,7 @@ def design(task: Task, progress: Progress = lambda _: None) -> Design:
     if task.scenario is None or task.scenario.plant.force_jitter == 0.0:
         return found
     no_jitter = "force_jitter is omitted: the delay of the force is constant here"
-    return replace(found, remark="; ".join(filter(None, (found.remark, no_jitter))))
+    return replace(found, remark=_joined(found.remark, no_jitter))
 
 
 def _design(task: Task, progress: Progress) -> Design:
@@ -181,7 +201,7 @@ def _design(task: Task, progress: Progress) -> Design:
         vibrations.append(bench.vibration(drive))
         progress(_SHARE_OF_VIBRATIONS * number / len(drives))
         if vibrations[-1].regime is Regime.UNBOUNDED:
-            speed = task.shown(drive.belt_speed, "m/s")
+            speed = number_text(drive, drive.belt_speed, "m/s")
             reason = f"without control the motion diverges at a belt speed of {speed}"
             return Design(task, remark=f"{reason}, so there is no limit cycle to suppress")
     candidates = Candidates(task, vibrations)
@@ -189,14 +209,14 @@ def _design(task: Task, progress: Progress) -> Design:
     if found.controller is None and not isinf(task.force_limit):
         enough = _sufficient_limit(bench, candidates)
         if enough is not None:
-            limit = f"a force limit of about {task.shown(enough, 'N')}"
+            limit = f"a force limit of about {number_text(task.drive, enough, 'N')}"
             return replace(found, remark=f"{found.remark}; {limit} is sufficient")
     return found
 
 
-def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Design:
+def _propose(bench: Bench, candidates: Candidates, progress: Progress) -> Design:
     """Return a proposal that was checked by simulation, or the reason why there is none."""
-    task, drives = candidates.task, candidates.task.drives()
+    task, loops = candidates.task, candidates.loops
     strength, shares = RESERVE, CUBIC_SHARES
     failure: str | None = None
     for attempt in range(8):
@@ -204,7 +224,7 @@ def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Desi
         if gains is None:
             return Design(task, remark=failure or candidates.why_none())
         waits = FILTER_SETTLED / gains.corner_frequency if gains.linear != 0.0 else 0.0
-        controller = DesignedLaw(
+        controller = Washout(
             corner_frequency=gains.corner_frequency,
             linear_gain=gains.linear,
             cubic_gain=gains.cubic,
@@ -212,29 +232,24 @@ def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Desi
             start_after=rounded(waits, digits=2, up=True),
         )
         left = (1.0 - _SHARE_OF_VIBRATIONS) * 0.5**attempt
-
-        def done(share: float, left: float = left) -> None:
-            progress(1.0 - left * (1.0 - 0.5 * share))
-
-        failure = None
         checks: list[Check] = []
-        while failure is None and len(checks) < len(drives):
-            checks.append(check_at_speed(bench, candidates, len(checks), controller))
-            failure = failure_of(task, checks[-1])
-            done(0.5 * len(checks) / len(drives))
+        for loop, vibration in zip(loops, candidates.vibrations, strict=True):
+            checks.append(_check(task, bench, loop, vibration, controller))
+            progress(1.0 - left * (1.0 - 0.25 * len(checks) / len(loops)))
+            failure = _failure_of(task, checks[-1])
+            if failure is not None:
+                break
         slowest = candidates.slowest(gains)
         remark, found, little = candidates.why_zero(), None, None
         if failure is None and gains.linear != 0.0:
-            found = margins(candidates.loops, gains)
+            found = margins(loops, gains)
             little = little_margin(task, found)
-            ends = [drive for drive in drives if drive in (drives[0], drives[-1], slowest.drive)]
-            remark, failure = throw_from_high_speeds(
-                task, bench, ends, controller, lambda share: done(0.5 + 0.5 * share)
-            )
+            ends = [loop.drive for loop in loops if loop in (loops[0], loops[-1], slowest)]
+            remark, failure = _throw_from_high_speeds(bench, ends, controller)
         if failure is None:
             progress(1.0)
-            remark = "; ".join(filter(None, (remark, little))) or None
             seen = tuple(candidates.vibrations)
+            remark = _joined(remark, little)
             return Design(task, controller, remark, slowest, found, tuple(checks), seen)
         peak = max((check.peak_force or 0.0 for check in checks), default=0.0)
         if peak > task.force_limit:
@@ -246,7 +261,77 @@ def _propose(bench: Bench, candidates: "Candidates", progress: Progress) -> Desi
     return Design(task, remark=failure)
 
 
-def _sufficient_limit(bench: Bench, candidates: "Candidates") -> float | None:
+def _joined(*remarks: str | None) -> str | None:
+    return "; ".join(filter(None, remarks)) or None
+
+
+def _check(
+    task: Task, bench: Bench, loop: LinearSampledLoop, vibration: Vibration, controller: Washout
+) -> Check:
+    """Return the check of the controller at one belt speed."""
+    drive, gains = loop.drive, controller.gains
+    decay_rate = loop.decay_rate(gains)
+    predicted = settling_time(decay_rate)
+    assert predicted is not None
+    caught: Outcome | None = None
+    if vibration.vibrates:
+        patience = 5.0 * predicted + 20.0 * drive.natural_period
+        caught = bench.catch(vibration, controller, patience)
+    rest: Rest | None = None
+    if task.is_rough:
+        settled = max(predicted, FILTER_SETTLED / controller.corner_frequency)
+        rest = bench.rest(drive, controller, settled)
+    return Check(
+        belt_speed=drive.belt_speed,
+        vibrates=vibration.vibrates,
+        decay_rate=decay_rate,
+        predicted_settling_time=predicted,
+        settling_time=None if caught is None else caught.settling_time,
+        predicted_peak_force=vibration.peak_force(gains),
+        peak_force=None if caught is None else caught.peak_force,
+        rest=rest,
+    )
+
+
+def _failure_of(task: Task, check: Check) -> str | None:
+    """Return how the simulated control fails; None if it does not."""
+    speed = f"at a belt speed of {number_text(task.drive, check.belt_speed, 'm/s')}"
+    if check.vibrates and check.settling_time is None:
+        if task.is_rough:
+            return (
+                f"{speed} the vibration does not decay to 1 % with the noise and rounding of "
+                "sensor and actuator"
+            )
+        return f"{speed} the vibration does not decay, although a small one would"
+    if check.peak_force is not None and check.peak_force > task.force_limit:
+        peak, limit = (
+            number_text(task.drive, n, "N") for n in (check.peak_force, task.force_limit)
+        )
+        return f"{speed} the force reaches {peak}, above the limit of {limit}"
+    return None
+
+
+def _throw_from_high_speeds(
+    bench: Bench, drives: Sequence[Drive], controller: Washout
+) -> tuple[str | None, str | None]:
+    """Return a remark on motions with a fast start, and how the controller fails, if it does."""
+    remark: str | None = None
+    unlimited = replace(controller, force_limit=inf)
+    for drive in drives:
+        for speed in (thrown * drive.speed_scale for thrown in _THROWN_SPEEDS):
+            if bench.returns(drive, controller, speed):
+                continue
+            slide = (
+                f"started at {number_text(drive, speed, 'm/s')} on a belt at "
+                f"{number_text(drive, drive.belt_speed, 'm/s')}, the slide"
+            )
+            if controller.cubic_gain != 0.0 or not bench.returns(drive, unlimited, speed):
+                return None, f"{slide} does not return to equilibrium"
+            remark = remark or f"{slide} needs more force than the limit"
+    return remark, None
+
+
+def _sufficient_limit(bench: Bench, candidates: Candidates) -> float | None:
     """Return the lowest force limit (N) for which there is a proposal, to a few per cent.
 
     None if even a force without limit does not suffice.

@@ -1,21 +1,27 @@
-"""Search for the gains that damp fastest within a force limit, by the linear sampled loop."""
+"""The search for gains that damp fastest within a force limit, by the linear sampled loop."""
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from math import ceil, floor, inf, isinf, log10
 from typing import Self
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.model.control import Washout, WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
-from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.physics.model.functions import zero_between
+from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop, why_no_linear_loop
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.scenarios.parameter_field import LARGEST, SMALLEST
 from stickslip_ros.studies.controller_trial import Vibration
-from stickslip_ros.studies.design_task import Task
-from stickslip_ros.studies.hopf_distance import hopf_distance, hopf_ratio
+from stickslip_ros.studies.options import OWN_SPEED_RANGE
+from stickslip_ros.studies.stability import hopf_distance, hopf_ratio, number_text
 
 CUBIC_SHARES = (0.0, 0.125, 0.25, 0.5)
 """Cubic gains to try, as shares of the friction law's own cubic coefficient.
@@ -28,15 +34,105 @@ RESERVE = 0.95
 """Share of the allowed force and gain that the first proposal uses."""
 
 
+@dataclass(frozen=True)
+class Task:
+    """The task of a design; SI units. Create it with `Task.from_scenario`."""
+
+    drive: Drive
+    """The drive; `belt_speeds` replaces its belt speed."""
+    rate: float
+    """Samples per second, Hz."""
+    force_delay: float
+    """Delay from a sample to the start of its force, s."""
+    force_limit: float
+    """Largest allowed force, N: that of the controller, or the limit of a weaker actuator."""
+    belt_speeds: tuple[float, float]
+    """Lowest and highest belt speed, m/s, above zero; the opposite direction is symmetric."""
+    sensor: Sensor = EXACT_SENSOR
+    """Sensor that measures the samples."""
+    scenario: Scenario | None = field(default=None, compare=False, repr=False)
+    """The scenario that the task comes from, if any."""
+
+    @classmethod
+    def from_scenario(
+        cls, scenario: Scenario, belt_speeds: tuple[float, float] | None = None
+    ) -> Self:
+        """Return the task of a scenario.
+
+        Parameters
+        ----------
+        scenario : Scenario
+            Source of drive, rate, delay and force limit.
+        belt_speeds : tuple[float, float], optional
+            Lowest and highest belt speed, m/s; by default 10 % below and above the scenario's.
+
+        Returns
+        -------
+        Task
+            The task.
+
+        Raises
+        ------
+        InvalidInputError
+            If the speeds are not a range above zero, if they are omitted and the scenario's belt
+            is at rest, or if a design does not cover the scenario's control law.
+        """
+        plant, law = scenario.plant, scenario.control_law
+        if law is None:
+            raise InvalidInputError(
+                "plant.expects_control = False: without control there are no gains"
+            )
+        if not isinstance(law, Washout):
+            raise InvalidInputError(
+                f"control law = {law.name} is refused: must be {Washout.name}, "
+                "whose gains a design proposes"
+            )
+        if belt_speeds is None:
+            own = abs(plant.belt_speed)
+            if own == 0.0:
+                raise InvalidInputError(
+                    "plant.belt_speed = 0: gains are for a moving belt, so speeds must be given"
+                )
+            belt_speeds = (own * (1.0 - OWN_SPEED_RANGE), own * (1.0 + OWN_SPEED_RANGE))
+        low, high = belt_speeds
+        if not SMALLEST <= low <= high <= LARGEST:
+            raise InvalidInputError(
+                f"belt speeds {low:g} to {high:g} m/s: must be from {SMALLEST:g} to {LARGEST:g}, "
+                "the lower first"
+            )
+        return cls(
+            plant.as_drive(),
+            plant.rate,
+            plant.force_delay,
+            min(law.force_limit, plant.as_actuator().limit),
+            (low, high),
+            plant.as_sensor(),
+            scenario,
+        )
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether noise or rounding keep the loop from resting."""
+        rounded = self.sensor.position_resolution or self.drive.actuator.resolution
+        return bool(rounded or self.sensor.position_noise or self.sensor.velocity_noise)
+
+    def drives(self) -> list[Drive]:
+        """Return the drive at five speeds across the range, or at the only one."""
+        low, high = self.belt_speeds
+        speeds = np.linspace(low, high, 5 if low < high else 1)
+        return [replace(self.drive, belt_speed=speed) for speed in speeds.tolist()]
+
+
 class Candidates:
     """Gains by theory: from the linear loops of the speed range, and the vibrations there."""
 
     def __init__(self, task: Task, vibrations: Sequence[Vibration]) -> None:
-        self.vibrations = vibrations
-        self.loops = [
-            loop for vibration in vibrations if (loop := task.linear_loop(vibration.drive))
-        ]
-        self.task = task
+        self.task, self.vibrations = task, vibrations
+        loops = (
+            LinearSampledLoop.from_drive(each.drive, task.rate, task.force_delay, task.sensor)
+            for each in vibrations
+        )
+        self.loops = [loop for loop in loops if loop is not None]
         # The loops differ in the slope of the friction only: the two extreme ones decide.
         slopes = [float(loop.jacobian[SPEED, SPEED]) for loop in self.loops]
         ends = sorted({int(np.argmin(slopes)), int(np.argmax(slopes))})
@@ -70,7 +166,7 @@ class Candidates:
 
         They have three digits, and are zero if nothing vibrates. None if no gains are stable.
         """
-        if not any(vibration.vibrates for vibration in self.vibrations):
+        if not self._vibrates:
             none = WashoutGains(rounded(self.task.drive.angular_frequency), 0.0, 0.0)
             if self.slowest(none).decay_rate(none) > 0.0:
                 return none
@@ -87,19 +183,19 @@ class Candidates:
 
     def why_zero(self) -> str:
         """Return the reason for zero gains."""
-        if any(vibration.vibrates for vibration in self.vibrations):
+        if self._vibrates:
             return "no gains within the force limit damp faster than none"
         distances = {
             abs(log10(ratio)): hopf_distance(vibration.drive)
             for vibration in self.vibrations
             if (ratio := hopf_ratio(vibration.drive)) is not None
         }
-        said = ["nothing vibrates without control at these belt speeds: the gains are zero"]
-        if distances:
-            nearest = min(distances)
-            little = ", with a very small margin" if nearest < log10(1.05) else ""
-            said.append(distances[nearest] + little)
-        return "; ".join(said)
+        said = "nothing vibrates without control at these belt speeds: the gains are zero"
+        if not distances:
+            return said
+        nearest = min(distances)
+        little = ", with a very small margin" if nearest < log10(1.05) else ""
+        return f"{said}; {distances[nearest]}{little}"
 
     def why_none(self) -> str:
         """Return why no gains are stable at all speeds within the force limit."""
@@ -115,11 +211,15 @@ class Candidates:
                 "no linear gain makes the equilibrium stable at all these belt speeds, at this "
                 "rate and delay"
             )
+        limit = number_text(self.task.drive, self.task.force_limit, "N")
         return (
-            f"the force limit of {self.task.shown(self.task.force_limit, 'N')} is too small for "
-            "gains that make the equilibrium stable at all these belt speeds and suppress the "
-            "vibration"
+            f"the force limit of {limit} is too small for gains that make the equilibrium stable "
+            "at all these belt speeds and suppress the vibration"
         )
+
+    @property
+    def _vibrates(self) -> bool:
+        return any(vibration.vibrates for vibration in self.vibrations)
 
     def _fastest(self, strength: float, cubic: float) -> WashoutGains:
         """Return the fastest gains: from five grids, each refined around the best point so far."""
@@ -159,8 +259,7 @@ class Candidates:
         """
         if corner_frequency not in self._peaks:
             self._peaks[corner_frequency] = max(
-                float(np.abs(vibration.filtered(corner_frequency)).max(initial=0.0))
-                for vibration in self.vibrations
+                vibration.peak_speed(corner_frequency) for vibration in self.vibrations
             )
         peak, limit = self._peaks[corner_frequency], strength * self.task.force_limit
         gain = limit / peak + cubic * peak**2 if peak > 0.0 else inf
@@ -184,3 +283,59 @@ def rounded(value: float, digits: int = 3, *, up: bool = False) -> float:
         unit = 10.0 ** (floor(log10(value)) + 1 - digits)
         value = ceil(value / unit) * unit
     return float(f"{value:.{digits}g}")
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Smallest gain and delay margins of a set of stable loops."""
+
+    gain_down: float | None
+    """Largest factor below one of the linear gain at which a loop is unstable; None: no such."""
+    gain_up: float | None
+    """Smallest factor above one of the linear gain at which a loop is unstable; None: no such."""
+    delay: float | None
+    """Delay margin: smallest additional delay of the force at which a loop is unstable, s; None: no
+    such within half a natural period, or within the range of the theory."""
+
+
+def margins(loops: Sequence[LinearSampledLoop], gains: WashoutGains) -> Margins:
+    """Return the margins of loops that are stable with these gains (SI units)."""
+    factors = [
+        end / gains.linear
+        for loop in loops
+        for interval in loop.stable_linear_gains(gains.corner_frequency)
+        if interval.low < gains.linear < interval.high
+        for end in interval
+    ]
+    delays = [delay for loop in loops if (delay := _delay_margin(loop, gains)) is not None]
+    return Margins(
+        gain_down=max((factor for factor in factors if 0.0 < factor < 1.0), default=None),
+        gain_up=min((factor for factor in factors if factor > 1.0), default=None),
+        delay=min(delays, default=None),
+    )
+
+
+def _delay_margin(loop: LinearSampledLoop, gains: WashoutGains) -> float | None:
+    def decay_rate(further: float) -> float:
+        return replace(loop, force_delay=loop.force_delay + further).decay_rate(gains)
+
+    further = np.linspace(0.0, loop.drive.natural_period / 2.0, 33).tolist()
+    for shorter, longer in pairwise(further):
+        if why_no_linear_loop(loop.drive, loop.rate, loop.force_delay + longer) is not None:
+            return None
+        if decay_rate(longer) < 0.0:
+            return zero_between(decay_rate, shorter, longer)
+    return None
+
+
+def little_margin(task: Task, found: Margins) -> str | None:
+    """Return a remark on loops with a small margin; None if all margins are large enough."""
+    little = [
+        f"{factor:.3g} times the linear gain is unstable"
+        for factor in (found.gain_down, found.gain_up)
+        if factor is not None and 1.0 / 1.1 < factor < 1.1
+    ]
+    if found.delay is not None and found.delay < 0.02 * task.drive.natural_period:
+        delay = number_text(task.drive, found.delay, "s")
+        little.append(f"an additional delay of {delay} makes it unstable")
+    return f"the margin is very small: {', '.join(little)}" if little else None

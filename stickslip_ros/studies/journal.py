@@ -5,12 +5,15 @@ import json
 import os
 import stat
 from array import array
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import astuple
+from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryFile
 from types import TracebackType
 from typing import Any, BinaryIO, Self
+from zlib import crc32
 
 import numpy as np
 
@@ -19,16 +22,16 @@ from stickslip_ros.studies.settling import MotionState
 from stickslip_ros.studies.study import Piece, Point, Study
 from stickslip_ros.versions import versions
 
-_FORMAT = "stickslip_ros study 1"
+_OPENING, _VERSION = b'{"format": "stickslip_ros study ', b'2"'
 _NO_JOURNAL = "exists already, and is not the journal of a study"
 
 
 class Journal:
-    """The computed points of a study, in a file of JSON lines; a context manager.
+    """The computed points of a study, in a file of lines; a context manager.
 
-    The first line describes the study, and each further line holds a piece. An unfinished last
-    line, of a writer that was killed, is removed. Memory holds one bit for each point and two
-    numbers for each piece.
+    The first line describes the study, and each further line holds a piece; both are JSON, and a
+    checksum of it and of its place. An unfinished last line, of a writer that was killed, is
+    removed. Memory holds one bit for each point and two numbers for each piece.
 
     Examples
     --------
@@ -57,8 +60,8 @@ class Journal:
         Raises
         ------
         InvalidInputError
-            If the file is not a journal of this study, another process writes it, or it cannot be
-            written.
+            If the file is not a journal of this study or has been changed, another process writes
+            it, or it cannot be written.
         """
         self.study = study
         """The study."""
@@ -67,7 +70,8 @@ class Journal:
         self._done = bytearray((study.plan.size + 7) // 8)
         self._firsts, self._offsets = array("Q"), array("Q")
         self._ends: dict[int, MotionState | None] = {}
-        self._path = path
+        self.path = path
+        """The file; None for a temporary one."""
         try:
             self._file = _opened(path)
         except OSError as error:
@@ -135,21 +139,23 @@ class Journal:
         line = {"points": [point.as_json() for point in piece.points], "end": end}
         self._file.seek(0, os.SEEK_END)
         offset = self._file.tell()
-        self._file.write(json.dumps(line, separators=(",", ":")).encode() + b"\n")
+        self._file.write(_line(json.dumps(line, separators=(",", ":")).encode(), offset))
         self._file.flush()
         self._enter(offset, [point.number for point in piece.points], piece.end)
 
     def points(self) -> Iterator[Point]:
         """Yield the points that are done, in order of their index."""
         for line in np.argsort(self._firsts):
-            self._file.seek(self._offsets[line])
-            found = [Point.from_json(values) for values in _parsed(self._file.readline())["points"]]
+            offset = self._offsets[line]
+            self._file.seek(offset)
+            with self._unchanged(offset):
+                found = _piece(self._file.readline(), offset).points
             yield from sorted(found, key=lambda point: point.number)
 
     def discard(self) -> None:
-        """Remove the file, after its contents were saved elsewhere."""
-        if self._path is not None:
-            self._path.unlink()
+        """Remove the file, after its contents were saved or printed."""
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)
 
     def _enter(self, offset: int, indices: Sequence[int], end: MotionState | None) -> None:
         for index in indices:
@@ -157,56 +163,77 @@ class Journal:
         self.count += len(indices)
         self._firsts.append(min(indices))
         self._offsets.append(offset)
-        if self.study.plan.carried:
+        if self.study.plan.continuation:
             # Of a chain only the newest end is needed, in either direction.
             for neighbour in (indices[0] - 1, indices[0] + 1):
                 self._ends.pop(neighbour, None)
             self._ends[indices[-1]] = end
 
     def _read(self) -> None:
-        header = {"format": _FORMAT, "versions": versions(), **self.study.as_dict()}
-        opening = json.dumps(header).encode() + b"\n"
-        first = self._file.readline()
+        text = _heading(self.study)
+        opening, first = _line(text, 0), self._file.readline()
         if first != opening and opening.startswith(first):
             self._file.seek(0)
             self._file.write(opening)
             self._file.flush()
             return
-        self._compare(json.loads(opening), first)
-        while True:
-            offset = self._file.tell()
-            line = self._file.readline()
-            if not line.endswith(b"\n"):
-                break
-            try:
-                read = _parsed(line)
-                end = None if read["end"] is None else MotionState.from_json(read["end"])
-                indices = [Point.from_json(values).number for values in read["points"]]
+        self._compare(json.loads(text), first)
+        offset = len(first)
+        while (line := self._file.readline()).endswith(b"\n"):
+            with self._unchanged(offset):
+                piece = _piece(line, offset)
+                indices = [point.number for point in piece.points]
                 if not 0 <= min(indices) <= max(indices) < self.study.plan.size:
                     raise ValueError
-                repeated = any(self.is_done(index) for index in indices)
-            except (ValueError, LookupError, TypeError):
-                raise InvalidInputError(
-                    f"{self._path}: the line at byte {offset} is not a piece of a study"
-                ) from None
-            if not repeated:
-                self._enter(offset, indices, end)
+                if not any(self.is_done(index) for index in indices):
+                    self._enter(offset, indices, piece.end)
+            offset += len(line)
         self._file.seek(offset)
         self._file.truncate()
 
     def _compare(self, header: Mapping[str, Any], line: bytes) -> None:
-        try:
-            found = _parsed(line)
-        except ValueError:
-            found = {}
-        if found.get("format") != _FORMAT:
-            raise InvalidInputError(f"{self._path}: {_NO_JOURNAL}")
-        differences = ", ".join(_differences(found, header))
+        if not line.startswith(_OPENING):
+            raise InvalidInputError(f"{self.path}: {_NO_JOURNAL}")
+        if not line.startswith(_OPENING + _VERSION):
+            raise InvalidInputError(
+                f"{self.path}: is the journal of another version of stickslip_ros; finish the "
+                "study with that version, or remove this journal of it"
+            )
+        with self._unchanged(0):
+            differences = ", ".join(_differences(_parsed(line, 0), header))
         if differences:
             raise InvalidInputError(
-                f"{self._path}: belongs to another study, which differs in {differences}; finish "
-                "that study, or remove the file"
+                f"{self.path}: belongs to another study, which differs in {differences}; finish "
+                "that study, or remove this journal of it"
             )
+
+    @contextmanager
+    def _unchanged(self, offset: int) -> Generator[None]:
+        """Refuse a line that is not as it was written."""
+        try:
+            yield
+        except (ValueError, LookupError, TypeError):
+            raise InvalidInputError(
+                f"{self.path}: the line at byte {offset} is not as it was written; cut the file "
+                f"there, with truncate -s {offset}, to keep the points before it"
+            ) from None
+
+
+def kept_journal(study: Study) -> Journal:
+    """Return the journal of a study in the user's cache; a temporary one if that is not to be."""
+    name = f"{study.scenario.name}-{sha256(_heading(study)).hexdigest()[:16]}.part"
+    try:
+        cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        path = Path(cache, "stickslip_ros", name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return Journal(study, path)
+    except (OSError, RuntimeError, InvalidInputError):  # no home, or the same study runs elsewhere
+        return Journal(study)
+
+
+def _heading(study: Study) -> bytes:
+    heading = {"versions": versions(), **study.as_dict(), **study.contents()}
+    return _OPENING + _VERSION + b", " + json.dumps(heading).encode()[1:]
 
 
 def _opened(path: Path | None) -> BinaryIO:
@@ -228,14 +255,26 @@ def _opened(path: Path | None) -> BinaryIO:
     return file
 
 
-def _parsed(line: bytes) -> dict[str, Any]:
+def _line(text: bytes, offset: int) -> bytes:
+    """Return a text as a line that belongs at one offset of the file, with its checksum."""
+    return b"%s %08x\n" % (text, crc32(text, offset))
+
+
+def _parsed(line: bytes, offset: int) -> dict[str, Any]:
+    """Return the values of a line; raises ValueError if it is not as it was written."""
+    text = line[:-10]
+    if line != _line(text, offset):
+        raise ValueError
     try:
-        found = json.loads(line)
+        return json.loads(text)
     except RecursionError:
         raise ValueError from None
-    if not isinstance(found, dict):
-        raise ValueError
-    return found
+
+
+def _piece(line: bytes, offset: int) -> Piece:
+    values = _parsed(line, offset)
+    end = None if values["end"] is None else MotionState.from_json(values["end"])
+    return Piece([Point.from_json(each) for each in values["points"]], end)
 
 
 def _differences(found: Mapping[str, Any], expected: Mapping[str, Any]) -> Iterator[str]:

@@ -13,7 +13,7 @@ LONGEST = 1e6
 
 
 @dataclass(frozen=True)
-class SettlingCourse:
+class SettlingOptions:
     """How long a motion is simulated until it is measured.
 
     Raises
@@ -23,8 +23,8 @@ class SettlingCourse:
 
     Examples
     --------
-    >>> SettlingCourse(transient=50.0, patience=80)
-    SettlingCourse(transient=50.0, cycles=4, patience=80)
+    >>> SettlingOptions(transient=50.0, patience=80)
+    SettlingOptions(transient=50.0, cycles=4, patience=80)
     """
 
     transient: float = 200.0
@@ -49,7 +49,7 @@ class SettlingCourse:
 DEFAULT_PERIODS = 200.0
 """Default duration of a simulation, in natural periods."""
 
-BASIN_COURSE = SettlingCourse(transient=50.0, patience=80)
+BASIN_OPTIONS = SettlingOptions(transient=50.0, patience=80)
 """Default settling of a basin study: short at first, since most motions are steady soon."""
 
 BASIN_COUNT = 40
@@ -59,7 +59,7 @@ OWN_SPEED_RANGE = 0.1
 """Default half width of the speed range, as a share of the scenario's belt speed."""
 
 
-class Carry(StrEnum):
+class Continuation(StrEnum):
     """Direction along an axis in which each point starts from the end of its neighbour."""
 
     UP = "up"
@@ -70,6 +70,6 @@ class Carry(StrEnum):
     """Up, then down in a chain of its own: a difference between the two shows hysteresis."""
 
     @property
-    def directions(self) -> tuple["Carry", ...]:
+    def directions(self) -> tuple["Continuation", ...]:
         """UP, DOWN, or both."""
-        return (Carry.UP, Carry.DOWN) if self is Carry.BOTH else (self,)
+        return (Continuation.UP, Continuation.DOWN) if self is Continuation.BOTH else (self,)

@@ -4,17 +4,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import isfinite, prod
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.deprecated_names import moved_from
 from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.parameter_field import Parameter, known_parameters
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
-from stickslip_ros.studies.options import Carry
-from stickslip_ros.text import by_group, did_you_mean
+from stickslip_ros.studies.options import Continuation
+from stickslip_ros.text import by_group, did_you_mean, shown
 
 MOST_POINTS = 1_000_000_000
 """Largest number of points of a study, since its results must fit into a file."""
@@ -43,7 +43,7 @@ class Axis:
     parameter: str
     """NODE.PARAMETER, a number of the plant or a controller."""
     first: float
-    """First value, in the unit of the parameter."""
+    """First value, in the unit of the parameter; or a text with a unit, such as "30mm/s"."""
     last: float
     """Last value; it may be below the first."""
     count: int
@@ -53,6 +53,9 @@ class Axis:
 
     def __post_init__(self) -> None:
         parameter, model = self._parameter, NODE_PARAMETERS[self.parameter.partition(".")[0]]
+        for end in ("first", "last"):
+            number = number_of(self.parameter, getattr(self, end), parameter.unit)
+            object.__setattr__(self, end, number)
         ends = f"{self.first:g}:{self.last:g}"
         if not (isfinite(self.first) and isfinite(self.last)) or self.first == self.last:
             raise InvalidInputError(f"{self}: {ends} must be two different finite numbers")
@@ -60,7 +63,9 @@ class Axis:
             raise InvalidInputError(
                 f"{self}: {self.count} values: must be from 2 to {MOST_POINTS:,}"
             )
-        if self._parameter.kind is int and self.count > abs(self.last - self.first) + 1.0:
+        if self.whole and not (float(self.first).is_integer() and float(self.last).is_integer()):
+            raise InvalidInputError(f"{self}: {ends} must be two whole numbers")
+        if self.whole and self.count > abs(self.last - self.first) + 1.0:
             raise InvalidInputError(f"{self}: there are fewer whole numbers from {ends}")
         if self.logarithmic and not self.first * self.last > 0.0:
             raise InvalidInputError(f"{self}: with :log {ends} must have one sign and exclude zero")
@@ -99,16 +104,16 @@ class Axis:
         3
         """
         parameter, _, values = text.partition("=")
-        first, last, count, *spacing = [*values.split(":"), "", ""]
+        parts: list[Any] = [*values.split(":"), "", ""]
+        first, last, count, *spacing = parts
         try:
             if spacing not in (["", ""], ["log", "", ""]):
                 raise ValueError
-            ends, number = (float(first), float(last)), int(count)
+            return cls(parameter, first, last, int(count), spacing[0] == "log")
         except ValueError:
             raise InvalidInputError(
                 f"{text:.80}: must be NODE.PARAMETER=A:B:COUNT, or A:B:COUNT:log"
             ) from None
-        return cls(parameter, *ends, number, spacing[0] == "log")
 
     def value(self, number: int) -> float:
         """Return one of the values.
@@ -123,8 +128,7 @@ class Axis:
         float
             The value in the unit of the parameter, rounded if that is a whole number.
         """
-        value = self.last if number == self.count - 1 else self.at(number / (self.count - 1))
-        return round(value) if self._parameter.kind is int else value
+        return self.at(number / (self.count - 1))
 
     def at(self, share: float) -> float:
         """Return the value at some share of the way along the axis.
@@ -137,15 +141,24 @@ class Axis:
         Returns
         -------
         float
-            The value in the unit of the parameter, not rounded.
+            The value in the unit of the parameter, rounded if that is a whole number.
         """
-        if self.logarithmic:
-            return self.first * (self.last / self.first) ** share
-        return self.first + (self.last - self.first) * share
+        if share == 1.0:
+            value = self.last
+        elif self.logarithmic:
+            value = self.first * (self.last / self.first) ** share
+        else:
+            value = self.first + (self.last - self.first) * share
+        return round(value) if self.whole else value
 
     def values(self) -> FloatArray:
         """Return all values, as an array of shape (count,)."""
         return np.array([self.value(number) for number in range(self.count)], dtype=float)
+
+    @property
+    def whole(self) -> bool:
+        """Whether the parameter is a whole number."""
+        return self._parameter.kind is int
 
     @property
     def unit(self) -> str:
@@ -173,6 +186,27 @@ class Axis:
         return known[name]
 
 
+@dataclass(frozen=True)
+class ListedAxis(Axis):
+    """Values of one parameter that rise or fall, by no rule."""
+
+    listed: tuple[float, ...] = ()
+    """The values."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len({*np.sign(np.diff(self.listed)).tolist()}) > 1:
+            raise InvalidInputError(f"{self}: the values must rise, or fall")
+
+    def __str__(self) -> str:
+        return f"{self.parameter}={shown(list(self.listed))}"
+
+    def value(self, number: int) -> float:
+        """Return one of the values; see `Axis.value`."""
+        value = self.listed[number]
+        return int(value) if self._parameter.kind is int and value == int(value) else value
+
+
 def _numbers(*nodes: str) -> Iterator[str]:
     """Yield the parameters of nodes that are numbers, as NODE.PARAMETER."""
     for node in nodes:
@@ -185,8 +219,8 @@ def _numbers(*nodes: str) -> Iterator[str]:
 class Grid:
     """All combinations of the values of one or more axes; the last axis varies fastest.
 
-    With `carry`, points follow each other along the last axis, and the grid has all points of
-    one direction, then all points of the other.
+    With a `continuation`, points follow each other along the last axis, and the grid has all points
+    of one direction, then all points of the other.
 
     Examples
     --------
@@ -201,8 +235,8 @@ class Grid:
     """Name of this kind of plan in journals and tables."""
     axes: tuple[Axis, ...]
     """The axes."""
-    carry: Carry | None = None
-    """Direction in which points are carried on; None: each starts in the initial state."""
+    continuation: Continuation | None = None
+    """Direction in which points follow each other; None: each starts in the initial state."""
 
     def __post_init__(self) -> None:
         _check_different(self.parameters)
@@ -215,9 +249,9 @@ class Grid:
         return tuple(axis.parameter for axis in self.axes)
 
     @property
-    def directions(self) -> tuple[Carry | None, ...]:
-        """Directions in which the points are carried on; one None if they are not."""
-        return (None,) if self.carry is None else self.carry.directions
+    def directions(self) -> tuple[Continuation | None, ...]:
+        """Directions in which the points follow each other; one None if they do not."""
+        return (None,) if self.continuation is None else self.continuation.directions
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -229,13 +263,8 @@ class Grid:
         """Number of points."""
         return len(self.directions) * prod(self.shape)
 
-    @property
-    def carried(self) -> bool:
-        """Whether each point of a chain starts where the previous one ended."""
-        return self.carry is not None
-
-    def direction(self, index: int) -> Carry | None:
-        """Return the direction in which a point is carried on.
+    def direction(self, index: int) -> Continuation | None:
+        """Return the direction in which a point follows its neighbour.
 
         Parameters
         ----------
@@ -244,8 +273,8 @@ class Grid:
 
         Returns
         -------
-        Carry or None
-            UP or DOWN; None if the grid is not carried on.
+        Continuation or None
+            UP or DOWN; None without a continuation.
         """
         return self.directions[index // prod(self.shape)]
 
@@ -277,14 +306,14 @@ class Grid:
             yield index
 
     def chains(self) -> Iterator[range]:
-        """Yield the indices of each chain in its order; without `carry`, all indices together."""
-        if self.carry is None:
+        """Yield the indices of each chain in its order; without a continuation, all together."""
+        if self.continuation is None:
             yield range(self.size)
             return
         count = self.axes[-1].count
         for first in range(0, self.size, count):
             points = range(first, first + count)
-            yield points[::-1] if self.direction(first) is Carry.DOWN else points
+            yield points[::-1] if self.direction(first) is Continuation.DOWN else points
 
 
 @dataclass(frozen=True)
@@ -303,6 +332,8 @@ class RandomSample:
 
     kind: ClassVar[str] = "sample"
     """Name of this kind of plan in journals and tables."""
+    continuation: ClassVar[None] = None
+    """None: the points of a sample are independent."""
     axes: tuple[Axis, ...]
     """The ranges; their counts do not matter."""
     size: int
@@ -321,11 +352,6 @@ class RandomSample:
     def parameters(self) -> tuple[str, ...]:
         """NODE.PARAMETER of the axes."""
         return tuple(axis.parameter for axis in self.axes)
-
-    @property
-    def carried(self) -> bool:
-        """Always false: the points of a sample are independent."""
-        return False
 
     def values(self, index: int) -> tuple[float, ...]:
         """Return the values of the parameters at a point.
@@ -361,6 +387,3 @@ Plan = Grid | RandomSample
 def _check_different(parameters: Sequence[str]) -> None:
     if len(set(parameters)) < len(parameters):
         raise InvalidInputError(f"{', '.join(parameters)}: must be different parameters")
-
-
-__getattr__ = moved_from(__name__)

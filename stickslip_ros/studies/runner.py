@@ -1,5 +1,6 @@
 """Running a study: in this process, in several local processes, or through an executor."""
 
+import logging
 import signal
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import (
@@ -11,11 +12,12 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     wait,
 )
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from multiprocessing import active_children, get_context, parent_process
 from os import _exit
 from threading import Thread
+from typing import Any, cast
 
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.studies.journal import Journal
@@ -31,12 +33,18 @@ _LARGEST_TASK = 1000
 _SCANNED = 100_000
 """Largest number of points to scan before the missing ones among them are started."""
 
+_DASK_TIMEOUT = "10s"
+
 CountPoints = Callable[[int], None]
 """A function that receives the number of points that are done."""
 
 
 class WorkersDiedError(RunError):
     """An executor has lost its workers."""
+
+
+class DaskError(RunError):
+    """A task has killed several workers of a cluster."""
 
 
 def run(
@@ -98,7 +106,7 @@ def run(
         if points is not None:
             waiting[executor.submit(compute, study, points, chain.start)] = chain
 
-    if study.plan.carried:
+    if study.plan.continuation:
         parallel = chains
     else:  # the pieces are independent
         parallel = (_Chain(iter((piece,)), None) for chain in chains for piece in chain.pieces)
@@ -111,7 +119,7 @@ def run(
             for task in wait(waiting, return_when=FIRST_COMPLETED).done:
                 piece, chain = task.result(), waiting.pop(task)
                 chain.start = _record(journal, piece, progress)
-                if study.plan.carried:
+                if study.plan.continuation:
                     submit(chain)
     except (BrokenExecutor, CancelledError) as error:
         raise WorkersDiedError(
@@ -173,10 +181,44 @@ def local_processes(workers: int) -> Generator[ProcessPoolExecutor]:
     except BaseException:
         for child in set(active_children()) - others:
             child.terminate()
+        # If one has ended within a result, the pool would wait for the rest of it.
+        cast(Any, pool)._result_queue._writer.close()
         pool.shutdown(cancel_futures=True)
         raise
     else:
         pool.shutdown()
+
+
+@contextmanager
+def dask_executor(address: str) -> Generator[tuple[Executor, int]]:
+    """Connect to the Dask scheduler at `address`; provide the executor and its tasks in flight.
+
+    A task whose worker dies is computed again by another worker. Raises InvalidInputError if
+    no scheduler answers or distributed is not installed, and DaskError for a task that has killed
+    several workers.
+    """
+    try:
+        from distributed import Client, KilledWorker
+    except ImportError:
+        raise InvalidInputError(
+            f"{address}: Dask is not installed: pip install 'stickslip_ros[dask]'"
+        ) from None
+    logger = logging.getLogger("distributed")
+    with ExitStack() as stack:
+        # Dask logs errors with tracebacks; they are raised here instead.
+        stack.callback(logger.setLevel, logger.level)
+        logger.setLevel(logging.CRITICAL)
+        try:
+            client = Client(address, timeout=_DASK_TIMEOUT)
+        except (OSError, ValueError) as error:
+            reason = " ".join(str(error).split()) or "nothing answers"
+            raise InvalidInputError(f"{address}: no scheduler found: {reason}") from None
+        with client:
+            threads: Any = client.nthreads()
+            try:
+                yield client.get_executor(), max(2 * sum(threads.values()), IN_FLIGHT)
+            except KilledWorker as error:
+                raise DaskError(f"{address}: {error}") from None
 
 
 def _begin_worker() -> None:
@@ -201,9 +243,9 @@ class _Chain:
 
 def _missing(journal: Journal) -> Iterator[tuple[range, MotionState | None]]:
     """Yield runs of missing points, and the state in which the first point of each starts."""
-    carried = journal.study.plan.carried
+    continuation = journal.study.plan.continuation
     chains = journal.study.plan.chains()
-    if not carried:
+    if not continuation:
         chains = (part for points in chains for part in pieces_of(points, _SCANNED))
     for points in chains:
         first = 0
@@ -211,7 +253,7 @@ def _missing(journal: Journal) -> Iterator[tuple[range, MotionState | None]]:
             if place < len(points) and not journal.is_done(points[place]):
                 continue
             if first < place:
-                start = journal.state_after(points[first - 1]) if carried and first > 0 else None
+                start = journal.state_after(points[first - 1]) if continuation and first else None
                 yield points[first:place], start
             first = place + 1
 
@@ -224,7 +266,7 @@ def _record(journal: Journal, piece: Piece, progress: CountPoints) -> MotionStat
 
 def _task_size(journal: Journal, in_flight: int) -> int:
     size = min(int(0.25 / journal.study.cost()), _LARGEST_TASK)  # tasks of about 0.25 s
-    if in_flight > 1 and not journal.study.plan.carried:
+    if in_flight > 1 and not journal.study.plan.continuation:
         # At least 16 tasks for each worker, so that all workers end at about the same time.
         size = min(size, journal.study.plan.size // (16 * in_flight // 2))
     return max(size, 1)

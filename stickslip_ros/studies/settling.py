@@ -1,7 +1,7 @@
 """The motion that a drive settles on from one start: a point of a sweep or basin study."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from math import inf
 from typing import Any, NamedTuple, Self
 
@@ -17,20 +17,24 @@ from stickslip_ros.physics.loop.controller import (
 )
 from stickslip_ros.physics.loop.reference import ReferenceKind
 from stickslip_ros.physics.loop.simulation import measure_block, simulate_sampled
-from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, CycleMeter, Measures, Regime
-from stickslip_ros.physics.measures.observer import MeasuredMotion
+from stickslip_ros.physics.measures.cycle_measures import (
+    LEAST_CYCLES,
+    RESTS,
+    CycleMeter,
+    Measures,
+    Regime,
+)
+from stickslip_ros.physics.measures.sample_meter import MeasuredMotion
 from stickslip_ros.physics.model.control import ContinuousControl, ControlLaw
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.physics.theory.cycle_bounds import loading_time, release_position
 from stickslip_ros.scenarios.files import Scenario
 from stickslip_ros.scenarios.parameters import PlantParameters
-from stickslip_ros.studies.options import DEFAULT_PERIODS, LONGEST, SettlingCourse
+from stickslip_ros.studies.options import DEFAULT_PERIODS, LONGEST, SettlingOptions
 
 CYCLES = (Regime.STICK_SLIP, Regime.PURE_SLIP)
 """Regimes of a limit cycle, which has an amplitude."""
-
-_RESTS = (Regime.EQUILIBRIUM, Regime.STUCK)
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,8 @@ class ControlledDrive:
     """Reference of the control law."""
     duration: float = inf
     """Duration of the scenario, s: the scale of time of a drive without a spring."""
+    meter: Callable[[int], CycleMeter] = field(default=CycleMeter, compare=False)
+    """Returns what measures the last cycles, given their number."""
 
     @classmethod
     def from_scenario(cls, scenario: Scenario, *, continuous: bool = False) -> "ControlledDrive":
@@ -91,7 +97,8 @@ class ControlledDrive:
         if law is not None and law.follows_reference:
             check_reference(scenario)
             reference = scenario.controller.as_reference()
-        return cls(drive, law, plant if sampled else None, reference, plant.duration)
+        loop = plant if sampled else None
+        return cls(drive, law, loop, reference, plant.duration, scenario.cycle_meter)
 
     @property
     def period(self) -> float:
@@ -168,7 +175,7 @@ class Settled(NamedTuple):
         return _is_settled(self.measures)
 
 
-def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) -> Settled:
+def settle(case: ControlledDrive, start: MotionState, course: SettlingOptions) -> Settled:
     """Simulate the motion from `start` and measure it after the transient.
 
     Raises RunError if the motion is too stiff to integrate.
@@ -212,7 +219,7 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) ->
 
     def observe() -> _Section:
         motion.recording = False
-        section = _Section(course.cycles, once=not drive.has_spring)
+        section = _Section(case.meter(course.cycles), course.cycles, once=not drive.has_spring)
         advance(transient, section)
         if motion.sticking and not controlled and loads:
             left = (release_position(drive) - motion.position) / drive.belt_speed
@@ -232,12 +239,12 @@ def settle(case: ControlledDrive, start: MotionState, course: SettlingCourse) ->
     for _ in range(course.patience - 1):
         before, section = section.meter.measures(), observe()
         measures = section.meter.measures()
-        if _is_settled(measures) and _alike(before, measures):
+        if _is_settled(measures) and _alike(before, measures, section.meter.drift.resolution):
             break
     state = motion.control_state if control is not None else None
     if controller is not None and loop is not None:
         answer(loop, controller)
-        state = controller.state
+        state = tuple(map(float, controller.state))  # also those of a law that uses numpy
     end = MotionState(motion.position, motion.velocity, state, motion.memory)
     return section.settled(end)
 
@@ -257,24 +264,24 @@ def _start_control(
 def _is_settled(measures: Measures) -> bool:
     """Return whether a motion is steady; a motion at rest after its transient is."""
     if measures.steady is None:
-        return measures.regime in _RESTS
+        return measures.regime in RESTS
     return measures.steady
 
 
-def _alike(before: Measures, after: Measures) -> bool:
-    """Return whether regime and amplitude agree."""
+def _alike(before: Measures, after: Measures, resolution: float) -> bool:
+    """Return whether regime and amplitude agree, these within the resolution (m) of the sensor."""
     one, other = before.amplitude, after.amplitude
     if before.regime is not after.regime or one is None or other is None:
         return before.regime is after.regime
-    return after.regime not in CYCLES or abs(other - one) <= 1e-4 * other
+    return after.regime not in CYCLES or abs(other - one) <= max(1e-4 * other, resolution)
 
 
 class _Section:
     """Measures a motion, keeps its Poincare section, and counts the measured cycles."""
 
-    def __init__(self, cycles: int, *, once: bool = False) -> None:
+    def __init__(self, meter: CycleMeter, cycles: int, *, once: bool = False) -> None:
         """Measure at least `cycles`; keep a turning point `once` if the slide sticks there."""
-        self.meter = CycleMeter(cycles)
+        self.meter = meter
         self._missing, self._once = max(cycles, LEAST_CYCLES), once
         self._sections = [np.empty(0)]
 
@@ -290,7 +297,7 @@ class _Section:
     @property
     def done(self) -> bool:
         """Whether there are enough cycles, or no more will follow."""
-        return self._missing <= 0 or self.meter.measures().regime in _RESTS
+        return self._missing <= 0 or self.meter.measures().regime in RESTS
 
     def settled(self, end: MotionState) -> Settled:
         """Return the settled motion, which ended in the state `end`."""
@@ -298,6 +305,6 @@ class _Section:
         section = np.concatenate(self._sections)
         if measures.regime is Regime.UNBOUNDED:
             section = np.empty(0)
-        elif measures.regime is Regime.EQUILIBRIUM:
+        elif measures.regime in (Regime.EQUILIBRIUM, Regime.HELD):
             section = np.array([measures.midpoint])
         return Settled(measures, section, end)

@@ -1,17 +1,25 @@
 """Simulation of a scenario's closed loop without ROS, measured on the motion itself."""
 
+import csv
 from math import isfinite
+from typing import TextIO
+
+from typing_extensions import override
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.loop.motion_tracer import MotionTracer
-from stickslip_ros.physics.loop.simulation import simulate_continuous, simulate_sampled
+from stickslip_ros.physics.loop.simulation import (
+    MotionTracer,
+    simulate_continuous,
+    simulate_sampled,
+)
 from stickslip_ros.physics.loop.trajectory import SampleRecorder
-from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
-from stickslip_ros.physics.measures.observer import RunObserver
+from stickslip_ros.physics.measures.cycle_measures import Measures
+from stickslip_ros.physics.measures.run_meter import RunObserver
 from stickslip_ros.physics.measures.sample_meter import SampleMeter
 from stickslip_ros.physics.motion import RecordedMotion
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.stamps import END_OF_TIME, NANOSECONDS
 from stickslip_ros.studies.options import DEFAULT_PERIODS
 from stickslip_ros.studies.settling import check_continuous, check_reference, unit_period
 
@@ -49,8 +57,9 @@ def simulate(
     sensor tells. Raises InvalidInputError for
     a duration that is not allowed, or if `continuous` control does not support the scenario.
     """
-    if not 0.0 <= duration < float("inf"):
-        raise InvalidInputError(f"a duration of {duration:g} s: must be finite, 0 or more")
+    longest = END_OF_TIME / NANOSECONDS
+    if not 0.0 <= duration <= longest:
+        raise InvalidInputError(f"a duration of {duration:g} s: must be from 0 to {longest:g} s")
     check_reference(scenario)
     if continuous:
         check_continuous(scenario)
@@ -64,7 +73,7 @@ def simulate(
         control,
         scenario.analyzer.given_stick_speed,
     )
-    meter = CycleMeter(scenario.analyzer.window)
+    meter = scenario.cycle_meter(scenario.analyzer.window)
     if continuous:
         return simulate_continuous(motion, law, duration, meter, progress, observer, recorder)
     tracer = None if observer is None else MotionTracer(motion, observer)
@@ -73,3 +82,22 @@ def simulate(
     return simulate_sampled(
         loop, motion, controller, duration, meter, progress, tracer, recorder, told
     )
+
+
+class TrajectoryFile(SampleRecorder):
+    """Writes the samples of a run to a CSV file as they come.
+
+    The first line has the names of its `quantities`. The numbers are in SI units, with all digits.
+    """
+
+    def __init__(
+        self, stream: TextIO, rate: float, every: int = 1, *, measured: bool = False
+    ) -> None:
+        """Write samples as `SampleRecorder` keeps them."""
+        super().__init__(rate, every, measured=measured)
+        self._write = csv.writer(stream, lineterminator="\n").writerow
+        self._write(self.quantities)
+
+    @override
+    def keep(self, row: tuple[float, ...]) -> None:
+        self._write(map(float, row))

@@ -7,16 +7,20 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SPEED
+from stickslip_ros.physics.model.drive_system import POSITION, SPEED
 from stickslip_ros.physics.theory.bifurcation_branches import BifurcationBranches
 from stickslip_ros.physics.theory.closed_forms import CubicLoop
-from stickslip_ros.physics.theory.critical_gains import critical_gains, why_no_linear_gain
+from stickslip_ros.physics.theory.critical_gains import (
+    critical_gains,
+    limit_cycle_from_hopf,
+    why_no_linear_gain,
+)
 from stickslip_ros.physics.theory.gain_intervals import gains_of, why_no_gains
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
-from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import Expansion, expand
 from stickslip_ros.physics.theory.linear_sampled_loop import (
@@ -44,6 +48,8 @@ Notes = dict[str, str]
 """Why a quantity does not exist, or what it omits, by its place in the sections."""
 
 _NO_CONTROL = "the scenario has no controller"
+
+_STICKING = ("onset_speed_approximate", "onset_speed", "speed_ranges", "searched_speeds")
 
 _GAINS = ("critical_linear_gain", "first_lyapunov_coefficient", "critical_cubic_gain")
 
@@ -77,6 +83,9 @@ def stability(scenario: Scenario) -> tuple[Section, Notes]:
         "sampled_loop": _sampled_loop(drive, law, plant, notes),
         "closed_forms": _closed_forms(drive, law),
     }
+    for loop in ("open_loop", "closed_loop"):
+        if found[loop]["stable"] is None and found[loop]["eigenvalues"]:
+            notes[f"{loop}.stable"] = "it is neutral: a small deviation neither decays nor grows"
     omitted = _omitted(plant)
     if omitted and "sampled_loop" not in notes:
         notes["sampled_loop"] = "; ".join(omitted)
@@ -145,9 +154,10 @@ def _places(found: Section) -> Iterator[tuple[str, Any]]:
 
 def _eigenvalues(drive: Drive, expansion: Expansion | None) -> Section:
     if expansion is None:
-        return {"eigenvalues": None, "stable": None}
+        return dict.fromkeys(("equilibrium_position", "eigenvalues", "stable"))
     values = expansion.eigenvalues * drive.angular_frequency
     return {
+        "equilibrium_position": float(expansion.equilibrium[POSITION]) * drive.length_scale,
         "eigenvalues": [[float(value.real), float(value.imag)] for value in values],
         "stable": expansion.stable,
     }
@@ -196,7 +206,7 @@ def _known(value: float) -> float | None:
 def _sticking(drive: Drive, notes: Notes) -> Section:
     onset = _covered("sticking", notes, None, lambda: sticking_onset(drive))
     if onset is None:
-        return dict.fromkeys(("onset_speed_approximate", "onset_speed", "speed_ranges"))
+        return dict.fromkeys(_STICKING)
     if onset.no_approximate is not None:
         notes["sticking.onset_speed_approximate"] = onset.no_approximate
     if onset.no_exact is not None:
@@ -215,6 +225,7 @@ def _sticking(drive: Drive, notes: Notes) -> Section:
         "onset_speed_approximate": onset.approximate,
         "onset_speed": onset.exact,
         "speed_ranges": [list(ends) for ends in onset.ranges],
+        "searched_speeds": [lowest, highest],
     }
 
 
@@ -287,7 +298,7 @@ def _sampled_loop(
         return dict.fromkeys(_SAMPLED_LOOP)
     radius = loop.spectral_radius(law)
     if radius >= 1.0:
-        notes["sampled_loop.settling_time"] = "a deviation from the equilibrium grows"
+        notes["sampled_loop.settling_time"] = "a deviation from the equilibrium does not decay"
     values = radius, radius < 1.0, loop.decay_rate(law), loop.settling_time(law)
     return dict(zip(_SAMPLED_LOOP, (*values, *_sampled_gains(loop, law, notes)), strict=True))
 
@@ -399,3 +410,37 @@ def bifurcation_branches(scenario: Scenario) -> BifurcationBranches:
     Call it only if `why_no_figure` returns None.
     """
     return BifurcationBranches.around(scenario.plant.as_drive())
+
+
+def hopf_ratio(drive: Drive) -> float | None:
+    """Return the belt speed over the nearest Hopf speed; None without one or at zero speed.
+
+    A drive that the theory does not cover has none.
+    """
+    try:
+        speeds = [point.belt_speed for point in hopf_points(drive)]
+    except InvalidInputError:
+        return None
+    speed = abs(drive.belt_speed)
+    if not speeds or speed == 0.0:
+        return None
+    return min((speed / each for each in speeds), key=lambda ratio: max(ratio, 1.0 / ratio))
+
+
+def hopf_distance(drive: Drive) -> str:
+    """Return a clause on the belt speed and the nearest Hopf speed, which reveals a wrong unit.
+
+    It is empty without a Hopf speed.
+    """
+    ratio = hopf_ratio(drive)
+    if ratio is None:
+        return ""
+    speed = abs(drive.belt_speed)
+    own, nearest = (number_text(drive, each, "m/s") for each in (speed, speed / ratio))
+    clause = f"{own} is {ratio:.4g} times the Hopf speed of {nearest}"
+    return clause if drive.is_dimensionless else f"{clause} (belt speeds are in m/s)"
+
+
+def number_text(drive: Drive, value: float, unit: str) -> str:
+    """Return a number for a sentence: in its SI unit, which a dimensionless drive has not."""
+    return f"{value:.4g}" if drive.is_dimensionless else f"{value:.4g} {unit}"

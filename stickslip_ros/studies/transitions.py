@@ -10,9 +10,9 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import StickslipError
+from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
-from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.physics.theory.sticking import release_margin
 from stickslip_ros.studies.plan import Axis
 from stickslip_ros.studies.settling import ControlledDrive
@@ -89,9 +89,11 @@ def transitions(study: Study, axis: Axis) -> dict[str, list[float]]:
     """Return the values of the axis' parameter at each kind of transition, by name, SI units.
 
     All other parameters are those of the study's scenario. Two transitions closer than 1/200 of
-    the axis may be missed.
+    the axis may be missed. Over whole numbers there are none.
     """
-    values = replace(axis, count=201).values().tolist()
+    if axis.whole:
+        return {}
+    values = [axis.at(number / 200) for number in range(201)]
     found: dict[str, list[float]] = {}
     for name, margin in _margins(study).items():
         at = partial(_at, study, [axis.parameter], margin)
@@ -101,8 +103,15 @@ def transitions(study: Study, axis: Axis) -> dict[str, list[float]]:
 
 
 def transition_map(study: Study, axes: tuple[Axis, Axis]) -> TransitionMap:
-    """Return the margins over two axes of the transitions that have a theory."""
-    first, second = (replace(axis, count=_MAPPED).values() for axis in axes)
+    """Return the margins over two axes of the transitions that have a theory.
+
+    If one is over whole numbers, there are none.
+    """
+    if any(axis.whole for axis in axes):
+        return TransitionMap(axes[0].values(), axes[1].values(), {})
+    first, second = (
+        np.array([axis.at(place / (_MAPPED - 1)) for place in range(_MAPPED)]) for axis in axes
+    )
     names = [axis.parameter for axis in axes]
     margins: dict[str, FloatArray] = {}
     for name, margin in _margins(study, coarse=True).items():

@@ -2,7 +2,7 @@
 
 import os
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from inspect import Parameter, signature
 from os import PathLike, fspath
@@ -17,16 +17,18 @@ from rclpy.validate_namespace import validate_namespace
 from stickslip_ros.bags.recorder import check_new_bag
 from stickslip_ros.errors import InvalidInputError, RunError
 from stickslip_ros.nodes.analyzer import VERDICT_TIME
+from stickslip_ros.nodes.base.machine import own_domain
 from stickslip_ros.nodes.base.managed import ERROR
+from stickslip_ros.nodes.base.network import domain_variables
+from stickslip_ros.nodes.base.process import ros_context
 from stickslip_ros.nodes.base.service_call import parameters_call
+from stickslip_ros.running.bringup import node_parameters
 from stickslip_ros.running.composition import Composition
 from stickslip_ros.running.controller_search import ControllerSearch
-from stickslip_ros.running.domain import domain_variables, own_domain, ros_context
-from stickslip_ros.running.lifecycle_client import LifecycleClient
-from stickslip_ros.running.loop_nodes import node_parameters
+from stickslip_ros.running.node_clients import LifecycleClient
 from stickslip_ros.running.user_controller import ControllerProcess, ControllerThread
+from stickslip_ros.scenarios import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.scenarios.files import Scenario, load_scenario
-from stickslip_ros.scenarios.namespace import DEFAULT_NAMESPACE, LONGEST_NAMESPACE
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
 from stickslip_ros.testing.result import Diagnostics, RunResult, result_of
 from stickslip_ros.text import shown
@@ -114,11 +116,14 @@ class ClosedLoop:
         self._is_law = isinstance(controller, str) and controller != _EXTERNAL
         named = isinstance(controller, str) and controller not in (_OF_SCENARIO, _EXTERNAL)
         self._law = str(controller) if named else None
-        self._name_or_path = fspath(scenario)
-        self._overrides = {_target(text): text for text in (*_OF_A_TEST, *overrides)}
-        if controller is None:
-            self._overrides.setdefault(_EXPECTS_CONTROL, f"{_EXPECTS_CONTROL}=false")
-        self.scenario = self._load(self._overrides)
+        scenario_of_test = load_scenario(
+            fspath(scenario),
+            [*_OF_A_TEST, *([f"{_EXPECTS_CONTROL}=false"] if controller is None else [])],
+            self.namespace,
+            controller=self._law,
+            other_nodes=not self._is_law and controller is not None,
+        )
+        self.scenario = self._changed(scenario_of_test, overrides)
         """The current scenario, including changes by `set` and `disturb`."""
         if self._is_law and not self.scenario.plant.expects_control:
             self._to_control, self._is_law = None, False
@@ -240,8 +245,7 @@ class ClosedLoop:
             If the loop is not open.
         """
         nodes = self._open_nodes()
-        changed = self._overrides | {_target(text): text for text in overrides}
-        scenario = self._load(changed)
+        scenario = self._changed(self.scenario, overrides)
         values: dict[str, dict[str, Any]] = {}
         for node, parameter in (_target(text).split(".", 1) for text in overrides):
             if node not in nodes.nodes:
@@ -252,7 +256,7 @@ class ClosedLoop:
         # Only an active node may still refuse, and at most one is active between runs.
         for node in sorted(values, key=lambda name: not nodes.nodes[name].active):
             nodes.set_parameters(nodes.nodes[node], values[node])
-        self.scenario, self._overrides = scenario, changed
+        self.scenario = scenario
 
     def disturb(self, force: float) -> None:
         """Apply a constant force to the slide from the next sample or run on.
@@ -284,23 +288,18 @@ class ClosedLoop:
         bag = self._bag or Path(self._directory, "bag")
         return bag if self._runs <= 1 else bag.with_name(f"{bag.name}_{self._runs}")
 
-    def _load(self, overrides: Mapping[str, str]) -> Scenario:
-        if _BAG in overrides:
+    def _changed(self, scenario: Scenario, overrides: Sequence[str]) -> Scenario:
+        given = {_target(text): text for text in overrides}
+        if _BAG in given:
             raise InvalidInputError(
-                f"{overrides[_BAG]} is refused: use the argument `bag` of ClosedLoop"
+                f"{given[_BAG]} is refused: use the argument `bag` of ClosedLoop"
             )
-        scenario = load_scenario(
-            self._name_or_path,
-            list(overrides.values()),
-            self.namespace,
-            controller=self._law,
-            other_nodes=not self._is_law and self._to_control is not None,
-        )
-        if self._to_control is None and scenario.plant.expects_control:
+        changed = scenario.overridden(overrides)
+        if self._to_control is None and changed.plant.expects_control:
             raise InvalidInputError(
-                f"{overrides[_EXPECTS_CONTROL]} is refused: this loop has no controller"
+                f"{given[_EXPECTS_CONTROL]} is refused: this loop has no controller"
             )
-        return scenario
+        return changed
 
     def _forget(self) -> None:
         self._nodes = self._running = self.controller = None

@@ -8,7 +8,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.bags import Recording
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.measures.cycle_measures import Measures
-from stickslip_ros.physics.measures.reading import Reading
+from stickslip_ros.physics.measures.reading import SampleAssumptions
 from stickslip_ros.physics.measures.run_meter import RunMeter
 from stickslip_ros.samples import ForceColumns, SampleColumns
 
@@ -85,7 +85,7 @@ class RunResult:
 
 
 def result_of(
-    bag: Path, window: int, reading: Reading, diagnostics: dict[str, Diagnostics]
+    bag: Path, window: int, reading: SampleAssumptions, diagnostics: dict[str, Diagnostics]
 ) -> RunResult:
     """Read a run and measure it over the last `window` cycles.
 

@@ -4,7 +4,6 @@ import ast
 import importlib.metadata
 import subprocess
 import sys
-import warnings
 from importlib import import_module
 from pathlib import Path
 
@@ -64,13 +63,5 @@ def test_what_is_not_there_is_an_attribute_error() -> None:
         _ = ss.nothing  # pyright: ignore
 
 
-def test_the_old_package_of_that_name_does_not_hide_the_function() -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        import_module("stickslip_ros.scenario.files")
-    try:
-        assert ss.scenario("paper", belt_speed=0.2).plant.belt_speed == 0.2
-    finally:
-        vars(ss).pop("scenario", None)
-        for name in ("stickslip_ros.scenario.files", "stickslip_ros.scenario"):
-            sys.modules.pop(name)
+def test_it_shows_no_names_but_the_public_ones() -> None:
+    assert dir(ss) == sorted(ss.__all__)

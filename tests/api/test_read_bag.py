@@ -14,23 +14,27 @@ from stickslip_ros.errors import BagError, InvalidInputError
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
 
 
-def test_a_bag_is_read_twice_the_same() -> None:
+@pytest.fixture(scope="module")
+def found() -> ss.RecordedRun:
+    """The reference bag."""
+    return ss.read_bag(str(REFERENCE))
+
+
+def test_it_has_what_the_bag_has(found: ss.RecordedRun) -> None:
     report = report_of_bag(REFERENCE)
     with Recording(REFERENCE) as recording:
         states, forces = recording.joint_states, recording.control_forces
-    for found in (ss.read_bag(REFERENCE), ss.read_bag(str(REFERENCE))):
-        assert found.report == report
-        assert found.measures.amplitude == report["amplitude"]
-        assert found.missing == []
-        for name, column in vars(states).items():
-            assert np.array_equal(getattr(found.samples, name), column)
-        assert np.array_equal(found.forces.stamp, forces.stamp)
-        assert np.array_equal(found.forces.force, forces.force)
-        assert found.drive == ss.scenario("feed_drive").plant.as_drive()
+    assert found.report == report
+    assert found.measures.amplitude == report["amplitude"]
+    assert found.missing == []
+    for name, column in vars(states).items():
+        assert np.array_equal(getattr(found.samples, name), column)
+    assert np.array_equal(found.forces.stamp, forces.stamp)
+    assert np.array_equal(found.forces.force, forces.force)
+    assert found.drive == ss.scenario("feed_drive").plant.as_drive()
 
 
-def test_its_table_has_the_columns_of_a_simulated_run() -> None:
-    found = ss.read_bag(REFERENCE)
+def test_its_table_has_the_columns_of_a_simulated_run(found: ss.RecordedRun) -> None:
     frame = found.to_pandas()
     simulated = ss.simulate("feed_drive", duration=0.1).to_pandas()
     assert list(frame.columns) == [*simulated.columns, "stamp"]
@@ -54,13 +58,11 @@ def test_a_part_is_that_of_the_report() -> None:
         ss.read_bag(REFERENCE, start=2.0, end=1.0)
 
 
-def test_it_prints_and_plots() -> None:
-    found = ss.read_bag(REFERENCE)
+def test_it_prints_and_plots(found: ss.RecordedRun) -> None:
     assert repr(found).splitlines()[0] == str(REFERENCE)
     assert "325.8 µm" in repr(found)
     assert "325.8 µm" in found._repr_html_()  # pyright: ignore
-    for _ in range(2):
-        assert isinstance(found.plot(), Figure)
+    assert isinstance(found.plot(), Figure)
 
 
 def test_what_is_no_bag_is_refused(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ def test_a_keyword_is_the_text_that_it_stands_for() -> None:
             "plant.initial.position=0.1",
             "analyzer.window=5",
             "washout_controller.linear_gain=-2",
-            "plant.expects_control=false",
+            "plant.publish_truth=true",
         ],
     )
     keywords = {
@@ -39,43 +39,37 @@ def test_a_keyword_is_the_text_that_it_stands_for() -> None:
         "initial_position": 0.1,
         "window": 5,
         "linear_gain": -2,
-        "expects_control": False,
+        "publish_truth": True,
     }
-    for _ in range(2):
-        found = ss.scenario("paper", **keywords)
-        assert found == by_text
-        assert found.given == by_text.given
+    found = ss.scenario("paper", **keywords)
+    assert found == by_text
+    assert found.given == by_text.given
 
 
-@pytest.mark.parametrize("parameter", EVERY)
-def test_every_parameter_has_a_keyword_of_its_own(parameter: str) -> None:
-    keyword = keyword_of(parameter)
-    node = parameter.partition(".")[0]
-    nodes = OF_PAPER if node in OF_PAPER else ("plant", node, "analyzer")
-    assert keyword.isidentifier()
-    assert keyword not in COLUMNS
-    if keyword in SHARED:
-        with pytest.raises(
-            InvalidInputError, match=r"several nodes .*; write plant.* or .*analyzer"
-        ):
-            parameter_of(keyword, nodes)
-    else:
+def test_every_parameter_has_a_keyword_of_its_own_that_takes_its_default() -> None:
+    scenarios: dict[str | None, ss.Scenario] = {}
+    for parameter in EVERY:
+        node, _, name = parameter.partition(".")
+        keyword, law = keyword_of(parameter), None
+        nodes = OF_PAPER if node in OF_PAPER else ("plant", node, "analyzer")
+        assert keyword.isidentifier()
+        assert keyword not in COLUMNS
+        if keyword in SHARED:
+            several = r"several nodes .*; write plant.* or .*analyzer"
+            with pytest.raises(InvalidInputError, match=several):
+                parameter_of(keyword, nodes)
+            continue
         assert parameter_of(keyword, nodes) == parameter
+        law = None if node in OF_PAPER else node.removesuffix("_controller")
+        if law not in scenarios:
+            scenarios[law] = load_scenario("paper", controller=law)
+        value = scenarios[law].as_dict()[node][name]
+        found = ss.scenario(scenarios[law], **{keyword: value})
+        assert found.as_dict() == scenarios[law].as_dict(), parameter
 
 
-@pytest.mark.parametrize("parameter", [name for name in EVERY if keyword_of(name) not in SHARED])
-def test_every_default_can_be_given_by_keyword(parameter: str) -> None:
-    node, _, name = parameter.partition(".")
-    law = None if node in OF_PAPER else node.removesuffix("_controller")
-    scenario = load_scenario("paper", controller=law)
-    value = scenario.as_dict()[node][name]
-    found = ss.scenario("paper", controller=law, **{keyword_of(parameter): value})
-    assert found.as_dict() == scenario.as_dict()
-
-
-@pytest.mark.parametrize(
-    ("keyword", "value", "meant"),
-    [
+def test_refusals_are_one_sentence() -> None:
+    refused: list[tuple[str, object, str]] = [
         ("belt_sped", 0.1, "belt_sped: no node has such a parameter; did you mean belt_speed?"),
         ("static", 0.1, "did you mean friction_static?"),
         ("friction__static", 0.1, "did you mean friction_static?"),
@@ -85,20 +79,14 @@ def test_every_default_can_be_given_by_keyword(parameter: str) -> None:
         ("mass", -1.0, "mass = -1.0 is refused: must be a finite number above 0"),
         ("window", 2.5, "window = 2.5 is refused: must be a whole number"),
         ("friction_law", "lienar", "friction.law = 'lienar' is refused"),
-        ("bag", "a: b", None),
-        ("bag", "true", None),
-        ("bag", "2.0", None),
-        ("bag", "with\nlines 机", None),
-    ],
-)
-def test_refusals_are_one_sentence(keyword: str, value: object, meant: str | None) -> None:
-    if meant is None:
-        assert ss.scenario("paper", **{keyword: value}).analyzer.bag == value
-        return
-    with pytest.raises(InvalidInputError) as refusal:
-        ss.scenario("paper", **{keyword: value})
-    assert meant in str(refusal.value)
-    assert "\n" not in str(refusal.value)
+    ]
+    for keyword, value, meant in refused:
+        with pytest.raises(InvalidInputError) as refusal:
+            ss.scenario("paper", **{keyword: value})
+        assert meant in str(refusal.value)
+        assert "\n" not in str(refusal.value)
+    for text in ("a: b", "true", "2.0", "with\nlines 机"):
+        assert ss.scenario("paper", bag=text).analyzer.bag == text
 
 
 def test_numbers_of_numpy_are_numbers() -> None:
@@ -131,7 +119,7 @@ def test_a_path_and_a_base(tmp_path: Path) -> None:
         ss.scenario("feeddrive")
 
 
-def test_it_prints_as_what_it_is() -> None:
+def test_it_prints_as_what_it_is_and_says_what_is_left_to_defaults(tmp_path: Path) -> None:
     found = ss.scenario("feed_drive", belt_speed=0.03)
     lines = repr(found).splitlines()
     assert lines[0] == "scenario feed_drive plant.belt_speed=0.03"
@@ -139,9 +127,6 @@ def test_it_prints_as_what_it_is() -> None:
     assert not any("m/s" in line for line in repr(ss.scenario("paper")).splitlines())
     assert "default" not in repr(found)
     assert "<td" in found._repr_html_()  # pyright: ignore
-
-
-def test_it_says_what_is_left_to_defaults(tmp_path: Path) -> None:
     file = tmp_path / "short.yaml"
     file.write_text("/**/plant:\n  ros__parameters:\n    mass: 2.0\n")
     rows = [line.split() for line in repr(ss.scenario(file)).splitlines()]
@@ -173,3 +158,12 @@ def test_a_keyword_of_a_controller_that_is_not_in_use_names_both() -> None:
     )
     with pytest.raises(InvalidInputError, match="linear_gain: is a parameter of washout_control"):
         ss.sweep(ss.scenario("paper", controller="velocity_feedback"), linear_gain=(-1.0, 0.0, 2))
+
+
+def test_none_is_no_control() -> None:
+    free = ss.scenario("feed_drive", controller=None)
+    assert free == ss.scenario("feed_drive", "plant.expects_control=false")
+    assert free.control_law is None
+    assert ss.scenario(ss.scenario("feed_drive"), controller=None).control_law is None
+    with pytest.raises(InvalidInputError, match="linear_gain is not used with"):
+        ss.scenario("feed_drive", controller=None, linear_gain=-5.0)

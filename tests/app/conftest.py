@@ -1,20 +1,71 @@
+import json
 import os
+import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import chdir
+from collections.abc import Callable, Generator, Iterator
+from contextlib import chdir, contextmanager
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import pytest
 from rclpy.logging import LoggingSeverity, set_logger_level
 
 from stickslip_ros.app.main import main
-from tests.nodes.conftest import domain, process_environment  # noqa: F401 - fixtures used here
+from tests.nodes.conftest import domain, graph, process_environment  # noqa: F401 - used here
 from tests.nodes.graph import PATIENCE
 
-Run = Callable[..., subprocess.CompletedProcess[str]]
+REFERENCE = str(Path(__file__).parents[2] / "bags" / "reference")
+
+Done = subprocess.CompletedProcess[str]
+Start = Callable[..., subprocess.Popen[str]]
+
+
+class Run:
+    """Runs a command of the entry script in a directory, and returns what it came to.
+
+    It runs in this process; the nodes that it starts are processes all the same, and what they
+    print belongs to its output.
+    """
+
+    def __init__(
+        self, directory: Path, environment: dict[str, str], capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        self._directory, self._environment, self._capfd = directory, environment, capfd
+
+    def __call__(self, *arguments: str) -> Done:
+        environment = mock.patch.dict(os.environ, self._environment, clear=True)
+        with environment, chdir(self._directory), pytest.raises(SystemExit) as ended:
+            main(arguments)
+        set_logger_level("", LoggingSeverity.INFO)  # a run has raised it for the whole process
+        return Done(arguments, ended.value.code, *self._capfd.readouterr())
+
+    def json(self, *arguments: str) -> Any:
+        """Return what a command that succeeds prints with --json."""
+        done = self(*arguments, "--json")
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+
+class RunOfItsOwn(Run):
+    """Runs a command in a process of its own, which finds further packages in the directory."""
+
+    def __init__(self, directory: Path, environment: dict[str, str]) -> None:
+        self._directory = directory
+        path = filter(None, [str(directory), environment.get("PYTHONPATH")])
+        self._environment = environment | {"PYTHONPATH": os.pathsep.join(path)}
+
+    def __call__(self, *arguments: str) -> Done:
+        return subprocess.run(
+            [sys.executable, "-m", "stickslip_ros.app.main", *arguments],
+            cwd=self._directory,
+            env=self._environment,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+        )
 
 
 @pytest.fixture
@@ -23,27 +74,14 @@ def stickslip(
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
 ) -> Run:
-    """Run a command of the entry script in an empty directory, and return what it came to.
-
-    It runs in this process; the nodes that it starts are processes all the same, and what they
-    print belongs to its output.
-    """
-
-    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-        environment = mock.patch.dict(os.environ, process_environment, clear=True)
-        with environment, chdir(tmp_path), pytest.raises(SystemExit) as ended:
-            main(arguments)
-        set_logger_level("", LoggingSeverity.INFO)  # a run has raised it for the whole process
-        return subprocess.CompletedProcess(arguments, ended.value.code, *capfd.readouterr())
-
-    return run
+    return Run(tmp_path, process_environment, capfd)
 
 
 @pytest.fixture
 def start_stickslip(
     process_environment: dict[str, str],  # noqa: F811
     tmp_path: Path,
-) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+) -> Iterator[Start]:
     """Start a command of the entry script in an empty directory; it is ended after the test."""
     started: list[subprocess.Popen[str]] = []
 
@@ -64,3 +102,25 @@ def start_stickslip(
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
         process.communicate(timeout=PATIENCE)
+
+
+def ended(process: subprocess.Popen[str], status: int, number: int = 0) -> tuple[str, str]:
+    """Return what a process has printed that ends with this status, after a signal if one is given.
+
+    Its standard output, and its standard error from now on.
+    """
+    process.send_signal(number)
+    output, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == status, errors
+    return output, errors
+
+
+@contextmanager
+def room_for(size: int) -> Generator[None]:
+    """Limit the bytes of each file: what fails is what fails on a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))

@@ -1,13 +1,18 @@
 """`stickslip basin`: shares, tables, figures, and refusals."""
 
 import csv
-import json
 from collections import Counter
+from collections.abc import Sequence
 from math import sqrt
 from pathlib import Path
 
 import pytest
 
+from stickslip_ros.app import output
+from stickslip_ros.studies import runner
+from stickslip_ros.studies import study as study_module
+from stickslip_ros.studies.settling import MotionState
+from stickslip_ros.studies.study import Piece, Study
 from tests.app.conftest import Run
 
 # Rest and stick-slip are both stable (see tests/studies/test_basin.py).
@@ -29,10 +34,7 @@ def drive(tmp_path: Path) -> str:
 
 
 def test_the_shares_are_those_of_the_table(stickslip: Run, tmp_path: Path, drive: str) -> None:
-    tables = ("--out", "basin.csv", "--plot", "basin.png", "--json")
-    done = stickslip("basin", drive, *RANGES, *tables)
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
+    found = stickslip.json("basin", drive, *RANGES, "--out", "basin.csv", "--plot", "basin.png")
     with (tmp_path / "basin.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     counts = Counter(int(row["attractor"]) for row in rows)
@@ -52,10 +54,8 @@ def test_a_sample_is_the_same_each_time_and_another_with_another_seed(
     stickslip: Run, drive: str
 ) -> None:
     def starts(*arguments: str) -> list[list[float]]:
-        sample = ("--position", "-2:2", "--velocity", "0:2", "--sample", "6", "--json")
-        done = stickslip("basin", drive, *sample, *arguments)
-        assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)["values"]
+        sample = ("--position", "-2:2", "--velocity", "0:2", "--sample", "6")
+        return stickslip.json("basin", drive, *sample, *arguments)["values"]
 
     first = starts()
     assert first == starts("--seed", "0")
@@ -72,20 +72,53 @@ def test_without_ranges_the_starts_are_around_the_equilibrium(stickslip: Run) ->
         assert text in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--position=1:2"], "--position=1:2: must be A:B:COUNT"),
-        (["--velocity=a:b:3"], "--velocity=a:b:3: "),
-        (["--position=1:2:3:4"], "--position=1:2:3:4: must be A:B:COUNT"),
-        (["--seed", "1"], "--seed 1: is for a random --sample"),
-        (["--sample", "0"], "0 points: must be from 1 to"),
-        (["--sample", "9", "--seed", "-1"], "--seed -1: must be 0 or more"),
-        (["--plot", "basin.txt"], "--plot basin.txt: must end in one of"),
-    ],
-)
-def test_invalid_input_is_refused(stickslip: Run, arguments: list[str], message: str) -> None:
-    done = stickslip("basin", "paper", "--no-control", *arguments)
-    assert done.returncode == 2
-    assert message in " ".join(done.stderr.split())
-    assert "Traceback" not in done.stderr
+def test_a_long_one_says_what_would_be_quicker(
+    stickslip: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(output, "_JUDGED", 0.0)
+    monkeypatch.setattr(output, "_LONG", -1.0)
+    starts = "--sample", "2", "--position=0:1e-4", "--velocity=0:1e-4", "--transient", "1"
+    for command, advice in (
+        ("", "; every sample is simulated: --continuous-control is several times as fast"),
+        ("-p plant.sensor.position_resolution=5e-6", ""),
+        ("-p plant.force_delay=0.001", ""),
+        ("--continuous-control", ""),
+        ("--no-control", ""),
+    ):
+        done = stickslip("basin", "feed_drive", *command.split(), *starts)
+        assert done.returncode == 0
+        assert f"basins of feed_drive, 2 starts: about 0 min more{advice}\n" in done.stderr
+
+
+def test_interrupted_without_a_file_it_goes_on_from_the_cache(
+    stickslip: Run,
+    process_environment: dict[str, str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    process_environment["XDG_CACHE_HOME"] = str(tmp_path / "cache")
+    command = "basin", "feed_drive", "--continuous-control", "--sample", "5"
+    computed: list[int] = []
+
+    def compute(study: Study, points: Sequence[int], start: MotionState | None) -> Piece:
+        if len(computed) == 2:
+            raise KeyboardInterrupt
+        computed.extend(points)
+        return study_module.compute(study, points[:], start)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(runner, "_task_size", lambda journal, in_flight: 1)
+        patch.setattr(runner, "compute", compute)
+        stopped = stickslip(*command)
+    assert stopped.returncode == 130
+    (part,) = (tmp_path / "cache/stickslip_ros").iterdir()
+    assert f"2 of 5 points are done; they stay in {part}, and the same command" in stopped.stderr
+    again = stickslip(*command)
+    assert again.returncode == 0
+    assert f"2 points are taken from {part}" in again.stderr
+    assert not part.exists()
+    whole = stickslip(*command)
+    assert (whole.stdout, whole.stderr) == (again.stdout, "")
+    (tmp_path / "cache/stickslip_ros").rmdir()
+    (tmp_path / "cache/stickslip_ros").write_text("no directory")
+    assert stickslip(*command).stdout == whole.stdout

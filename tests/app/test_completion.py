@@ -57,31 +57,25 @@ def complete(stickslip: Run, tmp_path: Path, shell: str) -> Complete:
     return call
 
 
-def test_commands(complete: Complete) -> None:
+def test_what_is_completed(complete: Complete, shell: str) -> None:
     assert complete("") == list(COMMANDS)
     assert complete("simu") == ["simulate"]
-
-
-def test_options_of_the_command(complete: Complete) -> None:
+    # Options of the command, and their choices.
     assert complete("run", "paper", "--no-") == ["--no-control"]
     assert "--carry" in complete("sweep", "paper", "--")
     assert "--carry" not in complete("simulate", "paper", "--")
-
-
-def test_scenarios_and_scenario_files(complete: Complete) -> None:
+    assert complete("run", "paper", "--pace", "lo") == ["lockstep"]
+    assert complete("completion", "z") == ["zsh"]
+    assert complete("simulate", "paper", "--duration", "") == []
+    # Scenarios and files.
     proposed = complete("simulate", "")
     assert {"feed_drive", "paper", "mine.yaml", "bags"} <= set(proposed)
     assert "notes.txt" not in proposed
     assert complete("simulate", "pa") == ["paper"]
     assert complete("new", "x.yaml", "--from", "fe") == ["feed_drive", "feed_profile"]
-
-
-def test_files(complete: Complete) -> None:
     assert complete("report", "b") == ["bags"]
     assert complete("simulate", "paper", "--plot", "no") == ["notes.txt"]
-
-
-def test_parameters_and_their_values(complete: Complete, shell: str) -> None:
+    # Parameters and their values.
     assert complete("simulate", "paper", "-p", "plant.belt_") == ["plant.belt_speed="]
     assert complete("sweep", "paper", "--over", "plant.mas") == ["plant.mass="]
     assert complete("set", "washout_controller.lin") == ["washout_controller.linear_gain="]
@@ -91,9 +85,3 @@ def test_parameters_and_their_values(complete: Complete, shell: str) -> None:
     else:
         law = "plant.friction.law="
         assert complete("run", "paper", "-p", f"{law}cou") == [f"{law}coulomb"]
-
-
-def test_choices(complete: Complete) -> None:
-    assert complete("run", "paper", "--pace", "lo") == ["lockstep"]
-    assert complete("completion", "z") == ["zsh"]
-    assert complete("simulate", "paper", "--duration", "") == []

@@ -1,6 +1,5 @@
 """`--controller` of the commands that run a control law: its name, and refusals."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -24,11 +23,7 @@ def two(tmp_path: Path) -> str:
 
 def test_the_law_is_simulated(stickslip: Run, two: str) -> None:
     def amplitude(*arguments: str) -> float:
-        done = stickslip(
-            "simulate", two, "--base", "paper", "--duration", "50", "--json", *arguments
-        )
-        assert done.returncode == 0, done.stderr
-        found = json.loads(done.stdout)
+        found = stickslip.json("simulate", two, "--base", "paper", "--duration", "50", *arguments)
         assert found["scenario"]["velocity_feedback_controller"]["law"] == "velocity_feedback"
         return found["amplitude"]
 
@@ -36,36 +31,12 @@ def test_the_law_is_simulated(stickslip: Run, two: str) -> None:
     assert amplitude(*VELOCITY) < 0.05 < 0.1 < amplitude(*VELOCITY, *gain)
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        ("show",),
-        ("simulate", "--duration", "1"),
-        ("stability",),
-        ("sweep", "--over", "plant.belt_speed=0.2:0.3:2"),
-        ("basin", "--sample", "2", "--position=0:1", "--velocity=0:1"),
-        ("run", "--duration", "1"),
-    ],
-    ids=lambda command: command[0],
-)
-def test_of_several_controllers_the_option_names_one(
-    stickslip: Run, two: str, command: tuple[str, ...]
-) -> None:
-    name, *further = command
-    done = stickslip(name, two, *further)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == (
-        f"stickslip {name}: two.yaml: has sections for the controllers washout_controller and "
-        "velocity_feedback_controller: name the control law to use, by --controller NAME\n"
-    )
-
-
 def test_without_control_no_controller_has_to_be_named(stickslip: Run, two: str) -> None:
     assert stickslip("simulate", two, "--no-control", "--duration", "1").returncode == 0
 
 
 def test_show_has_the_controller_in_use(stickslip: Run, two: str) -> None:
-    shown = json.loads(stickslip("show", two, *VELOCITY, "--json").stdout)["parameters"]
+    shown = stickslip.json("show", two, *VELOCITY)["parameters"]
     assert list(shown) == ["plant", "velocity_feedback_controller", "analyzer"]
     gain = shown["velocity_feedback_controller"]["velocity_gain"]
     assert (gain["value"], gain["source"], gain["unit"]) == (-0.5, "file", "N s/m")
@@ -80,44 +51,16 @@ def test_new_writes_the_section_of_the_law(stickslip: Run, tmp_path: Path) -> No
 
 
 def test_list_has_every_control_law(stickslip: Run) -> None:
-    found = json.loads(stickslip("list", "--json").stdout)["control_laws"]
+    found = stickslip.json("list")["control_laws"]
     assert [law["name"] for law in found] == list(CONTROL_LAWS)
     assert found[0]["parameters"][0] == "washout_controller.corner_frequency"
     assert found[1]["description"].startswith("Force proportional to velocity and displacement")
 
 
-@pytest.mark.parametrize(
-    ("command", "given", "reason"),
-    [
-        ("simulate", "velocity_fedback", "--controller: unknown control law velocity_fedback; did"),
-        ("run", "velocity_fedback", "--controller: unknown control law velocity_fedback; did you"),
-        ("show", "my/damper", "--controller: my/damper is refused: must be the name of a control"),
-        ("simulate", "damper.py", "--controller: damper.py is refused: must be the name of a"),
-    ],
-)
-def test_what_is_no_law_is_refused(stickslip: Run, command: str, given: str, reason: str) -> None:
-    done = stickslip(command, "paper", "--controller", given)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert reason in done.stderr
-    assert len(done.stderr.splitlines()) == 1
-
-
-def test_a_law_takes_no_arguments(stickslip: Run) -> None:
-    done = stickslip("run", "paper", *VELOCITY, "--", "--ros-args")
-    assert done.returncode == 2
-    assert done.stderr == (
-        "stickslip run: -- --ros-args: arguments after -- are for a script or executable of "
-        "--controller, and velocity_feedback is a control law\n"
-    )
-
-
 @pytest.mark.process
 @pytest.mark.parametrize("how", [["--composed"], []], ids=["composed", "processes"])
 def test_the_law_runs_as_a_node(stickslip: Run, two: str, how: list[str]) -> None:
-    arguments = (two, "--base", "paper", *VELOCITY, "--duration", "5", "--json", *how)
-    done = stickslip("run", *arguments)
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
+    found = stickslip.json("run", two, "--base", "paper", *VELOCITY, "--duration", "5", *how)
     assert found["controller"] == "/feed_drive/velocity_feedback_controller"
     assert found["controller_command"] is None
     assert found["scenario"]["velocity_feedback_controller"]["velocity_gain"] == -0.5

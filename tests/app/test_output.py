@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from stickslip_ros.app.output import print_figures, print_table, progress_bar
+from stickslip_ros.app import output
+from stickslip_ros.app.output import print_table, print_values, progress_bar
 from tests.nodes.graph import PATIENCE
 
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference"
@@ -45,23 +46,18 @@ def on_terminal(command: list[str], columns: int, **environment: str) -> list[st
 
 
 @pytest.mark.process
-def test_a_person_gets_a_frame_and_a_colour() -> None:
-    lines = on_terminal([*REPORT, str(REFERENCE)], 80)
-    (regime,) = (line for line in lines if "stick-slip" in line)
-    assert regime.count("│") == 3
-    assert "\x1b[" in regime
-
-
-@pytest.mark.process
-@pytest.mark.parametrize("environment", [{"NO_COLOR": "1"}, {"TERM": "dumb"}])
-def test_colours_are_left_out_where_they_are_not_wanted(environment: dict[str, str]) -> None:
+@pytest.mark.parametrize("environment", [{}, {"NO_COLOR": "1"}, {"TERM": "dumb"}])
+def test_a_person_gets_a_frame_and_a_colour_unless_it_is_not_wanted(
+    environment: dict[str, str],
+) -> None:
     lines = on_terminal([*REPORT, str(REFERENCE)], 80, **environment)
     (regime,) = (line for line in lines if "stick-slip" in line)
-    assert re.search(r"\x1b\[[0-9;]*3[0-9]m", regime) is None
+    assert regime.count("│") == 3
+    assert bool(re.search(r"\x1b\[[0-9;]*3[0-9]m", regime)) == (not environment)
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("columns", [80, 40, 30])
+@pytest.mark.parametrize("columns", [80, 30])
 def test_nothing_is_lost_on_a_narrow_terminal(columns: int, tmp_path: Path) -> None:
     """Headings and labels may be broken over lines, figures may not."""
     other = tmp_path / "the other one"
@@ -87,17 +83,14 @@ def test_a_pipe_gets_plain_lines(capsys: pytest.CaptureFixture[str]) -> None:
     ]
 
 
-def test_one_column_has_no_heading(capsys: pytest.CaptureFixture[str]) -> None:
-    print_figures("run", {"": {"amplitude": 434e-6, "bag": "bags/机床"}})
+def test_plain_tables(capsys: pytest.CaptureFixture[str]) -> None:
+    """One column has no heading; control characters are shown as escapes."""
+    print_values("run", {"": {"amplitude": 434e-6, "bag": "bags/机床"}})
     assert capsys.readouterr().out == "run\namplitude  434 µm\nbag        bags/机床\n"
-
-
-def test_a_table_without_rows_is_its_headings(capsys: pytest.CaptureFixture[str]) -> None:
+    print_values("", {"": {"regime": "stick_slip", "steady": False, "trend": "decaying"}})
+    assert capsys.readouterr().out == "regime  stick-slip, not steady: decaying\n"
     print_table("empty", ["topic", "messages"], [])
     assert capsys.readouterr().out == "empty\ntopic  messages\n"
-
-
-def test_control_characters_are_shown_as_escapes(capsys: pytest.CaptureFixture[str]) -> None:
     print_table("a\x1b[2J", ["", ""], [["b\n", "\x07"]])
     assert capsys.readouterr().out == "a\\x1b[2J\nb\\n  \\x07\n"
 
@@ -123,18 +116,13 @@ def test_rounding_reads_zero(capsys: pytest.CaptureFixture[str]) -> None:
     before = {"regime": "stick_slip", "amplitude": 4e-4, "midpoint": 3e-4, "peak_force": 120.0}
     resting = {"amplitude": 9e-17, "velocity_amplitude": 1e-15, "midpoint": 2.5e-4}
     after = {"regime": "equilibrium", **resting, "peak_force": 7e-15, "resting_force": 7e-15}
-    print_figures("", {"before": before, "after": after})
+    print_values("", {"before": before, "after": after})
     shown = [line.split(maxsplit=1)[-1].strip() for line in capsys.readouterr().out.splitlines()]
     assert re.search(r"400 µm +0 µm", shown[2])
     assert re.search(r"- +0 m/s", shown[3])
     assert re.search(r"300 µm +250 µm", shown[4])
     assert re.search(r"120 N +0 N", shown[5])
     assert re.search(r"- +0 N", shown[6])
-
-
-def test_a_transient_says_that_it_is_not_steady(capsys: pytest.CaptureFixture[str]) -> None:
-    print_figures("", {"": {"regime": "stick_slip", "steady": False, "trend": "decaying"}})
-    assert capsys.readouterr().out == "regime  stick-slip, not steady: decaying\n"
 
 
 def test_a_progress_bar_says_what_is_done_next(
@@ -146,3 +134,23 @@ def test_a_progress_bar_says_what_is_done_next(
         progress(0.0)
         progress(0.0, "identifying: stribeck")
     assert "identifying: stribeck" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("on_a_terminal", [True, False])
+def test_a_long_work_says_once_how_long_it_takes(
+    on_a_terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: on_a_terminal)
+    monkeypatch.setattr(output, "monotonic", lambda: clock)
+    clock = 0.0
+    with progress_bar("sweep", 1000, "; this is quicker") as progress:
+        for number in range(10):  # of which 100 points were done before
+            clock = 1.2 * number
+            progress(100 + 10 * number)
+    assert capsys.readouterr().err.count("sweep: about 2 min more; this is quicker") == 1
+    for total, step in ((100, 10), (None, 1), (1000, 0)):
+        with progress_bar("short, of unknown length, or without progress", total) as progress:
+            for number in range(10):
+                clock += 1.2
+                progress(step * number)
+    assert "about" not in capsys.readouterr().err

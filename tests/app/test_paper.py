@@ -38,13 +38,3 @@ def test_the_whole_paper(stickslip: Run, tmp_path: Path) -> None:
     assert [picture.name for picture in pictures] == [f"figure_{n:02}.png" for n in range(2, 14)]
     for picture in pictures:
         assert f"(reproduction/{picture.name})" in page
-
-
-@pytest.mark.parametrize("out", ["file", "file/below", "/proc/none/out"])
-def test_a_directory_that_cannot_be_made(stickslip: Run, tmp_path: Path, out: str) -> None:
-    (tmp_path / "file").write_text("precious")
-    done = stickslip("paper", "--out", out)
-    assert done.returncode == 2
-    (line,) = done.stderr.splitlines()
-    assert out in line
-    assert (tmp_path / "file").read_text() == "precious"

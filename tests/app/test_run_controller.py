@@ -12,15 +12,13 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.messages.topics import DIAGNOSTICS
-from tests.app.conftest import Run
-from tests.app.test_run import children, command, is_running, wait_for_samples
-from tests.nodes.graph import PATIENCE, Graph, wait_for
+from tests.app.conftest import Run, Start, ended
+from tests.app.test_run import children, command, is_complete, is_running, wait_for_samples
+from tests.nodes.graph import Graph, wait_for
 
 pytestmark = pytest.mark.process
 
 Install = Callable[..., str]
-Start = Callable[..., subprocess.Popen[str]]
-
 DAMPER = """
 import signal
 import sys
@@ -68,11 +66,6 @@ class ManagedDamper(Answering, LifecycleNode):
             super().answer(state)
 
 
-class Mute(Damper):
-    def answer(self, state):
-        pass
-
-
 class Mortal(Damper):
     def answer(self, state):
         if state.header.stamp.sec == 2:
@@ -86,11 +79,14 @@ class ForceOnly(Node):
         self.force = self.create_publisher(WrenchStamped, "control_force", 1000)
 
 
-class Deaf(Damper):
+class DeafAndMute(Damper):
     def __init__(self):
         super().__init__()
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def answer(self, state):
+        pass
 
 
 def run(node):
@@ -167,86 +163,56 @@ SCENARIO = """
 """
 
 
-@pytest.mark.parametrize(("node", "flags"), [("Damper", ()), ("ManagedDamper", ("--composed",))])
+FURTHER = ("--", "--ros-args", "-p", "gain:=2.0")  # the scenario says otherwise
+
+
+@pytest.mark.parametrize(
+    ("node", "flags", "gain"),
+    [("Damper", (), 0.5), ("ManagedDamper", ("--composed", *FURTHER), 2.0)],
+)
 def test_a_controller_of_a_user(
-    stickslip: Run, install: Install, tmp_path: Path, node: str, flags: tuple[str, ...]
+    stickslip: Run, install: Install, tmp_path: Path, node: str, flags: tuple[str, ...], gain: float
 ) -> None:
-    name = install(damper(node))
+    if flags:
+        name = install(damper(node))
+    else:
+        name = "my_controller.py"
+        (tmp_path / name).write_text(damper(node), encoding="utf-8")
     (tmp_path / "my.yaml").write_text(SCENARIO, encoding="utf-8")
-    arguments = ("my.yaml", "--duration", "2", "--bag", "bag", "--json", *flags)
-    done = stickslip("run", *arguments, "--controller", name)
+    arguments = ("my.yaml", "--duration", "2", "--bag", "bag", "--json")
+    done = stickslip("run", *arguments, "--controller", name, *flags)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert (result["samples"], result["late_forces"], result["lost_samples"]) == (201, 0, 0)
-    assert (result["controller"], result["controller_command"]) == ("/feed_drive/damper", name)
+    assert result["controller"] == "/feed_drive/damper"
+    assert result["controller_command"] == " ".join([name, *flags[2:]])
     assert "my.yaml: section /**/dumper matches no node" in done.stderr
     assert "/**/damper" not in done.stderr
     assert "ended as it should" in done.stderr
     with Recording(tmp_path / "bag") as recording:
         states, forces = recording.joint_states, recording.control_forces
     assert forces.stamp.tolist() == states.stamp.tolist()
-    assert forces.force.tolist() == (-0.5 * states.velocity).tolist()
-
-
-def test_a_controller_that_is_a_script(stickslip: Run, tmp_path: Path) -> None:
-    (tmp_path / "my_controller.py").write_text(damper("Damper"), encoding="utf-8")
-    arguments = ("paper", "--pace", "lockstep", "--duration", "1", "--bag", "bag", "--json")
-    done = stickslip("run", *arguments, "--composed", "--controller", "my_controller.py")
-    assert done.returncode == 0, done.stderr
-    result = json.loads(done.stdout)
-    made_by = (result["controller"], result["controller_command"])
-    assert made_by == ("/feed_drive/damper", "my_controller.py")
-    assert result["report"]["peak_force"] > 0.0
-
-
-@pytest.mark.parametrize("name", ["missing.py", "here/and/missing.py"])
-def test_a_script_that_does_not_exist(stickslip: Run, name: str) -> None:
-    done = stickslip("run", "paper", "--controller", name)
-    assert done.returncode == 2
-    assert f"--controller {name}: there is no such file" in done.stderr
-
-
-@pytest.mark.long
-def test_arguments_for_the_controller(stickslip: Run, install: Install, tmp_path: Path) -> None:
-    name = install(damper("Damper"))
-    (tmp_path / "my.yaml").write_text(SCENARIO, encoding="utf-8")
-    further = ("--", "--ros-args", "-p", "gain:=2.0")  # the scenario says otherwise
-    arguments = ("my.yaml", "--duration", "1", "--bag", "bag", "--json")
-    done = stickslip("run", *arguments, "--controller", name, *further)
-    assert done.returncode == 0, done.stderr
-    made_by = json.loads(done.stdout)["controller_command"]
-    assert made_by == "my_controllers/damper --ros-args -p gain:=2.0"
-    with Recording(tmp_path / "bag") as recording:
-        states, forces = recording.joint_states, recording.control_forces
-    assert forces.force.tolist() == (-2.0 * states.velocity).tolist()
-
-
-def test_a_controller_that_dies_ends_the_run(
-    stickslip: Run, install: Install, tmp_path: Path
-) -> None:
-    name = install(damper("Mortal"))
-    done = stickslip("run", "paper", "--composed", "--bag", "bag", "--controller", name)
-    assert done.returncode == 1
-    assert "the node /feed_drive/damper died (exit status 3)" in done.stderr
-    with Recording(tmp_path / "bag") as recording:
-        assert recording.complete
+    assert forces.force.tolist() == (-gain * states.velocity).tolist()
 
 
 @pytest.mark.parametrize(
     ("script", "interpreter", "named"),
     [
+        (damper("Mortal"), sys.executable, "/feed_drive/damper died (exit status 3)"),
         ("raise SystemExit(3)", sys.executable, "my_controllers/damper died (exit status 3)"),
         ("", "/nowhere/python", "cannot be started: No such file"),
     ],
+    ids=["dies", "ends at once", "cannot start"],
 )
-def test_a_controller_that_does_not_start(
+def test_a_controller_that_dies_ends_the_run(
     stickslip: Run, install: Install, tmp_path: Path, script: str, interpreter: str, named: str
 ) -> None:
     name = install(script, interpreter=interpreter)
-    done = stickslip("run", "paper", "--composed", "--controller", name)
+    done = stickslip("run", "paper", "--composed", "--bag", "bag", "--controller", name)
     assert done.returncode == 1
     assert named in done.stderr
     assert "Traceback" not in done.stderr
+    assert "Mortal" not in script or is_complete(tmp_path / "bag")
 
 
 @pytest.mark.long
@@ -262,13 +228,16 @@ def test_a_controller_that_never_closes_the_loop(
 
 
 @pytest.mark.long
-def test_a_controller_that_never_answers(stickslip: Run, install: Install) -> None:
+def test_a_controller_that_never_answers_and_is_deaf_is_killed_at_the_end(
+    stickslip: Run, install: Install
+) -> None:
     impatient = ("-p", "plant.reply_timeout=0.5", "--duration", "3", "--json")
-    done = stickslip("run", "paper", *impatient, "--controller", install(damper("Mute")))
+    done = stickslip("run", "paper", *impatient, "--controller", install(damper("DeafAndMute")))
     assert done.returncode == 0, done.stderr
     assert done.stderr.count("no control force arrives") == 1
     result = json.loads(done.stdout)
     assert (result["samples"], result["late_forces"]) == (301, 300)
+    assert "my_controllers/damper ends neither on SIGINT nor on SIGTERM: killed" in done.stderr
 
 
 @pytest.mark.long
@@ -289,13 +258,6 @@ def test_no_controller_outlives_the_run(
     process.kill()
     process.wait()
     wait_for(lambda: not any(map(is_running, (guard, shell_process, node))), "they end")
-
-
-@pytest.mark.long
-def test_a_deaf_controller_is_killed_at_the_end(stickslip: Run, install: Install) -> None:
-    done = stickslip("run", "paper", "--duration", "1", "--controller", install(damper("Deaf")))
-    assert done.returncode == 0, done.stderr
-    assert "my_controllers/damper ends neither on SIGINT nor on SIGTERM: killed" in done.stderr
 
 
 @pytest.fixture
@@ -319,43 +281,25 @@ def start_damper(
         process.wait()
 
 
-@pytest.mark.parametrize("late", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_an_external_controller_is_waited_for(
-    start_stickslip: Start, start_damper: Callable[..., subprocess.Popen[bytes]], late: bool
+    start_stickslip: Start, start_damper: Callable[..., subprocess.Popen[bytes]]
 ) -> None:
+    """Other nodes are not treated as the controller."""
+    start_damper(namespace="/other")
     arguments = ("paper", "--composed", "--external-controller", "--duration", "2", "--json")
-    if not late:
-        start_damper()
     process = start_stickslip("run", *arguments)
     waits = read_until(process, "waiting for a controller")
     assert waits.endswith(
         "a node that reads /feed_drive/joint_states and publishes /feed_drive/control_force\n"
     )
-    if late:
-        start_damper()
-    output, errors = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 0, errors
+    assert read_until(process, "/other/damper reads").endswith(
+        "reads /other/joint_states, the plant publishes /feed_drive/joint_states\n"
+    )
+    start_damper()
+    output, _ = ended(process, 0)
     result = json.loads(output)
     assert (result["samples"], result["late_forces"]) == (201, 0)
     assert (result["controller"], result["controller_command"]) == ("/feed_drive/damper", None)
-
-
-@pytest.mark.long
-def test_other_nodes_are_not_treated_as_the_controller_and_ctrl_c_ends_waiting(
-    start_stickslip: Start,
-    start_damper: Callable[..., subprocess.Popen[bytes]],
-    tmp_path: Path,
-) -> None:
-    start_damper(namespace="/other")
-    process = start_stickslip("run", "paper", "--external-controller", "--bag", "bag")
-    hint = read_until(process, "/other/damper reads")
-    assert hint.endswith(
-        "reads /other/joint_states, the plant publishes /feed_drive/joint_states\n"
-    )
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=PATIENCE)
-    assert process.returncode == 130
-    assert not (tmp_path / "bag").exists()
 
 
 @pytest.mark.long
@@ -379,9 +323,7 @@ def test_an_external_controller_may_die_and_return(
     start_damper()
     graph.wait_until(lambda: "no control" not in words_of_plant(health), "it is taken back")
     graph.close()
-    process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 130
+    _, errors = ended(process, 130, signal.SIGINT)
     assert "no control force arrives" not in errors
 
 

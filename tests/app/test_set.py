@@ -2,19 +2,17 @@
 
 import signal
 import time
-from collections.abc import Callable
 from pathlib import Path
-from subprocess import Popen
 
 import pytest
 
 from stickslip_ros.bags import Recording
-from tests.app.conftest import Run
+from tests.app.conftest import Run, Start
 from tests.nodes.graph import PATIENCE
 
 
 def test_parameters_of_running_nodes_are_set_or_refused(
-    stickslip: Run, start_stickslip: Callable[..., "Popen[str]"], tmp_path: Path
+    stickslip: Run, start_stickslip: Start, tmp_path: Path
 ) -> None:
     run = start_stickslip("run", "paper", "--composed", "--pace", "realtime", "--bag", "bag")
     deadline = time.monotonic() + PATIENCE
@@ -31,6 +29,10 @@ def test_parameters_of_running_nodes_are_set_or_refused(
     refused = stickslip("set", "plant.belt_speed=0.2", "plant.friction.static=0.1")
     assert (refused.returncode, refused.stdout) == (2, "")
     assert "/feed_drive/plant: friction.minimum = 0.25 must not exceed" in refused.stderr
+
+    idle = stickslip("set", "plant.friction.viscous=0.5")
+    assert (idle.returncode, idle.stdout) == (0, "/feed_drive/plant: friction.viscous = 0.5 s/m\n")
+    assert "friction.viscous is not used by the law stribeck; laws that use it: " in idle.stderr
 
     elsewhere = stickslip("set", "--namespace", "other", "plant.belt_speed=0.2")
     assert (elsewhere.returncode, elsewhere.stdout) == (1, "")

@@ -5,7 +5,6 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +12,10 @@ import pytest
 
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.testing import own_domain
-from tests.app.conftest import Run
+from tests.app.conftest import Run, Start
 from tests.app.test_run import wait_for_samples
 from tests.nodes.graph import PATIENCE
 from tests.nodes.runs import messages_of
-
-Start = Callable[..., subprocess.Popen[str]]
 
 LOCKSTEP = ("--pace", "lockstep", "--duration", "10")
 DRIVES = {
@@ -118,13 +115,9 @@ def test_two_users_do_not_disturb_each_other(
             directory = tmp_path / f"user_{user}"
             directory.mkdir()
             os.chown(directory, user, user)
+            namespace = f"/user_{user}" if same_domain else "/drive"
             command = [sys.executable, "-m", "stickslip_ros.app.main", "run", "paper", "--json"]
-            command += [
-                *LOCKSTEP,
-                *how,
-                "--namespace",
-                f"/user_{user}" if same_domain else "/drive",
-            ]
+            command += [*LOCKSTEP, *how, "--namespace", namespace]
             if domain and not same_domain:
                 process_environment["ROS_DOMAIN_ID"] = domain
             started.append(

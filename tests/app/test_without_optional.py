@@ -14,19 +14,17 @@ WITHOUT = (
 
 
 @pytest.mark.parametrize(
-    ("missing", "arguments", "status", "shown"),
+    ("missing", "command", "status", "shown"),
     [
-        ("rclpy", ("simulate", "paper", "--duration", "50"), 0, "amplitude"),
-        ("rclpy", ("run", "paper"), 1, "needs ROS 2, of which rclpy is not installed"),
-        ("nicegui", ("dashboard",), 1, "pip install 'stickslip_ros[dashboard]'"),
-        ("nicegui", ("run", "paper", "--dashboard"), 1, "pip install 'stickslip_ros[dashboard]'"),
+        ("rclpy", "simulate paper --duration 50", 0, "amplitude"),
+        ("rclpy", "run paper", 1, "needs ROS 2, of which rclpy is not installed"),
+        ("nicegui", "dashboard", 1, "pip install 'stickslip_ros[dashboard]'"),
+        ("nicegui", "run paper --dashboard", 1, "pip install 'stickslip_ros[dashboard]'"),
     ],
 )
-def test_commands(
-    missing: str, arguments: tuple[str, ...], status: int, shown: str, tmp_path: str
-) -> None:
+def test_commands(missing: str, command: str, status: int, shown: str, tmp_path: str) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", WITHOUT, missing, *arguments],
+        [sys.executable, "-c", WITHOUT, missing, *command.split()],
         cwd=tmp_path,
         capture_output=True,
         text=True,

@@ -1,9 +1,10 @@
-"""Bags of a run with exactly known content."""
+"""Bags with exactly known content."""
 
 import numpy as np
 
 from stickslip_ros.bags.recorder import QosProfile, Recorder
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
+from stickslip_ros.messages.topics import TOPICS
 
 STATES = "/feed_drive/joint_states"
 FORCES = "/feed_drive/control_force"
@@ -26,13 +27,33 @@ def state(stamp):
 STAMPS = [5 * SECOND + n * SECOND // 100 for n in range(1000)]
 
 
-def record(directory, states=STAMPS, forces=STAMPS):
+_TYPES = {topic.name: topic.type_name for topic in TOPICS}
+
+
+def write_bag(directory, messages, *, topics=(), flush_every=0):
+    """Record messages: topic, stamp (ns) and data of each. A topic of no name of ours is a number.
+
+    The `topics` are in the bag even if they have no message.
+    """
+    channels = {}
     with Recorder(directory) as recorder:
-        qos = QosProfile(depth=10)
-        state_channel = recorder.add_topic(STATES, "sensor_msgs/msg/JointState", qos)
-        force_channel = recorder.add_topic(FORCES, "geometry_msgs/msg/WrenchStamped", qos)
-        for stamp in sorted({*states, *forces}):
-            if stamp in states:
-                recorder.write(state_channel, state(stamp), stamp)
-            if stamp in forces:
-                recorder.write(force_channel, pack_wrench(stamp, stamp / SECOND), stamp)
+
+        def channel(topic):
+            if topic not in channels:
+                kind = _TYPES.get(topic.rpartition("/")[2], "std_msgs/msg/Float64")
+                channels[topic] = recorder.add_topic(topic, kind, QosProfile(depth=10))
+            return channels[topic]
+
+        for topic in topics:
+            channel(topic)
+        for number, (topic, stamp, data) in enumerate(messages, 1):
+            recorder.write(channel(topic), data, stamp)
+            if flush_every and number % flush_every == 0:
+                recorder.flush()
+
+
+def record(directory, states=STAMPS, forces=STAMPS):
+    messages = [(STATES, stamp, state(stamp)) for stamp in states]
+    messages += [(FORCES, stamp, pack_wrench(stamp, stamp / SECOND)) for stamp in forces]
+    messages.sort(key=lambda message: message[1])
+    write_bag(directory, messages, topics=(STATES, FORCES))

@@ -17,10 +17,9 @@ from stickslip_ros.bags.recorder import QosProfile, Recorder
 from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import StickslipError
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
+from tests.bags.runs import FORCES, STATES
 from tests.examples import examples
 
-STATES = "/feed_drive/joint_states"
-FORCES = "/feed_drive/control_force"
 CHUNKS = 10
 PAIRS = 40
 """Of a joint state and a force, in each chunk."""
@@ -83,10 +82,8 @@ def sound(tmp_path_factory):
     directory = tmp_path_factory.mktemp("sound") / "bag"
     with Recorder(directory) as recorder:
         qos = QosProfile(depth=10)
-        channels = [
-            recorder.add_topic(STATES, "sensor_msgs/msg/JointState", qos),
-            recorder.add_topic(FORCES, "geometry_msgs/msg/WrenchStamped", qos),
-        ]
+        kinds = {STATES: "sensor_msgs/msg/JointState", FORCES: "geometry_msgs/msg/WrenchStamped"}
+        channels = [recorder.add_topic(topic, kind, qos) for topic, kind in kinds.items()]
         for number, data in enumerate(MESSAGES):
             recorder.write(channels[number % 2], data, number)
             if number % (2 * PAIRS) == 2 * PAIRS - 1:

@@ -18,6 +18,7 @@ from stickslip_ros.bags.reader import Recording
 from stickslip_ros.bags.recorder import QosProfile, Recorder
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
+from tests.bags.runs import write_bag
 
 JOINT_STATES = "/feed_drive/joint_states"
 FORCES = "/feed_drive/control_force"
@@ -56,7 +57,7 @@ def scratch(tmp_path_factory):
     return tmp_path_factory.mktemp("scratch") / "scratch.mcap"
 
 
-def test_messages_come_as_they_were_written(bag):
+def test_messages_metadata_attachments_and_qos_come_as_they_were_written(bag):
     for path in (bag, bag / "bag_0.mcap"):
         with Recording(path) as recording:
             assert recording.topics == {JOINT_STATES: "sensor_msgs/msg/JointState"}
@@ -65,31 +66,26 @@ def test_messages_come_as_they_were_written(bag):
                 (JOINT_STATES, number, state) for number, state in enumerate(STATES)
             ]
             assert recording.complete
-
-
-def test_metadata_and_attachments_are_found(bag):
-    with Recording(bag) as recording:
-        assert recording.metadata("scenario") == {"name": "paper"}
-        assert recording.attachment("scenario.yaml") == b"plant:"
-        assert recording.metadata("other") is None
-        assert recording.attachment("other") is None
+            assert recording.metadata("scenario") == {"name": "paper"}
+            assert recording.attachment("scenario.yaml") == b"plant:"
+            (profile,) = yaml.safe_load(recording.offered_qos(JOINT_STATES))
+            assert profile["depth"] == 10
+            assert recording.metadata("other") is recording.attachment("other") is None
+            assert recording.offered_qos("/other") == ""
 
 
 def test_columns_are_those_of_the_messages_chunk_by_chunk_and_as_a_whole(tmp_path):
     """Forces come late and in bursts, so that chunks hold different numbers of either."""
-    with Recorder(tmp_path / "bag") as recorder:
-        states = recorder.add_topic(JOINT_STATES, "sensor_msgs/msg/JointState", QOS)
-        forces = recorder.add_topic(FORCES, "geometry_msgs/msg/WrenchStamped", QOS)
-        for number in range(COUNT):
-            recorder.write(states, state(number), number)
-            if number % 7 == 6:
-                for answered in range(number - 6, number + 1):
-                    recorder.write(forces, pack_wrench(answered, -answered), answered)
-            if number % 100 == 99:
-                recorder.flush()
+    messages = []
+    for number in range(COUNT):
+        messages.append((JOINT_STATES, number, state(number)))
+        if number % 7 == 6:
+            late = range(number - 6, number + 1)
+            messages += [(FORCES, stamp, pack_wrench(stamp, -stamp)) for stamp in late]
+    write_bag(tmp_path / "bag", messages, flush_every=200)
     with Recording(tmp_path / "bag") as recording:
         blocks = list(recording.blocks())
-        assert len(blocks) == 6
+        assert len(blocks) == len(messages) // 200 + 1
         position = [value for block in blocks for value in block.joint_states.position]
         assert position == recording.joint_states.position.tolist() == list(range(COUNT))
         force = [value for block in blocks for value in block.control_forces.force]
@@ -101,10 +97,8 @@ def test_columns_are_those_of_the_messages_chunk_by_chunk_and_as_a_whole(tmp_pat
 
 
 def test_invalid_messages_are_skipped_and_reported(tmp_path):
-    with Recorder(tmp_path / "bag") as recorder:
-        channel = recorder.add_topic(JOINT_STATES, "sensor_msgs/msg/JointState", QOS)
-        for number in range(9):
-            recorder.write(channel, state(number) if number % 3 else b"rubbish", number)
+    data = (state(number) if number % 3 else b"rubbish" for number in range(9))
+    write_bag(tmp_path / "bag", [(JOINT_STATES, *each) for each in enumerate(data)])
     with Recording(tmp_path / "bag") as recording:
         assert recording.joint_states.stamp.tolist() == [1, 2, 4, 5, 7, 8]
         (sentence,) = recording.missing
@@ -113,47 +107,12 @@ def test_invalid_messages_are_skipped_and_reported(tmp_path):
 
 
 def test_only_the_topics_asked_for_are_read(tmp_path):
-    with Recorder(tmp_path / "bag") as recorder:
-        channels = {
-            topic: recorder.add_topic(topic, "std_msgs/msg/Float64", QOS) for topic in "abc"
-        }
-        for stamp, topic in enumerate("abcab"):
-            recorder.write(channels[topic], bytes(12), stamp)
+    write_bag(tmp_path / "bag", [(t, stamp, bytes(12)) for stamp, t in enumerate("abcab")])
     with Recording(tmp_path / "bag") as recording:
         read = [(topic, stamp) for topic, stamp, _ in recording.messages("a", "b")]
         assert read == [("a", 0), ("b", 1), ("a", 3), ("b", 4)]
         assert [stamp for _, stamp, _ in recording.messages("c", "d")] == [2]
         assert list(recording.messages()) == []
-
-
-@given(st.data())
-def test_a_cut_file_gives_its_whole_chunks(bag, scratch, data):
-    content = (bag / "bag_0.mcap").read_bytes()
-    scratch.write_bytes(content[: data.draw(st.integers(8, len(content) - 1))])
-    with Recording(scratch) as recording:
-        assert not recording.complete
-        stamps = [stamp for _, stamp, _ in recording.messages(JOINT_STATES)]
-        assert not recording.complete
-        assert stamps == list(range(len(stamps)))
-        assert len(stamps) % 100 == 0
-        if stamps:
-            assert recording.metadata("scenario") == {"name": "paper"}
-            assert recording.attachment("scenario.yaml") == b"plant:"
-        else:
-            assert set(recording.topics) <= {JOINT_STATES}
-
-
-def test_a_recording_can_be_read_while_it_is_made(tmp_path):
-    with Recorder(tmp_path / "bag") as recorder:
-        with Recording(tmp_path / "bag") as recording:
-            assert recording.topics == {}
-            assert not recording.complete
-        channel = recorder.add_topic("/a", "std_msgs/msg/Float64", QOS)
-        recorder.write(channel, bytes(12), 5)
-        recorder.flush()
-        with Recording(tmp_path / "bag") as recording:
-            assert list(recording.messages("/a")) == [("/a", 5, bytes(12))]
-            assert not recording.complete
 
 
 @given(st.data())
@@ -183,14 +142,6 @@ def test_a_damaged_chunk_is_skipped_and_reported(bag, scratch):
     assert set(stamps) < set(range(COUNT))
 
 
-def test_a_bag_without_metadata_yaml_is_not_complete(bag, tmp_path):
-    shutil.copytree(bag, tmp_path / "bag")
-    (tmp_path / "bag" / "metadata.yaml").unlink()
-    with Recording(tmp_path / "bag") as recording:
-        assert not recording.complete
-        assert len(list(recording.messages(JOINT_STATES))) == COUNT
-
-
 @pytest.mark.parametrize(
     "options",
     [
@@ -208,36 +159,23 @@ def test_a_bag_without_metadata_yaml_is_not_complete(bag, tmp_path):
         },
     ],
 )
-def test_files_of_other_writers_are_read(scratch, options):
+@pytest.mark.parametrize("own", [b"", struct.pack("<BQ", 0x99, 3) + b"own"])
+def test_files_of_other_writers_are_read_and_records_of_their_own_passed_over(
+    scratch, options, own
+):
     with scratch.open("wb") as stream:
         writer = Writer(stream, **options)
         writer.start(profile="ros2")
         schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
         channel = writer.register_channel(JOINT_STATES, "cdr", schema)
         for number in range(COUNT):
+            if own and number % 100 == 50:
+                writer.flush()
+                stream.write(own * 2)
             writer.add_message(channel, number, state(number), number)
         writer.finish()
     with Recording(scratch) as recording:
         assert recording.topics == {JOINT_STATES: "sensor_msgs/msg/JointState"}
-        assert [stamp for _, stamp, _ in recording.messages(JOINT_STATES)] == list(range(COUNT))
-        assert recording.complete
-
-
-@pytest.mark.parametrize("chunked", [True, False])
-def test_records_of_a_kind_of_its_own_are_passed_over(scratch, chunked):
-    private = struct.pack("<BQ", 0x99, 3) + b"own"
-    with scratch.open("wb") as stream:
-        writer = Writer(stream, use_chunking=chunked)
-        writer.start(profile="ros2")
-        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"")
-        channel = writer.register_channel(JOINT_STATES, "cdr", schema)
-        for number in range(COUNT):
-            if number % 100 == 50:
-                writer.flush()
-                stream.write(private * 2)
-            writer.add_message(channel, number, state(number), number)
-        writer.finish()
-    with Recording(scratch) as recording:
         assert recording.joint_states.stamp.tolist() == list(range(COUNT))
         assert recording.complete
 
@@ -256,12 +194,16 @@ def test_a_chunk_that_unpacks_to_masses_of_nothing_costs_nothing(bag, scratch):
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000  # kB
 
 
-@pytest.mark.parametrize("text", ["a: 2001-99-99", "[" * 5000, "- 1", "\xff", ""])
-def test_an_unreadable_metadata_yaml_is_reported(bag, tmp_path, text):
+def test_a_metadata_yaml_that_is_missing_or_unreadable_is_reported(bag, tmp_path):
     shutil.copytree(bag, tmp_path / "bag")
-    (tmp_path / "bag" / "metadata.yaml").write_text(text, encoding="latin-1")
+    for text in ("a: 2001-99-99", "[" * 5000, "- 1", "\xff", ""):
+        (tmp_path / "bag" / "metadata.yaml").write_text(text, encoding="latin-1")
+        with Recording(tmp_path / "bag") as recording:
+            assert recording.missing == ["metadata.yaml cannot be read"]
+    (tmp_path / "bag" / "metadata.yaml").unlink()
     with Recording(tmp_path / "bag") as recording:
-        assert recording.missing == ["metadata.yaml cannot be read"]
+        assert not recording.complete
+        assert len(list(recording.messages(JOINT_STATES))) == COUNT
 
 
 def test_a_split_bag_is_read_in_order(tmp_path):
@@ -295,23 +237,13 @@ def test_a_bag_of_rosbags_is_read_however_it_is_packed(tmp_path, packing):
         assert list(recording.messages(JOINT_STATES)) == [(JOINT_STATES, 5, state(5))]
 
 
-def bag_of_two_drives(directory):
-    with Recorder(directory) as recorder:
-        for number, namespace in enumerate(("/one", "/two/deep")):
-            states = recorder.add_topic(
-                f"{namespace}/joint_states", "sensor_msgs/msg/JointState", QOS
-            )
-            forces = recorder.add_topic(
-                f"{namespace}/control_force", "geometry_msgs/msg/WrenchStamped", QOS
-            )
-            recorder.add_topic(f"{namespace}/frequency", "std_msgs/msg/Float64", QOS)
-            for stamp in range(number, 10, 2):
-                recorder.write(states, state(stamp), stamp)
-                recorder.write(forces, pack_wrench(stamp, stamp), stamp)
-
-
 def test_one_of_several_drives_is_chosen_by_its_namespace(tmp_path):
-    bag_of_two_drives(tmp_path / "bag")
+    messages = []
+    for stamp in range(10):
+        namespace = ("/one", "/two/deep")[stamp % 2]
+        messages.append((f"{namespace}/joint_states", stamp, state(stamp)))
+        messages.append((f"{namespace}/control_force", stamp, pack_wrench(stamp, stamp)))
+    write_bag(tmp_path / "bag", messages, topics=["/one/frequency", "/two/deep/frequency"])
     for namespace, first in (("/one", 0), ("one", 0), ("/two/deep/", 1)):
         with Recording(tmp_path / "bag", namespace) as recording:
             assert recording.joint_states.stamp.tolist() == list(range(first, 10, 2))
@@ -326,44 +258,18 @@ def test_one_of_several_drives_is_chosen_by_its_namespace(tmp_path):
 
 def test_forces_of_strangers_do_not_get_in_the_way(tmp_path):
     with Recorder(tmp_path / "bag") as recorder:
-        states = recorder.add_topic("/one/joint_states", "sensor_msgs/msg/JointState", QOS)
-        recorder.write(states, state(1), 1)
-        for namespace in ("/one", "/two"):
-            forces = recorder.add_topic(
-                f"{namespace}/control_force", "geometry_msgs/msg/WrenchStamped", QOS
-            )
-            recorder.write(forces, pack_wrench(1, 4.0 if namespace == "/one" else 5.0), 1)
         recorder.add_topic("/joint_states", "std_msgs/msg/Float64", QOS)
+        for topic, kind, data in (
+            ("/one/joint_states", "sensor_msgs/msg/JointState", state(1)),
+            ("/one/control_force", "geometry_msgs/msg/WrenchStamped", pack_wrench(1, 4.0)),
+            ("/two/control_force", "geometry_msgs/msg/WrenchStamped", pack_wrench(1, 5.0)),
+        ):
+            recorder.write(recorder.add_topic(topic, kind, QOS), data, 1)
     with Recording(tmp_path / "bag") as recording:
         assert recording.control_forces.force.tolist() == [4.0]
 
 
-def test_the_qos_of_the_publishers_is_returned(tmp_path):
-    record(tmp_path / "bag", range(3))
-    with Recording(tmp_path / "bag") as recording:
-        (profile,) = yaml.safe_load(recording.offered_qos(JOINT_STATES))
-        assert profile["depth"] == 10
-        assert recording.offered_qos("/other") == ""
-
-
-@pytest.mark.parametrize(
-    ("name", "complaint"),
-    [
-        ("nothing", "does not exist"),
-        ("empty", "holds no .mcap file"),
-        ("file.txt", "not an MCAP file"),
-        ("empty.mcap", "not an MCAP file"),
-        ("truncated.mcap", "not an MCAP file"),
-        ("sqlite", "stored as sqlite3"),
-        ("sqlite/sqlite.db3", "stored as sqlite3"),
-        ("file.txt/bag", "does not exist"),
-        ("nul\0nul", "does not exist"),
-        ("long" * 100, "does not exist"),
-        ("directory", "cannot be opened"),
-        ("pipe", "not a regular file"),
-    ],
-)
-def test_what_is_no_bag_is_refused(tmp_path, name, complaint):
+def test_what_is_no_bag_is_refused(tmp_path):
     rosbags_bag(tmp_path / "sqlite", StoragePlugin.SQLITE3)
     (tmp_path / "empty").mkdir()
     (tmp_path / "directory" / "directory.mcap").mkdir(parents=True)
@@ -371,5 +277,14 @@ def test_what_is_no_bag_is_refused(tmp_path, name, complaint):
     (tmp_path / "empty.mcap").touch()
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "truncated.mcap").write_bytes(b"\x89MCAP")
-    with pytest.raises(BagError, match=complaint):
-        Recording(tmp_path / name)
+    for complaint, *names in (
+        ("does not exist", "nothing", "file.txt/bag", "nul\0nul", "long" * 100),
+        ("holds no .mcap file", "empty"),
+        ("not an MCAP file", "file.txt", "empty.mcap", "truncated.mcap"),
+        ("stored as sqlite3", "sqlite", "sqlite/sqlite.db3"),
+        ("cannot be opened", "directory"),
+        ("not a regular file", "pipe"),
+    ):
+        for name in names:
+            with pytest.raises(BagError, match=complaint):
+                Recording(tmp_path / name)

@@ -1,22 +1,19 @@
 """The model of the drive for robot_state_publisher, and its moving parts."""
 
-from collections.abc import Iterator
 from math import pi
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-import rclpy
 import yaml
 from geometry_msgs.msg import WrenchStamped
-from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from stickslip_ros.messages.codec import BELT, SLIDE, pack_joint_state, pack_wrench
-from stickslip_ros.nodes.base.network import this_machine_only
+from stickslip_ros.nodes.base.process import ros_context
 from stickslip_ros.testing import own_domain
 
 CONFIG = Path(__file__).parents[2] / "config"
@@ -63,10 +60,10 @@ def test_all_hangs_together() -> None:
             assert len(path) <= len(LINKS)
 
 
-@pytest.mark.parametrize("name", [SLIDE, BELT])
-def test_slide_and_belt_move_along_x(name: str) -> None:
-    assert JOINTS[name].attrib["type"] == "prismatic"
-    assert vector(element(JOINTS[name], "axis")["xyz"]) == pytest.approx([1, 0, 0])
+def test_slide_and_belt_move_along_x() -> None:
+    for name in (SLIDE, BELT):
+        assert JOINTS[name].attrib["type"] == "prismatic"
+        assert vector(element(JOINTS[name], "axis")["xyz"]) == pytest.approx([1, 0, 0])
 
 
 @pytest.mark.parametrize("name", PULLEYS)
@@ -102,23 +99,13 @@ def test_the_control_force_is_drawn_at_the_slide() -> None:
     assert rviz["Visualization Manager"]["Global Options"]["Fixed Frame"] in LINKS
 
 
-@pytest.fixture
-def context(monkeypatch: pytest.MonkeyPatch) -> Iterator[Context]:
-    for name, value in this_machine_only().items():
-        monkeypatch.setenv(name, value)
-    context = Context()
-    with own_domain() as domain:
-        arguments = ["--ros-args", "-p", f"robot_description:={TEXT}"]
-        rclpy.init(args=arguments, context=context, domain_id=domain)
-        yield context
-        rclpy.shutdown(context=context)
-
-
-def test_ros_takes_it_as_a_parameter(context: Context) -> None:
+def test_ros_takes_it_as_a_parameter() -> None:
     """As robot_state_publisher is given it; it goes through a parser of YAML on its way."""
-    node = Node("reader", context=context)
-    text = node.declare_parameter("robot_description", "").value
-    node.destroy_node()
+    arguments = ["--ros-args", "-p", f"robot_description:={TEXT}"]
+    with own_domain() as domain, ros_context(domain, arguments) as context:
+        node = Node("reader", context=context)
+        text = node.declare_parameter("robot_description", "").value
+        node.destroy_node()
     assert {joint.attrib["name"] for joint in ElementTree.fromstring(text).iter("joint")} == set(
         JOINTS
     )

@@ -44,7 +44,7 @@ The directives:
     For `sh`: in a shell without this environment, with an index for pip. Stays in effect to the
     end of the page. `$ROS_SETUP` replaces the set-up script of an installed ROS.
 `not because REASON`
-    Not run. test_pages.py has the list of these.
+    Not run. Each of these is a decision.
 """
 
 import re
@@ -109,6 +109,14 @@ def pages() -> list[str]:
     found = [*CHECKOUT.glob("*.md"), *(CHECKOUT / "docs").rglob("*.md")]
     found += (CHECKOUT / "bags").glob("*.md")
     return sorted(str(page.relative_to(CHECKOUT)) for page in found)
+
+
+def public_names() -> list[str]:
+    """The names that the reference documents, with their modules."""
+    found = [
+        page.read_text(encoding="utf-8") for page in (CHECKOUT / "docs/reference").glob("*.md")
+    ]
+    return [name for text in found for name in re.findall(r"^::: (\S+)$", text, re.MULTILINE)]
 
 
 def directives_file(page: str) -> Path:

@@ -15,15 +15,10 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
-from lifecycle_msgs.msg import State
-from lifecycle_msgs.srv import GetState
-from rclpy.qos import qos_profile_sensor_data
-from sensor_msgs.msg import JointState
-
 from stickslip_ros.app import INTERRUPTED
 from stickslip_ros.nodes.base.network import this_machine_only
 from tests.docs.page import CHECKOUT
-from tests.nodes.graph import PATIENCE, Graph, wait_for
+from tests.nodes.graph import PATIENCE, wait_for
 
 # Variables that tie a process to the installation in which the tests run.
 _OURS = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "PYTHONPATH")
@@ -44,13 +39,14 @@ _OTHERS_INTERRUPTED = {0, -signal.SIGINT}
 
 _SIGNS = {
     "ros2 topic": "\n",
+    "stickslip": "\n",
     "dask scheduler": "Scheduler at:",
     "dask worker": "Registered to:",
 }
-"""What programs print when they are up, if their nodes do not show it."""
+_ACTIVE = "]: active"
+"""What programs print when they are up, and our nodes."""
 
-_MANAGED = re.compile(r"_node\b|nodes\.|stickslip run")
-"""Commands that start managed nodes."""
+_HEARS_A_JOINT_STATE = "ros2 topic echo --once /feed_drive/joint_states"
 
 _ROS_SETUP = f"""
 export AMENT_PREFIX_PATH={sys.prefix}
@@ -58,6 +54,22 @@ export LD_LIBRARY_PATH={os.environ.get("LD_LIBRARY_PATH", "")}
 export PYTHONPATH={sysconfig.get_path("purelib")}
 """
 """Set-up script of an installed ROS: makes the ROS of the tests visible to other environments."""
+
+_ROS2 = f"""#!/bin/sh
+if [ "$1" = run ]; then
+  IFS=:
+  for prefix in $AMENT_PREFIX_PATH; do
+    if [ -e "$prefix/share/ament_index/resource_index/packages/$2" ]; then
+      program=$prefix/lib/$2/$3
+      shift 3
+      exec env -u _ROS_WHEELS_BOOTSTRAP_COMPLETE "$program" "$@"
+    fi
+  done
+  exit 1
+fi
+PYTHONPATH={CHECKOUT} exec {sys.executable} -m tests.docs.ros2 "$@"
+"""
+"""Stand-in for `ros2`."""
 
 _TO_END = 10.0
 """How long, s, the processes of a page may take to end when their terminal is closed."""
@@ -90,8 +102,6 @@ class Shell:
         self.checkout = scratch / "stickslip_ros"
         copy_checkout(self.checkout)
         self._scratch = scratch
-        self._domain = domain
-        self._beside: frozenset[str] = frozenset()  # nodes of the other terminals
         self._common = {k: v for k, v in os.environ.items() if k not in _CALLERS}
         self._common |= {
             "ROS_DOMAIN_ID": str(domain),
@@ -105,9 +115,7 @@ class Shell:
         self._fill_environment()
         stand_in = scratch / "bin" / "ros2"
         stand_in.parent.mkdir()
-        stand_in.write_text(
-            f'#!/bin/sh\nexec {sys.executable} {CHECKOUT}/tests/docs/ros2.py "$@"\n'
-        )
+        stand_in.write_text(_ROS2)
         stand_in.chmod(0o755)
         (scratch / "setup.bash").write_text(_ROS_SETUP)
         self._path = [str(stand_in.parent), self._common["PATH"]]
@@ -168,23 +176,18 @@ class Shell:
 
         def is_up() -> bool:
             assert process.poll() is None, f"has ended: {said()}"
-            if sign := _of(command, _SIGNS, ""):
-                return sign in output.read_text()
-            return watch.active(self._beside, managed=bool(_MANAGED.search(command))) and (
-                "stickslip run" not in command or watch.hears_a_joint_state()
-            )
+            return _of(command, _SIGNS, _ACTIVE) in output.read_text()
 
-        before = self._beside
         try:
-            with watching(self._domain) as watch:
-                wait_for(is_up, f"up: {command}")
-                self._beside = before | watch.nodes()
+            wait_for(is_up, f"up: {command}")
+            if "stickslip run" in command:  # whose nodes say nothing
+                status, heard = self.run(_HEARS_A_JOINT_STATE, 2.0 * PATIENCE)
+                assert status == 0, f"{heard}\n{said()}"
             yield
             assert process.poll() is None, f"has ended: {said()}"
             os.killpg(process.pid, signal.SIGINT)
             status = process.wait(PATIENCE)
         finally:
-            self._beside = before
             _end(process)
         assert status in _of(command, _INTERRUPTED, _OTHERS_INTERRUPTED), (
             f"ended with status {status}: {said()}"
@@ -207,55 +210,6 @@ class Shell:
         return process, output
 
 
-class Watch:
-    """Finds the nodes of a domain that are up; a new instance lists no node that has ended."""
-
-    def __init__(self, graph: Graph) -> None:
-        self._graph = graph
-        self._listening: dict[str, Any] = {}
-        self._heard: list[JointState] = []
-
-    def nodes(self) -> frozenset[str]:
-        found = self._graph.observer.get_node_names_and_namespaces()
-        names = {f"{space.rstrip('/')}/{name}" for name, space in found if name[0] != "_"}
-        return frozenset(names - {self._graph.observer.get_fully_qualified_name()})
-
-    def active(self, others: frozenset[str], *, managed: bool) -> bool:
-        """Whether nodes other than `others` exist, and the managed ones of these are active.
-
-        A node is visible before its lifecycle services are: `managed` tells to wait for them.
-        """
-        nodes = self.nodes() - others
-        services = {name for name, _ in self._graph.observer.get_service_names_and_types()}
-        having_states = {name for name in nodes if f"{name}/get_state" in services}
-        return bool(having_states or (nodes and not managed)) and all(
-            self._state(name) == State.PRIMARY_STATE_ACTIVE for name in having_states
-        )
-
-    def hears_a_joint_state(self) -> bool:
-        observer = self._graph.observer
-        for name, kinds in observer.get_topic_names_and_types():
-            if kinds == ["sensor_msgs/msg/JointState"] and name not in self._listening:
-                self._listening[name] = observer.create_subscription(
-                    JointState, name, self._heard.append, qos_profile_sensor_data
-                )
-        self._graph.run_for(0.1)
-        return bool(self._heard)
-
-    def _state(self, node: str) -> Any:
-        answer = self._graph.call(GetState, f"{node}/get_state", GetState.Request())
-        return answer.current_state.id
-
-
-@contextmanager
-def watching(domain: int) -> Generator[Watch]:
-    graph = Graph(domain)
-    try:
-        yield Watch(graph)
-    finally:
-        graph.close()
-
-
 def _of(command: str, by_program: Mapping[str, Any], otherwise: Any) -> Any:
     """The value for the program of a command, which may begin with environment variables."""
     bare = re.sub(r"^(\w+=\S* )+", "", command)
@@ -265,22 +219,10 @@ def _of(command: str, by_program: Mapping[str, Any], otherwise: Any) -> Any:
 def _end(process: subprocess.Popen[bytes]) -> None:
     """End a process and all processes of its session, as closing a terminal does."""
     for number in (signal.SIGHUP, signal.SIGKILL):
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, number)
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(_TO_END)
         deadline = time.monotonic() + _TO_END
-        while _has_members(process.pid):
-            if time.monotonic() > deadline:
-                break
-            _NEVER.wait(0.02)
-        else:
-            return
-
-
-def _has_members(group: int) -> bool:
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return False
-    return True
+        with suppress(ProcessLookupError):  # when none is left
+            os.killpg(process.pid, number)
+            while time.monotonic() < deadline:
+                process.poll()
+                os.killpg(process.pid, 0)
+                _NEVER.wait(0.02)

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from stickslip_ros.app.commands import COMMANDS
-from stickslip_ros.app.main import command_parser
+from stickslip_ros.app.commands import COMMANDS, command_parser
 from tests.app.conftest import Run, stickslip  # noqa: F401 - a fixture used here
 from tests.nodes.conftest import domain, process_environment  # noqa: F401 - fixtures used here
 
@@ -177,21 +176,14 @@ def test_every_command_with_json_is_on_the_page() -> None:
     assert {name for name in COMMANDS if "--json" in options[name]} <= sections().keys()
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
+def test_what_differs_is_found(stickslip: Run) -> None:  # noqa: F811
+    printed = json.loads(stickslip("simulate", "paper", "--duration", "1", "--json").stdout)
+    for change, said in (
         ({"amplitude": "wide"}, "('amplitude',) = 'wide' is no number"),
         ({"cycles": 1.5}, "('cycles',) = 1.5 is no integer"),
         ({"cycles": None}, "('cycles',) is null"),
         ({"new": 1}, "('new',) is not on the page"),
-    ],
-)
-def test_what_differs_is_found(
-    stickslip: Run,  # noqa: F811
-    change: dict[str, Any],
-    said: str,
-) -> None:
-    printed = json.loads(stickslip("simulate", "paper", "--duration", "1", "--json").stdout)
-    assert list(differences("simulate", {**printed, **change})) == [said]
+    ):
+        assert list(differences("simulate", {**printed, **change})) == [said]
     del printed["regime"]
     assert list(differences("simulate", printed)) == ["there is no regime"]

@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 import pytest
 import yaml
 
+from stickslip_ros.nodes.base.machine import own_domain
 from stickslip_ros.nodes.base.network import this_machine_only
-from stickslip_ros.running.domain import own_domain
 from stickslip_ros.scenarios.files import load_scenario
 from tests.docs.page import CHECKOUT, DIRECTIVES, Block, blocks, directives_file, pages
 from tests.docs.shell import Shell
@@ -20,18 +20,6 @@ BLOCKS = {page: blocks(page) for page in pages()}
 
 PATIENCE = 1200.0
 """Time limit of a block, s."""
-
-# What cannot be run here, by page and beginning. Each entry is a decision.
-NOT_RUN = [
-    ("docs/dashboard.md", "ssh -L 8642:127.0.0.1:8642 machine-of-the-drive"),
-    ("docs/security.md", "sudo apt install ros-jazzy-sros2"),
-    ("docs/studies.md", "from dask_jobqueue import SLURMCluster"),
-    ("docs/studies.md", "from dask_kubernetes.operator import KubeCluster"),
-    ("docs/tools.md", "sudo apt install ros-jazzy-rqt-plot"),
-    ("docs/tools.md", "sudo apt install ros-jazzy-plotjuggler-ros"),
-    ("docs/tools.md", "sudo apt install ros-jazzy-foxglove-bridge"),
-    ("docs/tools.md", "sudo apt install ros-jazzy-robot-state-publisher"),
-]
 
 # Printed on standard error with status 0, by `ros2` and by its stand-in.
 REFUSALS = ("Setting parameter failed", "Transitioning failed")
@@ -58,18 +46,6 @@ def test_the_blocks_of_a_page_run(page: str, shell: Shell) -> None:
 
 def test_every_file_of_directives_belongs_to_a_page() -> None:
     assert {*DIRECTIVES.rglob("*.toml")} <= {directives_file(page) for page in BLOCKS}
-
-
-def test_the_blocks_that_are_not_run_are_known() -> None:
-    found = [
-        (page, block.text)
-        for page, its_blocks in BLOCKS.items()
-        for block in its_blocks
-        if "not because" in block.directives
-    ]
-    assert [page for page, _ in found] == [page for page, _ in NOT_RUN]
-    for (page, text), (_, beginning) in zip(found, NOT_RUN, strict=True):
-        assert text.startswith(beginning), page
 
 
 def run(page: list[Block], shell: Shell) -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.identification.curves import SaturatingCurve
+from stickslip_ros.identification.findings import Findings
 from stickslip_ros.identification.identify import identify
 from stickslip_ros.identification.record import Record
 from stickslip_ros.identification.regression import Regression, regress
@@ -14,8 +15,13 @@ from stickslip_ros.identification.servo import closed_loop, servo_of
 from tests.identification.axis_record import COULOMB, SATURATING, SERVO, axis, record
 
 
-def test_the_constants_of_coulomb_friction_by_direction() -> None:
-    found = identify([record("coulomb")], "coulomb", {"force_delay": 0.0})
+@pytest.fixture(scope="module")
+def coulomb() -> Findings:
+    """Coulomb friction that differs between the directions."""
+    return identify([record("coulomb")], "coulomb", {"force_delay": 0.0})
+
+
+def test_the_constants_of_coulomb_friction_by_direction(coulomb: Findings) -> None:
     forward, reverse = COULOMB.forward, COULOMB.reverse
     true = {
         "mass": 95.0,
@@ -24,30 +30,32 @@ def test_the_constants_of_coulomb_friction_by_direction() -> None:
         "friction.reverse.static": reverse.static,
         "friction.reverse.viscous": reverse.viscous,
     }
-    assert found.fitted.keys() == true.keys()
+    assert coulomb.fitted.keys() == true.keys()
     for name, value in true.items():
-        assert found.fitted[name].value == pytest.approx(value, rel=0.02), name
-    assert found.force_error(found.records[0]) < 0.02
-    assert {"damping", "bias_force", "normal_force"} <= found.unidentified.keys()
+        assert coulomb.fitted[name].value == pytest.approx(value, rel=0.02), name
+    assert coulomb.force_error(coulomb.records[0]) < 0.02
+    assert {"damping", "bias_force", "normal_force"} <= coulomb.unidentified.keys()
 
 
-def test_the_normal_force_scales_the_coefficients_only() -> None:
-    plain = identify([record("coulomb")], "coulomb")
-    scaled = identify([record("coulomb")], "coulomb", {"normal_force": 50.0})
-    assert scaled.fitted["mass"] == plain.fitted["mass"]
-    ratio = plain.fitted["friction.static"].value / scaled.fitted["friction.static"].value
+def test_what_is_known_is_not_fitted(coulomb: Findings) -> None:
+    """The normal force scales the coefficients only."""
+    fixed = {"force_delay": 0.0, "normal_force": 50.0}
+    scaled = identify([record("coulomb")], "coulomb", fixed)
+    assert scaled.fitted["mass"] == coulomb.fitted["mass"]
+    ratio = coulomb.fitted["friction.static"].value / scaled.fitted["friction.static"].value
     assert ratio == pytest.approx(50.0)
     assert "normal_force" not in scaled.unidentified
+    known = identify([record("coulomb")], "coulomb", {"force_delay": 0.0, "mass": 95.0})
+    assert "mass" not in known.fitted
+    assert known.drive.mass == 95.0
 
 
-def test_a_known_mass_is_not_fitted() -> None:
-    found = identify([record("coulomb")], "coulomb", {"mass": 95.0})
-    assert "mass" not in found.fitted
-    assert found.drive.mass == 95.0
-
-
-def test_the_law_is_chosen_by_held_out_parts() -> None:
-    found = identify([record("saturating", duration=10.0)])
+@pytest.mark.parametrize(
+    ("duration", "fixed"),
+    [(5.0, {"force_delay": 0.0}), pytest.param(10.0, {}, marks=pytest.mark.long)],
+)
+def test_the_law_is_chosen_by_held_out_parts(duration: float, fixed: dict[str, float]) -> None:
+    found = identify([record("saturating", duration=duration)], fixed=fixed)
     assert found.law == "table"
     errors = {each.law: each.error for each in found.candidates}
     assert errors["table"] < 0.7 * errors["coulomb"]
@@ -56,12 +64,13 @@ def test_the_law_is_chosen_by_held_out_parts() -> None:
     fast = curve.speed > 0.02
     assert curve.force[fast] == pytest.approx(true[fast], rel=0.03)
     assert (curve.standard_error > 0.0).all()
-    check = found.check(record("saturating", duration=6.0, seed=1))
+    check = found.check(record("saturating", duration=3.0, seed=1))
     assert check["position_error"] < 2e-4
     assert check["closed_loop_force_error"] < 0.1
     assert check["free_run_error"] < 0.02
 
 
+@pytest.mark.long
 def test_coulomb_friction_needs_no_table() -> None:
     found = identify([record("coulomb", duration=10.0)])
     assert found.law == "coulomb"
@@ -76,71 +85,37 @@ def test_the_controller_is_found_from_the_record() -> None:
     assert found.velocity_gain == pytest.approx(SERVO.velocity_gain, rel=0.01)
 
 
-def test_a_force_of_another_origin_has_no_controller() -> None:
+def test_a_force_of_another_origin_or_without_a_reference_has_no_controller() -> None:
     own = record("coulomb")
-    random = np.random.default_rng(0).normal(size=len(own.position))
-    assert servo_of(Record("axis", 1e-3, own.position, own.belt_velocity, random)) is None
-    other = Record("axis", 1e-3, own.position, own.belt_velocity, random, reference=own.reference)
-    assert servo_of(other) is None
+    other = np.random.default_rng(0).normal(size=len(own.position))
+    assert servo_of(replace(own, force=other, reference=None)) is None
+    assert servo_of(replace(own, force=other)) is None
+    assert servo_of(replace(own, reference=np.full(len(own.position), np.nan))) is None
 
 
-@pytest.mark.parametrize(
-    ("law", "fixed", "message"),
-    [
-        ("stribek", {}, "law stribek is refused: did you mean stribeck"),
-        ("dahl", {}, "law dahl is refused for a drive without a spring"),
-        ("coulomb", {"friction.static": 3.0}, "plant.friction.static cannot be fixed"),
-        ("auto", {"mass": -1.0}, "plant.mass = -1.0 is refused: must be a number above 0"),
-        ("auto", {"damping": -1.0}, "plant.damping = -1.0 is refused: must be a number of 0 or"),
-        ("auto", {"bias_force": np.inf}, "plant.bias_force = inf is refused: must be a finite"),
-        ("auto", {"force_delay": 1.0}, r"must be from -0.001 s to 0.02 s, -1 to 20 periods"),
-        ("auto", {"force_delay": -0.5}, "plant.force_delay = -0.5 is refused"),
-        ("auto", {"mas": 1.0}, r"plant.mas is refused: did you mean plant.mass\? must be one of"),
-        ("auto", {"xyz": 1.0}, "plant.xyz is refused: must be one of plant.mass, "),
-    ],
-)
-def test_what_is_refused(law: str, fixed: dict[str, float], message: str) -> None:
-    with pytest.raises(InvalidInputError, match=message):
-        identify([record("coulomb")], law, fixed)
-
-
-def test_without_a_force_an_axis_tells_nothing() -> None:
-    own = record("coulomb")
-    still = Record("axis", 1e-3, own.position, own.belt_velocity)
-    with pytest.raises(InvalidInputError, match=r"no force is recorded.* name its column"):
-        identify([still])
-
-
-def test_a_force_that_is_always_0_is_refused() -> None:
-    own = record("coulomb")
-    without = replace(own, force=np.zeros(len(own.position)))
-    with pytest.raises(InvalidInputError, match="the recorded force is always 0") as refusal:
-        identify([without])
-    assert "column" not in str(refusal.value)
-
-
-def test_a_force_of_the_wrong_sign_is_refused() -> None:
+def test_what_is_refused() -> None:
     own = record("coulomb")
     assert own.force is not None
-    wrong = Record("axis", 1e-3, own.position, own.belt_velocity, -own.force)
-    with pytest.raises(InvalidInputError, match=r"the mass comes out as 0.* sign"):
-        identify([wrong], "coulomb")
-
-
-def test_a_slide_that_never_moves_is_refused() -> None:
-    own = record("coulomb")
-    still = Record("axis", 1e-3, np.zeros(len(own.position)), own.belt_velocity, own.force)
-    with pytest.raises(InvalidInputError, match="axis: the position has 1 value in 12000 samples"):
-        identify([still])
-
-
-def test_a_reference_with_gaps_has_no_controller() -> None:
-    own = record("coulomb")
-    gap = np.full(len(own.position), np.nan)
-    assert (
-        servo_of(Record("axis", 1e-3, own.position, own.belt_velocity, own.force, None, gap))
-        is None
-    )
+    refused: list[tuple[list[Record], str, dict[str, float], str]] = [
+        ([own], "stribek", {}, "law stribek is refused: did you mean stribeck"),
+        ([own], "dahl", {}, "law dahl is refused for a drive without a spring"),
+        ([own], "coulomb", {"friction.static": 3.0}, "plant.friction.static cannot be fixed"),
+        ([own], "auto", {"mass": -1.0}, "plant.mass = -1.0 is refused: must be a number above 0"),
+        ([own], "auto", {"damping": -1.0}, "plant.damping = -1.0 is refused: must be a number of"),
+        ([own], "auto", {"bias_force": np.inf}, "plant.bias_force = inf is refused: must be a fin"),
+        ([own], "auto", {"force_delay": 1.0}, r"from -0.001 s to 0.02 s, -1 to 20 periods"),
+        ([own], "auto", {"force_delay": -0.5}, "plant.force_delay = -0.5 is refused"),
+        ([own], "auto", {"mas": 1.0}, r"plant.mas is refused: did you mean plant.mass\? must be "),
+        ([own], "auto", {"xyz": 1.0}, "plant.xyz is refused: must be one of plant.mass, "),
+        ([replace(own, force=None)], "auto", {}, r"no force is recorded.* name its column"),
+        ([replace(own, force=0.0 * own.force)], "auto", {}, r"recorded force is always 0[^;]*$"),
+        ([replace(own, force=-own.force)], "coulomb", {}, r"the mass comes out as 0.* sign"),
+        ([replace(own, position=0.0 * own.position)], "auto", {}, "has 1 value in 12000 samples"),
+        ([own, replace(own, period=2e-3)], "auto", {}, r"sample period of 0\.001 s and .* 0\.002"),
+    ]
+    for records, law, fixed, message in refused:
+        with pytest.raises(InvalidInputError, match=message):
+            identify(records, law, fixed)
 
 
 def test_the_constants_of_other_laws_of_an_axis() -> None:
@@ -154,9 +129,8 @@ def test_the_constants_of_other_laws_of_an_axis() -> None:
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_pulses_of_a_checked_record(known: bool) -> None:
+def test_pulses_of_a_checked_record(coulomb: Findings, known: bool) -> None:
     """They are a known disturbance, or were added to the command of the controller."""
-    fitted = identify([record("coulomb")], "coulomb")
     pulses = np.zeros(len(record("coulomb").position))
     for number in range(400, len(pulses), 700):
         pulses[number : number + 40] = (-1.0) ** number * 30.0
@@ -169,7 +143,7 @@ def test_pulses_of_a_checked_record(known: bool) -> None:
         force=force if known else force + pulses,
         disturbance=pulses if known else None,
     )
-    check = fitted.check(tapped)
+    check = coulomb.check(tapped)
     assert check["force_error"] < 0.02
     assert check["position_error"] < 1e-4
     assert check["closed_loop_force_error"] < 0.03
@@ -191,7 +165,7 @@ def test_a_controller_is_found_beside_forces_that_are_added_to_it() -> None:
 
 def test_a_curve_does_not_rise_far_below_the_slowest_speed() -> None:
     """A rise there is one with the force at rest: neither would be told."""
-    found = identify([record("coulomb")], "table")
+    found = identify([record("coulomb")], "table", {"force_delay": 0.0})
     fit = found.chosen.fit
     assert isinstance(fit, Regression)
     curve = SaturatingCurve()
@@ -200,11 +174,3 @@ def test_a_curve_does_not_rise_far_below_the_slowest_speed() -> None:
     for number, law in enumerate((COULOMB.forward, COULOMB.reverse)):
         force = found.friction(number)
         assert force.force[1] == pytest.approx(law.static, rel=0.3)
-
-
-def test_recordings_of_different_rates_are_refused() -> None:
-    own = record("coulomb")
-    with pytest.raises(
-        InvalidInputError, match=r"axis has a sample period of 0\.001 s and .* 0\.002 s"
-    ):
-        identify([own, replace(own, period=2e-3)])

@@ -21,6 +21,8 @@ _FILE = Path(
 )
 _STUDY = Path(__file__).parents[2] / "benchmarks" / "ball_screw_axis.json"
 
+pytestmark = pytest.mark.process
+
 
 @pytest.fixture(scope="module")
 def record() -> Record:
@@ -51,6 +53,7 @@ def test_the_published_constants_by_direction(record: Record) -> None:
     assert found.force_error(record) == pytest.approx(0.0306, abs=0.0003)
 
 
+@pytest.mark.long
 def test_a_curve_is_chosen_that_predicts_better(record: Record, table: Findings) -> None:
     assert table.law == "table"
     assert table.chosen.error < 0.0265
@@ -70,6 +73,7 @@ def test_a_curve_is_chosen_that_predicts_better(record: Record, table: Findings)
         assert check[name] == pytest.approx(documented[name], rel=0.01), name
 
 
+@pytest.mark.long
 def test_the_first_half_predicts_the_second(record: Record) -> None:
     half = len(record.position) // 2
     found = identify([record.part(0, half)])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stickslip_ros.identification.intervals import block_covariance, carried
+from stickslip_ros.identification.intervals import block_covariance, propagated
 
 _ROWS = 2400
 
@@ -29,7 +29,7 @@ def test_what_rows_do_not_tell_has_no_finite_error() -> None:
 def test_what_depends_on_an_untold_constant_has_no_finite_error() -> None:
     covariance = np.array([[4.0, 0.0], [0.0, np.inf]])
     linear = np.array([[1.0, 0.0], [3.0, 0.0], [1.0, 1.0]])
-    found = carried(linear, covariance)
+    found = propagated(linear, covariance)
     assert found[0].tolist() == [4.0, 12.0, 0.0]
     assert np.diag(found).tolist() == [4.0, 36.0, np.inf]
 

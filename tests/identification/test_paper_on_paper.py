@@ -28,6 +28,7 @@ def _compare(row: Mapping[str, Any], found: study.Features) -> None:
         assert value == expected, name
 
 
+@pytest.mark.process
 @pytest.mark.skipif(not study.DATA.exists(), reason="the recorded data are not here")
 def test_the_slips_of_the_records() -> None:
     for row in _rows("measured"):

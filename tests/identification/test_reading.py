@@ -54,3 +54,15 @@ def test_a_part_that_is_not_there_is_refused(tables: list[Path]) -> None:
         read_records(tables[0], columns, start=5.0)
     with pytest.raises(InvalidInputError, match="no samples from 5 s to 6 s: it lasts"):
         read_records(tables[0], columns, start=5.0, end=6.0)
+
+
+@pytest.mark.parametrize("cell", ["1e160", "-1e308", "inf", "1e-320"])
+def test_a_wild_cell_is_not_used(tables: list[Path], cell: str) -> None:
+    rows = tables[1].read_text().splitlines()
+    rows[300] = f"0.299,{cell},{cell},{cell}"
+    tables[1].write_text("\n".join(rows))
+    (record,) = read_records(tables[1], _COLUMNS).records
+    assert len(record.position) == 700
+    for values in (record.position, record.force, record.disturbance):
+        assert values is not None
+        assert np.abs(values).max() < 1.1

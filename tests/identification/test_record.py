@@ -133,19 +133,16 @@ def test_the_share_of_samples_in_parts_that_are_too_short() -> None:
     assert record.left_out == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize(
-    "time",
-    [
+def test_a_clock_that_is_not_even_is_refused() -> None:
+    for time in (
         np.cumsum(np.where(np.arange(1200) % 2, 1e-3, 3e-3)),
         np.cumsum(np.where(np.arange(1201) % 2, 1e-3, 3e-3)),
         np.cumsum(np.random.default_rng(0).uniform(1e-4, 3e-3, 1200)),
         np.where(np.arange(1200) < 600, 0.0, -0.3) + 1e-3 * np.arange(1200),
         np.zeros(1200),
-    ],
-)
-def test_a_clock_that_is_not_even_is_refused(time: np.ndarray) -> None:
-    with pytest.raises(InvalidInputError, match="must be even up to gaps"):
-        evenly_spaced("log", _stamps(time), _columns(time))
+    ):
+        with pytest.raises(InvalidInputError, match="must be even up to gaps"):
+            evenly_spaced("log", _stamps(time), _columns(time))
 
 
 def test_stamps_that_repeat_are_one_sample() -> None:

@@ -12,12 +12,15 @@ from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
 from rclpy.task import Future
 
 from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.base.process import spin
 from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
+from stickslip_ros.running.spinner import destroy
 
 PATIENCE = 60.0
 """How long a test waits, s, for what should happen at once on an idle machine."""
@@ -113,16 +116,30 @@ class Graph:
     def listen(self, topic: Any, raw: bool = False) -> list[Any]:
         """Return a list to which every message of a topic will be appended."""
         heard: list[Any] = []
-        name = topic.name if topic.name.startswith("/") else f"/test/{topic.name}"
-        self.observer.create_subscription(
-            message_class(topic.type_name), name, heard.append, qos_profile(topic, 10_000), raw=raw
-        )
+        self.subscribe(topic, heard.append, raw=raw)
         return heard
+
+    def subscribe(
+        self, topic: Any, callback: Callable[[Any], None], raw: bool = True
+    ) -> Subscription:
+        """Let the observer take every message of a topic, serialized if `raw`."""
+        kind, qos = message_class(topic.type_name), qos_profile(topic, 10_000)
+        return self.observer.create_subscription(kind, topic.name, callback, qos, raw=raw)
+
+    def publisher(self, topic: Any, readers: int = 0) -> Publisher:
+        """Return a publisher of the observer that is matched with so many readers or more."""
+        made = self.observer.create_publisher(
+            message_class(topic.type_name), topic.name, qos_profile(topic)
+        )
+        self.wait_until(
+            lambda: made.get_subscription_count() >= readers, f"readers of {topic.name}"
+        )
+        return made
 
     def close(self) -> None:
         """Take everything down."""
         for node in reversed(self._nodes):
             self.executor.remove_node(node)
-            node.destroy_node()
+            destroy(node)
         self.executor.shutdown()
         rclpy.shutdown(context=self.context)

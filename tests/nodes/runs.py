@@ -3,13 +3,12 @@
 from pathlib import Path
 
 from stickslip_ros.bags.reader import Recording
-from stickslip_ros.bags.recorder import QosProfile, Recorder
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
-from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.testing import own_domain
+from tests.bags.runs import write_bag
 from tests.nodes.graph import Graph
 
 SECOND = 1_000_000_000
@@ -19,31 +18,33 @@ FORCES = "/test/control_force"
 
 def record_states(bag: Path, count: int, step: int = SECOND // 100) -> str:
     """Write as many joint states and forces, `step` ns apart, from 1 s on; return the path."""
-    with Recorder(bag) as recorder:
-        qos = QosProfile(depth=JOINT_STATES.depth)
-        states = recorder.add_topic(STATES, JOINT_STATES.type_name, qos)
-        forces = recorder.add_topic(FORCES, CONTROL_FORCE.type_name, qos)
-        for number in range(count):
-            stamp = SECOND + number * step
-            state = pack_joint_state(stamp, (number, 0.0), (0.1, 0.4), (0.0, 0.0))
-            recorder.write(states, state, stamp)
-            recorder.write(forces, pack_wrench(stamp, 0.5 * number), stamp)
+    messages: list[tuple[str, int, bytes]] = []
+    for number in range(count):
+        stamp = SECOND + number * step
+        state = pack_joint_state(stamp, (number, 0.0), (0.1, 0.4), (0.0, 0.0))
+        messages += [(STATES, stamp, state), (FORCES, stamp, pack_wrench(stamp, 0.5 * number))]
+    write_bag(bag, messages)
     return str(bag)
 
 
-def record_run(bag: Path, **plant_parameters: object) -> None:
+def close_the_loop(graph: Graph, bag: Path, **plant_parameters: object) -> None:
     """Record the closed loop in lockstep until the plant pauses by itself."""
+    analyzer = graph.add(AnalyzerNode, bag=str(bag))
+    controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
+    graph.wait_until(lambda: analyzer.active and controller.active, "both active")
+    listeners = ["analyzer", "washout_controller"]
+    plant = graph.add(PlantNode, wait_for=listeners, **plant_parameters)
+    graph.wait_until(lambda: plant.active, "plant active")
+    graph.wait_until(lambda: not plant.active, "plant pauses")
+    for node in listeners[::-1]:
+        graph.deactivate(node)
+
+
+def record_run(bag: Path, **plant_parameters: object) -> None:
+    """Record the closed loop in a graph of its own."""
     with own_domain() as domain:
         graph = Graph(domain)
-        analyzer = graph.add(AnalyzerNode, bag=str(bag))
-        controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
-        graph.wait_until(lambda: analyzer.active and controller.active, "both active")
-        listeners = ["analyzer", "washout_controller"]
-        plant = graph.add(PlantNode, wait_for=listeners, **plant_parameters)
-        graph.wait_until(lambda: plant.active, "plant active")
-        graph.wait_until(lambda: not plant.active, "plant pauses")
-        for node in listeners[::-1]:
-            graph.deactivate(node)
+        close_the_loop(graph, bag, **plant_parameters)
         graph.close()
 
 

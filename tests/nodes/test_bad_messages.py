@@ -12,8 +12,6 @@ from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import WrenchStamped
-from rclpy.publisher import Publisher
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
@@ -34,11 +32,9 @@ from stickslip_ros.messages.topics import (
     DISTURBANCE_FORCE,
     JOINT_STATES,
     RECORDED,
-    Topic,
 )
 from stickslip_ros.nodes.analyzer import AnalyzerNode
 from stickslip_ros.nodes.base.managed import OK, WARN
-from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import PATIENCE, Graph
@@ -50,15 +46,6 @@ PADDING = bytes(3)
 """Fast DDS fills a message up to four bytes: one that was cut may arrive complete."""
 VALUES = (nan, inf, -inf, 1e308, -1e308, 1e100, 5e-324, 0.1, -3.0)
 paces = pytest.mark.parametrize("pace", ["lockstep", "realtime"])
-
-
-def publisher(graph: Graph, topic: Topic) -> Publisher:
-    """Return a publisher of the test's own, matched with somebody."""
-    made = graph.observer.create_publisher(
-        message_class(topic.type_name), f"/test/{topic.name}", qos_profile(topic)
-    )
-    graph.wait_until(made.get_subscription_count, f"{topic.name} is matched")
-    return made
 
 
 def close_the_loop(graph: Graph, bag: Path, **plant_parameters: object) -> tuple[Any, Any, Any]:
@@ -117,10 +104,8 @@ def resident(process: int) -> int:
 def test_the_plant_says_what_it_dropped_and_waits_for_a_force_that_is_one(graph: Graph) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
     plant = graph.add(PlantNode, wait_for=["observer"], reply_timeout=1e3)
-    force = graph.observer.create_publisher(
-        WrenchStamped, f"/test/{CONTROL_FORCE.name}", qos_profile(CONTROL_FORCE)
-    )
-    graph.wait_until(lambda: len(heard) == 1 and force.get_subscription_count() == 1, "matched")
+    force = graph.publisher(CONTROL_FORCE, 1)
+    graph.wait_until(lambda: len(heard) == 1, "sample 0")
     assert plant.diagnose()[0] == OK
     for message in (b"\0", b"\xff" * 100, pack_wrench(SECOND, nan), pack_wrench(SECOND, -inf)):
         force.publish(message)
@@ -134,7 +119,7 @@ def test_the_plant_says_what_it_dropped_and_waits_for_a_force_that_is_one(graph:
     graph.wait_until(lambda: len(heard) == 2, "sample 1")
 
     for topic, message in ((DISTURBANCE_FORCE, pack_wrench(0, nan)), (RECORDED, b"\0\1\0")):
-        publisher(graph, topic).publish(message)
+        graph.publisher(topic, 1).publish(message)
     graph.wait_until(lambda: plant.diagnose()[2]["dropped_messages"] == 6, "six are dropped")
     assert len(heard) == 2
 
@@ -142,19 +127,8 @@ def test_the_plant_says_what_it_dropped_and_waits_for_a_force_that_is_one(graph:
 def test_of_two_controllers_the_first_answer_counts_and_both_are_named(graph: Graph) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
     plant = graph.add(PlantNode, wait_for=["observer"], reply_timeout=1e3)
-    first, second = (
-        graph.observer.create_publisher(
-            WrenchStamped, f"/test/{CONTROL_FORCE.name}", qos_profile(CONTROL_FORCE)
-        )
-        for _ in range(2)
-    )
-    graph.wait_until(
-        lambda: (
-            len(heard) == 1
-            and first.get_subscription_count() == second.get_subscription_count() == 1
-        ),
-        "matched",
-    )
+    first, second = (graph.publisher(CONTROL_FORCE, 1) for _ in range(2))
+    graph.wait_until(lambda: len(heard) == 1, "sample 0")
     first.publish(pack_wrench(SECOND, 0.25))
     graph.wait_until(lambda: len(heard) == 2, "sample 1")
     second.publish(pack_wrench(SECOND, 99.0))
@@ -171,8 +145,8 @@ def test_of_two_controllers_the_first_answer_counts_and_both_are_named(graph: Gr
 def test_a_second_plant_is_named_while_it_is_there(graph: Graph, tmp_path: Path) -> None:
     analyzer, controller, _ = close_the_loop(graph, tmp_path / "bag", pace="realtime")
     assert "publishers" not in controller.diagnose()[1]
-    states = publisher(graph, JOINT_STATES)
-    disturbances = publisher(graph, APPLIED_DISTURBANCE)
+    states = graph.publisher(JOINT_STATES, 1)
+    disturbances = graph.publisher(APPLIED_DISTURBANCE, 1)
     names = "2 publishers of /test/joint_states: /test/observer, /test/plant"
     graph.wait_until(lambda: names in controller.diagnose()[1], "the controller names both")
     graph.wait_until(lambda: names in analyzer.diagnose()[1], "the analyzer names both")
@@ -190,7 +164,7 @@ def test_the_controller_never_sends_what_is_not_finite(graph: Graph) -> None:
         WashoutControllerNode, wait_for=["observer"], corner_frequency=1e3, cubic_gain=-1e30
     )
     forces = graph.listen(CONTROL_FORCE, raw=True)
-    states = publisher(graph, JOINT_STATES)
+    states = graph.publisher(JOINT_STATES, 1)
     graph.wait_until(lambda: controller.active, "the controller listens")
 
     def send(number: int, velocity: float) -> None:
@@ -210,9 +184,8 @@ def test_the_controller_never_sends_what_is_not_finite(graph: Graph) -> None:
 def test_a_stamp_beyond_ros_time_is_dropped(graph: Graph, tmp_path: Path) -> None:
     analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
     controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
+    states = graph.publisher(JOINT_STATES, 2)
     graph.wait_until(lambda: analyzer.active and controller.active, "both listen")
-    states = publisher(graph, JOINT_STATES)
-    graph.wait_until(lambda: states.get_subscription_count() == 2, "both are matched")
     late = JointState(name=["slide", "belt"], position=[0.0, 0.0], velocity=[0.1, 0.4])
     late.header.stamp.sec, late.header.stamp.nanosec = 2**31 - 1, 2**32 - 1
     states.publish(late)
@@ -228,7 +201,7 @@ def test_messages_of_every_kind_harm_no_node(graph: Graph, tmp_path: Path, pace:
     heard = graph.listen(JOINT_STATES, raw=True)
     forces = graph.listen(CONTROL_FORCE, raw=True)
     analyzer, controller, plant = close_the_loop(graph, tmp_path / "bag", pace=pace)
-    strangers = [publisher(graph, topic) for topic in TOPICS]
+    strangers = [graph.publisher(topic, 1) for topic in TOPICS]
     sent = messages(17, lambda: plant._loop.sample.stamp)
     chance = random.Random(17)
     for _ in range(30):
@@ -276,7 +249,7 @@ def test_a_flood_of_garbage_leaves_no_trace_but_a_count(
     graph.observer.create_subscription(DiagnosticArray, DIAGNOSTICS.name, hear, 100)
     heard = graph.listen(JOINT_STATES, raw=True)
     graph.wait_until(lambda: len(heard) > 100 and health.keys() >= started.keys(), "they run")
-    strangers = [publisher(graph, topic) for topic in TOPICS]
+    strangers = [graph.publisher(topic, 1) for topic in TOPICS]
     newest = SECOND if pace == "lockstep" else unpack_header(heard[-1])
     sent = messages(23, lambda: newest)
     sizes: list[dict[str, int]] = []

@@ -1,35 +1,34 @@
 """The controller node of any law, and references, on the real middleware."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
+from math import nan
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import pytest
+from rclpy.duration import Duration
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import JointState
 
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.messages.codec import pack_joint_state, pack_reference, unpack_wrench
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, REFERENCE
 from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.controller import ControllerNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
+from stickslip_ros.physics.model.control.base import State
 from stickslip_ros.samples import Reference, Sample
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     NODE_PARAMETERS,
     controller_model,
 )
-from tests.nodes.graph import Graph
+from tests.nodes.graph import PATIENCE, Graph
 
 SECOND = 1_000_000_000
 
@@ -75,14 +74,8 @@ class Loop:
         self.forces = graph.listen(CONTROL_FORCE, raw=True)
         self.references = graph.listen(REFERENCE, raw=True)
         self.controller = graph.add(node, **parameters)
-        self.states, self.given = (
-            graph.observer.create_publisher(JointState, f"/test/{topic.name}", qos_profile(topic))
-            for topic in (JOINT_STATES, REFERENCE)
-        )
-        graph.wait_until(
-            lambda: self.controller.active and self.states.get_subscription_count() == 1,
-            "controller listens",
-        )
+        self.states, self.given = graph.publisher(JOINT_STATES, 1), graph.publisher(REFERENCE)
+        graph.wait_until(lambda: self.controller.active, "controller listens")
 
     def force(self, stamp: int, position: float = 0.0, velocity: float = 0.0) -> float:
         """Send a state and return the force of the answer."""
@@ -107,12 +100,45 @@ def test_a_law_has_a_node_of_its_name_and_its_constants_as_parameters(graph: Gra
     assert "law = 'washout'" in result.reason
 
 
-def test_a_position_that_is_not_finite_is_dropped(graph: Graph) -> None:
-    loop = Loop(graph, partial(ControllerNode, "velocity_feedback"))
-    nowhere = pack_joint_state(SECOND, (float("inf"), 0.0), (0.0, 0.0), (0.0, 0.0))
-    loop.states.publish(nowhere)
-    graph.wait_until(lambda: "position inf" in loop.controller.diagnose()[1], "it is dropped")
-    assert loop.force(2 * SECOND, velocity=1.0) == -1.0
+def test_it_listens_only_while_it_is_active(graph: Graph) -> None:
+    """A plant that waits for it must not take it for ready before it is."""
+    controller = graph.add(partial(ControllerNode, "washout"), autostart=False)
+
+    def readers() -> int:
+        return controller.count_subscribers(JOINT_STATES.name)
+
+    controller.trigger_configure()
+    plant = graph.add(PlantNode, wait_for=["washout_controller"], duration=1.0)
+    assert readers() == 0
+    controller.trigger_activate()
+    graph.wait_until(lambda: controller._answered == 101, "each sample is answered")
+    assert plant.diagnose()[2]["late_forces"] == 0
+    graph.deactivate("washout_controller")
+    graph.wait_until(lambda: readers() == 0, "it listens no more")
+
+
+def test_what_is_no_later_finite_state_is_dropped_and_the_filter_goes_on(graph: Graph) -> None:
+    loop = Loop(graph, partial(ControllerNode, "washout"))
+    law = CONTROLLER_PARAMETERS["washout"]().as_controller()
+
+    def check(stamp: int, velocity: float) -> None:
+        sample = Sample(stamp, 0.0, velocity, 0.0, 0.0, 0.0)
+        assert loop.force(stamp, velocity=velocity) == law.answer(sample)
+
+    for number, velocity in enumerate((0.1, 0.3, -0.2)):
+        check(SECOND + number * SECOND // 100, velocity)
+    zero = (0.0, 0.0)
+    for message, told in (
+        (pack_joint_state(2 * SECOND, zero, (nan, 0.4), zero), "velocity nan"),
+        (pack_joint_state(2 * SECOND, (float("inf"), 0.0), zero, zero), "position inf"),
+        (b"\x00\x01\x00\x00 nothing", "ends after"),
+        (pack_joint_state(SECOND + SECOND // 100, zero, (0.3, 0.4), zero), "not later than the"),
+    ):
+        loop.states.publish(message)
+        graph.wait_until(lambda told=told: told in loop.controller.diagnose()[1], "it is dropped")
+    check(2 * SECOND, 0.4)
+    assert len(loop.forces) == 4
+    assert loop.force(SECOND, velocity=0.1) == 0.0  # a plant that was started again
 
 
 def test_a_reference_from_a_topic_holds_until_the_next(
@@ -135,6 +161,30 @@ def test_a_reference_from_a_topic_holds_until_the_next(
     loop.given.publish(pack_reference(0, Reference(float("inf"))))
     graph.wait_until(lambda: "position inf" in loop.controller.diagnose()[1], "it is dropped")
     assert loop.force(9 * SECOND, position=0.1) == pytest.approx(4.0)
+
+
+def test_it_survives_a_law_that_fails_and_says_so(
+    graph: Graph, servo: partial[ControllerNode], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    respond = Servo.respond
+
+    def failing(law: Servo, state: State, elapsed: float, sample: Sample, given: Reference) -> Any:
+        if sample.position == 1.0:
+            raise KeyError("table")
+        return (
+            (nan, state) if sample.position == 2.0 else respond(law, state, elapsed, sample, given)
+        )
+
+    monkeypatch.setattr(Servo, "respond", failing)
+    loop = Loop(graph, servo, force_limit=5.0)
+    assert loop.force(SECOND, 0.1) == -1.0
+    dropped = "a joint state stamped {0}000000000 ns: the control law servo fails at {1} s: {2}"
+    for position, reason in ((1, "KeyError: 'table'"), (2, "its force is nan, which must be")):
+        stamp = (2 + position) * SECOND
+        loop.states.publish(pack_joint_state(stamp, (position, 0.0), (0.0, 0.0), (0.0, 0.0)))
+        told = dropped.format(2 + position, 1 + position, reason)
+        graph.wait_until(lambda told=told: told in loop.controller.diagnose()[1], "it is dropped")
+    assert loop.force(5 * SECOND, 0.1) == -1.0
 
 
 def test_a_course_of_its_own_is_published_with_each_answer(
@@ -166,6 +216,7 @@ def test_the_analyzer_records_references_and_the_parameters_of_the_controller(
         ),
         "parameters are known",
     )
+    graph.deactivate("servo_controller")
     graph.deactivate("analyzer")
     with Recording(tmp_path / "bag") as recording:
         states, forces, references = (
@@ -176,8 +227,7 @@ def test_the_analyzer_records_references_and_the_parameters_of_the_controller(
         kept = recording.metadata("stickslip_ros/servo_controller")
     assert json.loads(kept["stiffness"]) == 7.0
     assert json.loads(kept["law"]) == "servo"
-    answered = states.stamp[: len(forces)]
-    assert references.stamp.tolist() == answered.tolist() == forces.stamp.tolist()
+    assert references.stamp.tolist() == states.stamp.tolist() == forces.stamp.tolist()
     law, motion = Servo(stiffness=7.0), ReferenceCourse(ReferenceKind.SINE, 0.2, frequency=2.0)
     for n in (0, 1, 57, len(forces) - 1):
         wanted = motion((int(states.stamp[n]) - SECOND) * 1e-9)
@@ -191,48 +241,14 @@ def test_a_reference_of_any_clock_is_recorded_within_the_run(
     graph: Graph, tmp_path: Path, stamp: int
 ) -> None:
     analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
-    publishers = [
-        graph.observer.create_publisher(JointState, f"/test/{topic.name}", qos_profile(topic))
-        for topic in (JOINT_STATES, REFERENCE)
-    ]
-    graph.wait_until(lambda: analyzer.active, "analyzer active")
-    graph.wait_until(
-        lambda: all(each.get_subscription_count() == 1 for each in publishers), "it listens"
-    )
-    states, references = publishers
+    states, references = graph.publisher(JOINT_STATES, 1), graph.publisher(REFERENCE, 1)
     states.publish(pack_joint_state(4 * SECOND, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)))
     graph.wait_until(lambda: analyzer.diagnose()[2]["samples"] == 1, "the sample is recorded")
     references.publish(pack_reference(stamp, Reference(0.5, -1.0)))
-    graph.wait_until(lambda: "reference" in analyzer._published, "the reference is recorded")
-    graph.run_for(0.2)
+    assert references.wait_for_all_acked(Duration(seconds=PATIENCE))
     graph.deactivate("analyzer")
     with Recording(tmp_path / "bag") as recording:
         ((_, logged, _),) = recording.messages("/test/reference")
         assert recording.references.position.tolist() == [0.5]
         assert recording.references.velocity.tolist() == [-1.0]
     assert logged == (stamp if stamp == 5 * SECOND else 4 * SECOND)
-
-
-@pytest.mark.process
-@pytest.mark.parametrize(
-    ("parameters", "reason"),
-    [
-        (["law:=washuot"], "unknown control law washuot; did you mean washout?"),
-        (
-            ["law:=velocity_feedback", "corner_frequency:=3.0"],
-            "velocity_feedback_controller: unknown parameter corner_frequency",
-        ),
-        (["law:=velocity_feedback", "velocity_gain:=a"], "velocity_gain = 'a' is refused"),
-    ],
-)
-def test_a_law_or_parameter_that_does_not_exist_is_refused(
-    parameters: list[str], reason: str, process_environment: dict[str, str]
-) -> None:
-    given = [word for parameter in parameters for word in ("-p", parameter)]
-    command = [sys.executable, "-m", "stickslip_ros.nodes.controller", "--ros-args", *given]
-    done = subprocess.run(
-        command, env=process_environment, capture_output=True, text=True, timeout=60, check=False
-    )
-    assert done.returncode == 2
-    assert reason in done.stderr
-    assert "Traceback" not in done.stderr

@@ -1,16 +1,21 @@
-"""Missed deadlines are counted correctly, by a clock of the test on which sending takes time."""
+"""Missed deadlines and late forces: counted correctly, and told when they are too many."""
 
+from itertools import count
 from threading import Event, Lock
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
+from stickslip_ros.messages.codec import pack_wrench, unpack_header
+from stickslip_ros.messages.topics import CONTROL_FORCE, DIAGNOSTICS, JOINT_STATES
 from stickslip_ros.nodes import pacing
-from stickslip_ros.nodes.pacing import RealtimePacer
+from stickslip_ros.nodes.pacing import RealtimePacer, TimingMonitor
+from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.samples import Sample
 from stickslip_ros.scenarios.parameters import PlantParameters
-from tests.nodes.graph import PATIENCE
+from tests.nodes.graph import PATIENCE, Graph
 
 MILLISECOND = 1e-3
 
@@ -59,3 +64,52 @@ def test_a_deadline_is_missed_when_the_next_one_has_passed(
     assert loop.sample_number == 100
     assert pacer.missed_deadlines == missed
     assert pacer.largest_lateness == pytest.approx(largest_lateness * MILLISECOND, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("late", "missed", "words"),
+    [
+        (0, 0, ""),
+        (9, 10, ""),
+        (410, 0, "41 % of the latest forces came late"),
+        (0, 280, "28 % of the latest samples missed their deadlines"),
+        (410, 280, "41 % of the latest forces came late (the last one was held) and 28 %"),
+    ],
+)
+def test_more_than_a_hundredth_is_a_complaint(late: int, missed: int, words: str) -> None:
+    complaint = TimingMonitor().check(1000, late, missed, controlled=True)
+    assert complaint.startswith(words)
+    assert bool(complaint) == bool(words) == ("lower rate or real_time_factor" in complaint)
+
+
+def test_only_the_latest_checks_count_and_none_without_a_controller() -> None:
+    timing = TimingMonitor()
+    assert timing.check(1000, 100, 0, controlled=True)
+    assert [timing.check(1000 * n, 100, 0, controlled=True) for n in range(2, 13)][-1] == ""
+    timing = TimingMonitor()
+    assert timing.check(1000, 1000, 0, controlled=False) == ""
+    assert timing.check(2000, 1005, 0, controlled=True) == ""
+    assert timing.check(3000, 1500, 0, controlled=True) != ""
+
+
+def test_a_plant_whose_controller_answers_every_third_sample_warns(
+    graph: Graph, often_diagnosed: None
+) -> None:
+    health: list[DiagnosticArray] = graph.listen(DIAGNOSTICS)
+    force = graph.publisher(CONTROL_FORCE)
+    counted = count()
+
+    def answer(message: bytes) -> None:
+        if next(counted) % 3 == 0:
+            force.publish(pack_wrench(unpack_header(message), 0.0))
+
+    graph.subscribe(JOINT_STATES, answer)
+    graph.add(PlantNode, pace="realtime", rate=500.0, wait_for=["observer"])
+    graph.wait_until(
+        lambda: any(
+            status.level == DiagnosticStatus.WARN and "forces came late" in status.message
+            for array in health
+            for status in array.status
+        ),
+        "a warning",
+    )

@@ -18,7 +18,6 @@ from stickslip_ros.bags.report import report_of_bag
 from stickslip_ros.errors import BagError
 from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.messages.topics import CONTROL_FORCE, JOINT_STATES, RECORDED, Topic
-from stickslip_ros.nodes.base.ros_topics import message_class, qos_profile
 from tests.nodes.graph import PATIENCE, Graph, wait_for
 from tests.nodes.processes import Processes
 
@@ -101,13 +100,7 @@ class Trio:
         def hear(message: Any) -> None:
             stamps.add(unpack_header(message))
 
-        reader = self._graph.observer.create_subscription(
-            message_class(topic.type_name),
-            f"/test/{topic.name}",
-            hear,
-            qos_profile(topic),
-            raw=True,
-        )
+        reader = self._graph.subscribe(topic, hear)
         yield stamps
         self._graph.observer.destroy_subscription(reader)
 

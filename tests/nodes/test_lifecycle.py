@@ -56,7 +56,7 @@ def ends(graph: Graph) -> dict[object, tuple[int, int]]:
     }
 
 
-@pytest.fixture(params=["composed", pytest.param("processes", marks=pytest.mark.process)])
+@pytest.fixture(params=["composed", pytest.param("processes", marks=pytest.mark.long)])
 def bring(request: pytest.FixtureRequest, graph: Graph) -> Callable[..., None]:
     """Start a node in this process, or in one of its own."""
     if request.param == "composed":
@@ -104,7 +104,7 @@ def test_a_node_says_once_what_it_is_and_whom_it_waits_for(
 
     plant = graph.add(PlantNode, wait_for=["observer", "nobody"], expects_control=False)
     graph.wait_until(lambda: logged("configured"), "it is configured")
-    graph.run_for(1.0)
+    graph.run_for(0.3)  # it tries twenty times a second
     assert logged("waiting for observer, nobody: missing: nobody, observer") == 1
     graph.listen(JOINT_STATES, raw=True)
     plant.set_parameters([Parameter("wait_for", value=["observer"])])

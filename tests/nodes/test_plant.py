@@ -4,10 +4,8 @@ from math import nan
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import WrenchStamped
-from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
-from std_msgs.msg import Header
+from rclpy.publisher import Publisher
 from std_srvs.srv import Trigger
 
 from stickslip_ros.messages.codec import (
@@ -28,7 +26,6 @@ from stickslip_ros.messages.topics import (
     RECORDED,
     TRUE_JOINT_STATES,
 )
-from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.physics.loop.controller import answer
@@ -40,19 +37,19 @@ from tests.nodes.graph import Graph
 SECOND = 1_000_000_000
 
 
-def answers(graph: Graph):
+def answers(graph: Graph) -> Publisher:
     """Return a publisher of control forces, matched with the plant."""
-    publisher = graph.observer.create_publisher(
-        WrenchStamped, f"/test/{CONTROL_FORCE.name}", qos_profile(CONTROL_FORCE)
-    )
-    graph.wait_until(lambda: publisher.get_subscription_count() == 1, "plant listens to forces")
-    return publisher
+    return graph.publisher(CONTROL_FORCE, 1)
 
 
-def test_without_control_the_samples_are_those_of_the_loop(graph: Graph) -> None:
-    heard = graph.listen(JOINT_STATES, raw=True)
-    plant = graph.add(PlantNode, expects_control=False, duration=3.0, wait_for=["observer"])
+def test_without_control_the_samples_are_those_of_the_loop_and_the_clock_shows_them(
+    graph: Graph,
+) -> None:
+    heard, clock = graph.listen(JOINT_STATES, raw=True), graph.listen(CLOCK)
+    options = {"publish_clock": True, "expects_control": False, "wait_for": ["observer"]}
+    plant = graph.add(PlantNode, duration=3.0, **options)
     graph.wait_until(lambda: len(heard) == 301 and not plant.active, "301 samples")
+    graph.wait_until(lambda: len(clock) == 301, "as many times")
 
     parameters = PlantParameters()
     loop = SampledLoop(Motion(parameters.as_drive(), 0.0, 0.0), 100.0, SECOND)
@@ -63,6 +60,8 @@ def test_without_control_the_samples_are_those_of_the_loop(graph: Graph) -> None
     assert columns.velocity.tolist() == [sample.velocity for sample in samples]
     assert columns.friction_force.tolist() == [sample.friction_force for sample in samples]
     assert columns.belt_velocity.tolist() == [0.4] * 301
+    times = [message.clock.sec * SECOND + message.clock.nanosec for message in clock]
+    assert times == columns.stamp.tolist()
 
 
 def test_jittered_forces_act_as_they_do_without_ros(graph: Graph) -> None:
@@ -84,50 +83,9 @@ def test_jittered_forces_act_as_they_do_without_ros(graph: Graph) -> None:
     assert columns.position.tolist() == positions
 
 
-def test_lockstep_waits_for_the_answer_to_each_sample(graph: Graph) -> None:
-    heard = graph.listen(JOINT_STATES, raw=True)
-    plant = graph.add(PlantNode, wait_for=["observer"])
-    force = answers(graph)
-    graph.wait_until(lambda: len(heard) == 1, "sample 0")
-    for stamp, value in ((0, 1.0), (SECOND + 1, 1.0), (9 * SECOND, 1.0), (SECOND, nan)):
-        force.publish(pack_wrench(stamp, value))
-    graph.wait_until(lambda: plant._loop.dropped.total() == 4, "four bad forces are dropped")
-    assert len(heard) == 1
-    force.publish(pack_wrench(SECOND, 0.25))
-    graph.wait_until(lambda: len(heard) == 2, "sample 1")
-    assert plant._loop.late_forces == 0
-
-
-def test_a_missing_controller_is_given_up_and_taken_back(graph: Graph) -> None:
-    heard = graph.listen(JOINT_STATES, raw=True)
-    diagnostics = graph.listen(DIAGNOSTICS)
-    plant = graph.add(PlantNode, wait_for=["observer"], reply_timeout=0.2)
-    graph.wait_until(lambda: len(heard) > 200, "the plant goes on without forces")
-    plant.publish_diagnostics()
-    graph.wait_until(
-        lambda: any(
-            "no control force" in status.message
-            for array in diagnostics
-            for status in array.status
-            if status.name == "/test/plant"
-        ),
-        "the gap is in the diagnostics",
-    )
-    controller = graph.add(WashoutControllerNode)
-    graph.wait_until(lambda: plant._loop.controller_present, "the controller is taken back")
-    late = plant._loop.late_forces
-    reached = plant._loop.sample_number
-    graph.wait_until(lambda: plant._loop.sample_number > reached + 500, "500 samples more")
-    assert plant._loop.late_forces == late
-    assert controller.active
-    assert "no control" not in plant.diagnose()[1]
-
-
 def test_it_runs_no_further_ahead_of_the_recorder_than_the_window(graph: Graph) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
-    recorded = graph.observer.create_publisher(
-        Header, f"/test/{RECORDED.name}", qos_profile(RECORDED)
-    )
+    recorded = graph.publisher(RECORDED)
     plant = graph.add(
         PlantNode, expects_control=False, wait_for=["observer"], flow_window=200, duration=10.0
     )
@@ -156,9 +114,7 @@ def test_a_pause_is_no_end_and_does_not_count_as_duration(
     graph: Graph, pace: str, enough: int
 ) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
-    recorded = graph.observer.create_publisher(
-        Header, f"/test/{RECORDED.name}", qos_profile(RECORDED)
-    )
+    recorded = graph.publisher(RECORDED)
     parameters = {"expects_control": False, "wait_for": ["observer"], "flow_window": 200}
     plant = graph.add(PlantNode, pace=pace, duration=3.0, real_time_factor=2.0, **parameters)
     graph.wait_until(lambda: len(heard) >= enough, "lockstep has used up its window")
@@ -174,12 +130,13 @@ def test_a_pause_is_no_end_and_does_not_count_as_duration(
         assert plant.diagnose()[2]["samples"] == samples
 
 
-@pytest.mark.parametrize("duration", [0.0, 0.3])
-def test_a_run_shorter_than_a_batch_ends(graph: Graph, duration: float) -> None:
+def test_a_run_shorter_than_a_batch_ends(graph: Graph) -> None:
     heard = graph.listen(JOINT_STATES, raw=True)
-    plant = graph.add(PlantNode, expects_control=False, wait_for=["observer"], duration=duration)
-    graph.wait_until(lambda: len(heard) == 1 + round(100 * duration), "every sample")
-    graph.wait_until(lambda: not plant.active, "the plant pauses")
+    plant = graph.add(PlantNode, expects_control=False, wait_for=["observer"], duration=0.0)
+    graph.wait_until(lambda: len(heard) == 1 and not plant.active, "the only sample")
+    plant.set_parameters([Parameter("duration", value=0.3)])
+    plant.trigger_activate()
+    graph.wait_until(lambda: len(heard) == 32 and not plant.active, "every sample")
 
 
 def test_reset_returns_to_the_initial_state_and_time_goes_on(graph: Graph) -> None:
@@ -204,10 +161,7 @@ def test_a_disturbance_acts_from_the_next_sample_and_is_told(graph: Graph) -> No
     applied = graph.listen(APPLIED_DISTURBANCE, raw=True)
     plant = graph.add(PlantNode, wait_for=["observer"])
     force = answers(graph)
-    tap = graph.observer.create_publisher(
-        WrenchStamped, f"/test/{DISTURBANCE_FORCE.name}", qos_profile(DISTURBANCE_FORCE)
-    )
-    graph.wait_until(lambda: tap.get_subscription_count() == 1, "plant listens to disturbances")
+    tap = graph.publisher(DISTURBANCE_FORCE, 1)
     graph.wait_until(lambda: len(heard) == 1, "sample 0")
     tap.publish(pack_wrench(0, 0.5))
     graph.wait_until(lambda: plant._loop.asked_disturbance == 0.5, "the disturbance came")
@@ -240,46 +194,16 @@ def test_the_truth_is_told_if_asked(graph: Graph) -> None:
     assert forces == (0.0, 0.2)
 
 
-def test_a_sensor_changes_while_the_plant_is_not_active(graph: Graph) -> None:
+def test_parameters_that_change_at_once_act_from_the_next_sample(graph: Graph) -> None:
     plant = graph.add(PlantNode, wait_for=["observer"])
-    heard = graph.listen(JOINT_STATES, raw=True)
-    graph.wait_until(lambda: len(heard) == 1, "sample 0")
-    name = "sensor.position_resolution"
-    assert (
-        "sensor.position_resolution" in plant.set_parameters([Parameter(name, value=0.1)])[0].reason
-    )
-    graph.deactivate("plant")
-    assert plant.set_parameters([Parameter(name, value=0.1)])[0].successful
-
-
-def test_parameters_change_all_at_once_or_not_at_all(graph: Graph) -> None:
-    graph.add(PlantNode, wait_for=["observer"])
     heard = graph.listen(JOINT_STATES, raw=True)
     force = answers(graph)
     graph.wait_until(lambda: len(heard) == 1, "sample 0")
-
-    def set_atomically(**values: object) -> object:
-        request = SetParametersAtomically.Request(
-            parameters=[
-                Parameter(name.replace("__", "."), value=value).to_parameter_msg()
-                for name, value in values.items()
-            ]
-        )
-        kind, name = SetParametersAtomically, "/test/plant/set_parameters_atomically"
-        return graph.call(kind, name, request).result
-
-    refused = set_atomically(belt_speed=0.2, mass=-1.0)
-    assert not refused.successful
-    assert "mass = -1.0" in refused.reason
-    assert "above 0" in refused.reason
-    assert not set_atomically(belt_speed="fast").successful
-    assert not set_atomically(belt_speed=nan).successful
-    fixed = set_atomically(rate=10.0)
-    assert not fixed.successful
-    assert "rate cannot be changed while the node is active" in fixed.reason
-    assert not set_atomically(friction__minimum=0.5).successful
-    assert set_atomically(belt_speed=1, friction__static=0.5, friction__minimum=0.45).successful
-
+    alone = {"friction.minimum": 0.5}
+    together = {"belt_speed": 1, "friction.static": 0.5, "friction.minimum": 0.45}
+    for values, taken in ((alone, False), (together, True)):
+        changes = [Parameter(name, value=value) for name, value in values.items()]
+        assert plant.set_parameters_atomically(changes).successful == taken
     force.publish(pack_wrench(SECOND, 0.0))
     graph.wait_until(lambda: len(heard) == 2, "sample 1")
     columns, _ = joint_state_columns(heard)
@@ -314,29 +238,13 @@ def test_realtime_keeps_the_stamps_on_the_grid_and_holds_late_forces(graph: Grap
     assert plant._loop.late_forces == 100
 
 
-def test_the_clock_follows_the_stamps(graph: Graph) -> None:
-    heard = graph.listen(CLOCK)
-    graph.add(
-        PlantNode, publish_clock=True, expects_control=False, duration=0.5, wait_for=["observer"]
-    )
-    graph.wait_until(lambda: len(heard) == 51, "51 samples")
-    times = [message.clock.sec * SECOND + message.clock.nanosec for message in heard]
-    assert times == [SECOND + n * SECOND // 100 for n in range(51)]
-
-
 def test_the_real_time_factor_scales_the_pace(graph: Graph) -> None:
-    factor = 5.0
     plant = graph.add(
-        PlantNode,
-        pace="realtime",
-        rate=100.0,
-        duration=2.0,
-        real_time_factor=factor,
-        expects_control=False,
+        PlantNode, pace="realtime", duration=2.0, real_time_factor=5.0, expects_control=False
     )
     graph.wait_until(lambda: hasattr(plant, "_pacer") and not plant.active, "two seconds")
     # It can be slower on a busy machine, never faster.
-    assert plant._pacer.steps_per_second <= 100.0 * factor * 1.01
+    assert plant._pacer.steps_per_second <= 100.0 * 5.0 * 1.01
     assert plant._loop.late_forces == 0
 
 

@@ -10,11 +10,9 @@ from threading import Lock
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from sensor_msgs.msg import JointState
 
 from stickslip_ros.messages.codec import unpack_header
 from stickslip_ros.messages.topics import DIAGNOSTICS, JOINT_STATES
-from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.pacing import RealtimePacer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.motion.motion import Motion
@@ -30,9 +28,7 @@ class Samples:
         self.stamps: list[int] = []
         self.arrivals: list[float] = []
         self._graph = graph
-        graph.observer.create_subscription(
-            JointState, JOINT_STATES.name, self._take, qos_profile(JOINT_STATES, 10_000), raw=True
-        )
+        graph.subscribe(JOINT_STATES, self._take)
 
     def _take(self, message: bytes) -> None:
         self.arrivals.append(time.monotonic())

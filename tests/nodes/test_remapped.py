@@ -2,33 +2,21 @@
 
 from pathlib import Path
 
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from stickslip_ros.bags.reader import Recording
 from stickslip_ros.messages.codec import pack_header, unpack_header
 from stickslip_ros.messages.topics import JOINT_STATES, RECORDED
-from stickslip_ros.nodes.analyzer import AnalyzerNode
-from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.nodes.plant import PlantNode
-from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
+from tests.nodes.runs import close_the_loop
 
 REMAPPED = ("-r", "joint_states:=/x/y", "-r", "control_force:=/force", "-r", "recorded:=/held")
 
 
 def test_the_loop_is_closed_and_recorded_under_other_names(domain: int, tmp_path: Path) -> None:
     graph = Graph(domain, *REMAPPED)
-    analyzer = graph.add(AnalyzerNode, bag=str(tmp_path / "bag"))
-    controller = graph.add(WashoutControllerNode, wait_for=["analyzer"])
-    graph.wait_until(lambda: analyzer.active and controller.active, "both active")
-    waits_for = ["analyzer", "washout_controller"]
-    plant = graph.add(PlantNode, flow_window=200, duration=10.0, wait_for=waits_for)
-    graph.wait_until(lambda: plant.active, "plant active")
-    graph.wait_until(lambda: not plant.active, "plant pauses")
-    for node in waits_for[::-1]:
-        graph.deactivate(node)
+    close_the_loop(graph, tmp_path / "bag", flow_window=200, duration=10.0)
     graph.close()
     with Recording(tmp_path / "bag") as recording:
         names = [name for name, _, _ in recording.messages("/x/y", "/force")]
@@ -38,11 +26,8 @@ def test_the_loop_is_closed_and_recorded_under_other_names(domain: int, tmp_path
 
 def test_the_recorder_is_waited_for_under_another_name(domain: int) -> None:
     graph = Graph(domain, *REMAPPED)
-    heard: list[bytes] = []
-    graph.observer.create_subscription(
-        JointState, "/x/y", heard.append, qos_profile(JOINT_STATES), raw=True
-    )
-    recorder = graph.observer.create_publisher(Header, "/held", qos_profile(RECORDED))
+    heard = graph.listen(JOINT_STATES, raw=True)
+    recorder = graph.publisher(RECORDED)
     parameters = {"expects_control": False, "reply_timeout": 1e3, "wait_for": ["observer"]}
     graph.add(PlantNode, flow_window=200, **parameters)
     graph.wait_until(lambda: len(heard) >= 200, "the plant fills the window")

@@ -14,6 +14,7 @@ KEYS = {
     "contourpy": set(),
     "distributed": set(),
     "fastapi": {"python3-fastapi"},
+    "jinja2": {"python3-jinja2"},
     "heyoka": set(),
     "hypothesis": {"python3-hypothesis"},
     "ipykernel": set(),
@@ -28,6 +29,7 @@ KEYS = {
     "orjson": {"python3-orjson"},
     "pandas": {"python3-pandas"},
     "pillow": {"python3-pil"},
+    "pint": {"python3-pint"},
     "playwright": {"chromium-browser"},  # what it drives; itself it has no key
     "pydantic": {"python3-pydantic"},
     "pytest": {"python3-pytest"},
@@ -52,6 +54,7 @@ KEYS = {
     "rosbags": {"python3-rosbags-pip"},
     "scipy": {"python3-scipy"},
     "setuptools": {"python3-setuptools"},
+    "typing_extensions": {"python3-typing-extensions"},
     "uvicorn": {"python3-uvicorn"},
     "xarray": set(),
     "zstandard": set(),

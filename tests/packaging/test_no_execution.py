@@ -3,10 +3,7 @@
 import ast
 from pathlib import Path
 
-import pytest
-
 PACKAGE = Path(__file__).parents[2] / "stickslip_ros"
-MODULES = sorted(PACKAGE.rglob("*.py"))
 
 EXECUTING_MODULES = {"code", "codeop", "dill", "joblib", "marshal", "pickle", "runpy", "shelve"}
 EXECUTING_CALLS = {"__import__", "compile", "eval", "exec"}
@@ -49,14 +46,15 @@ def is_harmless(call: ast.Call) -> bool:
     return method not in EXECUTING_METHODS
 
 
-@pytest.mark.parametrize("module", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_no_module_executes_data(module: Path) -> None:
-    assert offences(ast.parse(module.read_text(encoding="utf-8"))) == []
+def test_no_module_executes_data() -> None:
+    modules = sorted(PACKAGE.rglob("*.py"))
+    assert len(modules) > 100
+    for module in modules:
+        assert offences(ast.parse(module.read_text(encoding="utf-8"))) == [], module
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
+def test_what_executes_data_is_noticed() -> None:
+    for code in (
         "eval(text)",
         "from pickle import loads",
         "import marshal",
@@ -65,7 +63,5 @@ def test_no_module_executes_data(module: Path) -> None:
         "subprocess.run(text, shell=True)",
         "os.system(text)",
         "numpy.load(path, allow_pickle=True)",
-    ],
-)
-def test_what_executes_data_is_noticed(code: str) -> None:
-    assert offences(ast.parse(code))
+    ):
+        assert offences(ast.parse(code)), code

@@ -2,7 +2,9 @@
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import cache
 from math import isfinite
 
 import numpy as np
@@ -20,7 +22,7 @@ from stickslip_ros.paper.claims import (
     Verdict,
 )
 from stickslip_ros.paper.claims.claim import Formula, Number, Observation, agrees
-from stickslip_ros.paper.claims.normal_form import Nonlinearity, samples
+from stickslip_ros.paper.claims.coefficients import Nonlinearity, samples
 from stickslip_ros.paper.claims.paper_values import FILTER, arrivals, expansion, hopf_point
 from stickslip_ros.paper.figures import (
     NUMBERS,
@@ -38,7 +40,7 @@ from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.theory.hopf import first_lyapunov_coefficient
 from stickslip_ros.physics.theory.limit_cycles import limit_cycles
-from stickslip_ros.studies.bifurcation import bifurcation_diagram
+from stickslip_ros.studies.sweep import bifurcation_diagram
 
 HOLDS, CORRECTED, FAILS = Verdict.HOLDS, Verdict.CORRECTED, Verdict.FAILS
 
@@ -56,31 +58,30 @@ KNOWN_SLIPS = {
     "fig-12-subcritical": FAILS,
     "jump-subcritical": FAILS,
 }
-"""What is known of the paper's slips, and what therefore must come out."""
+"""Known slips of the paper, with the verdict that must result."""
 
 
 class NoFigureError(Exception):
-    pass
+    """A claim asked for a figure, which takes long to compute."""
 
 
 def no_figure(number: int) -> PaperFigure:
     raise NoFigureError(number)
 
 
-def findings(claims: Sequence[Claim]) -> dict[str, Finding]:
+@cache
+def findings_without_figures() -> dict[str, Finding]:
     """Return the findings of those claims that need no figure."""
     found: dict[str, Finding] = {}
-    for claim in claims:
-        try:
+    for claim in CLAIMS:
+        with suppress(NoFigureError):
             found[claim.identifier] = claim.check(Evidence(no_figure))
-        except NoFigureError:
-            continue
     return found
 
 
 @pytest.fixture(scope="module")
 def without_figures() -> dict[str, Finding]:
-    return findings(CLAIMS)
+    return findings_without_figures()
 
 
 def check_form(claim: Claim, finding: Finding) -> None:
@@ -114,14 +115,12 @@ def test_what_is_computed_are_the_decidable_claims(without_figures: dict[str, Fi
     assert sorted([*COMPUTATIONS, *undecidable]) == sorted(claim.identifier for claim in CLAIMS)
 
 
-@pytest.mark.parametrize("number", range(1, 31))
-def test_every_equation_has_a_claim(number: int) -> None:
-    assert any(re.search(rf"eq\. {number}\b", claim.place) for claim in CLAIMS)
-
-
-@pytest.mark.parametrize("number", NUMBERS)
-def test_every_figure_has_a_claim(number: int) -> None:
-    assert any(re.search(rf"Fig\. ({number}|8 and {number})\b", claim.place) for claim in CLAIMS)
+def test_every_equation_and_every_figure_has_a_claim() -> None:
+    places = "\n".join(claim.place for claim in CLAIMS)
+    for number in range(1, 31):
+        assert re.search(rf"eq\. {number}\b", places), number
+    for number in NUMBERS:
+        assert re.search(rf"Fig\. ({number}|8 and {number})\b", places), number
 
 
 def test_claims_about_equations_need_no_figure(without_figures: dict[str, Finding]) -> None:
@@ -137,23 +136,19 @@ def test_known_slips_are_found(without_figures: dict[str, Finding]) -> None:
     assert found == {name: KNOWN_SLIPS[name] for name in found}
 
 
-@pytest.mark.parametrize(
-    ("identifier", "value"),
-    [
-        ("vb1", 0.48876261),
-        ("vb0", 0.43947190),
-        ("eq-15-value", -0.225),
-        ("eq-11-value", -1.8 * 0.48876261),
-        ("eq-20-trace", 0.43 - 1.8 * 0.49**2),
-        ("smallest-at", 0.5),
-        ("eq-15-imaginary", (3.6 * 0.48876261) ** 2 / 32.0),
-        ("linear-slope", 0.45),
-    ],
-)
-def test_computed_numbers(
-    identifier: str, value: float, without_figures: dict[str, Finding]
-) -> None:
-    assert without_figures[identifier].computed == pytest.approx(value, rel=1e-7)
+def test_computed_numbers(without_figures: dict[str, Finding]) -> None:
+    expected = {
+        "vb1": 0.48876261,
+        "vb0": 0.43947190,
+        "eq-15-value": -0.225,
+        "eq-11-value": -1.8 * 0.48876261,
+        "eq-20-trace": 0.43 - 1.8 * 0.49**2,
+        "smallest-at": 0.5,
+        "eq-15-imaginary": (3.6 * 0.48876261) ** 2 / 32.0,
+        "linear-slope": 0.45,
+    }
+    computed = {name: without_figures[name].computed for name in expected}
+    assert computed == pytest.approx(expected, rel=1e-7)
 
 
 def test_another_printed_number_gets_another_verdict(without_figures: dict[str, Finding]) -> None:
@@ -182,44 +177,38 @@ def test_a_number_agrees_with_what_it_rounds_to(units: int, digits: int, rest: f
     assert not agrees(printed, printed + (rest + 1.0) * unit)
 
 
-@pytest.mark.parametrize(
-    ("value", "corrected", "verdict"),
-    [(0.4944, 0.1, HOLDS), (0.48876, 0.49441, CORRECTED), (0.48876, 0.4943, FAILS)],
-)
-def test_verdict_on_a_number(value: float, corrected: float, verdict: Verdict) -> None:
-    finding = Number(value, {"With x": corrected}, "So it is.").finding(0.4944)
-    assert finding.verdict is verdict
-    assert finding.computed == value
-    assert finding.remark.startswith("With x: 0.49441.") == (verdict is CORRECTED)
-    assert finding.remark.endswith("So it is.")
+def test_verdict_on_a_number() -> None:
+    for value, corrected, verdict in (
+        (0.4944, 0.1, HOLDS),
+        (0.48876, 0.49441, CORRECTED),
+        (0.48876, 0.4943, FAILS),
+    ):
+        finding = Number(value, {"With x": corrected}, "So it is.").finding(0.4944)
+        assert (finding.verdict, finding.computed) == (verdict, value)
+        assert finding.remark.startswith("With x: 0.49441.") == (verdict is CORRECTED)
+        assert finding.remark.endswith("So it is.")
 
 
-@pytest.mark.parametrize(
-    ("printed", "corrected", "verdict", "difference"),
-    [
+def test_verdict_on_a_formula() -> None:
+    for printed, corrected, *expected in (
         ([1.0, 2.0 + 1e-12], [0.0, 0.0], HOLDS, 0.0),
         ([1.0, 2.5], [1.0, 2.0], CORRECTED, 0.5),
         (None, [1.0, 2.0], CORRECTED, None),
         ([1.0, 2.5], [1.0, 2.1], FAILS, 0.5),
         (None, [1.0, 2.1], FAILS, None),
-    ],
-)
-def test_verdict_on_a_formula(
-    printed: list[float] | None,
-    corrected: list[float],
-    verdict: Verdict,
-    difference: float | None,
-) -> None:
-    finding = Formula(printed, [1.0, 2.0], {"With x": corrected}).finding("a = b")
-    assert (finding.verdict, finding.difference) == (verdict, difference)
+    ):
+        finding = Formula(printed, [1.0, 2.0], {"With x": corrected}).finding("a = b")
+        assert [finding.verdict, finding.difference] == expected
 
 
-@pytest.mark.parametrize(
-    ("holds", "corrected", "verdict"),
-    [(True, False, HOLDS), (True, True, HOLDS), (False, True, CORRECTED), (False, False, FAILS)],
-)
-def test_verdict_on_a_statement(holds: bool, corrected: bool, verdict: Verdict) -> None:
-    assert Observation("", holds, corrected).finding(None).verdict is verdict
+def test_verdict_on_a_statement() -> None:
+    for holds, corrected, verdict in (
+        (True, False, HOLDS),
+        (True, True, HOLDS),
+        (False, True, CORRECTED),
+        (False, False, FAILS),
+    ):
+        assert Observation("", holds, corrected).finding(None).verdict is verdict
 
 
 def sigma_of_coefficients(q: Nonlinearity) -> float:
@@ -230,9 +219,8 @@ def sigma_of_coefficients(q: Nonlinearity) -> float:
     return sigma.real
 
 
-@pytest.mark.parametrize("order", [2, 3])
-def test_the_coefficients_make_up_the_first_lyapunov_coefficient(order: int) -> None:
-    for q in samples(order):
+def test_the_coefficients_make_up_the_first_lyapunov_coefficient() -> None:
+    for q in [*samples(2), *samples(3)]:
         assert sigma_of_coefficients(q) == pytest.approx(q.sigma, rel=1e-9)
 
 

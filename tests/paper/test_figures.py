@@ -1,6 +1,7 @@
 """The data of the paper's figures: parameters and results."""
 
 import pickle
+from functools import cache
 from math import sqrt
 
 import numpy as np
@@ -15,7 +16,9 @@ from stickslip_ros.paper.figures import (
     PortraitFigure,
     bifurcation_drives,
     compute_figure,
+    transition_marks,
     unit_drive,
+    unstable_equilibria,
 )
 from stickslip_ros.paper.portraits import Portrait
 from stickslip_ros.physics.measures.cycle_measures import Regime
@@ -25,6 +28,11 @@ def bifurcation(number: int, points: int) -> BifurcationFigure:
     figure = compute_figure(number, points=points)
     assert isinstance(figure, BifurcationFigure)
     return figure
+
+
+@cache
+def over_belt_speed() -> BifurcationFigure:
+    return bifurcation(2, 11)
 
 
 def portraits(number: int) -> list[list[Portrait]]:
@@ -51,11 +59,10 @@ def test_there_are_figures_2_to_13() -> None:
     assert list(range(2, 14)) == list(NUMBERS)
 
 
-@pytest.mark.parametrize("stiffness", [0.2, 1.0, 5.0])
-def test_si_numbers_of_a_unit_drive_are_the_paper_s(stiffness: float) -> None:
-    drive = unit_drive(0.3, damping=0.05, stiffness=stiffness)
+def test_si_numbers_of_a_unit_drive_are_the_paper_s() -> None:
+    drive = unit_drive(0.3, damping=0.05, stiffness=5.0)
     assert (drive.mass, drive.normal_force, drive.damping) == (1.0, 1.0, 0.05)
-    assert drive.natural_period == pytest.approx(2.0 * np.pi / sqrt(stiffness))
+    assert drive.natural_period == pytest.approx(2.0 * np.pi / sqrt(5.0))
 
 
 def test_slopes_of_the_linear_law() -> None:
@@ -65,27 +72,40 @@ def test_slopes_of_the_linear_law() -> None:
     assert pytest.approx(3.0 * (0.4 - 0.25) / 0.5) == PRINTED_SLOPE
 
 
-@pytest.mark.parametrize("number", [2, 3, 4, 5])
-def test_the_parameter_of_a_bifurcation_diagram_is_all_that_varies(number: int) -> None:
-    values, drives = bifurcation_drives(number, 5)
-    varied = {
-        2: [drive.belt_speed for drive in drives],
-        3: [drive.damping / 2.0 for drive in drives],
-        4: [drive.stiffness for drive in drives],
-        5: [drive.friction.static / getattr(drive.friction, "minimum", 0.0) for drive in drives],
-    }
-    for name, column in varied.items():
-        assert column == pytest.approx(values if name == number else [column[0]] * 5)
+def test_the_parameter_of_a_bifurcation_diagram_is_all_that_varies() -> None:
+    for number in (2, 3, 4, 5):
+        values, drives = bifurcation_drives(number, 5)
+        varied = {
+            2: [drive.belt_speed for drive in drives],
+            3: [drive.damping / 2.0 for drive in drives],
+            4: [drive.stiffness for drive in drives],
+            5: [drive.friction.static / getattr(drive.friction, "minimum", 0) for drive in drives],
+        }
+        for name, column in varied.items():
+            assert column == pytest.approx(values if name == number else [column[0]] * 5)
 
 
 def test_over_the_belt_speed_sticking_ends_and_then_the_vibration() -> None:
-    figure = bifurcation(2, 11)
+    figure = over_belt_speed()
     assert figure.values.tolist() == pytest.approx(np.linspace(0.0, 1.0, 11).tolist())
     assert regimes(figure) == [
         Regime.STUCK,
         *[Regime.STICK_SLIP] * 4,
         *[Regime.EQUILIBRIUM] * 6,
     ]
+
+
+def test_theory_adds_the_unstable_equilibria_and_the_last_of_each_transition() -> None:
+    figure = over_belt_speed()
+    found = unstable_equilibria(figure)
+    # Eq. 9: v_b1 = 0.4888. On a belt at rest there is no equilibrium of slip.
+    assert np.isfinite(found).tolist() == [False, *[True] * 4, *[False] * 6]
+    # Eq. 6: X0 = mu_s - a v0 + b v0^3.
+    values = figure.values[1:5]
+    assert found[1:5] == pytest.approx(0.4 - 0.45 * values + 0.6 * values**3, rel=1e-12)
+    marks = transition_marks(figure)
+    assert marks["Hopf point"] == pytest.approx(0.48876, abs=1e-5)
+    assert marks["limit of sticking"] == pytest.approx(0.4395, abs=1e-3)
 
 
 def test_over_the_damping_the_vibration_ends_at_the_hopf_point() -> None:

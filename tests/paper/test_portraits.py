@@ -74,8 +74,8 @@ def test_what_still_changes_has_no_settling_time() -> None:
 
 
 def test_a_diverging_motion_ends_and_does_not_affect_the_others() -> None:
-    calm = PortraitCase("", replace(PAPER, belt_speed=0.3), duration=100.0)
-    before, away, after = portraits([calm, RUNS_AWAY, calm])
+    bounded = PortraitCase("", replace(PAPER, belt_speed=0.3), duration=100.0)
+    before, away, after = portraits([bounded, RUNS_AWAY, bounded])
     assert away.runs_away
     assert away.settling_time is None
     assert away.least_relative_speed is None

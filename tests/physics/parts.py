@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.control import ControlLaw, LinearFeedback, Reference
 from stickslip_ros.physics.model.course import Course
@@ -16,30 +17,9 @@ from stickslip_ros.physics.model.functions import sin
 from stickslip_ros.samples import Sample
 
 
-@dataclass(frozen=True)
-class Dahl(FrictionLaw):
-    """One state: z' = v - S |v| z / static, mu = -S z."""
-
-    name = "dahl"
-    states: ClassVar[Mapping[str, str | None]] = {"z": "m"}
-    bristle: Any = constant(20.0, "Stiffness S of the contact.", "1/m")
-
-    def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        return -self.static * sign + 0.0 * relative_speed
-
-    def friction(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Any:
-        return -self.bristle * memory[0]
-
-    def memory_rates(
-        self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
-    ) -> Sequence[Any]:
-        slowing = self.bristle * sign * relative_speed * memory[0] / self.static
-        return (relative_speed - slowing,)
-
-    def memory_at(self, relative_speed: float, sign: float) -> Sequence[float]:
-        return (sign * self.static / self.bristle,)
+def lag(time_constant: float) -> Actuator:
+    """An actuator that only lags, by a time constant in s."""
+    return Actuator(time_constant=time_constant)
 
 
 @dataclass(frozen=True)
@@ -88,7 +68,7 @@ class Ramp(Course):
             return (1.0, 0.0)
         return (0.0, 1.0 if time < self.start + self.duration else 0.0)
 
-    def corner(self, switches: Sequence[float]) -> float:
+    def next_switch_time(self, switches: Sequence[float]) -> float:
         before, rising = switches
         return self.start if before else self.start + self.duration if rising else inf
 

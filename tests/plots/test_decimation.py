@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from stickslip_ros.plots.decimation import Trace, intervals, peaks
+from stickslip_ros.plots.decimation import Trace, peaks
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -39,26 +39,6 @@ def test_it_keeps_what_a_plain_loop_would(
     found: tuple[npt.NDArray[np.int64], FloatArray, FloatArray],
 ) -> None:
     assert peaks(*found).tolist() == naively(*found)
-
-
-@given(COLUMN)
-def test_rows_ascend_and_no_peak_is_lost(
-    found: tuple[npt.NDArray[np.int64], FloatArray, FloatArray],
-) -> None:
-    bucket, *columns = found
-    rows = peaks(bucket, *columns)
-    assert np.all(np.diff(rows) > 0)
-    for number in set(bucket.tolist()):
-        before, after = bucket == number, bucket[rows] == number
-        for column in columns:
-            for extreme in (np.fmin, np.fmax):
-                lost = extreme.reduce(column[before]), extreme.reduce(column[rows][after])
-                assert lost[0] == lost[1] or np.isnan(lost).all()
-
-
-def test_many_rows_become_few() -> None:
-    time = np.arange(100_000) * 1e-3
-    assert len(peaks(intervals(time, 1.0), np.sin(time), np.cos(time))) <= 6 * 100
 
 
 def noise(length: int) -> list[FloatArray]:
@@ -110,15 +90,6 @@ def test_what_is_old_is_forgotten_and_nothing_else() -> None:
         kept = slice(max(start - 5000, 0), start + 1000)
         for whole, of_it in zip((time, *columns), found, strict=True):
             assert np.array_equal(of_it[-len(whole[kept]) :], whole[kept])
-
-
-def test_a_short_trace_is_left_as_it_is() -> None:
-    columns = noise(1000)
-    trace = Trace(2)
-    trace.add(*(column[:400] for column in columns))
-    trace.add(*(column[400:] for column in columns))
-    for found, given_ in zip(trace.columns(), columns, strict=True):
-        assert np.array_equal(found, given_)
 
 
 def test_rows_of_one_instant_are_thinned_too() -> None:

@@ -102,6 +102,14 @@ def test_stamps_that_do_not_continue_restart_the_trace() -> None:
     assert frame is not None
     assert frame.end == pytest.approx(0.009)
     assert frame.position.y.max() == 0.0
+    # So do stamps that descend within a block.
+    block = states(range(SECOND, 2 * SECOND, 1_000_000), np.ones(1000))
+    block.stamp[500:] -= SECOND
+    trace.feed(block, NO_FORCES)
+    frame = trace.frame(1e3, 1e3, 100)
+    assert frame is not None
+    assert frame.end == pytest.approx(0.499)
+    assert frame.position.x[0] == pytest.approx(-0.499)
 
 
 def test_forces_for_the_past_are_left_out() -> None:
@@ -128,17 +136,6 @@ def test_a_line_is_broken_where_samples_are_missing() -> None:
         (gap,) = np.flatnonzero(np.isnan(line.y))
         assert line.x[gap - 1] == pytest.approx(-2.0)
         assert line.x[gap] == line.x[gap + 1] == pytest.approx(-0.999)
-
-
-def test_descending_stamps_within_a_block_restart_the_trace() -> None:
-    trace = LiveTrace(1e3)
-    block = states(range(SECOND, 2 * SECOND, 1_000_000), np.ones(1000))
-    block.stamp[500:] -= SECOND
-    trace.feed(block, NO_FORCES)
-    frame = trace.frame(1e3, 1e3, 100)
-    assert frame is not None
-    assert frame.end == pytest.approx(0.499)
-    assert frame.position.x[0] == pytest.approx(-0.499)
 
 
 def test_a_force_for_the_far_future_does_not_hide_the_others() -> None:

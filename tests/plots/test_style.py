@@ -1,4 +1,4 @@
-"""How figures are written to files."""
+"""How figures look, what their titles say, and how they are written to files."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,9 +19,9 @@ from stickslip_ros.plots.style import (
     save,
     styled,
     text_width,
+    title_of,
 )
-
-ENDINGS = (".png", ".svg", ".pdf", ".PNG")
+from stickslip_ros.scenarios.files import load_scenario
 
 
 @styled
@@ -33,10 +33,14 @@ def small_figure(label: str = "displacement (µm)") -> Figure:
     return figure
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_the_suffix_gives_the_format(tmp_path: Path, ending: str) -> None:
-    path = tmp_path / f"picture{ending}"
-    save(small_figure(), path)
+@pytest.mark.parametrize("ending", [".png", ".svg", ".pdf", ".PNG"])
+def test_the_suffix_gives_the_format_and_the_same_figure_the_same_file(
+    tmp_path: Path, ending: str
+) -> None:
+    path, again = tmp_path / f"one{ending}", tmp_path / f"other{ending}"
+    for each in (path, again):
+        save(small_figure(), each)
+    assert path.read_bytes() == again.read_bytes()
     match ending.lower():
         case ".png":
             with Image.open(path) as image:
@@ -48,15 +52,7 @@ def test_the_suffix_gives_the_format(tmp_path: Path, ending: str) -> None:
             assert path.read_bytes().startswith(b"%PDF")
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
-def test_the_same_picture_is_the_same_file(tmp_path: Path, ending: str) -> None:
-    paths = tmp_path / f"one{ending}", tmp_path / f"other{ending}"
-    for path in paths:
-        save(small_figure(), path)
-    assert paths[0].read_bytes() == paths[1].read_bytes()
-
-
-def test_few_colours_make_a_small_picture(tmp_path: Path) -> None:
+def test_few_colours_make_a_small_file(tmp_path: Path) -> None:
     save(small_figure(), tmp_path / "full.png")
     save(small_figure(), tmp_path / "small.png", colours=16)
     assert 2 * (tmp_path / "small.png").stat().st_size < (tmp_path / "full.png").stat().st_size
@@ -72,7 +68,7 @@ def test_a_users_own_settings_neither_matter_nor_change(tmp_path: Path) -> None:
     assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "other.svg").read_bytes()
 
 
-def test_a_title_is_shown_as_it_is_within_the_picture() -> None:
+def test_a_title_is_shown_as_it_is_within_the_figure() -> None:
     figure = Figure(figsize=(8.0, 2.0))
     SCREEN.set_title(figure, "a $name$ with \x1b[31m" + " and more" * 40, "a second line")
     title, *more = figure.get_suptitle().split("\n")
@@ -113,11 +109,6 @@ def test_a_style_gives_size_and_font(name: str, width: float, height: float, poi
     figure = labelled_figure(style=STYLES[name])
     assert figure.get_size_inches() == pytest.approx([width, height], rel=1e-3)
     assert figure.axes[0].xaxis.label.get_size() == points
-
-
-@pytest.mark.parametrize("name", STYLES)
-def test_title_and_legend_are_within_the_figure(name: str) -> None:
-    figure = labelled_figure(style=STYLES[name])
     figure.draw_without_rendering()
     for artist in (*figure.texts, *figure.legends):
         box = artist.get_window_extent()
@@ -125,15 +116,11 @@ def test_title_and_legend_are_within_the_figure(name: str) -> None:
         assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1
 
 
-def test_a_size_that_is_asked_for_beats_that_of_the_style() -> None:
-    figure = labelled_figure(style=replace(STYLES["paper"], size=(6.0, 5.0)))
+def test_a_size_that_is_asked_for_beats_that_of_the_style_and_a_title_may_be_left_out() -> None:
+    figure = labelled_figure(style=replace(STYLES["paper"], size=(6.0, 5.0), titled=False))
+    assert figure.get_suptitle() == ""
     assert figure.get_size_inches().tolist() == [6.0, 5.0]
     assert figure.axes[0].xaxis.label.get_size() == 8.0
-
-
-def test_without_a_title_there_is_none() -> None:
-    figure = labelled_figure(style=replace(SCREEN, titled=False))
-    assert figure.get_suptitle() == ""
 
 
 def test_the_width_of_a_text_is_that_of_the_drawn_one() -> None:
@@ -166,3 +153,15 @@ def test_ticks_are_round() -> None:
     finish(figure)
     steps = np.diff(axes.get_xticks())
     assert f"{steps[0]:.6e}"[:8] in ("1.000000", "2.000000", "5.000000")
+
+
+def test_a_title_names_what_is_shown_the_drive_and_the_control() -> None:
+    free = "plant.expects_control=false"
+    damping = "plant.damping=3.0"
+    for overrides, drive, control in (
+        ([], "feed_drive", "washout control"),
+        ([damping], f"feed_drive {damping}", "washout control"),
+        (["plant.damping=4.0", free, damping], f"feed_drive {damping}", "no control"),
+    ):
+        scenario = load_scenario("feed_drive", overrides)
+        assert title_of("Simulated run", scenario) == f"Simulated run, {drive}, {control}"

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from stickslip_ros.plots.units import Units, typeset
 from tests.physics.drives import FEED_DRIVE, PAPER
@@ -11,9 +10,8 @@ from tests.physics.drives import FEED_DRIVE, PAPER
 SI = Units.for_drive(FEED_DRIVE)
 
 
-@pytest.mark.parametrize(
-    ("name", "unit", "largest", "scale", "label"),
-    [
+def test_si_has_the_prefix_that_suits() -> None:
+    for name, unit, largest, scale, label in (
         ("displacement", "m", 4.3e-4, 1e-6, "displacement (µm)"),
         ("velocity", "m/s", 0.04, 1e-3, "velocity (mm/s)"),
         ("force", "N", 1200.0, 1e3, "force (kN)"),
@@ -21,13 +19,9 @@ SI = Units.for_drive(FEED_DRIVE)
         ("stick fraction", "", 0.3, 1.0, "stick fraction"),
         ("time", "s", 3600.0, 1.0, "time (s)"),
         ("time", "s", 0.02, 1e-3, "time (ms)"),
-    ],
-)
-def test_si_has_the_prefix_that_suits(
-    name: str, unit: str, largest: float, scale: float, label: str
-) -> None:
-    values = np.array([0.0, np.nan, -largest])
-    assert SI.axis(name, unit, values, np.empty(0)) == (scale, label)
+    ):
+        values = np.array([0.0, np.nan, -largest])
+        assert SI.axis(name, unit, values, np.empty(0)) == (scale, label)
 
 
 def test_the_unit_drive_is_dimensionless() -> None:
@@ -45,15 +39,19 @@ def test_a_study_that_varies_one_of_its_scales_is_in_si() -> None:
     assert not Units.for_drive(PAPER, ["plant.belt_speed", "plant.mass"]).dimensionless
 
 
-@pytest.mark.parametrize("other", ["mass", "stiffness", "normal_force"])
-def test_a_drive_that_differs_in_one_scale_is_not(other: str) -> None:
-    assert not Units.for_drive(replace(PAPER, **{other: 2.0})).dimensionless
+def test_a_drive_that_differs_in_one_scale_is_not() -> None:
+    for other in ("mass", "stiffness", "normal_force"):
+        assert not Units.for_drive(replace(PAPER, **{other: 2.0})).dimensionless
     assert not Units.for_drive(None).dimensionless
 
 
 def test_a_unit_with_a_prefix_of_its_own_gets_no_other() -> None:
     assert SI.text(0.027, "kg") == "0.027 kg"
     assert SI.text(2000.0, "kg") == "2000 kg"
+    for unit in ("kg", "kg/s", "1/s", "1/(m s)", "m^2"):
+        assert SI.text(2000.0, unit) == f"2000 {unit}"
+        assert SI.axis("quantity", unit, [2000.0]) == (1.0, f"quantity ({unit})")
+    assert SI.text(2000.0, "N/(m s)") == "2 kN/(m s)"
 
 
 def test_what_is_infinite_is_unbounded() -> None:

@@ -1,4 +1,4 @@
-"""Whether the texts of a figure can be read."""
+"""The texts of a figure, and whether they can be read."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -36,6 +36,11 @@ def faults(figure: Figure) -> list[str]:
         if both is not None and min(both.width, both.height) > _TOUCHING:
             found.append(f"{name!r} overlaps {other!r}")
     return found
+
+
+def legend_texts(figure: Figure) -> list[str]:
+    """Return the entries of the legends below the panels."""
+    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
 
 
 def _texts(figure: Figure) -> Iterator[Text]:

@@ -6,12 +6,12 @@ import pytest
 ReadByRos = Callable[..., dict[str, Any]]
 
 # What a node declares by itself.
-OWN = {"use_sim_time", "start_type_description_service"}
+OWN = {"use_sim_time": False, "start_type_description_service": True}
 
 
 @pytest.fixture
 def read_by_ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[ReadByRos]:
-    """What ROS itself gives to a node `plant` from a parameter file."""
+    """What ROS itself gives to a node from a parameter file; RuntimeError if it gives nothing."""
     context_module = pytest.importorskip("rclpy.context")
     node_module = pytest.importorskip("rclpy.node")
     from stickslip_ros.nodes.base.network import this_machine_only
@@ -19,24 +19,27 @@ def read_by_ros(monkeypatch: pytest.MonkeyPatch) -> Iterator[ReadByRos]:
 
     for name, value in this_machine_only().items():
         monkeypatch.setenv(name, value)
+    context = context_module.Context()
 
-    def read(path: str, namespace: str = "/feed_drive") -> dict[str, Any]:
-        context = context_module.Context()
-        context.init(["test", "--ros-args", "--params-file", path], domain_id=domain)
-        try:
-            node = node_module.Node(
-                "plant",
-                namespace=namespace,
-                context=context,
-                automatically_declare_parameters_from_overrides=True,
-                enable_rosout=False,
-                start_parameter_services=False,
-            )
-            parameters = node.get_parameters_by_prefix("")
-            node.destroy_node()
-        finally:
-            context.shutdown()
-        return {name: found.value for name, found in parameters.items() if name not in OWN}
+    def read(path: str, namespace: str = "/feed_drive", node: str = "plant") -> dict[str, Any]:
+        made = node_module.Node(
+            node,
+            namespace=namespace,
+            context=context,
+            cli_args=["--ros-args", "--params-file", path],
+            use_global_arguments=False,
+            automatically_declare_parameters_from_overrides=True,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        parameters = made.get_parameters_by_prefix("")
+        made.destroy_node()
+        values = {name: found.value for name, found in parameters.items()}
+        return {name: value for name, value in values.items() if value is not OWN.get(name)}
 
     with own_domain() as domain:
-        yield read
+        context.init(domain_id=domain)
+        try:
+            yield read
+        finally:
+            context.shutdown()

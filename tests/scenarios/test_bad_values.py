@@ -13,7 +13,7 @@ from tests.scenarios.files import refusal, scenario_file
 from tests.scenarios.values import UNKNOWN, bad_values, good_values
 
 MODELS = {**NODE_PARAMETERS, "replay": ReplayParameters}
-TEXTS = ["1" + 400 * "0", 5000 * "9", "0x" + 5000 * "f", "1e400", "[[1]]", "[~]"]
+TEXTS = ["1" + 400 * "0", 5000 * "9", "0x" + 5000 * "f", "1e400", "[1]", "[yes]"]
 models = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
 
 
@@ -81,7 +81,8 @@ def test_so_are_they_in_a_file_and_as_an_override(tmp_path: Any, node: str) -> N
         assert len(message) < 500
 
     for number, parameter in enumerate(parameters_of(NODE_PARAMETERS[node])):
-        values = [value for value in bad_values(parameter) if value != [b"\1"]]
+        # ROS reads null as text.
+        values = [each for each in bad_values(parameter) if each not in ([b"\1"], [None], None)]
         value = values[number % len(values)]
         path = scenario_file(tmp_path, parameter_file({node: {parameter.name: value}}))
         check(parameter, refusal(path))
@@ -93,13 +94,10 @@ def test_so_are_they_in_a_file_and_as_an_override(tmp_path: Any, node: str) -> N
             check(parameter, str(caught.value))
 
 
-@pytest.mark.parametrize("text", ["5e-324", "1e-400", "-1e-310", "1e309", "-1e999"])
-def test_numbers_that_ros_does_not_read_are_refused_here_too(text: str) -> None:
+def test_numbers_are_taken_or_refused_as_ros_reads_them() -> None:
     """What `stickslip run` takes, the nodes must be able to read from the file they get."""
-    assert f"damping = '{text}' is refused" in refusal("paper", f"plant.damping={text}")
-
-
-@pytest.mark.parametrize("text", ["0e-400", "0.0", "-0.0", "2.2250738585072014e-308"])
-def test_the_smallest_numbers_that_ros_reads_are_taken(text: str) -> None:
-    scenario = load_scenario("paper", [f"plant.belt_speed={text}"])
-    assert bits(scenario.plant.belt_speed) == bits(float(text))
+    for text in ("5e-324", "1e-400", "-1e-310", "1e309", "-1e999"):
+        assert f"damping = '{text}' is refused" in refusal("paper", f"plant.damping={text}")
+    for text in ("0e-400", "0.0", "-0.0", "2.2250738585072014e-308"):
+        scenario = load_scenario("paper", [f"plant.belt_speed={text}"])
+        assert bits(scenario.plant.belt_speed) == bits(float(text))

@@ -32,11 +32,11 @@ def test_the_nearest_section_of_a_controller_chooses_it(tmp_path: Path) -> None:
     assert load_scenario(scenario_file(tmp_path, BASE)).controller.law == "washout"
 
 
-@pytest.mark.parametrize("pattern", ["/feed_drive/velocity_feedback_controller", "/*/{}", "/**/{}"])
-def test_its_name_may_have_any_namespace_that_applies(tmp_path: Path, pattern: str) -> None:
-    name = pattern.format("velocity_feedback_controller")
-    path = scenario_file(tmp_path, BASE + section(name, "{velocity_gain: -1.0}"))
-    assert load_scenario(path).controller.law == "velocity_feedback"
+def test_its_name_may_have_any_namespace_that_applies(tmp_path: Path) -> None:
+    for pattern in ("/feed_drive/", "/*/", "/**/"):
+        name = f"{pattern}velocity_feedback_controller"
+        path = scenario_file(tmp_path, BASE + section(name, "{velocity_gain: -1.0}"))
+        assert load_scenario(path).controller.law == "velocity_feedback"
     elsewhere = scenario_file(
         tmp_path, BASE + section("/other/velocity_feedback_controller", "{a: 1}")
     )
@@ -103,3 +103,20 @@ def test_unknown_parameters_of_a_controller_not_in_use_are_refused(tmp_path: Pat
     path = scenario_file(tmp_path, BASE + WASHOUT + wrong)
     with pytest.raises(InvalidInputError, match="velocity_gian"):
         load_scenario(path, controller="washout")
+
+
+def test_the_force_limit_follows_another_law(tmp_path: Path) -> None:
+    limited = section("/**/washout_controller", "{force_limit: 120.0}")
+    path = scenario_file(tmp_path, BASE + limited)
+    scenario = load_scenario(path)
+    for other in (
+        load_scenario(path, controller="velocity_feedback"),
+        scenario.with_controller("velocity_feedback"),
+    ):
+        assert other.controller.as_law().force_limit == 120.0
+        name = "velocity_feedback_controller.force_limit"
+        assert name in other.given
+        assert name not in other.left_to_defaults
+    own = BASE + limited + section("/**/velocity_feedback_controller", "{force_limit: 30.0}")
+    other = load_scenario(scenario_file(tmp_path, own), controller="velocity_feedback")
+    assert other.controller.as_law().force_limit == 30.0

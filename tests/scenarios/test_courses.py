@@ -1,6 +1,5 @@
 """The courses of belt, load and disturbance in scenarios."""
 
-import os
 import pickle
 from pathlib import Path
 
@@ -23,28 +22,22 @@ def plant(**values: object) -> PlantParameters:
     )
 
 
-@pytest.mark.parametrize("part", ["belt", "load"])
-def test_each_kind_gives_its_course(part: str) -> None:
+def test_each_kind_gives_its_course() -> None:
     constants = {"amplitude": 0.5, "start": 1.0, "duration": 4.0, "frequency": 2.0}
-    given = {f"{part}.{name}": value for name, value in constants.items()}
-    expected = {
-        "none": NO_COURSE,
-        "step": Step(0.5, 1.0, 4.0),
-        "impulse": Impulse(0.5, 1.0, 0.02),
-        "ramp": Ramp(0.5, 1.0, 4.0),
-        "sine": Sine(0.5, 1.0, 4.0, 2.0),
-        "trapezoid": Trapezoid(0.5, 1.0, 4.0, 2.0),
-    }
-    for kind, course in expected.items():
-        parameters = PlantParameters.validated(
-            {**given, f"{part}.kind": kind, "rate": 50.0}, "test"
-        )
-        assert getattr(parameters.as_drive(), part) == course
-
-
-def test_by_default_belt_and_load_are_constant() -> None:
-    drive = plant().as_drive()
-    assert drive.belt is drive.load is NO_COURSE
+    for part in ("belt", "load"):
+        assert getattr(plant().as_drive(), part) is NO_COURSE
+        given = {f"{part}.{name}": value for name, value in constants.items()}
+        for kind, course in {
+            "none": NO_COURSE,
+            "step": Step(0.5, 1.0, 4.0),
+            "impulse": Impulse(0.5, 1.0, 0.02),
+            "ramp": Ramp(0.5, 1.0, 4.0),
+            "sine": Sine(0.5, 1.0, 4.0, 2.0),
+            "trapezoid": Trapezoid(0.5, 1.0, 4.0, 2.0),
+        }.items():
+            values = {**given, f"{part}.kind": kind, "rate": 50.0}
+            parameters = PlantParameters.validated(values, "test")
+            assert getattr(parameters.as_drive(), part) == course
 
 
 @pytest.mark.parametrize("part", ["belt", "load", "disturbance"])
@@ -63,57 +56,42 @@ def test_a_file_of_an_override_is_relative_to_the_working_directory(
 ) -> None:
     (tmp_path / "course.csv").write_text(TABLE)
     monkeypatch.chdir(tmp_path)
-    overrides = ["plant.belt.file=course.csv", "plant.belt.kind=table"]
-    scenario = load_scenario("paper", overrides)
+    scenario = load_scenario("paper", ["plant.belt.file=course.csv", "plant.belt.kind=table"])
     assert scenario.plant.belt.file == str(tmp_path / "course.csv")
-    changed = load_scenario("paper").changed(
-        {"plant.belt.file": "course.csv", "plant.belt.kind": "table"}
-    )
-    assert changed.plant.belt == scenario.plant.belt
+    given = {"plant.belt.file": "course.csv", "plant.belt.kind": "table"}
+    assert load_scenario("paper").changed(given).plant.belt == scenario.plant.belt
 
 
-def test_the_content_is_that_at_loading(tmp_path: Path) -> None:
-    path = tmp_path / "course.csv"
+def test_the_content_is_that_at_loading_unless_the_file_is_given_again(tmp_path: Path) -> None:
+    path, table = tmp_path / "course.csv", Table((0.0, 1.0, 3.0), (0.0, 0.5, -0.25))
     path.write_text(TABLE)
-    parameters = plant(load__kind="table", load__file=str(path))
+    scenario = load_scenario("paper", ["plant.belt.kind=table", f"plant.belt.file={path}"])
+    path.write_text("0,1\n")
+    for name in ("plant.mass", "plant.belt.start"):
+        assert scenario.changed({name: 2.0}).plant.belt.table == table
+    given = {"plant.belt.file": str(path)}
+    assert scenario.changed(given).plant.belt.table == Table((0.0,), (1.0,))
     path.unlink()
-    assert parameters.as_drive().load == Table((0.0, 1.0, 3.0), (0.0, 0.5, -0.25))
+    assert scenario.plant.as_drive().belt == table
+    with pytest.raises(InvalidInputError, match="the file cannot be read: No such file"):
+        scenario.changed(given)
 
 
-@pytest.mark.parametrize(
-    ("content", "reason"),
-    [
-        ("", "the file has no numbers"),
-        ("0,1\n0,2\n", "time = 0.0 s after 0.0 s: the times must increase"),
-        ("1,1\n0,2\n", "time = 0.0 s after 1.0 s: the times must increase"),
-        ("0,1\n1\n", "must be two numbers"),
-        ("0,1\n1,nan\n", "must be two numbers"),
-        ("0,1\n1,1e31\n", "must be two numbers"),
-        ("0,1\n" * 300_000, "must have at most"),
-        ("\xff", "the file has no numbers"),
-    ],
-)
-def test_bad_files_are_refused(tmp_path: Path, content: str, reason: str) -> None:
+def test_bad_files_are_refused(tmp_path: Path) -> None:
+    """What is no table for friction either is in test_friction_parameters.py."""
     path = tmp_path / "course.csv"
-    path.write_text(content)
-    message = refusal("paper", "plant.belt.kind=table", f"plant.belt.file={path}")
-    assert "belt.file = '" in message
-    assert reason in message
-
-
-@pytest.mark.parametrize("name", ["missing.csv", "", "/dev/zero", "\0"])
-def test_what_is_no_file_is_refused(tmp_path: Path, name: str) -> None:
-    file = str(tmp_path / name) if name.endswith("csv") else name
-    with pytest.raises(InvalidInputError, match=r"belt\.file = .* is refused") as caught:
-        plant(belt__kind="table", belt__file=file)
-    assert len(str(caught.value).splitlines()) == 1
-
-
-def test_a_pipe_without_a_writer_is_refused(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe.csv")
-    assert "must be a regular file" in refusal(
-        "paper", "plant.load.kind=table", f"plant.load.file={tmp_path / 'pipe.csv'}"
-    )
+    for content, reason in (
+        ("", "the file has no numbers"),
+        ("1,1\n0,2\n", "point 2 of the table: the time must be above the one before"),
+        ("0,0\n1,-1.25\n", "must leave a normal force of at least 0 N"),
+    ):
+        path.write_text(content)
+        message = refusal("paper", "plant.load.kind=table", f"plant.load.file={path}")
+        assert "load.file = '" in message
+        assert reason in message
+    for name in (str(tmp_path / "missing.csv"), "", "\0"):
+        with pytest.raises(InvalidInputError, match=r"belt\.file = .* is refused"):
+            plant(belt__kind="table", belt__file=name)
 
 
 @pytest.mark.parametrize("part", ["belt", "load", "disturbance"])
@@ -126,41 +104,23 @@ def test_constants_that_make_no_course_are_refused(part: str) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        ["kind=step", "amplitude=-1.5"],
-        ["kind=ramp", "amplitude=-1.5", "duration=2"],
-        ["kind=sine", "amplitude=1.01"],
-        ["kind=sine", "amplitude=-1.01", "frequency=0.1"],
-        ["kind=trapezoid", "amplitude=-1.5", "duration=9"],
-    ],
-)
-def test_a_load_that_lifts_the_slide_is_refused(values: list[str]) -> None:
-    message = refusal("paper", *(f"plant.load.{value}" for value in values))
-    assert "load.amplitude = " in message
-    assert "must leave a normal force of at least 0 N, with normal_force = 1.0 N" in message
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        ["kind=none", "amplitude=-9"],
-        ["kind=step", "amplitude=-1"],
-        ["kind=sine", "amplitude=1"],
-        ["kind=sine", "amplitude=9", "duration=0.4"],
-    ],
-)
-def test_a_load_that_does_not_is_taken(values: list[str]) -> None:
-    load_scenario("paper", [f"plant.load.{value}" for value in values])
-
-
-def test_a_table_that_lifts_the_slide_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "course.csv").write_text("0,0\n1,-1.25\n")
-    file = tmp_path / "course.csv"
-    message = refusal("paper", "plant.load.kind=table", f"plant.load.file={file}")
-    assert "load.file = '" in message
-    assert " is refused: must leave a normal force" in message
+def test_a_load_that_lifts_the_slide_is_refused() -> None:
+    for values in (
+        ("kind=step", "amplitude=-1.5"),
+        ("kind=ramp", "amplitude=-1.5", "duration=2"),
+        ("kind=sine", "amplitude=1.01"),
+        ("kind=sine", "amplitude=-1.01", "frequency=0.1"),
+        ("kind=trapezoid", "amplitude=-1.5", "duration=9"),
+    ):
+        message = refusal("paper", *(f"plant.load.{value}" for value in values))
+        assert "load.amplitude = " in message
+        assert "must leave a normal force of at least 0 N, with normal_force = 1.0 N" in message
+    for values in (
+        ("kind=step", "amplitude=-1"),
+        ("kind=sine", "amplitude=1"),
+        ("kind=sine", "amplitude=9", "duration=0.4"),
+    ):
+        load_scenario("paper", [f"plant.load.{value}" for value in values])
 
 
 def test_when_they_can_be_changed() -> None:

@@ -1,4 +1,4 @@
-"""The laws of other packages: found by entry point, or refused with the reason."""
+"""The laws of other packages: found by entry point, tried, or refused with the reason."""
 
 import importlib
 import importlib.util
@@ -14,7 +14,7 @@ import pytest
 from stickslip_ros import scenarios
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.control import CONTROL_LAWS
-from stickslip_ros.physics.model.friction import LAWS, Directional, Linear
+from stickslip_ros.physics.model.friction import LAWS, Directional, Linear, Table
 from stickslip_ros.physics.motion import Motion
 from stickslip_ros.scenarios import friction_parameters, parameters
 from stickslip_ros.scenarios.files import load_scenario
@@ -24,6 +24,7 @@ from stickslip_ros.scenarios.foreign_laws import (
     LawFamily,
     add_laws_of_other_packages,
 )
+from stickslip_ros.scenarios.law_trial import try_control_law, try_friction_law
 from stickslip_ros.scenarios.parameter_field import parameters_of
 from stickslip_ros.scenarios.parameters import NodeParameters
 from tests.scenarios.foreign_laws import BRAKE, FALLING, write_package
@@ -77,17 +78,26 @@ def parameters_anew() -> ModuleType:
     return module
 
 
-def test_a_law_of_another_package_is_found(install: Install) -> None:
+@pytest.mark.parametrize("name", LAWS)
+def test_every_friction_law_of_this_package_passes_the_trial(name: str) -> None:
+    points = {"points": ((0.0, 0.4), (0.1, 0.3), (1.0, 0.25))}
+    law = LAWS[name](**(points if name == Table.name else {}))
+    try_friction_law(law, symbols=True)
+    try_friction_law(Directional(law, law))
+
+
+def test_so_does_every_control_law() -> None:
+    for law in CONTROL_LAWS.values():
+        try_control_law(law(), symbols=True)
+
+
+def test_a_law_of_another_package_is_found_with_its_constants(install: Install) -> None:
     install()
-    assert LAWS["falling"].constants() == ("static", "fall")
-    assert list(LAWS)[-1] == "falling"
-    assert FRICTION_LAWS.refused == {}
     add_laws_of_other_packages()  # the same law again is no other law
     assert FRICTION_LAWS.refused == {}
-
-
-def test_its_constants_are_parameters(install: Install) -> None:
-    install()
+    assert list(LAWS)[-1] == "falling"
+    falling = LAWS["falling"]
+    assert falling.constants() == ("static", "fall")
     plant = parameters_anew().PlantParameters
     known = {parameter.name: parameter for parameter in parameters_of(plant)}
     assert known["friction.law"].choices == tuple(LAWS)
@@ -95,19 +105,21 @@ def test_its_constants_are_parameters(install: Install) -> None:
     assert (fall.unit, fall.default, fall.bounds) == ("s/m", 0.2, "at least 0")
     assert fall.meaning == "Decrease with speed (falling)."
     assert known["friction.static"].meaning == "Static (break-away) coefficient mu_s."
-    law = plant.validated({"friction.law": "falling", "friction.fall": 0.7}, "test").as_drive()
-    assert law.friction == LAWS["falling"](static=0.4, fall=0.7)
-    assert law.friction.coefficient(0.3, 1.0) == Linear(0.4, 0.7).coefficient(0.3, 1.0)
 
-
-def test_a_law_refuses_constants_under_the_names_of_the_parameters(install: Install) -> None:
-    install()
-    plant = parameters_anew().PlantParameters
-    with pytest.raises(InvalidInputError) as refused:
-        plant.validated({"friction.law": "falling", "friction.fall": 11}, "test")
-    assert str(refused.value) == (
-        "test: friction.fall = 11.0 must not exceed 10 friction.static = 10.0"
-    )
+    given = {"friction.law": "falling", "friction.fall": 0.7}
+    law = plant.validated(given, "test").as_drive().friction
+    assert law == falling(static=0.4, fall=0.7)
+    assert law.coefficient(0.3, 1.0) == Linear(0.4, 0.7).coefficient(0.3, 1.0)
+    both = plant.validated(given | {"friction.reverse.fall": 0.3}, "test").as_drive().friction
+    assert both == Directional(falling(0.4, fall=0.7), falling(0.4, fall=0.3))
+    for name, value, reason in (
+        ("fall", 11, "fall = 11.0 must not exceed 10 friction.static = 10.0"),
+        ("reverse.fall", 11, "reverse.fall = 11.0 must not exceed 10 friction.static = 10.0"),
+        ("reverse.fall", -1.0, "reverse.fall = -1.0 is refused: must"),
+    ):
+        with pytest.raises(InvalidInputError) as refused:
+            plant.validated(given | {f"friction.{name}": value}, "test")
+        assert str(refused.value).startswith(f"test: friction.{reason}")
 
 
 def test_a_constant_of_several_laws_names_them_all(install: Install) -> None:
@@ -123,22 +135,6 @@ def test_a_constant_of_several_laws_names_them_all(install: Install) -> None:
     assert known["friction.kinetic"].meaning == (
         "Kinetic coefficient mu_k (exponential, rate_state, falling)."
     )
-
-
-def test_its_constants_may_differ_between_the_directions(install: Install) -> None:
-    install()
-    plant = parameters_anew().PlantParameters
-    falling = LAWS["falling"]
-    given = {"friction.law": "falling", "friction.fall": 0.3, "friction.reverse.fall": 0.7}
-    law = plant.validated(given, "test").as_drive().friction
-    assert law == Directional(falling(0.4, fall=0.3), falling(0.4, fall=0.7))
-    with pytest.raises(InvalidInputError) as refused:
-        plant.validated(given | {"friction.reverse.fall": 11}, "test")
-    assert str(refused.value) == (
-        "test: friction.reverse.fall = 11.0 must not exceed 10 friction.static = 10.0"
-    )
-    with pytest.raises(InvalidInputError, match=r"friction.reverse.fall = -1.0 is refused: must"):
-        plant.validated(given | {"friction.reverse.fall": -1.0}, "test")
 
 
 CONSTANT = '    fall: Any = constant(0.2, "Decrease with speed", "s/m", at_least=0.0)'
@@ -208,72 +204,39 @@ def test_tuples_of_one_name_may_have_different_defaults(install: Install, tmp_pa
     assert FRICTION_LAWS.refused == {}
 
 
+OTHER_CONSTANTS = {
+    '    slope: Any = constant(0.45, "Fall.", "m/s")': (
+        "slope with unit m/s: must be s/m as in law linear, or have another"
+    ),
+    '    static: Any = constant(0.3, "Static.", at_least=0.0)': (
+        "static with default 0.3: must be 0.4 as in law stribeck"
+    ),
+    '    kinetic: Any = constant(0.2, "Level.", positive=True)': (
+        "kinetic with bounds above 0 and default 0.2: must be at least 0, 0.25 as in law expon"
+    ),
+    '    law: Any = constant(0.2, "Fall.")': "law: the name cannot be that of a parameter",
+    '    copy: Any = constant(0.2, "Fall.")': "copy: the name cannot",
+    '    _fall: Any = constant(0.2, "Fall.")': "_fall: the name cannot",
+}
+
+
 @pytest.mark.parametrize(
     ("old", "new", "reason"),
     [
         ("FrictionLaw)", "object)", "is no class derived from FrictionLaw"),
         ("import dataclass\n", "import dataclas\n", "cannot be imported: ImportError: cannot"),
         ("from typing", "raise SystemExit(3)\nfrom typing", "cannot be imported: SystemExit: 3"),
-        ("class Falling(", "class Rising(", "cannot be imported: AttributeError: module 'foreign'"),
         ("(frozen=True)", "()", "cannot be imported: TypeError: cannot inherit non-frozen"),
         ("@dataclass(frozen=True)", "", "is no dataclass: must have @dataclass(frozen=True)"),
         ("def coefficient", "def coeficient", "does not define coefficient"),
-        (
-            CONSTANT,
-            "    fall: Any = 0.2",
-            "does not describe its constant fall by `constant`",
-        ),
-        (
-            '"falling"',
-            '"fallen"',
-            "has the name 'fallen' in its class and 'falling' in its entry point",
-        ),
-        (
-            CONSTANT,
-            '    slope: Any = constant(0.45, "Fall.", "m/s")',
-            "has a constant slope with unit m/s: must be s/m as in law linear, or have another",
-        ),
-        (
-            CONSTANT,
-            '    static: Any = constant(0.3, "Static.", at_least=0.0)',
-            "has a constant static with default 0.3: must be 0.4 as in law stribeck",
-        ),
-        (
-            CONSTANT,
-            '    kinetic: Any = constant(0.2, "Level.", positive=True)',
-            "has a constant kinetic with bounds above 0 and default 0.2: must be at least 0, 0.25 "
-            "as in law exponential",
-        ),
-        (
-            CONSTANT,
-            '    law: Any = constant(0.2, "Fall.")',
-            "has a constant law: the name cannot be that of a parameter",
-        ),
-        (CONSTANT, '    copy: Any = constant(0.2, "Fall.")', "has a constant copy: the name"),
-        (CONSTANT, '    _fall: Any = constant(0.2, "Fall.")', "has a constant _fall: the name"),
-        (
-            "constant(0.2",
-            "constant(-0.2",
-            "has the default -0.2 for its constant fall: must be a number within its bounds",
-        ),
-        (
-            CONSTANT,
-            TERMS.replace("(2,", "(1.5,"),
-            "has the default 1.5 for its constant terms: must be a whole number within its bounds",
-        ),
-        (
-            CONSTANT,
-            TERMS.replace("(2,", "(float('inf'),"),
-            "has the default inf for its constant terms: must be a whole number within its bounds",
-        ),
-        ("constant(0.2", 'constant("0.2"', "has the default '0.2' for its constant fall"),
+        (CONSTANT, "    fall: Any = 0.2", "does not describe its constant fall by `constant`"),
+        ('"falling"', '"fallen"', "has the name 'fallen' in its class and 'falling' in its entry"),
+        *((CONSTANT, new, f"has a constant {reason}") for new, reason in OTHER_CONSTANTS.items()),
+        ("constant(0.2", "constant(-0.2", "has the default -0.2 for its constant fall: must be a"),
+        (CONSTANT, TERMS.replace("(2,", "(1.5,"), "has the default 1.5 for its constant terms: mu"),
         ("constant(0.2", 'constant(float("nan")', "has the default nan for its constant fall"),
         ('"s/m"', '"mm"', "cannot be imported: ValueError: unit 'mm': 'mm' is none of"),
-        (
-            "if self.fall",
-            "if self.fell",
-            "cannot be made from its defaults: AttributeError: 'Falling' object has no",
-        ),
+        ("if self.fall", "if self.fell", "fails with its defaults: AttributeError: 'Falling' obj"),
     ],
 )
 def test_a_law_that_does_not_fit_is_refused(
@@ -285,11 +248,103 @@ def test_a_law_that_does_not_fit_is_refused(
     assert laws == LAWS
     whole = f"foreign:Falling of package foreign-laws {reason}"
     assert FRICTION_LAWS.refused["falling"].startswith(whole)
+
+
+def test_what_is_refused_is_told_to_who_names_it(install: Install) -> None:
+    install(FALLING.replace("FrictionLaw)", "object)"))
     plant = parameters_anew().PlantParameters  # the others can be used
     assert plant().friction.law == "stribeck"
     with pytest.raises(InvalidInputError) as refused:
         plant.validated({"friction.law": "falling"}, "test")
+    whole = "foreign:Falling of package foreign-laws is no class derived from FrictionLaw"
     assert str(refused.value).startswith(f"test: friction.law = 'falling' is refused: {whole}")
+
+
+RESULT = "-self.static * sign + self.fall * relative_speed"
+STEADY = "def coefficient"
+MEMORY = """states = {"z": None}
+
+    def friction(self, relative_speed, sign, memory, switches):
+        return -memory[0]
+
+    def memory_rates(self, relative_speed, sign, memory, switches):
+        return (relative_speed - memory[0],)
+
+    def coefficient"""
+
+
+def member(name: str, value: str) -> str:
+    """Return a further member of the law, before the first."""
+    return f"{name} = {value}\n\n    def coefficient"
+
+
+def method(name: str, value: str) -> str:
+    """Return a further method of the law, before the first."""
+    return f"{name} = lambda *_: {value}\n\n    def coefficient"
+
+
+def with_memory(further: str) -> str:
+    """Return the members of a law with a memory, and a further one."""
+    return MEMORY.replace("states", f"{further}\n    states", 1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        (RESULT, RESULT.replace("relative_speed", "abs(relative_speed) * sign"), "abs()"),
+        (RESULT, f"{RESULT} if relative_speed < 0.3 else -sign", "truth value of an array"),
+        (RESULT, f"{RESULT} * __import__('math').tanh(relative_speed)", "TypeError: only "),
+        (RESULT, f"{RESULT} if type(relative_speed) is float else 0.0 * sign", "for an array (2)"),
+        (RESULT, f"{RESULT} * (2.0 if 'heyoka' in str(type(sign)) else 1.0)", "its equations give"),
+        (RESULT, f"{RESULT} * relative_speed", "its coefficient at 0.1 m/s is [-0.398"),
+        (RESULT, "float('nan') * sign", "its equations: [nan], which must be finite numbers"),
+        (RESULT, "None", "TypeError: float() argument must be a string or a real number, not"),
+        (RESULT, "1 / 0", "ZeroDivisionError: division by zero"),
+        (RESULT, "exit(3)", "SystemExit: 3"),
+        (RESULT, f"-({RESULT})", "its coefficient(0, 1) is 0.4, which must be -0.4, as static"),
+        (STEADY, member("limits", "(0.3, 0.4)"), "its coefficient(0, 1) is -0.4, which must be"),
+        (STEADY, member("limits", "(0.4,)"), "its limits: [0.4], which must be one for each of"),
+        (STEADY, member("characteristic_speed", "0.0"), "its characteristic_speed is 0.0 m/s"),
+        (STEADY, method("warning", "1 / 0"), "ZeroDivisionError: division by zero"),
+        (STEADY, method("scaled", "None"), "AttributeError: 'NoneType' object has no"),
+        (STEADY, method("friction", "-0.4"), "and as friction, which must be the same"),
+        (STEADY, method("margins", "(float('nan'),)"), "its equations: [-0.38, nan], which must"),
+        (STEADY, member("switches", '("a", "b")'), "its switches_at: [], which must be one for"),
+        (STEADY, method("__post_init__", "1 / 0"), "ZeroDivisionError: division by zero"),
+        (STEADY, with_memory("memory_at = 0"), "TypeError: 'int' object"),
+        (STEADY, MEMORY.replace("(relative_speed - memory[0],)", "()"), "its memory_rates: [], wh"),
+        (STEADY, MEMORY.replace("- memory", "- abs(relative_speed) * memory"), "bad operand type"),
+        (STEADY, with_memory("initial_memory = lambda *_: 'xy'"), "could not convert string"),
+        (STEADY, with_memory("rate_sensitivity = 0.1"), "NotImplementedError"),
+    ],
+)
+def test_what_motion_and_theory_ask_of_a_law_is_tried(
+    install: Install, old: str, new: str, reason: str
+) -> None:
+    assert old in FALLING
+    install(FALLING.replace(old, new))
+    assert "falling" not in LAWS
+    refusal = FRICTION_LAWS.refused["falling"]
+    assert refusal.startswith("foreign:Falling of package foreign-laws fails with its defaults: ")
+    assert reason in refusal
+    assert "\n" not in refusal
+
+
+@pytest.mark.parametrize("direction", ["", "reverse."])
+def test_values_for_which_a_law_fails_are_refused_with_their_names(
+    install: Install, direction: str
+) -> None:
+    speed = "characteristic_speed = property(lambda self: self.fall)\n\n    def coefficient"
+    install(FALLING.replace(STEADY, speed))
+    plant = parameters_anew().PlantParameters
+    chosen = {"friction.law": "falling", f"friction.{direction}fall": 0.0}
+    with pytest.raises(InvalidInputError) as refused:
+        plant.validated(chosen, "test")
+    assert str(refused.value).startswith("test: law falling with ")
+    assert "fall=0.0" in str(refused.value) or "friction.fall = 0.0" in str(refused.value)
+    assert str(refused.value).endswith(
+        " fails: its characteristic_speed is 0.0 m/s, which must be above 0"
+    )
 
 
 @pytest.mark.parametrize(
@@ -298,7 +353,6 @@ def test_a_law_that_does_not_fit_is_refused(
         ("coulomb", "foreign:Falling", "has the name of another law, stickslip_ros.physics.model."),
         ("dry-run", "foreign:Falling", "has the name 'dry-run': must be of letters, digits and _"),
         ("falling", "absent:Falling", "cannot be imported: ModuleNotFoundError: No module named"),
-        ("falling", "foreign:FALLING", "cannot be imported: AttributeError"),
         ("falling", "foreign", "is no class derived from FrictionLaw"),
         ("falling", "for eign:", "cannot be imported: "),
     ],
@@ -358,13 +412,10 @@ STRENGTH = '    strength: Any = constant(1.0, "Force per velocity", "N s/m", at_
         *(
             (
                 STRENGTH,
-                f'{STRENGTH}\n    {name}: Any = constant(1.0, "Gain.")',
-                f"has a constant {name}: the name cannot be that of a parameter",
+                f'{STRENGTH}\n    {name}: Any = constant(1.0, "G.")',
+                f"has a constant {name}: ",
             )
-            for name in (
-                *("law", "reference", *NodeParameters.model_fields),
-                *("node", "as_law", "as_reference", "as_controller", "law_names", "copy"),
-            )
+            for name in ("law", *NodeParameters.model_fields, "as_law", "copy")
         ),
     ],
 )

@@ -4,7 +4,6 @@ from math import isfinite, isnan
 from pathlib import Path
 from typing import Any
 
-import pytest
 import yaml
 
 from stickslip_ros.scenarios.files import load_scenario
@@ -14,39 +13,12 @@ from tests.scenarios.files import refusal, scenario_file, section
 INF, NAN = float("inf"), float("nan")
 
 FINITE: dict[str, Any] = {
-    "1e3": 1000.0,
-    "1E3": 1000.0,
-    "1.0e6": 1e6,
-    "-.5e-3": -5e-4,
-    ".5": 0.5,
-    "5.": 5.0,
-    "0": 0,
-    "-5": -5,
-    "+5": 5,
-    "0x10": 16,
-    "-0x10": -16,
-    "010": 8,
-    "08": 8.0,
-    "true": True,
-    "True": True,
-    "yes": True,
-    "Yes": True,
-    "on": True,
-    "y": True,
-    "FALSE": False,
-    "no": False,
-    "off": False,
-    "n": False,
-    "'yes'": "yes",
-    '"1e3"': "1e3",
-    "1_000": "1_000",
-    "0o17": "0o17",
-    "1e": "1e",
-    "12:30": "12:30",
-    "2001-01-01": "2001-01-01",
-    "tRue": "tRue",
-    "stribeck": "stribeck",
-    "[a, b]": ["a", "b"],
+    **{"1e3": 1000.0, "1E3": 1000.0, "1.0e6": 1e6, "-.5e-3": -5e-4, ".5": 0.5, "5.": 5.0},
+    **{"0": 0, "-5": -5, "+5": 5, "0x10": 16, "-0x10": -16, "010": 8, "08": 8.0},
+    **dict.fromkeys(["true", "True", "yes", "Yes", "on", "y"], True),
+    **dict.fromkeys(["FALSE", "no", "off", "n"], False),
+    **{text: text for text in ("1_000", "0o17", "1e", "12:30", "2001-01-01", "tRue", "stribeck")},
+    **{"'yes'": "yes", '"1e3"': "1e3", "[a, b]": ["a", "b"]},
 }
 NOT_FINITE = {".inf": INF, "-.Inf": -INF, "inf": INF, "-inf": -INF, ".nan": NAN, "nan": NAN}
 
@@ -75,25 +47,18 @@ def test_ros_reads_them_so(tmp_path: Path, read_by_ros: ReadByRos) -> None:
         assert same(read[f"p{number}"], value), text
 
 
-@pytest.mark.parametrize(("text", "value"), FINITE.items(), ids=FINITE.keys())
-def test_a_scenario_reads_them_so(tmp_path: Path, text: str, value: Any) -> None:
-    node, name = TAKERS[type(value)]
-    path = scenario_file(tmp_path, section(f"/**/{node}", f"{{{name}: {text}}}"))
-    given = float(value) if type(value) is int else value
-    assert same(load_scenario(path).as_dict()[node][name], given)
-
-
-@pytest.mark.parametrize(("text", "value"), NOT_FINITE.items(), ids=NOT_FINITE.keys())
-def test_a_scenario_reads_what_is_not_finite_so(tmp_path: Path, text: str, value: float) -> None:
-    """To be refused nearly everywhere."""
-    path = scenario_file(tmp_path, section("/**/plant", f"{{mass: {text}}}"))
-    assert f"mass = {value!r} is refused" in refusal(path)
-
-
-@pytest.mark.parametrize("text", [".inf", "inf"])
-def test_a_duration_may_be_infinite(tmp_path: Path, text: str) -> None:
-    path = scenario_file(tmp_path, section("/**/plant", f"{{duration: {text}}}"))
-    assert not isfinite(load_scenario(path).plant.duration)
+def test_a_scenario_reads_them_so(tmp_path: Path) -> None:
+    for text, value in FINITE.items():
+        node, name = TAKERS[type(value)]
+        path = scenario_file(tmp_path, section(f"/**/{node}", f"{{{name}: {text}}}"))
+        given = float(value) if type(value) is int else value
+        assert same(load_scenario(path).as_dict()[node][name], given), text
+    for text, value in NOT_FINITE.items():
+        path = scenario_file(tmp_path, section("/**/plant", f"{{mass: {text}}}"))
+        assert f"mass = {value!r} is refused" in refusal(path)
+    for text in (".inf", "inf"):
+        path = scenario_file(tmp_path, section("/**/plant", f"{{duration: {text}}}"))
+        assert not isfinite(load_scenario(path).plant.duration)
 
 
 def test_pyyaml_alone_would_not() -> None:

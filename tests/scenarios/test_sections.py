@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import pytest
-
 from stickslip_ros.scenarios.files import load_scenario
 from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
 from tests.scenarios.conftest import ReadByRos
@@ -31,22 +29,15 @@ matching = [(namespace, p) for namespace, (these, _) in MATCHES.items() for p in
 not_matching = [(namespace, p) for namespace, (_, others) in MATCHES.items() for p in others]
 
 
-@pytest.mark.parametrize(("namespace", "pattern"), matching)
-def test_a_section_applies_to_the_nodes_it_matches(
-    tmp_path: Path, namespace: str, pattern: str
-) -> None:
-    path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))
-    assert load_scenario(path, namespace=namespace).plant.mass == 7.0
-
-
-@pytest.mark.parametrize(("namespace", "pattern"), not_matching)
-def test_a_section_that_matches_no_node_is_refused(
-    tmp_path: Path, namespace: str, pattern: str
-) -> None:
-    path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))
-    message = refusal(path, namespace=namespace)
-    assert message.startswith(f"{path}: section /{pattern.strip('/')} matches no node")
-    assert f"the nodes in namespace {namespace} are {', '.join(NODE_PARAMETERS)}" in message
+def test_a_section_applies_to_the_nodes_that_it_matches(tmp_path: Path) -> None:
+    for namespace, pattern in matching:
+        path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))
+        assert load_scenario(path, namespace=namespace).plant.mass == 7.0
+    for namespace, pattern in not_matching:
+        path = scenario_file(tmp_path, section(pattern, "{mass: 7.0}"))
+        message = refusal(path, namespace=namespace)
+        assert message.startswith(f"{path}: section /{pattern.strip('/')} matches no node")
+        assert f"the nodes in namespace {namespace} are {', '.join(NODE_PARAMETERS)}" in message
 
 
 def test_sections_of_other_nodes_are_left_alone_where_there_may_be_some(tmp_path: Path) -> None:
@@ -72,23 +63,13 @@ def test_a_section_for_all_gives_to_each_what_it_has(tmp_path: Path) -> None:
     assert (scenario.plant.mass, scenario.analyzer.window) == (7.0, 5)
 
 
-in_turn = pytest.mark.parametrize("patterns", [("/**", "/**/plant"), ("/**/plant", "/**")])
-
-
-@in_turn
-def test_the_later_section_counts(tmp_path: Path, patterns: tuple[str, str]) -> None:
-    text = section(patterns[0], "{mass: 7.0, rate: 50.0}") + section(patterns[1], "{mass: 8.0}")
-    path = scenario_file(tmp_path, text)
-    plant = load_scenario(path).plant
-    assert (plant.mass, plant.rate) == (8.0, 50.0)
-
-
-@in_turn
-def test_ros_lets_the_later_section_count_too(
-    tmp_path: Path, patterns: tuple[str, str], read_by_ros: ReadByRos
-) -> None:
-    text = section(patterns[0], "{mass: 7.0, rate: 50.0}") + section(patterns[1], "{mass: 8.0}")
-    assert read_by_ros(scenario_file(tmp_path, text)) == {"mass": 8.0, "rate": 50.0}
+def test_the_later_section_counts_as_in_ros(tmp_path: Path, read_by_ros: ReadByRos) -> None:
+    for first, second in (("/**", "/**/plant"), ("/**/plant", "/**")):
+        text = section(first, "{mass: 7.0, rate: 50.0}") + section(second, "{mass: 8.0}")
+        path = scenario_file(tmp_path, text)
+        plant = load_scenario(path).plant
+        assert {"mass": plant.mass, "rate": plant.rate} == {"mass": 8.0, "rate": 50.0}
+        assert read_by_ros(path) == {"mass": 8.0, "rate": 50.0}
 
 
 def test_names_may_be_nested(tmp_path: Path) -> None:

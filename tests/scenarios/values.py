@@ -9,22 +9,8 @@ from stickslip_ros.scenarios.parameter_field import Parameter
 OF_EVERY_TYPE: list[Any] = [None, True, 7, 0.5, "no such word", [True], [7], [0.5], [b"\1"]]
 """One value of each type that ROS knows, a list of strings excepted."""
 
-EXTREMES = [
-    0.0,
-    -0.0,
-    5e-324,
-    -5e-324,
-    1e-310,
-    1e-30,
-    -1.0,
-    200.0,
-    1e30,
-    1.1e30,
-    -1e308,
-    1e308,
-    inf,
-    -inf,
-]
+EXTREMES = [0.0, -0.0, 5e-324, -5e-324, 1e-310, 1e-30, -1.0, 200.0]
+EXTREMES += [1e30, 1.1e30, -1e308, 1e308, inf, -inf]
 
 UNKNOWN: dict[str, Any] = {
     "": 1.0,

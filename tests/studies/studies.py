@@ -2,11 +2,11 @@
 
 from stickslip_ros.progress import Progress
 from stickslip_ros.scenarios.files import Scenario, load_scenario
-from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settling import SettlingCourse
+from stickslip_ros.studies.plan import Axis, Continuation, Grid
+from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Study
 
-SHORT = SettlingCourse(transient=5.0, cycles=2)
+SHORT = SettlingOptions(transient=5.0, cycles=2)
 """Long enough to tell one motion from another."""
 
 EXPONENTIAL = (
@@ -38,7 +38,7 @@ def free(*overrides: str) -> Scenario:
 
 
 def speeds(
-    count: int, first: float = 0.2, last: float = 0.6, *, carry: Carry | None = None
+    count: int, first: float = 0.2, last: float = 0.6, *, carry: Continuation | None = None
 ) -> Study:
     """Return a study of the free drive over so many belt speeds."""
     return Study(free(), Grid((Axis("plant.belt_speed", first, last, count),), carry), SHORT)

@@ -15,13 +15,11 @@ import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.studies import dask_cluster
-from stickslip_ros.studies.columns import compute_columns
-from stickslip_ros.studies.dask_cluster import dask_executor
+from stickslip_ros.studies import runner
 from stickslip_ros.studies.journal import Journal
-from stickslip_ros.studies.plan import Axis, Carry
-from stickslip_ros.studies.runner import WorkersDiedError, run
-from stickslip_ros.studies.settling import SettlingCourse
+from stickslip_ros.studies.plan import Axis, Continuation
+from stickslip_ros.studies.runner import WorkersDiedError, dask_executor, run
+from stickslip_ros.studies.settling import SettlingOptions
 from stickslip_ros.studies.study import Study
 from stickslip_ros.studies.sweep import sweep_study
 
@@ -79,18 +77,27 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
     cluster.end()
 
 
-def study(carry: Carry | None = None) -> Study:
+def study(speeds: int = 100, carry: Continuation | None = None) -> Study:
     scenario = load_scenario("paper", ["plant.expects_control=false"])
-    axes = [Axis("plant.damping", 0.0, 0.05, 8), Axis("plant.belt_speed", 0.1, 0.6, 100)]
-    return sweep_study(scenario, axes, carry=carry, course=SettlingCourse(transient=100.0))
+    axes = [Axis("plant.damping", 0.0, 0.05, 8), Axis("plant.belt_speed", 0.1, 0.6, speeds)]
+    return sweep_study(scenario, axes, continuation=carry, course=SettlingOptions(transient=100.0))
 
 
-@pytest.mark.parametrize("carry", [None, Carry.DOWN])
-def test_a_worker_killed_on_the_way_changes_nothing(cluster: Cluster, carry: Carry | None) -> None:
+@pytest.mark.parametrize(
+    ("speeds", "carry"),
+    [
+        (20, None),
+        pytest.param(100, None, marks=pytest.mark.long),
+        pytest.param(100, Continuation.DOWN, marks=pytest.mark.long),
+    ],
+)
+def test_a_worker_killed_on_the_way_changes_nothing(
+    cluster: Cluster, speeds: int, carry: Continuation | None
+) -> None:
     doomed = cluster.add_worker()
     cluster.add_worker()
     cluster.wait_for_workers(2)
-    asked = study(carry)
+    asked = study(speeds, carry)
     killed = threading.Event()
 
     def kill_after_the_first_task(done: float) -> None:
@@ -109,23 +116,15 @@ def test_a_worker_killed_on_the_way_changes_nothing(cluster: Cluster, carry: Car
     assert len(found) == asked.plan.size
 
 
-def test_workers_that_come_late_are_waited_for(cluster: Cluster) -> None:
-    asked = study()
-    with dask_executor(cluster.address) as (executor, in_flight):
-        cluster.add_worker()
-        found = compute_columns(asked, executor=executor, in_flight=in_flight)
-    assert found.regime.tolist() == compute_columns(asked).regime.tolist()
-
-
+@pytest.mark.long
 def test_a_scheduler_that_dies_is_an_error_and_what_was_done_is_kept(cluster: Cluster) -> None:
-    cluster.add_worker()
-    cluster.wait_for_workers(1)
     asked = study()
 
     def kill_after_the_first_task(done: float) -> None:
         if done > 0:
             cluster.processes[0].kill()
 
+    cluster.add_worker()  # one that comes late is waited for
     with Journal(asked) as journal:
         with (
             pytest.raises(WorkersDiedError, match="has lost its workers"),
@@ -137,15 +136,11 @@ def test_a_scheduler_that_dies_is_an_error_and_what_was_done_is_kept(cluster: Cl
         assert journal.count == asked.plan.size
 
 
-def test_where_no_scheduler_answers_the_address_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(dask_cluster, "_TIMEOUT", "1s")
-    with (
-        pytest.raises(InvalidInputError, match=r"^tcp://127.0.0.1:9: no scheduler"),
-        dask_executor("tcp://127.0.0.1:9"),
+def test_what_is_no_scheduler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "_DASK_TIMEOUT", "1s")
+    for address, message in (
+        ("tcp://127.0.0.1:9", r"^tcp://127.0.0.1:9: no scheduler"),
+        ("???", r"^\?\?\?: "),
     ):
-        pass
-
-
-def test_what_is_no_address_is_refused() -> None:
-    with pytest.raises(InvalidInputError, match=r"^\?\?\?: "), dask_executor("???"):
-        pass
+        with pytest.raises(InvalidInputError, match=message), dask_executor(address):
+            pass

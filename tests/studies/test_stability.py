@@ -6,14 +6,24 @@ import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.control import CONTROL_LAWS
+from stickslip_ros.physics.model.courses import Sine
+from stickslip_ros.physics.model.friction import Coulomb
 from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.linear import expand
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.plots.study_tables import stability_tables
 from stickslip_ros.scenarios.files import Scenario, load_scenario
 from stickslip_ros.scenarios.parameters import controller_model
 from stickslip_ros.studies.design import Task
-from stickslip_ros.studies.stability import stability, why_no_figure
-from tests.physics.drives import FEED_DRIVE
+from stickslip_ros.studies.stability import (
+    Notes,
+    Section,
+    hopf_distance,
+    hopf_ratio,
+    stability,
+    why_no_figure,
+)
+from tests.physics.drives import FEED_DRIVE, PAPER
 from tests.physics.parts import Switching
 
 ONLY = "this exists for the washout law only, and the control law is velocity_feedback"
@@ -83,3 +93,54 @@ def test_a_design_refuses_another_law_by_name(damped: Scenario) -> None:
     assert str(refused.value) == (
         "control law = velocity_feedback is refused: must be washout, whose gains a design proposes"
     )
+
+
+def test_the_equilibrium_under_control_is_told_beside_that_without() -> None:
+    gain = ["velocity_feedback_controller.position_gain=-200000"]
+    scenario = load_scenario("feed_drive", gain, controller="velocity_feedback")
+    found, notes = stability(scenario)
+    drive = scenario.plant.as_drive()
+    assert found["open_loop"]["equilibrium_position"] == drive.equilibrium_position
+    closed = drive.equilibrium_position * drive.stiffness / (drive.stiffness + 200000.0)
+    assert found["closed_loop"]["equilibrium_position"] == pytest.approx(closed)
+    shown = "\n".join(str(part) for part in _lines(scenario, found, notes))
+    assert "258.4 µm" in shown
+    assert "215.3 µm" in shown
+    assert "growth rate" in shown
+    assert "decay rate" not in shown
+    lowest = found["sticking"]["searched_speeds"][0]
+    assert found["sticking"]["speed_ranges"][0][0] == lowest
+    assert f"up to 43.95 mm/s (searched from {1e3 * lowest:.4g} mm/s)" in shown
+
+
+@pytest.mark.long
+def test_a_neutral_equilibrium_is_called_so() -> None:
+    found, notes = stability(
+        load_scenario("paper", ["plant.friction.law=coulomb", "plant.damping=0"])
+    )
+    assert found["open_loop"]["stable"] is None
+    assert notes["open_loop.stable"].startswith("it is neutral")
+    assert found["closed_loop"]["stable"] is True
+
+
+def _lines(scenario: Scenario, found: Section, notes: Notes) -> list[str]:
+    tables = stability_tables(scenario, found, notes)
+    return [line for part in tables if not isinstance(part, str) for line in part.lines()]
+
+
+def test_the_distance_from_the_hopf_speed() -> None:
+    for speed in (40.0, -40.0):
+        drive = replace(FEED_DRIVE, belt_speed=speed)
+        assert hopf_ratio(drive) == pytest.approx(40.0 / 0.048876, rel=1e-4)
+        assert hopf_distance(drive) == (
+            "40 m/s is 818.4 times the Hopf speed of 0.04888 m/s (belt speeds are in m/s)"
+        )
+    assert hopf_distance(PAPER) == "0.4 is 0.8184 times the Hopf speed of 0.4888"
+    for drive in (
+        replace(FEED_DRIVE, friction=Coulomb(0.4)),
+        replace(FEED_DRIVE, belt_speed=0.0),
+        replace(FEED_DRIVE, stiffness=0.0),  # not covered by the theory, like the next one
+        replace(FEED_DRIVE, load=Sine(amplitude=100.0)),
+    ):
+        assert hopf_ratio(drive) is None
+        assert hopf_distance(drive) == ""

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Measures, Regime
 from stickslip_ros.scenarios.files import Scenario
-from stickslip_ros.studies.columns import Columns, compute_columns
-from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settling import MotionState, SettlingCourse
+from stickslip_ros.studies.columns import compute_columns
+from stickslip_ros.studies.plan import Axis, Continuation, Grid
+from stickslip_ros.studies.settling import MotionState, SettlingOptions
 from stickslip_ros.studies.study import Point, Study, compute, pieces_of
 from stickslip_ros.studies.sweep import sweep_study
 from tests.studies.studies import CYCLE_LOST_SPEED, EXPONENTIAL, HOPF_SPEED, SHORT, free, paper
@@ -32,7 +32,7 @@ LINEAR = free("plant.friction.law=linear", "plant.belt_speed=0.2")
 
 MIXED = [
     Study(free(), Grid((MINIMUM,)), SHORT),
-    Study(LINEAR, Grid((SLOPE,)), SettlingCourse(40.0, 2)),
+    Study(LINEAR, Grid((SLOPE,)), SettlingOptions(40.0, 2)),
     Study(free(), Grid((DAMPING, Axis("plant.belt_speed", 0.2, 0.3, 2))), SHORT),
 ]
 
@@ -68,18 +68,17 @@ def test_a_refused_diverging_or_too_stiff_point_is_a_row_with_the_reason() -> No
 def test_every_point_is_what_it_is_alone(study: Study) -> None:
     together = points(study)
     assert [point.number for point in together] == list(range(study.plan.size))
-    for index in range(study.plan.size):
-        assert compute(study, [index], None).points == [together[index]]
-    backwards = compute(study, range(study.plan.size)[::-1], None)
-    assert backwards.points == together[::-1]
-    assert backwards.end is None
+    for index in range(study.plan.size)[::-1]:
+        piece = compute(study, [index], None)
+        assert piece.points == [together[index]]
+        assert piece.end is None
 
 
 CHAINS = [
-    (replace(MINIMUM, first=0.6, last=0.3, count=4), Carry.UP, free(), 2),
-    (MINIMUM, Carry.DOWN, free(), 2),
-    (DAMPING, Carry.DOWN, free(), 2),
-    (SLOPE, Carry.DOWN, LINEAR, 1),
+    (replace(MINIMUM, first=0.6, last=0.3, count=4), Continuation.UP, free(), 2),
+    (MINIMUM, Continuation.DOWN, free(), 2),
+    (DAMPING, Continuation.DOWN, free(), 2),
+    (SLOPE, Continuation.DOWN, LINEAR, 1),
 ]
 
 
@@ -89,9 +88,9 @@ CHAINS = [
     ids=["out of bounds", "downwards", "too stiff", "runs away"],
 )
 def test_a_chain_restarts_after_a_failed_point(
-    axis: Axis, carry: Carry, scenario: Scenario, failing: int
+    axis: Axis, carry: Continuation, scenario: Scenario, failing: int
 ) -> None:
-    alone = Study(scenario, Grid((axis,)), SettlingCourse(40.0, 2))
+    alone = Study(scenario, Grid((axis,)), SettlingOptions(40.0, 2))
     study = replace(alone, plan=Grid((axis,), carry))
     (chain,) = study.plan.chains()
     piece = compute(study, chain, None)
@@ -105,7 +104,7 @@ def test_a_chain_restarts_after_a_failed_point(
 
 
 def test_a_chain_in_pieces_is_the_chain_at_once() -> None:
-    study = Study(free(), Grid((Axis("plant.belt_speed", 0.3, 0.6, 12),), Carry.DOWN), SHORT)
+    study = Study(free(), Grid((Axis("plant.belt_speed", 0.3, 0.6, 12),), Continuation.DOWN), SHORT)
     (chain,) = study.plan.chains()
     at_once = compute(study, chain, None)
     for size in (1, 5, 11):
@@ -121,14 +120,14 @@ def test_a_chain_in_pieces_is_the_chain_at_once() -> None:
 def test_the_filter_is_carried_on_and_the_control_does_not_restart() -> None:
     scenario = paper("plant.rate=20.0", "washout_controller.start_after=100.0")
     gain = Axis("washout_controller.linear_gain", -2.0, -1.9, 2)
-    study = Study(scenario, Grid((gain,), Carry.UP), SettlingCourse(5.0, 1))
+    study = Study(scenario, Grid((gain,), Continuation.UP), SettlingOptions(5.0, 1))
     start = MotionState(scenario.plant.as_drive().equilibrium_position, 0.0, (0.0, 0.0))
     at_rest = compute(study, [1], start).points[0].measures
     assert at_rest.regime is Regime.EQUILIBRIUM
     # Without control that is not stable; with it, a filter that is not at rest pushes.
     alone = compute(study, [1], None).points[0].measures
     pushed = compute(
-        replace(study, course=SettlingCourse(0.0, 1)), [1], replace(start, control=(1.0, 0.0))
+        replace(study, course=SettlingOptions(0.0, 1)), [1], replace(start, control=(1.0, 0.0))
     )
     assert alone.amplitude is not None
     assert alone.amplitude > 1e-3
@@ -137,38 +136,29 @@ def test_the_filter_is_carried_on_and_the_control_does_not_restart() -> None:
     assert point.measures.amplitude > 0.1
 
 
-STEP = 0.01
-
-
-@pytest.fixture(scope="module")
-def hysteresis() -> Columns:
+@pytest.mark.parametrize("count", [18, pytest.param(86, marks=pytest.mark.long)])
+def test_up_the_cycle_is_kept_until_it_is_lost_and_down_rest_to_the_hopf_point(count: int) -> None:
     """Belt speeds across the range in which rest and cycle coexist, up and then down."""
-    speed = Axis("plant.belt_speed", 1.05, 1.9, 86)
-    return compute_columns(sweep_study(free(*EXPONENTIAL), [speed], carry=Carry.BOTH))
-
-
-def test_upwards_the_cycle_is_kept_until_it_is_lost(hysteresis: Columns) -> None:
-    speed, regime = hysteresis.values["plant.belt_speed"][:86], hysteresis.regime[:86]
-    cycles = regime == Regime.STICK_SLIP
-    kept = cycles.sum()
-    assert cycles[:kept].all()
-    assert (regime[kept:] == Regime.EQUILIBRIUM).all()
-    assert speed[kept - 1] < CYCLE_LOST_SPEED < speed[kept] + STEP
-    assert (np.diff(hysteresis.amplitude[:kept]) > 0.0).all()
-    assert hysteresis.steady[:86].all()
-
-
-def test_downwards_rest_is_kept_to_the_hopf_point(hysteresis: Columns) -> None:
-    speed, regime = hysteresis.values["plant.belt_speed"][86:], hysteresis.regime[86:]
-    steady, amplitude = hysteresis.steady[86:], hysteresis.amplitude[86:]
-    rests = steady & (regime == Regime.EQUILIBRIUM)
-    cycles = regime == Regime.STICK_SLIP
-    assert HOPF_SPEED < speed[rests][0] < HOPF_SPEED + STEP
+    axis = Axis("plant.belt_speed", 1.05, 1.9, count)
+    found = compute_columns(sweep_study(free(*EXPONENTIAL), [axis], continuation=Continuation.BOTH))
+    step = 0.85 / (count - 1)
+    speed = axis.values()
+    (up, down), (grown, amplitude), (settled, steady) = (
+        np.split(column, 2) for column in (found.regime, found.amplitude, found.steady)
+    )
+    kept = (up == Regime.STICK_SLIP).sum()
+    assert (up[:kept] == Regime.STICK_SLIP).all()
+    assert (up[kept:] == Regime.EQUILIBRIUM).all()
+    assert speed[kept - 1] < CYCLE_LOST_SPEED < speed[kept] + step
+    assert (np.diff(grown[:kept]) > 0.0).all()
+    assert settled.all()
+    rests, cycles = steady & (down == Regime.EQUILIBRIUM), down == Regime.STICK_SLIP
+    assert HOPF_SPEED < speed[rests][0] < HOPF_SPEED + step
     # Just below, where rest is barely unstable, the vibration has only begun to grow.
-    assert speed[cycles][-1] > HOPF_SPEED - 4 * STEP
+    assert speed[cycles][-1] > HOPF_SPEED - 4 * step
     assert (rests | cycles | ~steady).all()
-    assert amplitude[cycles] == pytest.approx(hysteresis.amplitude[:86][cycles], rel=1e-9)
-    assert (steady[cycles]).all()
+    assert amplitude[cycles] == pytest.approx(grown[cycles], rel=1e-9)
+    assert steady[cycles].all()
 
 
 @pytest.mark.parametrize(
@@ -177,15 +167,19 @@ def test_downwards_rest_is_kept_to_the_hopf_point(hysteresis: Columns) -> None:
         # The slope of the friction at 0.4 m/s.
         (free(), Axis("plant.damping", 0.3, 0.0, 16), 0.162),
         # By Routh and Hurwitz.
-        (paper(), Axis("washout_controller.linear_gain", -1.6, 0.0, 17), -0.9352960893854753),
+        pytest.param(
+            paper(),
+            Axis("washout_controller.linear_gain", -1.6, 0.0, 17),
+            -0.9352960893854753,
+            marks=pytest.mark.long,
+        ),
     ],
-    ids=["damping", "gain"],
 )
 def test_rest_is_not_carried_on_to_where_it_is_unstable(
     scenario: Scenario, axis: Axis, critical: float
 ) -> None:
     # Neither parameter moves the equilibrium: nothing but a push takes the slide off it.
-    study = sweep_study(scenario, [axis], carry=Carry.BOTH, continuous=True)
+    study = sweep_study(scenario, [axis], continuation=Continuation.BOTH, continuous=True)
     found = compute_columns(study)
     step = abs(axis.last - axis.first) / (axis.count - 1)
     stable = (found.values[axis.parameter] - critical) * (axis.first - critical) > 0.0
@@ -245,27 +239,22 @@ def test_a_study_without_a_point_that_can_be_is_refused() -> None:
     Study(free(), Grid((MINIMUM,)), SHORT).check()
 
 
-@pytest.mark.parametrize("minimum", [(0.3, 0.5), (0.5, 0.3)])
-@pytest.mark.parametrize("static", [(0.2, 0.4), (0.4, 0.2)])
-@pytest.mark.parametrize("carry", [None, Carry.BOTH])
-def test_a_study_of_which_only_one_corner_can_be_is_not_refused(
-    minimum: tuple[float, float], static: tuple[float, float], carry: Carry | None
-) -> None:
-    axes = Axis("plant.friction.static", *static, 3), Axis(MINIMUM.parameter, *minimum, 3)
-    study = Study(free(), Grid(axes, carry), SHORT)
-    study.check()
-    assert any(point.reason is None for point in points(study))
+@pytest.mark.parametrize("carry", [None, Continuation.BOTH])
+def test_a_study_of_which_only_one_corner_can_be_is_not_refused(carry: Continuation | None) -> None:
+    for static in ((0.2, 0.4), (0.4, 0.2)):
+        for minimum in ((0.3, 0.5), (0.5, 0.3)):
+            axes = Axis("plant.friction.static", *static, 3), Axis(MINIMUM.parameter, *minimum, 3)
+            study = Study(free(), Grid(axes, carry), SHORT)
+            study.check()
+            corners = compute(study, [*study.plan.corners()], None).points
+            assert sum(point.reason is None for point in corners) == 1
 
 
-def test_what_continuous_control_does_not_have_is_refused_before_anything_is_computed() -> None:
+def test_what_continuous_control_does_not_have_is_refused_or_a_row_with_the_reason() -> None:
     delayed = paper("plant.force_delay=0.1")
     with pytest.raises(InvalidInputError, match=r"force_delay = 0\.1 is refused: .* must be 0"):
         sweep_study(delayed, [Axis("plant.belt_speed", 0.1, 0.2, 2)], continuous=True)
-
-
-def test_a_point_under_continuous_control_with_a_delay_is_a_row() -> None:
     delay = Axis("plant.force_delay", 0.0, 0.1, 2)
-    study = sweep_study(paper(), [delay], course=SHORT, continuous=True)
-    without, delayed = points(study)
-    assert without.reason is None
-    assert "plant.force_delay = 0.1 is refused" in (delayed.reason or "")
+    one, other = points(sweep_study(paper(), [delay], course=SHORT, continuous=True))
+    assert one.reason is None
+    assert "plant.force_delay = 0.1 is refused" in (other.reason or "")

@@ -1,17 +1,19 @@
 """The kinds of sweeps."""
 
-from collections.abc import Sequence
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.model.friction import Linear
 from stickslip_ros.physics.theory.critical_gains import critical_gains
 from stickslip_ros.studies.columns import compute_columns
-from stickslip_ros.studies.plan import Axis, Carry, Grid
-from stickslip_ros.studies.settling import SettlingCourse
-from stickslip_ros.studies.sweep import sweep_study
-from tests.physics.drives import LIMIT_CYCLES
+from stickslip_ros.studies.plan import Axis, Continuation, Grid
+from stickslip_ros.studies.settling import SettlingOptions
+from stickslip_ros.studies.sweep import bifurcation_diagram, sweep_study
+from tests.physics.drives import FEED_DRIVE, LIMIT_CYCLES, PAPER
 from tests.studies.studies import free, paper
 
 SPEED = Axis("plant.belt_speed", 0.2, 0.4, 3)
@@ -21,7 +23,7 @@ GAIN = Axis("washout_controller.linear_gain", -2.0, 0.0, 6)
 
 
 def test_a_map_has_the_reference_cycles_where_its_axes_have_their_drives() -> None:
-    found = compute_columns(sweep_study(free(), [DAMPING, SPEED], course=SettlingCourse(300.0, 6)))
+    found = compute_columns(sweep_study(free(), [DAMPING, SPEED], course=SettlingOptions(300.0, 6)))
     rows = slice(3, 6)
     assert found.values["plant.damping"][rows] == pytest.approx(0.02)
     for name in ("amplitude", "stick_fraction", "period", "midpoint"):
@@ -46,29 +48,72 @@ def test_over_the_gain_the_vibration_ends_where_theory_has_it() -> None:
 
 
 def test_it_carries_along_the_last_axis() -> None:
-    plan = sweep_study(free(), [DAMPING, SPEED], carry=Carry.UP).plan
-    assert plan == Grid((DAMPING, SPEED), Carry.UP)
+    plan = sweep_study(free(), [DAMPING, SPEED], continuation=Continuation.UP).plan
+    assert plan == Grid((DAMPING, SPEED), Continuation.UP)
     for chain in plan.chains():
         assert len({plan.values(index)[0] for index in chain}) == 1
 
 
-@pytest.mark.parametrize("axes", [[], [SPEED, DAMPING, STATIC]])
-def test_no_axes_or_three_are_refused(axes: Sequence[Axis]) -> None:
-    with pytest.raises(InvalidInputError, match=f"^{len(axes)} parameters: a sweep is over one or"):
-        sweep_study(free(), axes)
-
-
-def test_one_parameter_twice_is_refused() -> None:
-    with pytest.raises(InvalidInputError, match="must be different parameters"):
-        sweep_study(free(), [SPEED, SPEED])
-
-
-def test_a_controllers_parameter_is_refused_without_control() -> None:
-    with pytest.raises(InvalidInputError, match="without control there is no controller"):
-        sweep_study(free(), [SPEED, GAIN])
-
-
-def test_the_message_of_a_refused_sweep_names_parameter_and_value() -> None:
+def test_what_is_no_sweep_is_refused() -> None:
     minimum = Axis("plant.friction.minimum", 0.5, 0.6, 2)
-    with pytest.raises(InvalidInputError, match=r"friction\.minimum = 0\.5 must not exceed"):
-        sweep_study(free(), [minimum])
+    for axes, message in (
+        ([], "^0 parameters: a sweep is over one or"),
+        ([SPEED, DAMPING, STATIC], "^3 parameters: a sweep is over one or"),
+        ([SPEED, SPEED], "must be different parameters"),
+        ([SPEED, GAIN], "without control there is no controller"),
+        ([minimum], r"friction\.minimum = 0\.5 must not exceed"),
+    ):
+        with pytest.raises(InvalidInputError, match=message):
+            sweep_study(free(), axes)
+
+
+def test_values_that_change_nothing_are_refused() -> None:
+    for scenario, text, reason in (
+        (free(), "plant.friction.viscous=0:5:2", "by the law stribeck; laws that use it: coulomb"),
+        (paper(), "plant.belt.amplitude=0:1:2", "by the kind none; kinds that use it: step"),
+        (paper(), "plant.duration=1:5:2", "in this study"),
+        (paper(), "plant.reply_timeout=1:5:2", "in this study"),
+        (free(), "plant.rate=50:100:2", "in this study"),
+        (free(), "plant.sensor.position_resolution=0:1e-06:2", "in this study"),
+        (free(), "plant.force_delay=0:0.01:2", "in this study"),
+        (free(), "plant.actuator.time_constant=0:0.01:2", "in this study"),
+    ):
+        name = text.partition("=")[0]
+        with pytest.raises(InvalidInputError, match=f"^{text}: {name} is not used {reason}"):
+            sweep_study(scenario, [Axis.parse(text)])
+
+
+def test_values_that_change_something_at_some_point_are_taken() -> None:
+    seeds = Axis("plant.force_jitter_seed", 0, 4, 2)
+    assert sweep_study(paper(), [seeds, Axis("plant.force_jitter", 0.0, 1e-3, 2)]).plan.size == 4
+    assert sweep_study(paper(), [Axis("plant.rate", 50.0, 100.0, 2)]).plan.size == 2
+
+
+def test_a_bifurcation_diagram_has_the_turning_points_of_each_drive() -> None:
+    """Of a motion that diverges there are none, and other rows do not depend on it."""
+    runs_away = replace(PAPER, belt_speed=0.2, friction=Linear(0.4, 0.9))
+    resting_belt = replace(PAPER, belt_speed=0.0)
+    at_rest = replace(PAPER, belt_speed=0.6)
+    cycle = next(cycle for cycle in LIMIT_CYCLES if cycle.belt_speed == 0.4)
+    shares: list[float] = []
+    drives = [PAPER, runs_away, PAPER, resting_belt, at_rest, FEED_DRIVE]
+    found = bifurcation_diagram(drives, shares.append)
+    first, away, again, held, rest, feed = (found.position[found.row == n] for n in range(6))
+    assert len(first) >= 10
+    assert np.abs(first - cycle.midpoint) == pytest.approx(cycle.amplitude, abs=1e-8)
+    assert np.diff(np.sign(np.diff(first))).all()
+    assert again.tolist() == first.tolist()
+    assert len(away) == 0
+    assert set(held.tolist()) == {0.0}
+    assert rest == pytest.approx([0.4 - 0.45 * 0.6 + 0.6 * 0.6**3])
+    assert feed.max() == pytest.approx(1e-3 * first.max())  # in metres
+    assert [measures.regime for measures in found.measures[:5]] == [
+        Regime.PURE_SLIP if cycle.stick_fraction == 0.0 else Regime.STICK_SLIP,
+        Regime.UNBOUNDED,
+        found.measures[0].regime,
+        Regime.STUCK,
+        Regime.EQUILIBRIUM,
+    ]
+    assert shares == [number / 6 for number in range(1, 7)]
+    nothing = bifurcation_diagram([])
+    assert (nothing.measures, len(nothing.row), len(nothing.position)) == ((), 0, 0)

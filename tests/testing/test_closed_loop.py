@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from select import select
@@ -24,7 +25,7 @@ from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.scenarios.files import load_scenario
-from stickslip_ros.testing import ClosedLoop
+from stickslip_ros.testing import ClosedLoop, RunResult
 from tests.nodes.graph import PATIENCE
 from tests.testing import controllers
 from tests.testing.controllers import GAIN, VelocityFeedback, WithoutArguments
@@ -34,6 +35,11 @@ SECOND = 1_000_000_000
 
 def process(controller: type[Node]) -> list[str]:
     return [sys.executable, str(controllers.__file__), controller.__name__]
+
+
+def assert_every_sample_is_answered(result: RunResult) -> None:
+    assert result.late_forces == 0
+    assert result.forces.stamp.tolist() == result.states.stamp.tolist()
 
 
 def test_a_controller_of_ones_own_acts_as_it_does_without_ros() -> None:
@@ -50,30 +56,26 @@ def test_a_controller_of_ones_own_acts_as_it_does_without_ros() -> None:
     assert loop.controller is None
     assert result.states.stamp.tolist() == [sample.stamp for sample in samples]
     assert result.states.position.tolist() == [sample.position for sample in samples]
-    assert result.forces.stamp.tolist() == result.states.stamp.tolist()
+    assert_every_sample_is_answered(result)
     assert result.forces.force.tolist() == [-GAIN * sample.velocity for sample in samples]
     assert result.time[[0, -1]].tolist() == [0.0, 3.0]
-    assert result.late_forces == result.lost_samples == 0
+    assert result.lost_samples == 0
 
 
 @pytest.mark.parametrize(
     "controller",
     [
-        VelocityFeedback,
         lambda: VelocityFeedback(),
         controllers.Informed,
         controllers.Managed,
         WashoutControllerNode,
         "scenario",
-        "washout",
         "velocity_feedback",
     ],
 )
 def test_every_kind_of_controller_answers_every_sample(controller: Any) -> None:
     with ClosedLoop("paper", controller=controller) as loop:
-        result = loop.run(0.5)
-    assert result.late_forces == 0
-    assert result.forces.stamp.tolist() == result.states.stamp.tolist()
+        assert_every_sample_is_answered(loop.run(0.5))
 
 
 @pytest.mark.long
@@ -89,10 +91,8 @@ def test_every_kind_of_controller_answers_every_sample(controller: Any) -> None:
 )
 def test_a_controller_in_a_process_of_its_own_answers_every_sample(command: list[str]) -> None:
     with ClosedLoop("paper", controller=command) as loop:
-        results = [loop.run(0.5), loop.run(0.5)]
-    for result in results:
-        assert result.late_forces == 0
-        assert result.forces.stamp.tolist() == result.states.stamp.tolist()
+        for _ in range(2):
+            assert_every_sample_is_answered(loop.run(0.5))
 
 
 @pytest.mark.long
@@ -125,11 +125,9 @@ def test_the_test_may_start_a_controller_by_itself() -> None:
         command = [*process(WithoutArguments), *loop.ros_arguments]
         with subprocess.Popen(command, env=loop.environment) as controller:
             try:
-                result = loop.run(0.5)
+                assert_every_sample_is_answered(loop.run(0.5))
             finally:
                 controller.kill()
-    assert result.late_forces == 0
-    assert result.forces.stamp.tolist() == result.states.stamp.tolist()
 
 
 def test_the_motion_goes_on_in_a_further_run(tmp_path: Path) -> None:
@@ -187,16 +185,7 @@ def test_a_scenario_that_expects_no_control_has_no_controller() -> None:
         ClosedLoop("paper", "plant.expects_control=true", controller=None)
 
 
-def test_a_bag_elsewhere_is_refused() -> None:
-    with pytest.raises(InvalidInputError, match=r"analyzer\.bag=elsewhere is refused.*`bag`"):
-        ClosedLoop("paper", "analyzer.bag=elsewhere")
-    with ClosedLoop("paper") as loop:
-        with pytest.raises(InvalidInputError, match=r"analyzer\.bag=elsewhere is refused"):
-            loop.set("analyzer.bag=elsewhere")
-        loop.run(0.1)
-
-
-@pytest.mark.parametrize("written", [0, 100, 401])
+@pytest.mark.parametrize("written", [0, 401])
 def test_a_run_that_cannot_be_recorded_fails(monkeypatch: pytest.MonkeyPatch, written: int) -> None:
     write, left = Recorder.write, iter(range(written))
 
@@ -213,19 +202,24 @@ def test_a_run_that_cannot_be_recorded_fails(monkeypatch: pytest.MonkeyPatch, wr
         loop.run(2.0)
 
 
-def test_a_change_that_an_active_node_refuses_changes_nothing() -> None:
+def test_a_bad_change_changes_nothing() -> None:
+    with pytest.raises(InvalidInputError, match=r"analyzer\.bag=elsewhere is refused.*`bag`"):
+        ClosedLoop("paper", "analyzer.bag=elsewhere")
+    refused = {
+        "plant.mass=-1.0": "mass",
+        "plant.mas=1.0": "mas",
+        "mass": "mass",
+        "washout_controller.d=1.0": "d",
+        "analyzer.bag=elsewhere": r"analyzer\.bag=elsewhere is refused",
+    }
     with ClosedLoop("paper") as loop:
         loop.run(0.1)
-        with pytest.raises(InvalidInputError, match="wait_for cannot be changed while"):
-            loop.set("plant.belt_speed=0.2", "washout_controller.wait_for=[plant]")
-        assert set(loop.run(0.1).states.belt_velocity) == {0.4}
-
-
-def test_a_bad_change_changes_nothing() -> None:
-    with ClosedLoop("paper", controller=WithoutArguments) as loop:
-        for change in ("plant.mass=-1.0", "plant.mas=1.0", "mass", "washout_controller.d=1.0"):
-            with pytest.raises(InvalidInputError, match=change.partition("=")[0].split(".")[-1]):
+        active = {"washout_controller.wait_for=[plant]": "wait_for cannot be changed while"}
+        for change, sentence in {**refused, **active}.items():
+            with pytest.raises(InvalidInputError, match=sentence):
                 loop.set("plant.belt_speed=0.2", change)
+        assert set(loop.run(0.1).states.belt_velocity) == {0.4}
+    with ClosedLoop("paper", controller=WithoutArguments) as loop:
         with pytest.raises(InvalidInputError, match="washout_controller is not part of this loop"):
             loop.set("plant.belt_speed=0.2", "washout_controller.linear_gain=-2.0")
         assert set(loop.run(0.1).states.belt_velocity) == {0.4}
@@ -269,10 +263,9 @@ def test_without_an_answer_the_run_goes_on() -> None:
 
 def test_a_run_that_takes_too_long_is_ended() -> None:
     with ClosedLoop("paper", controller=controllers.Silent) as loop:
-        with pytest.raises(RunError, match=r"took more than 0.1 s: 1 samples so far"):
-            loop.run(1.0, timeout=0.1)
-        with pytest.raises(RunError, match=r"took more than 0.2 s"):
-            loop.run(1.0, timeout=0.2)
+        for timeout in (0.1, 0.2):
+            with pytest.raises(RunError, match=f"took more than {timeout} s: 1 samples so far"):
+                loop.run(1.0, timeout=timeout)
 
 
 class _Elsewhere(Node):
@@ -315,9 +308,8 @@ def test_a_controller_that_is_not_found_is_explained(
         assert sentence in str(told.value)
 
 
-@pytest.mark.parametrize(
-    ("options", "sentence"),
-    [
+def test_invalid_input_is_refused() -> None:
+    refusals: list[tuple[dict[str, Any], str]] = [
         ({"controller": "python my.py"}, "controller = 'python my.py' is refused: must be a class"),
         ({"controller": []}, r"controller = \[\] is refused"),
         ({"controller": ["no_such_command"]}, "no command 'no_such_command'"),
@@ -325,11 +317,10 @@ def test_a_controller_that_is_not_found_is_explained(
         ({"controller": controllers.Refusing}, "refusing could not be configured: failure"),
         ({"namespace": "a b"}, "namespace = 'a b' is refused"),
         ({"namespace": "/" + 230 * "n"}, "must have at most 200 characters"),
-    ],
-)
-def test_invalid_input_is_refused(options: dict[str, Any], sentence: str) -> None:
-    with pytest.raises((InvalidInputError, RunError), match=sentence):
-        ClosedLoop("paper", **options).__enter__()
+    ]
+    for options, sentence in refusals:
+        with pytest.raises((InvalidInputError, RunError), match=sentence):
+            ClosedLoop("paper", **options).__enter__()
 
 
 def test_a_loop_has_to_be_open_and_to_run_for_some_time(tmp_path: Path) -> None:
@@ -376,9 +367,8 @@ def test_two_loops_do_not_meet() -> None:
         ClosedLoop("paper", controller=WithoutArguments) as first,
         ClosedLoop("paper", controller=VelocityFeedback) as second,
     ):
-        results = [loop.run(0.2) for loop in (first, second, first, second)]
-    for result in results:
-        assert result.forces.stamp.tolist() == result.states.stamp.tolist()
+        for loop in (first, second, first, second):
+            assert_every_sample_is_answered(loop.run(0.2))
 
 
 def _in_use() -> dict[str, Any]:
@@ -393,8 +383,18 @@ def _in_use() -> dict[str, Any]:
     }
 
 
+@pytest.fixture
+def no_collection() -> Iterator[None]:
+    """What is left to the garbage collector is left for as long as it likes."""
+    gc.collect()
+    gc.disable()
+    yield
+    gc.enable()
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-@pytest.mark.parametrize("controller", [WithoutArguments, "washout"])
+@pytest.mark.usefixtures("no_collection")
+@pytest.mark.parametrize("controller", [controllers.Managed, "washout"])
 def test_nothing_is_left_behind(
     controller: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -414,6 +414,7 @@ def test_nothing_is_left_behind(
 
 
 @pytest.mark.process
+@pytest.mark.usefixtures("no_collection")
 @pytest.mark.parametrize("timeout", [300.0, 0.01])
 def test_a_fork_has_nothing_of_a_closed_loop_to_finalise(timeout: float) -> None:
     """Whether its run came to its end or failed: what raised held the nodes for longer."""
@@ -441,3 +442,15 @@ def test_no_process_is_left_behind(tmp_path: Path) -> None:
         ended, _, _ = select([written], [], [], 60.0)
         assert ended
         assert written.read() == ""
+
+
+def test_what_an_earlier_call_named_may_fall_idle() -> None:
+    with ClosedLoop("paper", controller=None) as loop:
+        loop.disturb(0.1)
+        loop.set("plant.disturbance.kind=none")
+        assert loop.scenario.plant.disturbance.amplitude == 0.1
+        with pytest.raises(InvalidInputError, match="amplitude is not used by the kind none"):
+            loop.set("plant.disturbance.amplitude=0.2")
+    with pytest.raises(InvalidInputError, match="real_time_factor is not used by the pace lock"):
+        ClosedLoop("paper", "plant.real_time_factor=2")
+    assert ClosedLoop("paper", "plant.pace=realtime").scenario.plant.pace == "realtime"

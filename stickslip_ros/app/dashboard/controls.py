@@ -1,7 +1,8 @@
 """Controls of the page: what sets a parameter, and what waits for the answer."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from math import ceil, floor, log2, log10
@@ -10,11 +11,15 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
+from stickslip_ros.app.dashboard.elements import call, named
 from stickslip_ros.app.dashboard.listener import Answer, ListenerNode
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
 from stickslip_ros.plots.units import Units, plain_name
-from stickslip_ros.scenarios.parameter_field import Fixed, Parameter, known_parameters
+from stickslip_ros.quantities import number_of
+from stickslip_ros.scenarios.keywords import described
+from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, Parameter, known_parameters
 from stickslip_ros.scenarios.parameters import (
     CONTROLLER_PARAMETERS,
     NODE_PARAMETERS,
@@ -45,12 +50,6 @@ def other_parameters(law: str) -> list[str]:
     return [name for name in names if name not in main_parameters(law)]
 
 
-def described(full_name: str) -> Parameter:
-    """Return the description of NODE.PARAMETER."""
-    node, _, name = full_name.partition(".")
-    return known_parameters(NODE_PARAMETERS[node])[name]
-
-
 def name_of(full_name: str) -> str:
     """Return the name of NODE.PARAMETER for a reader."""
     named = plain_name(full_name)
@@ -62,7 +61,7 @@ def slider_range(value: float, parameter: Parameter) -> tuple[float, float, floa
 
     The range is a round one that a smaller change of the value does not change.
     """
-    scale = value or parameter.default or 1.0
+    scale = value if abs(value) >= SMALLEST else parameter.default or 1.0
     size = 2.0 ** (ceil(log2(abs(scale))) + 1)
     low, high = (0.0, size) if scale > 0.0 else (-size, 0.25 * size)
     if parameter.least is not None:
@@ -84,20 +83,20 @@ class SliderField:
         self._listener, self.full_name = listener, full_name
         self._parameter = described(full_name)
         self._earlier: list[float] = []
-        self._shown: float | None = None
+        self._shown = ""
         self._held = False
         name = name_of(full_name)
         with ui.element("div").classes("w-full"):
             with ui.row().classes("w-full items-center no-wrap gap-1"):
                 self._label = ui.label(name).classes("grow text-sm")
-                self._number = ui.number(format="%.6g").classes("w-28")
-                self._number.props(f'dense outlined aria-label="{name}, value"')
+                self._number = ui.input().classes("w-28")
+                named(self._number.props("dense outlined"), f"{name}, value")
                 self._number.on("keydown.enter", self._enter)
                 self._number.on("blur", self._enter)
                 self._undo = ui.button(icon="undo", on_click=self._go_back)
-                self._undo.props(f'flat dense round size=sm aria-label="undo {name}"')
+                named(self._undo.props("flat dense round size=sm"), f"undo {name}")
             self._slider = ui.element("input").classes("w-full slider")
-            self._slider.props(f'type=range aria-label="{name}"')
+            named(self._slider.props("type=range"), name)
             self._slider.on("input", self._hold)
             self._slider.on("change", self._slide, js_handler="(e) => emit(e.target.value)")
             self._refusal = refusal_label()
@@ -111,15 +110,15 @@ class SliderField:
         known = isinstance(value, float)
         self._number.set_enabled(known)
         self._undo.set_enabled(known and bool(self._earlier))
-        if known and not self._held and value != self._shown:
+        if known and not self._held and f"{value:.6g}" != self._shown:
             self._show(value)
 
     def _show(self, value: float) -> None:
-        self._shown = value
+        self._shown = f"{value:.6g}"
         low, high, step = slider_range(value, self._parameter)
         # The value last: a range input keeps it within the limits that it has.
-        self._slider.props(f"min={low!r} max={high!r} step={step!r} value={value!r}")
-        self._number.set_value(value)
+        self._slider.props.update(min=low, max=high, step=step, value=value)
+        self._number.set_value(self._shown)
 
     def _hold(self) -> None:
         self._held = True
@@ -129,10 +128,11 @@ class SliderField:
         await self._set(float(f"{float(event.args):.9g}"))
 
     async def _enter(self) -> None:
-        if self._number.value is None:
-            self._refusal.set_text("a number is needed")
-        elif self._number.value != self._shown:
-            await self._set(float(self._number.value))
+        if self._number.value != self._shown:
+            with refusals_in(self._refusal):
+                value = number_of(self.full_name, self._number.value, self._parameter.unit)
+                self._number.set_value(f"{value:.6g}")
+                await self._set(value)
 
     async def _go_back(self) -> None:
         if self._earlier:
@@ -184,17 +184,14 @@ class OtherParameter:
         return f"{number} {units.of_unit(described(full_name).unit or '')}".rstrip()
 
     async def _apply(self) -> None:
-        chosen, text = self._choice.value, self._field.value or ""
+        chosen = self._choice.value
         if chosen is None:
             self._refusal.set_text("choose a parameter first")
             return
-        try:
-            value = float(text)
-        except ValueError:
-            self._refusal.set_text(f"{text!r} is not a number")
-            return
         node, _, name = chosen.partition(".")
-        await report(self._listener.set_parameter(node, name, value), self._refusal)
+        with refusals_in(self._refusal):
+            value = number_of(chosen, self._field.value, described(chosen).unit)
+            await report(self._listener.set_parameter(node, name, value), self._refusal)
 
 
 @dataclass(frozen=True)
@@ -273,7 +270,7 @@ class Settings:
         self._stored[name] = self._now()
         self._use[name].set_enabled(True)
         self._table.set_visibility(True)
-        ui.run_javascript(f"stickslip.keep({name!r})")
+        call("keep", name)
         self.refresh()
 
     async def _apply(self, name: str) -> None:
@@ -289,13 +286,22 @@ class Settings:
         self._refusal.set_text("; ".join(filter(None, refusals)))
 
     def _overlay(self, event: Any) -> None:
-        ui.run_javascript(f"stickslip.overlay = {'true' if event.value else 'false'}")
+        call("showKept", bool(event.value))
 
 
 def refusal_label() -> ui.label:
     """Return a label for the reason of a refusal, hidden while it is empty."""
     label = ui.label().classes("text-sm refusal").props("role=alert")
     return label.bind_visibility_from(label, "text")
+
+
+@contextmanager
+def refusals_in(label: ui.label) -> Generator[None]:
+    """Show why an input is refused."""
+    try:
+        yield
+    except InvalidInputError as error:
+        label.set_text(str(error))
 
 
 async def report(answer: Answer, refusal: ui.label) -> None:

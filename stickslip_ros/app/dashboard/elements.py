@@ -1,5 +1,9 @@
-"""Elements that the parts of the page share."""
+"""Elements that the parts of the page share.
 
+Text of others is data: it is never parsed as `props`, HTML or a script, which are literals.
+"""
+
+import json
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -11,28 +15,37 @@ from nicegui import ui
 def card(title: str) -> Generator[None]:
     """Add a part of the page with a heading; further elements go into it."""
     with ui.element("section").classes("panel"):
-        heading(2, title, "font-bold")
+        heading(2, title)
         yield
 
 
-def heading(level: int, text: str, classes: str) -> None:
-    """Add a heading, as readers of screens know it."""
-    with ui.element(f"h{level}").classes(classes):
+def heading(level: int, text: str) -> ui.element:
+    """Add a heading, as readers of screens know it, and return it."""
+    with ui.element(f"h{level}").classes("font-bold") as added:
         ui.label(text)
+    return added
 
 
-def chart(options: dict[str, Any], text: str, classes: str = "") -> ui.echart:
+def named(element: Any, name: str) -> Any:
+    """Give an element a name for readers of screens, and return it."""
+    element.props["aria-label"] = name
+    return element
+
+
+def chart(options: dict[str, Any], name: str) -> ui.echart:
     """Add a chart with a name for readers of screens, and return it."""
-    drawn = ui.echart(options).classes(f"relative w-full chart {classes}")
-    return drawn.props(f'role=img aria-label="{text}"')
+    return named(ui.echart(options).classes("relative w-full chart").props("role=img"), name)
 
 
 def show_commands(commands: Sequence[str]) -> None:
     """Add commands for a terminal."""
-    shown = ui.code("\n".join(commands), language="bash").classes("w-full")
-    shown.copy_button.props('aria-label="copy"')
+    with ui.row().classes("w-full no-wrap items-start commands"):
+        ui.label("\n".join(commands)).classes("grow")
+        copy = ui.button(icon="content_copy").props("flat round size=sm")
+        copy.on("click", js_handler="(event) => stickslip.copy(event)")
+        named(copy, "copy")
 
 
-def call(script: str) -> None:
-    """Run a function of page.js on the page."""
-    ui.run_javascript(f"stickslip.{script}")
+def call(function: str, *arguments: Any) -> None:
+    """Run a function of page.js on the page; its arguments are data."""
+    ui.run_javascript(f"stickslip.{function}({', '.join(map(json.dumps, arguments))})")

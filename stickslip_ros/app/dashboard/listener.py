@@ -3,8 +3,9 @@
 import re
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from math import isfinite
@@ -16,7 +17,6 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter, parameter_value_to_python
@@ -25,6 +25,7 @@ from rclpy.timer import Timer
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
+from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.messages.codec import joint_state_columns, pack_wrench, wrench_columns
 from stickslip_ros.messages.topics import (
     AMPLITUDE,
@@ -38,9 +39,9 @@ from stickslip_ros.messages.topics import (
     Topic,
 )
 from stickslip_ros.nodes.base.managed import STATE
-from stickslip_ros.nodes.base.polling import PollingNode, waiting_messages
-from stickslip_ros.nodes.base.ros_topics import qos_profile
+from stickslip_ros.nodes.base.ros_topics import PollingNode, qos_profile, waiting_messages
 from stickslip_ros.nodes.base.service_call import ANSWER_TIME, ServiceCall, parameters_call
+from stickslip_ros.nodes.base.steady_clock import steady_clock
 from stickslip_ros.running.controller_search import DASHBOARD
 from stickslip_ros.samples import ForceColumns, SampleColumns
 from stickslip_ros.scenarios.parameter_field import known_parameters
@@ -51,6 +52,7 @@ from stickslip_ros.scenarios.parameters import (
     controller_node,
 )
 from stickslip_ros.stamps import NANOSECONDS
+from stickslip_ros.text import number_in
 
 SILENCE = 2.5
 """Time, s, without diagnostics (sent once per second) after which a node counts as silent."""
@@ -112,18 +114,23 @@ class ListenerNode(PollingNode):
         self,
         namespace: str,
         show: Callable[[SampleColumns, ForceColumns, ForceColumns], None],
+        readable: Collection[str] = (),
         *,
         context: Context | None = None,
     ) -> None:
-        """Listen in a namespace; pass states, forces and dropped forces to `show`, in blocks."""
+        """Listen in a namespace; pass states, forces and dropped forces to `show`, in blocks.
+
+        Of the paths that other nodes name, only those that are `readable` are read.
+        """
         super().__init__(DASHBOARD, namespace=namespace, context=context)
         self._show = show
+        self.readable = readable
         self.health: Mapping[str, Health] = {node: Health() for node in ("analyzer", "plant")}
         """Health by the node's name relative to the namespace; controllers once heard."""
         self.law = DEFAULT_LAW
         """Control law of the controller that was heard, the default law until one is heard."""
         self.parameters: Mapping[str, Mapping[str, Any]] = {node: {} for node in NODE_PARAMETERS}
-        """Current parameters by node and flat name, as far as they are known."""
+        """Current parameters by node and flat name, as far as they are known and allowed."""
         self.cycles: dict[Topic[Any], deque[float]] = {}
         """The measures of the last cycles by topic."""
         self.cycle_count = 0
@@ -132,8 +139,8 @@ class ListenerNode(PollingNode):
         """What happened, the newest last."""
         self.moved_at = 0.0
         """Time of the newest samples on the monotonic clock, s."""
-        self._answering_since: int | None = None
-        self._steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
+        self._answering_since: float | None = None
+        self._every = partial(self.create_timer, clock=steady_clock(self))
         self._calls: list[tuple[ServiceCall, float, Callable[[], None]]] = []
         self._asked_parameters: dict[str, ServiceCall] = {}
         self._parameter_writers = 0
@@ -193,13 +200,15 @@ class ListenerNode(PollingNode):
         waiting = self.moved_at and self.health["plant"].state == "active" and still > _STILL
         if not waiting or plant.get("pace") != "lockstep" or not plant.get("expects_control"):
             return 0.0
-        return max(plant.get("reply_timeout", 0.0) - still, 0.0)
+        return max((plant.get("reply_timeout") or 0.0) - still, 0.0)
 
     def set_parameter(self, node: str, name: str, value: Any) -> Answer:
         """Set a parameter of a node while it runs."""
 
         def outcome(response: Any) -> str:
             if response.result.successful:
+                if response.result.reason:  # it has no effect yet
+                    self._tell(response.result.reason)
                 return ""
             self._tell(f"{node} refused: {response.result.reason}")
             return response.result.reason
@@ -277,9 +286,6 @@ class ListenerNode(PollingNode):
         qos = qos_profile(topic)
         qos.reliability = ReliabilityPolicy.BEST_EFFORT
         return self.create_polled_subscription(topic, qos)
-
-    def _every(self, period: float, callback: Callable[[], None]) -> Timer:
-        return self.create_timer(period, callback, clock=self._steady_clock)
 
     def _call_soon(self, callback: Callable[[], None]) -> None:
         def call() -> None:
@@ -374,10 +380,10 @@ class ListenerNode(PollingNode):
             self._tell(f"{node} restarted")
         self._update(node, Health(state, status.level[0], message, figures, time.monotonic()))
         if node == self.controller:
-            rate, answered = self.parameters["plant"].get("rate"), figures.get("answered", "")
-            known = bool(rate) and answered.isdecimal()
-            period = NANOSECONDS / rate if rate else 0.0
-            self._answering_since = self._newest - round(int(answered) * period) if known else None
+            rate, answered = self.parameters["plant"].get("rate"), figures.get("answered")
+            self._answering_since = None
+            if rate and answered:
+                self._answering_since = self._newest - number_in(answered) / rate * NANOSECONDS
         if node in NODE_PARAMETERS and (restarted or state != before.state):
             self._ask_parameters(node)  # it may be another node of the same name
 
@@ -403,17 +409,30 @@ class ListenerNode(PollingNode):
         self._asked_parameters[node] = parameters_call(self, node, names, partial(self._know, node))
 
     def _know(self, node: str, values: Mapping[str, Any]) -> None:
-        self.parameters = {**self.parameters, node: {**self.parameters[node], **values}}
+        known = {**self.parameters[node], **self._allowed(node, values)}
+        self.parameters = {**self.parameters, node: known}
+
+    def _allowed(self, node: str, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the values of known parameters; None for what a node of ours never has."""
+        model = NODE_PARAMETERS[node]
+        known = known_parameters(model)
+        allowed: dict[str, Any] = dict.fromkeys(name for name in values if name in known)
+        for name in allowed:
+            if not known[name].file or values[name] in ("", *self.readable):
+                with suppress(InvalidInputError):
+                    model.check_bounds(name, values[name])
+                    allowed[name] = values[name]
+        return allowed
 
     def _on_parameter_event(self, event: ParameterEvent) -> None:
         here = f"{self.get_namespace().rstrip('/')}/"
         node = event.node.removeprefix(here)
         if event.node.startswith(here) and node in self.parameters:
-            known = known_parameters(NODE_PARAMETERS[node])
             changed = (*event.new_parameters, *event.changed_parameters)
-            values = {p.name: parameter_value_to_python(p.value) for p in changed}
-            values = {name: value for name, value in values.items() if name in known}
-            for name, value in values.items():
+            values: dict[str, Any] = {}
+            with suppress(RuntimeError):  # a type that ROS does not know
+                values = {p.name: parameter_value_to_python(p.value) for p in changed}
+            for name, value in self._allowed(node, values).items():
                 before = self.parameters[node].get(name)
                 # Nodes that end take their parameters back. A NaN differs from itself.
                 if None not in (before, value) and repr(before) != repr(value):
@@ -446,8 +465,6 @@ def _wording(message: str) -> str:
 def _has_restarted(before: Mapping[str, str], figures: Mapping[str, str]) -> bool:
     """Return whether a counter of a node has started again from 0."""
     return any(
-        figures.get(count, "").isdecimal()
-        and before.get(count, "").isdecimal()
-        and int(figures[count]) < int(before[count])
+        count in figures and number_in(figures[count]) < number_in(before.get(count, ""))
         for count in ("samples", "answered")
     )

@@ -11,7 +11,8 @@ const FRAMES_OF_PORTRAIT = 3;
 const CYCLES_INTERVAL = 500;
 const MARGIN = 1.08;
 const MARK_WIDTH = 70; // pixels between the texts of two marks
-const page = window.stickslip;
+const page = {};
+window.stickslip = page;
 const limits = {};
 const shown = {};
 const kept = {};
@@ -411,10 +412,18 @@ page.end = async () => {
   page.rows = await blobOf(shownRows());
   return true;
 };
-page.restart = () => page.fit();
+page.copy = ({ currentTarget }) => navigator.clipboard.writeText(currentTarget.previousElementSibling.textContent);
+page.scaleFriction = (scale) => {
+  page.frictionScale = scale;
+};
+page.showKept = (overlay) => {
+  page.overlay = overlay;
+};
 page.frames = 0;
-page.start = () => {
+const start = () => {
+  Object.assign(page, JSON.parse(document.querySelector("[data-start]").dataset.start));
   dark.addEventListener("change", redraw);
   redraw();
   follow();
 };
+document.addEventListener("DOMContentLoaded", start); // then NiceGUI has added its elements

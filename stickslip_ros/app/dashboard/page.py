@@ -7,11 +7,11 @@ import time
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import FastAPI, Response, WebSocket, WebSocketDisconnect
+from fastapi import FastAPI, Query, Response, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse
-from nicegui import background_tasks, ui
+from nicegui import background_tasks, core, ui
 from nicegui.events import GenericEventArguments
 
 from stickslip_ros.app.dashboard.charts import CYCLES, PORTRAIT, TRACE
@@ -22,21 +22,24 @@ from stickslip_ros.app.dashboard.controls import (
     main_parameters,
     other_parameters,
     refusal_label,
+    refusals_in,
     report,
 )
-from stickslip_ros.app.dashboard.elements import call, card, chart, heading, show_commands
+from stickslip_ros.app.dashboard.elements import call, card, chart, heading, named, show_commands
 from stickslip_ros.app.dashboard.ended_run import EndedRun
 from stickslip_ros.app.dashboard.frames import PERIODS, Frames
 from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Health, ListenerNode
 from stickslip_ros.app.dashboard.theory import Theory
 from stickslip_ros.app.dashboard.theory_panel import TheoryPanel
 from stickslip_ros.messages.topics import AMPLITUDE, FREQUENCY, STICK_FRACTION
-from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.measures.cycle_measures import RESTS, Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.regimes import REGIMES
 from stickslip_ros.plots.style import BLUE, GREEN, GREY, ORANGE, SKY_BLUE
 from stickslip_ros.plots.units import Units
+from stickslip_ros.quantities import number_of
 from stickslip_ros.scenarios.parameters import controller_node
+from stickslip_ros.text import number_in
 
 _REFRESH = 0.25
 _EVENTS = 100
@@ -66,9 +69,8 @@ class Pages:
         self._listener = listener
         self._open: set[_Page] = set()
         ended = EndedRun(listener)
-        self._ended = ended
-        self._script = (_HERE / "page.js").read_text(encoding="utf-8")
-        self._look = (_HERE / "page.css").read_text(encoding="utf-8")
+        for name in ("page.css", "page.js"):
+            core.app.add_static_file(local_file=_HERE / name, url_path=f"/{name}", max_cache_age=0)
 
         @app.websocket("/frames")
         async def send_frames(socket: WebSocket) -> None:  # pyright: ignore[reportUnusedFunction]
@@ -78,12 +80,15 @@ class Pages:
                 return
             await socket.accept()
             with suppress(WebSocketDisconnect):
-                while (periods := await socket.receive_text()) in map(str, PERIODS):
-                    await socket.send_bytes(frames.frame(int(periods)))
+                with suppress(KeyError):  # bytes in place of text
+                    while (periods := await socket.receive_text()) in map(str, PERIODS):
+                        await socket.send_bytes(frames.frame(int(periods)))
                 await socket.close()
 
         @app.get("/shown.csv")
-        def shown(periods: int, end: float) -> Response:  # pyright: ignore[reportUnusedFunction]
+        def shown(  # pyright: ignore[reportUnusedFunction]
+            periods: int, end: Annotated[float, Query(ge=0.0, le=9e9)]
+        ) -> Response:
             """Return the samples that a page shows."""
             length = periods if periods in PERIODS else PERIODS[0]
             return Response(frames.table(length, end), media_type="text/csv")
@@ -91,15 +96,15 @@ class Pages:
         @app.get("/bag.mcap")
         def bag() -> Response:  # pyright: ignore[reportUnusedFunction]
             """Return the bag of a run that has ended."""
-            file = ended.file
-            return Response(status_code=404) if file is None else FileResponse(file)
+            if ended.file is None:
+                return Response(status_code=404)
+            return FileResponse(ended.file, media_type="application/octet-stream")
 
         @ui.page("/")
         def page() -> None:  # pyright: ignore[reportUnusedFunction]
-            ui.add_css(self._look)
+            ui.add_head_html('<link rel="stylesheet" href="/page.css">')
+            ui.add_body_html('<script type="module" src="/page.js"></script>')
             _Page(listener, frames, self.theory, ended, self._open)
-            ui.add_body_html(f'<script type="module">{self._script}</script>')
-            ui.run_javascript("stickslip.start()")
 
     async def take_leave(self) -> None:
         """Show the end of a run on open pages, with what they need once the server is gone."""
@@ -137,7 +142,7 @@ class _Page:
         self._regime_colour = ""
         ui.colors(primary=BLUE)
         ui.dark_mode(value=None)
-        with ui.element("div").classes("whole"):
+        with ui.element("div").classes("whole") as whole:
             self._add_header()
             self._empty = ui.element("section").classes("w-full notice")
             with self._empty:
@@ -158,7 +163,7 @@ class _Page:
                     self._add_health()
                     with card("Events"):
                         self._events = ui.element("div").classes("events")
-                        self._events.props('role=log tabindex=0 aria-label="events"')
+                        named(self._events.props("role=log tabindex=0"), "events")
                 self._theory = TheoryPanel(listener, theory)
                 self._charts |= self._theory.charts
         start = {
@@ -169,7 +174,7 @@ class _Page:
                 "BLUE": BLUE, "GREEN": GREEN, "GREY": GREY, "ORANGE": ORANGE, "SKY_BLUE": SKY_BLUE,
             },
         }  # fmt: skip
-        ui.add_body_html(f"<script>window.stickslip = {json.dumps(start)}</script>")
+        whole.props["data-start"] = json.dumps(start)
         self._refresh()
         ui.timer(_REFRESH, self._refresh)
         opened.add(self)
@@ -178,7 +183,7 @@ class _Page:
 
     def _add_header(self) -> None:
         with ui.row().classes("w-full items-center"):
-            heading(1, self._listener.get_namespace(), "text-2xl font-bold")
+            heading(1, self._listener.get_namespace()).classes("text-2xl")
             self._regime = ui.label("").classes("regime")
             self._wait = ui.label("").props("role=status")
             self._trouble = ui.label("").classes("refusal").props("role=alert")
@@ -192,14 +197,14 @@ class _Page:
             window.props("no-caps outline")
             self._view = ui.button("Pause view", on_click=self._pause_view).props("outline no-caps")
             for text, function in (("Fit", "fit"), ("CSV", "csv"), ("PNG", "png")):
-                button = ui.button(text, on_click=partial(call, f"{function}()"))
+                button = ui.button(text, on_click=partial(call, function))
                 button.props("outline no-caps")
 
     def _add_charts(self) -> None:
         self._charts: dict[str, ui.echart] = {}
         with card("Motion"):
             over_time = "displacement, velocity and force over time"
-            self._charts["trace"] = chart(TRACE, over_time, "tall")
+            self._charts["trace"] = chart(TRACE, over_time).classes("tall")
         with ui.element("div").classes("pair"):
             with card("Phase portrait"):
                 self._charts["portrait"] = chart(PORTRAIT, "velocity over displacement")
@@ -219,8 +224,8 @@ class _Page:
             self._switch.on("update:model-value", self._switch_control, [None])  # by the user only
             self._switch_refusal = refusal_label()
             with ui.row().classes("items-end gap-2"):
-                self._tap_force = ui.number("force (N)", value=None, format="%g").classes("w-24")
-                self._tap_time = ui.number("duration (s)", value=None, format="%g").classes("w-24")
+                self._tap_force = ui.input("force (N)").classes("w-24")
+                self._tap_time = ui.input("duration (s)").classes("w-24")
                 ui.button("Impulse", on_click=self._tap).props("outline no-caps")
             with ui.row().classes("items-end gap-2"):
                 ui.button("Reset", on_click=self._reset).props("outline no-caps")
@@ -243,7 +248,7 @@ class _Page:
 
     def _say_how_to_start(self) -> None:
         namespace = self._listener.get_namespace()
-        heading(2, f"No drive is running in {namespace}", "text-lg font-bold")
+        heading(2, f"No drive is running in {namespace}").classes("text-lg")
         ui.label("Start one in a terminal; this page shows it as soon as it is there:")
         command = ["stickslip", "run", "feed_drive"]
         show_commands([shlex.join([*command, "--namespace", namespace])])
@@ -296,7 +301,7 @@ class _Page:
         units = Units.for_drive(self._frames.drive)
         found: dict[str, str] = {}
         # At rest the last cycles are rounding errors.
-        rests = self._listener.health["analyzer"].figures.get("regime") == Regime.EQUILIBRIUM
+        rests = self._listener.health["analyzer"].figures.get("regime") in RESTS
         for topic, name, unit in _MEASURES:
             values = self._listener.cycles[topic]
             value = values[-1] if values else None
@@ -330,7 +335,7 @@ class _Page:
                 (self._tap_force, scales[0], units.label("force", "N")),
                 (self._tap_time, scales[1], units.label("duration", "s")),
             ):
-                field.value = float(f"{scale / 4.0:.2g}")
+                field.value = f"{float(f'{scale / 4.0:.2g}'):g}"
                 field.props["label"] = label
 
     def _show_regime(self, analyzer: Health) -> None:
@@ -347,7 +352,8 @@ class _Page:
         colour = GREY if trend else look.colour
         if colour != self._regime_colour:
             self._regime_colour = colour
-            self._regime.style(f"border-color: {colour}")
+            self._regime.style["border-color"] = colour
+            self._regime.update()
 
     def _show_health(self) -> None:
         health = sorted(self._listener.health.items())
@@ -358,11 +364,11 @@ class _Page:
             "\n".join(f"{node}: {each.message}" for node, each in health if each.message)
         )
         figures = self._listener.health["plant"].figures
-        samples = int(figures.get("samples", "0") or 0)
+        samples = number_in(figures.get("samples", ""))
         shares = [
-            f"{name.replace('_', ' ')} {100.0 * int(figures.get(name, 0)) / samples:.2g} %"
+            f"{name.replace('_', ' ')} {100.0 * number_in(figures[name]) / samples:.2g} %"
             for name in ("late_forces", "missed_deadlines")
-            if samples and figures.get(name, "").isdecimal()
+            if samples and figures.get(name)
         ]
         self._shares.set_text(", ".join(shares))
         self._raw.set_text(
@@ -377,7 +383,7 @@ class _Page:
             if self._end_shown:
                 self._end_shown = False
                 self._end.set_visibility(False)
-                call("restart()")
+                call("fit")
         elif not self._end_shown:
             self._end_shown = True
             background_tasks.create(self.show_end())
@@ -392,10 +398,10 @@ class _Page:
             self._end_shown = True
             self._end.clear()
             with self._end:
-                self._ended.show()
+                self._ended.show(Units.for_drive(self._frames.drive))
             self._end.set_visibility(True)
             if last:
-                await ui.run_javascript("return await stickslip.end()", timeout=_FAREWELL)
+                await ui.run_javascript("stickslip.end()", timeout=_FAREWELL)
 
     def _is_active(self) -> bool:
         return self._state_of_controller() == "active"
@@ -426,22 +432,21 @@ class _Page:
         await report(self._listener.set_active("plant", not active), self._act_refusal)
 
     async def _tap(self) -> None:
-        force, duration = self._tap_force.value, self._tap_time.value
-        if force is None or duration is None:
-            self._act_refusal.set_text("an impulse needs a force and a duration")
-            return
-        await report(self._listener.tap(force, duration), self._act_refusal)
+        with refusals_in(self._act_refusal):
+            force = number_of("force", self._tap_force.value, "N")
+            duration = number_of("duration", self._tap_time.value, "s")
+            await report(self._listener.tap(force, duration), self._act_refusal)
 
     async def _reset(self) -> None:
         await report(self._listener.reset(), self._act_refusal)
 
     def _show_window(self, event: Any) -> None:
-        call(f"show({int(event.value)})")
+        call("show", event.value)
 
     def _pause_view(self) -> None:
         paused = self._view.text == "Pause view"
         self._view.set_text("Continue view" if paused else "Pause view")
-        call(f"pause({'true' if paused else 'false'})")
+        call("pause", paused)
 
 
 def _row(node: str, health: Health) -> dict[str, str]:

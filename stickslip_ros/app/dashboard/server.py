@@ -1,17 +1,21 @@
 """Serve the page, loopback only, next to the ROS node that listens for it."""
 
+import logging
 import signal
 import socket
 import sys
 import threading
-from collections.abc import Awaitable, Callable, Generator
+from collections.abc import Awaitable, Callable, Collection, Generator
 from contextlib import contextmanager
+from pathlib import Path
+from secrets import token_urlsafe
 
 import rclpy
 import uvicorn
 from fastapi import FastAPI, Request, Response
 from fastapi.middleware.trustedhost import TrustedHostMiddleware
-from nicegui import core, ui
+from jinja2 import DictLoader
+from nicegui import client, core, ui
 from rclpy.experimental import EventsExecutor
 from rclpy.task import Future
 
@@ -24,11 +28,19 @@ from stickslip_ros.nodes.base.process import initialise, spin
 
 _HOST = "127.0.0.1"
 
+_POLICY = (
+    "default-src 'none'; script-src 'self' 'nonce-{nonce}' 'unsafe-eval'; connect-src 'self'; "
+    "style-src 'self' 'unsafe-inline'; font-src 'self'; img-src 'self' data:; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'"
+)
+"""What the page may load and run; docs/security.md says what NiceGUI needs of it."""
 
-def serve(namespace: str, port: int | None, reach: str) -> None:
+
+def serve(namespace: str, port: int | None, reach: str, readable: Collection[str]) -> None:
     """Serve the page of a namespace until SIGINT or SIGTERM.
 
-    `reach` describes which nodes can be heard. Raises InvalidInputError for a port in use.
+    `reach` describes which nodes can be heard; of the paths that they name, those that are
+    `readable` are read. Raises InvalidInputError for a port in use.
     """
     listening = _listen(port)
     signal.signal(signal.SIGTERM, _exit)  # uvicorn passes it on when it ends
@@ -37,19 +49,19 @@ def serve(namespace: str, port: int | None, reach: str) -> None:
     initialise()
     try:
         listener = ListenerNode(
-            namespace, lambda states, forces, dropped: frames.feed(states, forces, dropped)
+            namespace,
+            lambda states, forces, dropped: frames.feed(states, forces, dropped),
+            readable,
         )
-        frames = Frames(listener)
+        frames: Frames = Frames(listener)
         with _running(listener):
+            for name in ("asyncio", "nicegui"):
+                logging.getLogger(name).addFilter(_in_one_line)
             app = FastAPI(openapi_url=None)
             _keep_others_out(app)
             pages = Pages(app, listener, frames)
-            ui.run_with(
-                app,
-                title=f"stickslip {namespace}",
-                language="en-US",
-                show_welcome_message=False,
-            )
+            title = f"stickslip {namespace}"
+            ui.run_with(app, title=title, language="en-US", show_welcome_message=False)
             host, port = listening.getsockname()
             print(f"dashboard of {namespace}, {reach}: http://{host}:{port}", file=sys.stderr)
             config = uvicorn.Config(
@@ -76,17 +88,32 @@ class _Server(uvicorn.Server):
 
 
 def _keep_others_out(app: FastAPI) -> None:
-    """Keep other web sites from controlling the drive: by host name, script or frame."""
+    """Keep others from controlling the drive: by host name, frame, or script, also in a text."""
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[_HOST, "localhost"])
     core.sio.eio.cors_allowed_origins = None  # the page's own origin only
+    # In the template, before there is any text of others: the scripts of NiceGUI, and no other.
+    template = client.templates.get_template("index.html")
+    source = Path(str(template.filename)).read_text(encoding="utf-8")
+    nonced = source.replace("<script", '<script nonce="{{ request.state.nonce }}"')
+    client.templates.env.loader = DictLoader({"index.html": nonced})
 
     @app.middleware("http")
-    async def refuse_frames(  # pyright: ignore[reportUnusedFunction]
+    async def restrict(  # pyright: ignore[reportUnusedFunction]
         request: Request, answer: Callable[[Request], Awaitable[Response]]
     ) -> Response:
+        request.state.nonce = token_urlsafe()
         response = await answer(request)
-        response.headers["Content-Security-Policy"] = "frame-ancestors 'none'"
+        policy = _POLICY.format(nonce=request.state.nonce)
+        response.headers["Content-Security-Policy"] = policy
+        response.headers["X-Content-Type-Options"] = "nosniff"
         return response
+
+
+def _in_one_line(record: logging.LogRecord) -> bool:
+    """Have NiceGUI, which checks no message, name an error without where it occurred."""
+    if record.exc_info:
+        record.msg, record.args, record.exc_info = repr(record.exc_info[1]), (), None
+    return True
 
 
 def _exit(*_: object) -> None:

@@ -5,9 +5,9 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from math import ceil, copysign, log2
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from time import monotonic
 from typing import Any, NamedTuple
 
@@ -86,7 +86,7 @@ def decay(plant: Values, law: str, controller: Values) -> Decay:
     loop = _loop(plant)
     exponents = np.linalg.eigvals(loop.jacobian) * loop.drive.angular_frequency
     uncontrolled, slowest = exponents.tolist(), -float(exponents.real.max())
-    if not (controller and plant["expects_control"]):
+    if not (controller and plant.get("expects_control")):
         return Decay(uncontrolled, slowest, [], None)
     model = CONTROLLER_PARAMETERS[law].validated(controller, law).as_law()
     multipliers = np.linalg.eigvals(loop.transition_matrix(model)).astype(complex)
@@ -120,26 +120,22 @@ def _loop(plant: Values) -> LinearSampledLoop:
 
 @dataclass
 class Result:
-    """The newest result of a computation."""
+    """The newest result of a computation, and what is to be computed next."""
 
+    compute: Callable[..., Any]
     value: Any = None
     refusal: str = ""
     """Why there is none; empty while nothing was computed."""
     version: int = 0
     """Number of results so far."""
-
-
-@dataclass
-class _Job:
-    compute: Callable[..., Any]
     asked: tuple[Any, ...] = ()
     changed_at: float = 0.0
     answered: str = ""
     """Inputs of the result, as text: a NaN that was received twice is no change."""
-    result: Result = field(default_factory=Result)
 
     @property
     def is_stale(self) -> bool:
+        """Whether it is that of other inputs than those asked for."""
         return bool(self.asked) and repr(self.asked) != self.answered
 
 
@@ -151,49 +147,49 @@ class Theory:
 
     def __init__(self, listener: ListenerNode) -> None:
         self._listener = listener
-        self._jobs = {
-            each: _Job(each) for each in (friction_curve, decay, stability_map, bifurcation)
+        self._results = {
+            each: Result(each) for each in (friction_curve, decay, stability_map, bifurcation)
         }
         self._pool: ProcessPoolExecutor | None = None
-        self._running: tuple[_Job, tuple[Any, ...], Future[Any]] | None = None
+        self._running: tuple[Result, tuple[Any, ...], Future[Any]] | None = None
         self._closed = False
 
     def result(self, computation: Callable[..., Any]) -> Result:
         """Return the newest result of one of the computations of this module."""
-        return self._jobs[computation].result
+        return self._results[computation]
 
     @property
     def busy(self) -> bool:
         """Whether something is being computed, or is to be."""
-        return self._running is not None or any(job.is_stale for job in self._jobs.values())
+        return self._running is not None or any(each.is_stale for each in self._results.values())
 
     def follow(self) -> None:
         """Take a finished result, and start the next computation whose parameters changed."""
         if self._closed:
             return
         now = monotonic()
-        for job in self._jobs.values():
-            inputs = self._inputs(job.compute)
-            if repr(inputs) != repr(job.asked):
-                job.asked, job.changed_at = inputs, now
+        for each in self._results.values():
+            inputs = self._inputs(each.compute)
+            if repr(inputs) != repr(each.asked):
+                each.asked, each.changed_at = inputs, now
         self._take()
-        if self._running is None:
-            for job in self._jobs.values():
-                if job.is_stale and now - job.changed_at > _SETTLED:
-                    self._running = job, job.asked, self._submit(job)
-                    return
+        for each in self._results.values():
+            if self._running is None and each.is_stale and now - each.changed_at > _SETTLED:
+                self._running = each, each.asked, self._submit(each)
 
     def close(self) -> None:
         """End the process; nothing is computed from then on."""
         self._closed = True
         if self._pool is not None:
             self._pool.shutdown(wait=False, cancel_futures=True)
+            for process in active_children():  # what it computes would be waited for at the exit
+                process.terminate()
 
     def _inputs(self, computation: Callable[..., Any]) -> tuple[Any, ...]:
         """Return the arguments of a computation; empty if they are not known.
 
         The ranges of map and diagram follow gains and belt speed by octaves, so that the present
-        point moves in a picture that stays.
+        point moves in a figure that stays.
         """
         plant = dict(self._listener.parameters["plant"])
         if not plant:
@@ -201,7 +197,7 @@ class Theory:
         if computation is friction_curve:
             return (plant,)
         if computation is bifurcation:
-            return (plant | {"belt_speed": _octave(plant["belt_speed"])},)
+            return (plant | {"belt_speed": _octave(plant.get("belt_speed"))},)
         controller = dict(self._listener.parameters[self._listener.controller])
         if computation is stability_map:
             if not controller:
@@ -210,30 +206,31 @@ class Theory:
             controller |= {name: _octave(controller[name]) for name in gains if name in controller}
         return (plant, self._listener.law, controller)
 
-    def _submit(self, job: _Job) -> Future[Any]:
+    def _submit(self, result: Result) -> Future[Any]:
         if self._pool is None:
             self._pool = ProcessPoolExecutor(1, get_context("spawn"), _begin, (os.getpid(),))
-        return self._pool.submit(job.compute, *job.asked)
+        return self._pool.submit(result.compute, *result.asked)
 
     def _take(self) -> None:
         if self._running is None or not self._running[2].done():
             return
-        job, inputs, future = self._running
+        result, inputs, future = self._running
         self._running = None
-        job.answered = repr(inputs)
-        done = replace(job.result, version=job.result.version + 1)
+        result.answered = repr(inputs)
+        result.version += 1
+        result.value, result.refusal = None, ""
         try:
-            job.result = replace(done, value=future.result(), refusal="")
+            result.value = future.result()
         except StickslipError as error:
-            job.result = replace(done, value=None, refusal=str(error))
+            result.refusal = str(error)
         except BrokenProcessPool:
             self._pool = None
-            job.result = replace(done, value=None, refusal="the computation was ended")
+            result.refusal = "the computation was ended"
 
 
-def _octave(value: float) -> float:
-    """Return the next power of two away from zero."""
-    return copysign(2.0 ** ceil(log2(abs(value))), value) if value else 0.0
+def _octave(value: Any) -> Any:
+    """Return the next power of two away from zero; 0 and what is not known stay."""
+    return copysign(2.0 ** ceil(log2(abs(value))), value) if value else value
 
 
 def _begin(parent: int) -> None:

@@ -80,7 +80,7 @@ class TheoryPanel:
     def _explain(self, name: str, value: Any, units: Units) -> None:
         if name == "friction":  # page.js draws the loop of a law with a memory
             scale, _ = units.axis("", "m/s", value.relative_speed)
-            call(f"frictionScale = {scale!r}")
+            call("scaleFriction", scale)
         if name == "decay":
             self._said[name].set_text(_decay_text(value, units))
 
@@ -108,10 +108,13 @@ def _options(name: str, found: Any, drive: Drive, gains: WashoutGains | None) ->
 
 
 def _decay_text(found: Decay, units: Units) -> str:
-    unit = units.of_unit("1/s")
-    without = f"{found.uncontrolled_rate + 0.0:.3g} {unit}".rstrip()
+    def named(rate: float) -> str:
+        name = "growth rate" if rate < 0.0 else "decay rate"
+        return f"{name} {abs(rate):.3g} {units.of_unit('1/s')}".rstrip()
+
+    without = named(found.uncontrolled_rate)
     if found.rate is None:
-        return f"decay rate {without}"
-    text = f"decay rate {found.rate + 0.0:.3g} {unit}".rstrip() + f" ({without} without control)"
+        return without
+    text = f"{named(found.rate)} (without control: {without})"
     settles = settling_time(found.rate)
     return text if settles is None else f"{text}, settles in {units.text(settles, 's')}"

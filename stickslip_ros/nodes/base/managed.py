@@ -1,13 +1,16 @@
 """Base class of the nodes: life cycle, topics, diagnostics."""
 
+import time
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Callable, Iterable
 from functools import partial
+from math import inf
 from typing import Any, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
+from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
@@ -17,15 +20,15 @@ from rclpy.timer import Timer
 
 from stickslip_ros.errors import BagError, InvalidInputError, StickslipError
 from stickslip_ros.messages.topics import DIAGNOSTICS, RECORDED, Topic
-from stickslip_ros.nodes.base.dropped_messages import DroppedMessages
 from stickslip_ros.nodes.base.parameters import ParameterNode, ParametersT
-from stickslip_ros.nodes.base.polling import PollingNode
 from stickslip_ros.nodes.base.ros_topics import (
+    PollingNode,
     matching_readers,
     matching_writers,
     message_class,
     qos_profile,
 )
+from stickslip_ros.nodes.base.steady_clock import steady_clock
 
 MessageT = TypeVar("MessageT")
 ThingT = TypeVar("ThingT")
@@ -40,6 +43,12 @@ Diagnosis = tuple[Level, str, dict[str, Any]]
 
 STATE = "state"
 """Key of a node's life-cycle state in its diagnostics."""
+NEWEST_STAMP = "newest_stamp"
+"""Key of the stamp of the plant's newest sample, ns."""
+FAILURE = "failure"
+"""Key of the reason why the plant could not continue, if it could not."""
+FINISHED = "finished"
+"""Key of whether the plant has paused by itself, not on request."""
 
 _DIAGNOSTICS_PERIOD = 1.0
 
@@ -50,20 +59,45 @@ def diagnosis(complaints: Iterable[str], figures: dict[str, Any]) -> Diagnosis:
     return WARN if complaint else OK, complaint, figures
 
 
+class DroppedMessages:
+    """Counts dropped messages and keeps the last reason, which is a complaint for 15 s."""
+
+    def __init__(self, logger: RcutilsLogger) -> None:
+        """Start counting; the first message dropped after a pause is logged."""
+        self._logger = logger
+        self._number = 0
+        self._last = ""
+        self._complaint_ends = -inf
+
+    def add(self, reason: str, number: int = 1) -> None:
+        """Count `number` dropped messages; `reason` is a sentence about the last of them."""
+        now = time.monotonic()
+        if now > self._complaint_ends:
+            self._logger.warning(reason)
+        self._number += number
+        self._last = reason
+        self._complaint_ends = now + 15.0
+
+    @property
+    def complaint(self) -> str:
+        """Current complaint; empty if there is none."""
+        if time.monotonic() > self._complaint_ends:
+            return ""
+        return f"{self._number} messages dropped so far, the last: {self._last}"
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """Number and last reason, for the diagnostics."""
+        return {"dropped_messages": self._number, "last_dropped": self._last or "none"}
+
+
 class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
     """A managed (lifecycle) node whose parameters come from one validated model.
 
     A subclass defines in `connect`, and optionally in `start` and `stop`, what it does when it is
     configured, activated and deactivated. An exception there is logged, and the transition fails.
-
-    Parameters
-    ----------
-    name : str
-        Name of the node.
-    model : type
-        Class of the parameters, in `stickslip_ros.scenarios.parameters`.
-    **options
-        Options of `ParameterNode`: `context`, `namespace` and `overrides`.
+    `model` is a class of `stickslip_ros.scenarios.parameters`; the options are those of
+    `ParameterNode`.
     """
 
     def __init__(self, name: str, model: type[ParametersT], **options: Any) -> None:
@@ -71,7 +105,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         super().__init__(name, model, **options)
         self.stopped = Future()
         """Done when the node's process may end; its result is the error that caused it, or None."""
-        self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
+        self.steady_clock = steady_clock(self)
         """Wall time, independent of simulated time."""
         self.dropped = DroppedMessages(self.get_logger())
         """Messages that the node has dropped since it was activated."""
@@ -112,20 +146,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         return set()
 
     def every(self, period: float, callback: Callable[[], None]) -> Timer:
-        """Call back at a fixed period of wall time.
-
-        Parameters
-        ----------
-        period : float
-            Period, s.
-        callback : callable
-            Function without arguments.
-
-        Returns
-        -------
-        rclpy.timer.Timer
-            The timer.
-        """
+        """Call back at a fixed period of wall time, s."""
         return self.create_timer(period, callback, clock=self.steady_clock)
 
     def call_soon(self, callback: Callable[[], None]) -> None:
@@ -134,18 +155,7 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
             self.executor.create_task(callback)
 
     def keep(self, thing: ThingT) -> ThingT:
-        """Destroy a publisher, subscription, service or timer when the node is cleaned up.
-
-        Parameters
-        ----------
-        thing
-            Any object with a method `destroy`.
-
-        Returns
-        -------
-        thing
-            The same object.
-        """
+        """Return a publisher, subscription, service or timer; cleaning up the node destroys it."""
         self._kept.append(thing)
         return thing
 
@@ -153,28 +163,14 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         """Destroy an object of `keep` now."""
         self._kept.remove(thing)
         # The node must release it, too: an object that only destroys itself still gets messages.
-        for destroy in (
-            self.destroy_publisher,
-            self.destroy_subscription,
-            self.destroy_service,
-            self.destroy_timer,
-        ):
-            if destroy(thing):
-                return
-        thing.destroy()
+        destroyers = self.destroy_publisher, self.destroy_subscription, self.destroy_service
+        if not any(destroy(thing) for destroy in (*destroyers, self.destroy_timer)):
+            thing.destroy()
 
     def advertise(self, topic: Topic[Any]) -> Publisher:
         """Create a publisher of a topic, which lasts until the node is cleaned up.
 
-        Parameters
-        ----------
-        topic : Topic
-            A topic of `stickslip_ros.messages.topics`.
-
-        Returns
-        -------
-        rclpy.publisher.Publisher
-            The publisher; it takes messages of the topic's type, or their serialized bytes.
+        It takes messages of the topic's type, or their serialized bytes.
         """
         kind = message_class(topic.type_name)
         return self.keep(self.create_publisher(kind, topic.name, qos_profile(topic)))
@@ -189,23 +185,10 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
     ) -> Subscription:
         """Pass the decoded messages of a topic to `callback` until the node is cleaned up.
 
-        A message counts as dropped if it cannot be decoded, or `callback` raises BagError.
-
-        Parameters
-        ----------
-        topic : Topic
-            A topic of `stickslip_ros.messages.topics`.
-        callback : callable
-            Receives what the decoder of the topic returns, or the ROS message if it has none.
-        depth : int, optional
-            Length of the queue; by default that of the topic.
-        while_active : bool
-            Whether to ignore messages while the node is not active.
-
-        Returns
-        -------
-        rclpy.subscription.Subscription
-            The subscription.
+        It receives the ROS messages of a topic without a decoder. A message counts as dropped if it
+        cannot be decoded, or `callback` raises BagError. The length of the queue, `depth`, is by
+        default that of the topic. With `while_active`, messages are ignored while the node is not
+        active.
         """
         decode = topic.decode or partial(
             deserialize_message, message_type=message_class(topic.type_name)
@@ -243,6 +226,26 @@ class ManagedNode(PollingNode, ParameterNode[ParametersT], ABC):
         array = DiagnosticArray(status=[status])
         array.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(array)
+
+    def duplicate_publishers(self, *topics: Topic[Any]) -> list[str]:
+        """Return a sentence for each topic with several publishers, with the names of their nodes.
+
+        A killed publisher counts until its lease in the middleware ends.
+        """
+        sentences: list[str] = []
+        for topic in topics:
+            name = self.resolve_topic_name(topic.name)
+            nodes = Counter(
+                f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
+                for publisher in self.get_publishers_info_by_topic(name)
+                if publisher.topic_type == topic.type_name
+            )
+            if nodes.total() > 1:
+                names = (f"{node} ({n} times)" if n > 1 else node for node, n in nodes.items())
+                sentences.append(
+                    f"{nodes.total()} publishers of {name}: {', '.join(sorted(names))}"
+                )
+        return sentences
 
     def end_process(self, reason: StickslipError | None) -> None:
         """End the process of the node; `reason` is the error that causes this, or None."""

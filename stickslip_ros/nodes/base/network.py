@@ -1,15 +1,17 @@
 """Network that ROS uses: set by the environment, or by the profiles beside this file."""
 
 import os
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-
-import rclpy
 
 TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 """Variable that names the transports of Fast DDS."""
 
+DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+NO_PEERS = {"ROS_STATIC_PEERS": ""}
+
 _PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
-_DISCOVERY_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 _LOCALHOST_ONLY = "ROS_LOCALHOST_ONLY"
 """Predecessor of the range; it takes precedence."""
 
@@ -21,10 +23,10 @@ def keep_on_this_machine(network: bool) -> str:
     `network` asks for more.
     """
     _translate_predecessor()
-    names = [_DISCOVERY_RANGE, *(["ROS_DISCOVERY_SERVER", _PROFILES] if is_fast_dds() else [])]
+    names = [DISCOVERY_RANGE, *(["ROS_DISCOVERY_SERVER", _PROFILES] if is_fast_dds() else [])]
     given = [f"{name}={os.environ[name]}" for name in names if os.environ.get(name)]
     if network:
-        os.environ[_DISCOVERY_RANGE] = "SUBNET"
+        os.environ[DISCOVERY_RANGE] = "SUBNET"
     elif not given:
         os.environ.update(this_machine_only())
     prefer_prompt_middleware()
@@ -38,15 +40,20 @@ def keep_on_this_machine(network: bool) -> str:
 def this_machine_only() -> dict[str, str]:
     """Return the environment variables that restrict ROS to the loopback."""
     if not is_fast_dds():
-        return {_DISCOVERY_RANGE: "LOCALHOST", _LOCALHOST_ONLY: ""}
+        return {DISCOVERY_RANGE: "LOCALHOST", _LOCALHOST_ONLY: ""}
     return {
         # LOCALHOST, by either name, would override the profile and use shared memory.
-        _DISCOVERY_RANGE: "SYSTEM_DEFAULT",
+        DISCOVERY_RANGE: "SYSTEM_DEFAULT",
         _LOCALHOST_ONLY: "",
         _PROFILES: _profile("loopback"),
         # Profiles in the working directory would override this one.
         "SKIP_DEFAULT_XML_FILE": "1",
     }
+
+
+def domain_variables(domain: int) -> dict[str, str]:
+    """Return the environment variables of a process for a domain, loopback only."""
+    return {**this_machine_only(), **NO_PEERS, "ROS_DOMAIN_ID": str(domain)}
 
 
 def prefer_prompt_middleware() -> None:
@@ -58,7 +65,7 @@ def prefer_prompt_middleware() -> None:
     _translate_predecessor()
     if any(os.environ.get(name) for name in (_PROFILES, TRANSPORTS)):
         return
-    if os.environ.get(_DISCOVERY_RANGE) == "LOCALHOST":
+    if os.environ.get(DISCOVERY_RANGE) == "LOCALHOST":
         os.environ.update(this_machine_only())
     else:
         os.environ[_PROFILES] = _profile("network")
@@ -71,13 +78,28 @@ def is_kept_on_loopback() -> bool:
 
 def is_fast_dds() -> bool:
     """Return whether ROS uses Fast DDS here."""
+    import rclpy  # not everybody who imports this module needs ROS
+
     return "fastrtps" in rclpy.get_rmw_implementation_identifier()
+
+
+@contextmanager
+def environment(variables: Mapping[str, str]) -> Generator[None]:
+    """Set environment variables for a time."""
+    before = {name: os.environ[name] for name in variables if name in os.environ}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name in variables:
+            del os.environ[name]
+        os.environ.update(before)
 
 
 def _translate_predecessor() -> None:
     """Translate a setting of the range's predecessor into the range."""
     if os.environ.get(_LOCALHOST_ONLY) == "1":
-        os.environ.update({_DISCOVERY_RANGE: "LOCALHOST", _LOCALHOST_ONLY: ""})
+        os.environ.update({DISCOVERY_RANGE: "LOCALHOST", _LOCALHOST_ONLY: ""})
 
 
 def _profile(name: str) -> str:

@@ -11,12 +11,12 @@ from rcl_interfaces.msg import (
 )
 from rclpy.context import Context
 from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode
 from rclpy.parameter import Parameter
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.nodes.base.ros_errors import RCLError, first_line
-from stickslip_ros.scenarios.namespace import LONGEST_NAMESPACE
+from stickslip_ros.scenarios import LONGEST_NAMESPACE
 from stickslip_ros.scenarios.parameter_field import Fixed, known_parameters
 from stickslip_ros.scenarios.parameter_field import Parameter as ModelParameter
 from stickslip_ros.scenarios.parameters import NodeParameters
@@ -25,6 +25,7 @@ from stickslip_ros.text import shown
 
 ParametersT = TypeVar("ParametersT", bound=NodeParameters)
 
+_RCL_ERROR: type[Exception] = rclpy_implementation.RCLError
 _OWNED_BY_ROS = ("start_type_description_service",)
 _ROS_TYPES = {
     bool: Parameter.Type.BOOL,
@@ -33,6 +34,11 @@ _ROS_TYPES = {
     str: Parameter.Type.STRING,
     list: Parameter.Type.STRING_ARRAY,
 }
+
+
+def first_line(error: Exception) -> str:
+    """Return the message of a ROS exception without the place in its source code."""
+    return str(error).strip().split("\n", 1)[0].split(", at ", 1)[0].rstrip(":")
 
 
 class ParameterNode(LifecycleNode, Generic[ParametersT]):
@@ -64,7 +70,7 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
             raise InvalidInputError(
                 f"{name}: ROS refuses a parameter (omit an empty list): {error}"
             ) from None
-        except (NameValidationException, RCLError) as error:
+        except (NameValidationException, _RCL_ERROR) as error:
             raise InvalidInputError(
                 f"{name}: ROS refuses to make the node, possibly because its namespace has more "
                 f"than {LONGEST_NAMESPACE} characters: {first_line(error)}"
@@ -98,7 +104,8 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
 
         Integers are accepted for numbers, as in parameter files and with -p, and so is text that is
         a number: `ros2 param load` sends inf and 1e-05 in this way. It also sends the parameters
-        that ROS itself declares; these are accepted if unchanged.
+        that ROS itself declares; these are accepted if unchanged. What has no effect is accepted,
+        with the reason: one by one, constants come before their law, and those of a ramp must.
         """
         given = {parameter.name: parameter for parameter in parameter_list}
         owned = [
@@ -118,8 +125,11 @@ class ParameterNode(LifecycleNode, Generic[ParametersT]):
         taken = self._as_ros({name: flat[name] for name in values})
         result = super().set_parameters_atomically([*owned, *taken])
         if result.successful:
-            self.parameters = changed
+            unused = changed.unused().items()
+            before, self.parameters = self.parameters.flat(), changed
             self.apply_parameters()
+            new = (f"{source}: {why}" for name, why in unused if flat[name] != before[name])
+            result.reason = "; ".join(new)
         return result
 
     def _declare(self) -> ParametersT:

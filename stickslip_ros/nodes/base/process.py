@@ -1,9 +1,12 @@
-"""Run one node as a process, and spin the executors of this package."""
+"""Initialise ROS, run one node as a process, and spin the executors of this package."""
 
 import argparse
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cache
+from threading import Lock
 from typing import Any
 
 import rclpy
@@ -11,22 +14,41 @@ from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.logging import get_logger
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
 from stickslip_ros.errors import InvalidInputError, StickslipError
 from stickslip_ros.nodes.base.child_process import die_with_parent
-from stickslip_ros.nodes.base.machine_check import check_machine, domain_of_environment
+from stickslip_ros.nodes.base.machine import (
+    FIRST_PROCESS,
+    check_machine,
+    domain_of_environment,
+    is_free,
+    own_domain,
+    port,
+)
 from stickslip_ros.nodes.base.managed import ManagedNode
-from stickslip_ros.nodes.base.network import prefer_prompt_middleware
-from stickslip_ros.nodes.base.ros_errors import first_line
+from stickslip_ros.nodes.base.network import (
+    DISCOVERY_RANGE,
+    NO_PEERS,
+    environment,
+    prefer_prompt_middleware,
+    this_machine_only,
+)
+from stickslip_ros.nodes.base.parameters import first_line
 from stickslip_ros.scenarios.parameter_field import parameters_of
 from stickslip_ros.scenarios.parameters import NodeParameters
 from stickslip_ros.standard_streams import open_closed_streams
 
 ROS_ARGUMENTS = ["--ros-args", "--log-level", "warn", "--disable-external-lib-logs"]
 """ROS arguments of the commands, which use standard error and need no home directory."""
+
+_NO_LOGS_ELSEWHERE = ("--disable-external-lib-logs", "--disable-rosout-logs")
+"""No log files in the home directory, and no /rosout topic, of which each node name has one."""
+
+_initialising = Lock()
 
 
 def initialise(
@@ -52,21 +74,29 @@ def initialise(
         raise InvalidInputError(first_line(error)) from None
 
 
+@contextmanager
+def ros_context(domain: int, arguments: Sequence[str]) -> Generator[Context]:
+    """Initialise ROS in a domain, loopback only, with these global arguments.
+
+    This uses rclpy's default context, so that nodes need not name it, unless it is already in use.
+    """
+    with _initialising:
+        context = Context() if rclpy.ok() else rclpy.get_default_context()
+        with environment({**_this_process_only_here(), **NO_PEERS}):
+            initialise([*arguments, *_NO_LOGS_ELSEWHERE], context=context, domain=domain)
+    try:
+        yield context
+    finally:
+        # Only without a named context can the default one be initialised again.
+        rclpy.try_shutdown(context=None if context is rclpy.get_default_context() else context)
+
+
 def run_node(make: Callable[[], ManagedNode[Any]], model: type[NodeParameters]) -> int:
-    """Run one node as a process, until SIGINT, SIGTERM or SIGHUP.
+    """Run the node that `make` returns as a process, until SIGINT, SIGTERM or SIGHUP.
 
-    Parameters
-    ----------
-    make : callable
-        Makes the node; its class, as a rule. The docstring of its module is the text of `--help`.
-    model : type
-        Class of the node's parameters, which `--help` lists.
-
-    Returns
-    -------
-    int
-        Exit status: 0 done, 1 the node failed, 2 a parameter or an argument was refused. The
-        reason is printed on standard error.
+    `--help` prints the docstring of the module of `make`, and the parameters of `model`. Returns
+    the exit status: 0 done, 1 the node failed, 2 a parameter or an argument was refused. The reason
+    is printed on standard error.
     """
     open_closed_streams()
     parser = argparse.ArgumentParser(
@@ -138,6 +168,24 @@ def spin(executor: Executor, until: Future) -> None:
             executor.spin_until_future_complete(until, timeout_sec=0.2)
         except Exception as error:  # an invalid request from outside ends here, too
             get_logger("stickslip_ros").error(f"{type(error).__name__}: {error}")
+
+
+@cache
+def _this_process_only_here() -> Mapping[str, str]:
+    """Return the environment variables that restrict ROS in this process to the loopback.
+
+    Fast DDS reads a profile once per process. If ROS was in use before ours could be read, it
+    listens on every address; then LOCALHOST, which uses shared memory, is the best available.
+    """
+    variables = this_machine_only()
+    context = Context()
+    with own_domain() as domain, environment({**variables, DISCOVERY_RANGE: "OFF"}):
+        initialise(["--ros-args", *_NO_LOGS_ELSEWHERE], context=context, domain=domain)
+        node = Node("which_addresses", context=context)
+        elsewhere_free = is_free(port(domain, FIRST_PROCESS), "127.0.0.2")
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+    return variables if elsewhere_free else {DISCOVERY_RANGE: "LOCALHOST"}
 
 
 def _parameter_help(model: type[NodeParameters]) -> str:

@@ -1,5 +1,6 @@
-"""Message class and quality of service of a topic for rclpy, and its matching endpoints."""
+"""Topics for rclpy: message class, quality of service, matching endpoints, messages that wait."""
 
+from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
 from typing import Any
@@ -82,3 +83,27 @@ def _explicit(profile: QoSProfile) -> QoSProfile:
         deadline=explicit(profile.deadline),
         liveliness_lease_duration=explicit(profile.liveliness_lease_duration),
     )
+
+
+class PollingNode(Node):
+    """A node that polls for messages: no thread wakes for each of them."""
+
+    def create_polled_subscription(self, topic: Topic[Any], qos: QoSProfile) -> Subscription:
+        """Subscribe to a topic whose serialized messages wait for `waiting_messages`."""
+        kind = message_class(topic.type_name)
+        return self.create_subscription(kind, topic.name, _never_called, qos, raw=True)
+
+    @property
+    def subscriptions(self) -> Iterator[Subscription]:
+        """The subscriptions that the executor serves: those that are not polled."""
+        return (s for s in super().subscriptions if s.callback is not _never_called)
+
+
+def waiting_messages(subscription: Subscription) -> Iterator[bytes]:
+    """Take the waiting serialized messages and yield them in order."""
+    with subscription.handle:
+        while taken := subscription.handle.take_message(subscription.msg_type, True):
+            yield taken[0]
+
+
+def _never_called(_: bytes) -> None: ...

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters
@@ -19,6 +20,7 @@ class ServiceCall:
 
     A client may never match an existing service, and an answer may be lost. Then a new client
     repeats the request, and has twice the time. So the service may get the request more than once.
+    The earlier clients stay: to answer one that is gone takes a service 0.1 s, and it complains.
     """
 
     def __init__(
@@ -29,8 +31,9 @@ class ServiceCall:
         self._kind = kind
         self._service = service
         self._answer_time = answer_time
-        self._client = self._new_client()
+        self._clients = [self._new_client()]
         self._pending: Future | None = None
+        self._factor = 1.0
 
     def start(self, request: Any, on_answer: Callable[[Any], None] = lambda _: None) -> None:
         """Send this request from now on, in place of an earlier one."""
@@ -40,7 +43,6 @@ class ServiceCall:
         """The answer; None until it arrives."""
         self._pending = None
         self._attempt_ends: float | None = None
-        self._factor = 1.0
 
     @property
     def sent(self) -> bool:
@@ -55,21 +57,22 @@ class ServiceCall:
             return False
         now = time.monotonic()
         if self._attempt_ends is not None and now > self._attempt_ends:
-            self._node.destroy_client(self._client)
-            self._client, self._pending = self._new_client(), None
-            self._attempt_ends, self._factor = None, 2.0 * self._factor
+            self._clients.append(self._new_client())
+            self._pending = self._attempt_ends = None
+            self._factor *= 2.0
         if self._attempt_ends is None:
             self._attempt_ends = now + ANSWER_TIME * self._factor
-        if self._pending is None and self._client.service_is_ready():
+        if self._pending is None and self._clients[-1].service_is_ready():
             self._attempt_ends = now + self._answer_time * self._factor
-            self._pending = self._client.call_async(self._request)
+            self._pending = self._clients[-1].call_async(self._request)
             self._pending.add_done_callback(self._take)
         return False
 
     def close(self) -> None:
         """Stop; ignore an answer that still arrives."""
         self._pending = None
-        self._node.destroy_client(self._client)
+        for client in self._clients:
+            self._node.destroy_client(client)
 
     def _new_client(self) -> Client:
         return self._node.create_client(self._kind, self._service)
@@ -78,6 +81,7 @@ class ServiceCall:
         response = pending.result()
         if response is not None and pending is self._pending:
             self.answer = response
+            self._factor = 1.0
             self._on_answer(response)
 
 
@@ -87,7 +91,9 @@ def parameters_call(
     """Return a call that requests the named parameters of the node `other`."""
 
     def take(response: Any) -> None:
-        values = [parameter_value_to_python(value) for value in response.values]
+        values: list[Any] = []
+        with suppress(RuntimeError):  # a type that ROS does not know
+            values += map(parameter_value_to_python, response.values)
         on_answer(dict(zip(names, values, strict=False)))
 
     call = ServiceCall(node, GetParameters, f"{other}/get_parameters")

@@ -14,19 +14,20 @@ from stickslip_ros.paper.claims.paper_values import (
     STATES,
     TAKEN_DAMPING,
     TAKEN_FOR_DAMPING,
+    VIBRATING,
     critical_beta,
     cycles,
     expansion,
     hopf_point,
+    listed,
     rates,
     slip_friction,
     trace_of,
 )
-from stickslip_ros.paper.claims.summaries import VIBRATING, listed
 from stickslip_ros.paper.figures import STRIBECK, BifurcationFigure, unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.theory.hopf import hopf_points
-from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
 
@@ -110,7 +111,7 @@ def _(evidence: Evidence) -> Number:
 @computes("fig-2-direction")
 def _(_: Evidence) -> Observation:
     speed = hopf_point().belt_speed
-    below, above = expansion(speed - 0.01).stable, expansion(speed + 0.01).stable
+    below, above = (bool(expansion(speed + off).stable) for off in (-0.01, 0.01))
     vanishes = len(cycles(speed - 2e-3)) == 1 and not cycles(speed + 2e-3)
     return Observation(
         f"{'stable' if below else 'unstable'} below, {'stable' if above else 'unstable'} above",

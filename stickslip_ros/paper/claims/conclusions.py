@@ -9,15 +9,18 @@ from stickslip_ros.paper.claims.claim import Computations, Evidence, Observation
 from stickslip_ros.paper.claims.paper_values import (
     DAMPING,
     FILTER,
+    VIBRATING,
+    amplitude,
     controlled_amplitude,
     critical,
     cycles,
     expansion,
+    falling,
     hopf_point,
+    listed,
     trace,
     trace_of,
 )
-from stickslip_ros.paper.claims.summaries import VIBRATING, amplitude, falling, listed
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
 
 computes = Computations()
@@ -158,7 +161,7 @@ def _(_: Evidence) -> Observation:
     return Observation(
         f"k1 = {washout[0]:.4f} against {plain:.4f}",
         min(map(abs, washout)) < abs(plain),
-        remark=f"The paper makes no comparison. A plain force k1 y needs {plain:.4f} at v0 = "
+        remark=f"The paper makes no comparison; a plain force k1 y needs {plain:.4f} at v0 = "
         f"0.4 and keeps the equilibrium too; the filter needs {washout[0] / plain:.3g} times "
         f"that with d = 2, {washout[1] / plain:.3g} times with d = 0.2 and "
         f"{washout[2] / plain:.5g} times with d = 0.02.",

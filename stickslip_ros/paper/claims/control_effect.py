@@ -13,17 +13,21 @@ from stickslip_ros.paper.claims.paper_values import (
     STUDIED_SPEED,
     TAKEN_DAMPING,
     TAKEN_FOR_DAMPING,
+    VIBRATING,
+    amplitude,
     amplitudes,
+    border,
     controlled_amplitude,
     critical,
     cycles,
     expansion,
+    falling,
     for_both,
     hopf_point,
     known,
+    listed,
     trace,
 )
-from stickslip_ros.paper.claims.summaries import VIBRATING, amplitude, border, falling, listed
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.control import WashoutGains
@@ -57,11 +61,10 @@ def _(_: Evidence) -> Observation:
     return Observation(
         listed(here),
         exponent < 0.1,
-        remark=f"Amplitudes of the limit cycles at v0 = {listed(_FIG_12_SPEEDS)}; with the damping "
-        f"of eq. 8 {listed(taken)}. They fall to zero without a jump: amplitude squared over the "
-        f"distance to v_b1 is {listed(squares)} at distances {listed(distances)}, and at the "
-        f"smallest the amplitude varies with power {exponent:.3f} of it. A square root is steep "
-        "there.",
+        remark="They fall to zero without a jump: amplitude squared over the distance to v_b1 is "
+        f"{listed(squares)} at distances {listed(distances)}, and at the smallest the amplitude "
+        f"varies with power {exponent:.3f} of it. Amplitudes of the limit cycles at v0 = "
+        f"{listed(_FIG_12_SPEEDS)}; with the damping of eq. 8 {listed(taken)}.",
     )
 
 
@@ -92,7 +95,7 @@ def _(evidence: Evidence) -> Observation:
 def _(_: Evidence) -> Observation:
     falling_speeds = (*sorted(_FIG_12_SPEEDS, reverse=True), 0.4, 0.1, 0.02)
     found = [cycles(speed, TAKEN_DAMPING) for speed in falling_speeds]
-    resting = [expansion(speed, TAKEN_DAMPING).stable for speed in falling_speeds]
+    resting = [bool(expansion(speed, TAKEN_DAMPING).stable) for speed in falling_speeds]
     multipliers = [abs(cycle.multipliers[0]) for here in found for cycle in here]
     above = expansion(hopf_point(TAKEN_DAMPING).belt_speed + 1e-3, TAKEN_DAMPING).stable
     return Observation(
@@ -297,7 +300,7 @@ def _comes_to_rest(linear: float, position: float, speed: float) -> bool:
 def _(_: Evidence) -> Observation:
     needed, slow = critical(0.4, DAMPING).linear, critical(0.4, DAMPING, 0.2).linear
     gains = replace(FILTER, linear=PRINTED_GAIN)
-    here, taken = for_both(lambda damping: expansion(0.4, damping, gains).stable)
+    here, taken = for_both(lambda damping: bool(expansion(0.4, damping, gains).stable))
     without, left = controlled_amplitude(0.4, FILTER), controlled_amplitude(0.4, gains)
     return Observation(
         f"k1 = {needed:.4f} is needed at v0 = 0.4",

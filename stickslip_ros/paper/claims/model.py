@@ -12,18 +12,18 @@ from stickslip_ros.paper.claims.paper_values import (
     cycles,
     exact_onset,
     hopf_point,
+    listed,
     only_rest_at,
     rates,
     slip_friction,
     time_dependent,
     trace,
 )
-from stickslip_ros.paper.claims.summaries import listed
 from stickslip_ros.paper.figures import STRIBECK, unit_drive
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Stribeck
-from stickslip_ros.physics.theory.roots import zero_between
+from stickslip_ros.physics.model.functions import zero_between
 
 computes = Computations()
 

@@ -1,4 +1,4 @@
-"""Reference values for the claims: the theory and the motion, at the paper's parameters.
+"""Reference values for the claims, at the paper's parameters, and summaries of values in words.
 
 Everything is dimensionless, for the unit drive of `figures`.
 """
@@ -6,6 +6,7 @@ Everything is dimensionless, for the unit drive of `figures`.
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -14,20 +15,22 @@ import numpy.typing as npt
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.paper.claims.claim import Formula, Number
 from stickslip_ros.paper.figures import unit_drive
+from stickslip_ros.paper.portraits import Portrait
+from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SLIP
 from stickslip_ros.physics.model.friction import FrictionLaw
+from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.model.hybrid import Mode
 from stickslip_ros.physics.model.plain_drive import drive_system
 from stickslip_ros.physics.motion import Motion, RecordedMotion
-from stickslip_ros.physics.motion.derivatives import flow_rates, parameter_values
+from stickslip_ros.physics.motion.compiled_flow import flow_rates, parameter_values
 from stickslip_ros.physics.theory.critical_gains import CriticalGains, critical_gains
 from stickslip_ros.physics.theory.cycle_bounds import follow, release_position
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
 from stickslip_ros.physics.theory.limit_cycles import LimitCycle, limit_cycle_of_run, limit_cycles
 from stickslip_ros.physics.theory.linear import Expansion, expand
-from stickslip_ros.physics.theory.roots import zero_between
 from stickslip_ros.physics.theory.sticking import StickingOnset, sticking_onset
 
 _T = TypeVar("_T")
@@ -38,7 +41,7 @@ DAMPING = 0.02
 TAKEN_DAMPING = 0.01
 """The value used in its place in eq. 8 and in all that follows from it: beta."""
 
-TAKEN_FOR_DAMPING = f"With the damping coefficient {TAKEN_DAMPING:g} in place of {DAMPING:g}"
+TAKEN_FOR_DAMPING = f"With the damping {TAKEN_DAMPING:g} for {DAMPING:g}"
 """The correction that many of the paper's numbers need."""
 
 PRINTED_HOPF_SPEED = 0.4944
@@ -52,6 +55,9 @@ STUDIED_SPEED = 0.49
 
 FILTER = WashoutGains(corner_frequency=2.0, linear=0.0, cubic=0.0)
 """A washout filter with the cutoff frequency of eq. 20 and no gain."""
+
+VIBRATING = (Regime.STICK_SLIP, Regime.PURE_SLIP)
+"""Regimes of vibration."""
 
 _ROUNDING = 1e-12
 """Deviation below which a speed equals that of the belt, as a share of it."""
@@ -225,3 +231,51 @@ def rates(drive: Drive, states: FloatArray, gains: WashoutGains | None = None) -
 def time_dependent() -> bool:
     """Return whether the equations depend on time explicitly."""
     return not drive_system(unit_drive(1.0)).autonomous
+
+
+def falling(values: Sequence[float]) -> bool:
+    """Return whether each value is below the previous one."""
+    return all(later < earlier for earlier, later in pairwise(values))
+
+
+def border(holds: Callable[[float], bool], low: float, high: float) -> float:
+    """Return the border between `low`, where `holds` is true, and `high`, where it is false."""
+    while high - low > 1e-4:
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def listed(values: Sequence[float]) -> str:
+    """Return the values as a list in words."""
+    return ", ".join(f"{value:.4g}" for value in values)
+
+
+def belt_speeds(portraits: Sequence[Portrait]) -> str:
+    """Return the belt speeds of the motions as a list in words."""
+    return listed([portrait.drive.belt_speed for portrait in portraits])
+
+
+def regimes(portraits: Sequence[Portrait]) -> list[Regime | None]:
+    """Return the final regime of each motion."""
+    return [portrait.measures.regime for portrait in portraits]
+
+
+def amplitude(portrait: Portrait) -> float:
+    """Return the final displacement amplitude of a motion, zero at rest."""
+    at_rest = portrait.measures.regime is Regime.EQUILIBRIUM
+    return 0.0 if at_rest else portrait.measures.amplitude or 0.0
+
+
+def stick_fractions(portraits: Sequence[Portrait]) -> list[float]:
+    """Return the stick fractions of the vibrating motions."""
+    return [
+        portrait.measures.stick_fraction or 0.0
+        for portrait in portraits
+        if portrait.measures.regime in VIBRATING
+    ]
+
+
+def complex_number(value: complex) -> str:
+    """Return the value in words."""
+    return f"{value.real:.4f} {'-' if value.imag < 0.0 else '+'} {abs(value.imag):.4f} i"

@@ -12,37 +12,35 @@ from stickslip_ros.paper.claims.paper_values import (
     FASTER,
     PRINTED_HOPF_SPEED,
     SLOWER,
+    VIBRATING,
+    amplitude,
     approximate_onset,
     arrivals,
+    belt_speeds,
+    border,
     critical_beta,
     cycles,
     exact_onset,
     expansion,
+    falling,
     hopf_point,
+    listed,
     only_rest_at,
     overdamped_from,
+    regimes,
     stays,
+    stick_fractions,
     trace,
     trace_of,
-)
-from stickslip_ros.paper.claims.summaries import (
-    VIBRATING,
-    amplitude,
-    belt_speeds,
-    border,
-    falling,
-    listed,
-    regimes,
-    stick_fractions,
 )
 from stickslip_ros.paper.figures import PRINTED_SLOPE, STRIBECK, TANGENT_SLOPE, unit_drive
 from stickslip_ros.paper.portraits import Portrait
 from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Linear, Stribeck
+from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.theory.hopf import hopf_points
 from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run, limit_cycles
-from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
 

@@ -177,7 +177,7 @@ computes["eq-8-polynomial"] = lambda _: Formula(
 @computes("hurwitz")
 def _(_: Evidence) -> Observation:
     speed = hopf_point().belt_speed
-    below, above = (expansion(speed * factor).stable for factor in (0.999, 1.001))
+    below, above = (bool(expansion(speed * factor).stable) for factor in (0.999, 1.001))
     p = trace(speed)
     return Observation(
         f"p = {abs(p):.6f}",

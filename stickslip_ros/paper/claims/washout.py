@@ -17,22 +17,24 @@ from stickslip_ros.paper.claims.paper_values import (
     STUDIED_SPEED,
     TAKEN_DAMPING,
     TAKEN_FOR_DAMPING,
+    complex_number,
     critical,
     expansion,
+    falling,
     for_both,
     formula_for_both,
     known,
+    listed,
     number_for_both,
     printed_trace,
     rates,
     trace,
 )
-from stickslip_ros.paper.claims.summaries import complex_number, falling, listed
 from stickslip_ros.paper.figures import unit_drive
 from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.theory.hopf import crossing_speed, hopf_points
 from stickslip_ros.physics.theory.linear import hurwitz_determinants
-from stickslip_ros.physics.theory.roots import zero_between
 
 computes = Computations()
 

@@ -1,10 +1,18 @@
 """A control law at work: the one place where a sample meets a controller."""
 
 from collections.abc import Callable
+from contextlib import suppress
+from math import dist, inf, isfinite, isnan, nan
+from numbers import Real
+from typing import Any
 
+from stickslip_ros.errors import RunError, in_words
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.model.control import NO_REFERENCE, ControlLaw, Reference
 from stickslip_ros.samples import Sample
+from stickslip_ros.text import shown
+
+_STATE = "which must be a tuple of finite numbers, as many at every sample"
 
 ReferenceSource = Callable[[float], Reference]
 """Returns the reference at a time since the first sample, s."""
@@ -75,36 +83,43 @@ class Controller:
         Returns
         -------
         float or None
-            Force, N, not finite if it overflows; None for no answer.
+            Force, N; None for no answer.
+
+        Raises
+        ------
+        RunError
+            If the law raises anything, or returns no finite force or no state of the size that it
+            had. The next sample continues from the last one whose state was good.
         """
-        stamp, last, law = sample.stamp, self._stamp, self.law
+        stamp, last, law, before = sample.stamp, self._stamp, self.law, self.state
+        starts = last is None
         if last is None:
-            self._start(sample)
-            elapsed = 0.0
-        elif stamp > last:
-            elapsed = (stamp - last) * 1e-9
-            if law.follows_reference:
-                self.reference = self.follows((stamp - self._first_stamp) * 1e-9)
-        else:
+            self._first_stamp = last = stamp
+        elif stamp <= last:
             return self._answer_older(sample, last)
-        self._stamp = stamp
-        self._older = None
-        force, self.state = law.respond(self.state, elapsed, sample, self.reference)
-        if (stamp - self._first_stamp) * 1e-9 < law.start_after:
+        since = (stamp - self._first_stamp) * 1e-9
+        if law.follows_reference:
+            self.reference = self.follows(since)
+        try:
+            if starts:
+                before = self._first_state or law.initial_state(sample, self.reference)
+                self._first_state = None
+            force, state = law.respond(before, (stamp - last) * 1e-9, sample, self.reference)
+        except (Exception, SystemExit) as error:  # the code of others: anything
+            raise _failure(law, since, in_words(error)) from None
+        try:
+            fits = dist(state, before) < inf  # the quickest way to see size and values
+        except (TypeError, ValueError, OverflowError):
+            fits = False
+        if not fits:
+            raise _failure(law, since, f"its state is {shown(state)}, {_STATE}")
+        self._stamp, self.state, self._older = stamp, state, None
+        if since < law.start_after:
             return 0.0
         limit = law.force_limit
-        if -limit < force < limit:
+        if isinstance(force, float) and -limit < force < limit:
             return force
-        return max(-limit, min(limit, force))
-
-    def _start(self, sample: Sample) -> None:
-        self._stamp = self._first_stamp = sample.stamp
-        if self.law.follows_reference:
-            self.reference = self.follows(0.0)
-        first_state, self._first_state = self._first_state, None
-        if first_state is None:
-            first_state = self.law.initial_state(sample, self.reference)
-        self.state = first_state
+        return _limited(law, since, force)
 
     def _answer_older(self, sample: Sample, newest: int) -> float | None:
         """Answer a sample that is not later than the newest answered one."""
@@ -144,3 +159,19 @@ def answer(loop: SampledLoop, controller: Controller | None) -> float:
         return 0.0
     loop.offer(sample.stamp, force)
     return force
+
+
+def _limited(law: ControlLaw, since: float, force: Any) -> float:
+    """Return a force within the limit as a float; refuse what is no number, or infinite then."""
+    limit, value = law.force_limit, nan
+    if not isinstance(force, bool) and isinstance(force, Real):
+        with suppress(OverflowError):
+            value = float(force)
+    limited = max(-limit, min(limit, value))
+    if isnan(value) or not isfinite(limited):
+        raise _failure(law, since, f"its force is {shown(force)}, which must be a finite number")
+    return limited
+
+
+def _failure(law: ControlLaw, since: float, reason: str) -> RunError:
+    return RunError(f"the control law {law.name} fails at {since:.6g} s: {reason}")

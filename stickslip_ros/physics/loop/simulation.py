@@ -1,19 +1,55 @@
 """Simulation of the closed loop without ROS, sampled or continuous as in the paper."""
 
+from math import ceil, inf
+
 import numpy as np
 
 from stickslip_ros.physics.loop.controller import Controller, answer
-from stickslip_ros.physics.loop.motion_tracer import MotionTracer
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
 from stickslip_ros.physics.loop.trajectory import SampleRecorder
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
-from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver, RunObserver
-from stickslip_ros.physics.measures.sample_meter import SampleMeter
+from stickslip_ros.physics.measures.run_meter import RunObserver
+from stickslip_ros.physics.measures.sample_meter import MeasuredMotion, MotionObserver, SampleMeter
 from stickslip_ros.physics.model.control import ControlLaw
 from stickslip_ros.physics.model.course import NO_COURSE
-from stickslip_ros.physics.motion import RecordedMotion
+from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.progress import Progress
 from stickslip_ros.samples import SampleColumns
+
+_STEPS_PER_PERIOD = 60
+"""Least number of steps in a natural period: a line through their ends then shows the motion."""
+
+
+class MotionTracer:
+    """Advances a motion in short steps, and passes its forces and the motion to an observer."""
+
+    def __init__(self, motion: Motion, observer: RunObserver, longest_period: float = inf) -> None:
+        """Trace a motion; the steps are parts of its natural period, of at most this one (s)."""
+        self._motion, self._observer, self._longest_period = motion, observer, longest_period
+        self._now = 0.0
+        self._forces: list[tuple[float, float, float, float]] = []
+        """Time (s) and force (N) from then on; time, and friction force (N) up to then."""
+
+    def advance(self, duration: float) -> None:
+        """Advance the motion by `duration` (s), or until it is unbounded."""
+        motion = self._motion
+        period = min(motion.drive.natural_period, self._longest_period)
+        steps = max(1, ceil(duration / period * _STEPS_PER_PERIOD))
+        for _ in range(steps):
+            if motion.unbounded:
+                break
+            start, force = self._now, motion.applied_force
+            motion.advance(duration / steps)
+            self._now += duration / steps
+            self._forces.append((start, force, self._now, motion.friction_force))
+
+    def take_motion(self, motion: MeasuredMotion) -> None:
+        """Pass the motion to the observer, and the forces up to its end."""
+        start, force, end, friction = np.array(self._forces).reshape(-1, 4).T
+        self._forces.clear()
+        self._observer.take_motion(motion)
+        self._observer.take_control(start, force, np.ones(len(force), dtype=bool))
+        self._observer.take_friction(end, friction)
 
 
 def measure_block(
@@ -22,6 +58,8 @@ def measure_block(
     """Feed a meter, and an observer, with what `motion` has recorded since the last call."""
     breakpoints, drive = motion.take_breakpoints(), motion.drive
     cycles = meter.feed(breakpoints, motion.belt_speed, drive.fastest_belt)
+    meter.drift.position.feed(breakpoints.time, breakpoints.position)
+    meter.drift.feed_cycles(meter.ends, cycles)
     if observer is not None:
         belt_velocity = np.full(len(breakpoints), drive.belt_speed)
         if drive.belt is not NO_COURSE:
@@ -38,7 +76,7 @@ def simulate_sampled(
     progress: Progress = lambda _: None,
     observer: MotionObserver | None = None,
     recorder: SampleRecorder | None = None,
-    told: SampleMeter | None = None,
+    measured: SampleMeter | None = None,
 ) -> Measures:
     """Simulate the sampled loop and measure its motion.
 
@@ -60,7 +98,7 @@ def simulate_sampled(
         Receives the motion in blocks.
     recorder : SampleRecorder, optional
         Takes each sample with the control force that answers it.
-    told : SampleMeter, optional
+    measured : SampleMeter, optional
         Receives the samples as the sensor measures them.
 
     Returns
@@ -94,19 +132,24 @@ def simulate_sampled(
     'equilibrium'
     """
     samples = round(duration / loop.period)
-    measured = [loop.sample]
+    seen, forces = [loop.sample], list[float]()
     for number in range(1, samples + 1):
         force = 0.0 if controller is None else answer(loop, controller)
+        forces.append(force)
         if recorder is not None:
             recorder.take(loop.true_sample, force, loop.sample)
         sample = loop.advance()
-        if told is not None:
-            measured.append(sample)
+        if measured is not None:
+            seen.append(sample)
         if number % 1000 == 0 or number == samples or motion.unbounded:
             measure_block(motion, meter, observer)
-            if told is not None:
-                told.feed(SampleColumns.from_samples(measured))
-                measured.clear()
+            times = loop.period * np.arange(number - len(forces), number)
+            meter.drift.force.feed(times, forces)
+            if measured is not None:
+                measured.feed(SampleColumns.from_samples(seen))
+                measured.drift.force.feed(times, forces)
+                seen.clear()
+            forces.clear()
             progress(number / samples)
             if motion.unbounded:
                 meter.report_run_away()

@@ -8,23 +8,30 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray, IntArray
 from stickslip_ros.physics.measures.cycle_measures import LEAST_CYCLES, Cycle
+from stickslip_ros.physics.measures.noise import FEW_SAMPLES, LEAST_SAMPLES
 from stickslip_ros.physics.measures.stick_fit import StickFit, fit_stick
 
 STICK_LEVEL = 6.63
 """Gain in squared residuals, in variances, above which a stick is shown: a test at 1 %."""
 
+_LEAST_PHASES = 12.0
+"""Least number of different phases: with a whole number of samples per cycle there are no more."""
 _HARMONICS = (6, 10, 14, 20, 28)
 """Numbers of harmonics of a cycle without a stick, from which the data choose."""
 _DEGREES = (6, 9, 12, 16, 20, 26)
 """Degrees of the polynomial of a slip, beyond the conditions at its ends, likewise."""
-_CERTAIN = 10.0
+_UNTESTED_ERRORS = 10.0
 """Stick time, in standard errors, from which a stick needs no test."""
-_NEAR_BELT = 0.85
+_STICKING_SHARE = 0.85
 """Share of the belt speed that a motion reaches that may stick."""
 _GRID = 512
 """Points of a cycle at which its extremes are looked for."""
-_BEYOND_BELT = 1.2
+_PASSING_SHARE = 1.2
 """Share of the belt speed beyond which a motion has passed the belt instead of sticking."""
+_WHITENING_RESIDUAL = 0.45
+"""Residual, in steps of an encoder, above which there is noise that makes the rounding white."""
+_OFFSETS = 16
+"""Number of offsets of the grid of an encoder for which rounding is looked at."""
 _UNLIKE_NOISE, _UNLIKE_AMPLITUDE = 3.0, 0.05
 """Residuals, in deviations of the noise and in amplitudes, up to which cycles are alike."""
 
@@ -71,34 +78,29 @@ class _Shape:
 
 
 def fit_mean_cycle(
-    time: FloatArray, position: FloatArray, belt_velocity: float, starts: FloatArray, noise: float
+    time: FloatArray,
+    position: FloatArray,
+    belt_velocity: float,
+    starts: FloatArray,
+    noise: float,
+    step: float = 0.0,
 ) -> MeanCycle | None:
-    """Fit the mean of cycles of equal period.
+    """Fit the mean of cycles of equal period to samples, s and m, on a belt with a velocity, m/s.
 
-    Parameters
-    ----------
-    time, position : array, shape (n,)
-        Samples of the cycles, s and m.
-    belt_velocity : float
-        Velocity of the belt, m/s.
-    starts : array, shape (cycles + 1,)
-        Start of each cycle and end of the last, s.
-    noise : float
-        Standard deviation of the noise of the positions, m.
-
-    Returns
-    -------
-    MeanCycle or None
-        None where there are too few samples, or where the cycles are not alike.
+    `starts` are the starts of the cycles and the end of the last, s, `noise` is the standard
+    deviation of the positions, m, and `step` that to which they are rounded, m. None where there
+    are too few samples, or where the cycles are not alike.
     """
     count = len(starts) - 1
-    if count < LEAST_CYCLES or len(time) < 8 * count:
+    if count < LEAST_CYCLES or len(time) < LEAST_SAMPLES * count:
         return None
     sign = -1.0 if belt_velocity < 0.0 else 1.0
     period = float(starts[-1] - starts[0]) / count
-    fold = _Fold(time - starts[0], sign * position, count, period)
+    fold = _Fold(time - starts[0], sign * position, count, period, step)
     belt_speed = abs(belt_velocity)
     shape = fold.smooth()
+    if len(time) < FEW_SAMPLES * count and fold.phases < _LEAST_PHASES:
+        return None
     stick = fold.stick(shape, belt_speed, noise) if belt_speed > 0.0 else None
     if stick is not None:
         shape = fold.slip(stick.fit, belt_speed)
@@ -146,8 +148,11 @@ class _Stick:
 class _Fold:
     """Samples of several cycles and their common period."""
 
-    def __init__(self, time: FloatArray, position: FloatArray, count: int, period: float) -> None:
+    def __init__(
+        self, time: FloatArray, position: FloatArray, count: int, period: float, step: float
+    ) -> None:
         self.time, self.position, self.count, self.period = time, position, count, period
+        self._step = step
         self._origin = 0.0
 
     @property
@@ -165,6 +170,12 @@ class _Fold:
         """Number of the cycle of each sample."""
         return np.clip(np.floor(self._turns), 0, self.count - 1).astype(np.int64)
 
+    @property
+    def phases(self) -> float:
+        """Period over the largest gap between the samples of all cycles."""
+        phase = np.sort(self.phase)
+        return self.period / float(np.diff(phase, append=phase[0] + self.period).max())
+
     def smooth(self) -> _Shape:
         """Return the cycle as a Fourier series, after fitting the period to it."""
 
@@ -178,6 +189,8 @@ class _Fold:
             )
 
         most = max(len(self.time) // (3 * self.count), 1)
+        if most < _HARMONICS[0]:  # the cycles have samples at different phases
+            most = max(min(int(self.phases / 3.0), _HARMONICS[2]), 1)
         for _ in range(4):
             phase = self.phase
             basis = rows(phase, 0, min(_HARMONICS[0], most))
@@ -188,6 +201,8 @@ class _Fold:
             self.period *= 1.0 + change
             if abs(change) < 1e-9:
                 break
+        if self._step:  # more harmonics would follow the stairs
+            most = min(most, max(int(np.ptp(self.position) / self._step / 2.0), 2))
         choices = [each for each in _HARMONICS if each <= most] or [most]
         return self._linear(rows, choices, lambda phase, derivative: np.zeros(len(phase)))
 
@@ -226,7 +241,7 @@ class _Fold:
         """Return the stick of the cycles; None without one."""
         grid = np.linspace(0.0, self.period, _GRID, endpoint=False)
         velocity = shape.rate(grid)
-        if not _NEAR_BELT * belt_speed < velocity.max() < _BEYOND_BELT * belt_speed:
+        if not _STICKING_SHARE * belt_speed < velocity.max() < _PASSING_SHARE * belt_speed:
             return None
         near = velocity > np.minimum(0.93 * belt_speed, 0.98 * velocity.max())
         turn = 2j * pi / self.period
@@ -243,13 +258,14 @@ class _Fold:
         relative = self.position[used] - belt_speed * time
         with_stick = fit_stick(time, relative, belt_speed, frequency, guess)
         covariance = _clustered(with_stick.jacobian, with_stick.residual, number)
+        covariance += self._rounding(with_stick.jacobian, with_stick.residual, self.position[used])
         middle, length = np.zeros((2, len(covariance)))
         middle[0] = length[1] = 1.0
         landing, departure, time_error = (
             float(np.sqrt(g @ covariance @ g))
             for g in (middle - length / 2.0, middle + length / 2.0, length)
         )
-        if with_stick.stick_time < _CERTAIN * time_error:
+        if with_stick.stick_time < _UNTESTED_ERRORS * time_error:
             without = fit_stick(time, relative, belt_speed, frequency, 0.0, sticks=False)
             variance = with_stick.squares / max(len(time) - with_stick.jacobian.shape[1], 1)
             if without.squares - with_stick.squares <= STICK_LEVEL * variance:
@@ -302,7 +318,10 @@ class _Fold:
             )
             return (slope[:, None] * basis + 2.0 * shape[:, None] * derived) / length
 
-        return self._linear(rows, _DEGREES, known, belt_speed)
+        # With a whole number of samples per cycle the slip has few different ones.
+        most = self.phases * length / self.period / 2.0
+        degrees = [each for each in _DEGREES if each <= most] or _DEGREES[:1]
+        return self._linear(rows, degrees, known, belt_speed)
 
     def adjust(self, shape: _Shape) -> None:
         """Fit the period to what a shape leaves."""
@@ -334,7 +353,21 @@ class _Fold:
         return np.column_stack([rate, rate * self._turns, np.ones(len(rate))])
 
     def _covariance(self, jacobian: FloatArray, residual: FloatArray) -> FloatArray:
-        return _clustered(jacobian, residual, self.number)
+        covariance = _clustered(jacobian, residual, self.number)
+        return covariance + self._rounding(jacobian, residual, self.position)
+
+    def _rounding(
+        self, jacobian: FloatArray, residual: FloatArray, position: FloatArray
+    ) -> FloatArray:
+        """Return the covariance by rounding to steps, which in each cycle follows the motion alike.
+
+        The mean over the offsets that the fit may have from the grid of the steps.
+        """
+        if float(np.std(residual)) >= _WHITENING_RESIDUAL * self._step:
+            return np.zeros((jacobian.shape[1],) * 2)
+        steps = (position - residual)[:, None] / self._step + np.arange(_OFFSETS) / _OFFSETS
+        errors = np.linalg.pinv(jacobian) @ ((np.rint(steps) - steps) * self._step)
+        return errors @ errors.T / _OFFSETS
 
 
 def _measures(shape: _Shape, fold: _Fold) -> tuple[Cycle, Cycle]:

@@ -1,7 +1,7 @@
 """The cycle measures, from breakpoints: amplitude, stick fraction, period and regime."""
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from enum import StrEnum
 from itertools import pairwise
@@ -10,6 +10,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
+from stickslip_ros.physics.measures.drift import Drift
+from stickslip_ros.text import quantity
 
 EQUILIBRIUM_SPEED = 1e-3
 """Speed amplitude, in belt speeds, below which the slide counts as at rest in equilibrium."""
@@ -19,6 +21,9 @@ UNBOUNDED_BELT_SPEEDS = 1e3
 
 STEADY = 1e-3
 """Largest relative difference between the amplitudes of the measured cycles of a steady motion."""
+
+STEADY_UNDER_NOISE = 0.01
+"""The same under noise."""
 
 LEAST_CYCLES = 3
 """Number of cycles needed to decide whether a motion is steady."""
@@ -41,15 +46,18 @@ class Regime(StrEnum):
     """Kind of motion.
 
     `stick_slip` cycles have a stick phase and `pure_slip` cycles do not; in `equilibrium` the slide
-    is at rest on a moving belt; `stuck` is a slide that sticks to a belt at rest; `unbounded` is a
-    motion that diverges.
+    is at rest on a moving belt, and `held` within the resolution of its sensor or actuator; `stuck`
+    is a slide that sticks to a belt at rest; `unbounded` is a motion that diverges, `undersampled`
+    one with too few samples per cycle to tell.
     """
 
     STICK_SLIP = "stick_slip"
     PURE_SLIP = "pure_slip"
     EQUILIBRIUM = "equilibrium"
+    HELD = "held"
     STUCK = "stuck"
     UNBOUNDED = "unbounded"
+    UNDERSAMPLED = "undersampled"
 
     @classmethod
     def label(cls, regime: str | None) -> str:
@@ -74,26 +82,37 @@ class Regime(StrEnum):
         return "no whole cycle" if regime is None else _LABELS[cls(regime)]
 
 
+RESTS = (Regime.EQUILIBRIUM, Regime.HELD, Regime.STUCK)
+"""Regimes of a slide that does not vibrate."""
+
 _LABELS = {
     Regime.STICK_SLIP: "stick-slip",
     Regime.PURE_SLIP: "pure slip",
     Regime.EQUILIBRIUM: "equilibrium",
+    Regime.HELD: "held within the resolution",
     Regime.STUCK: "stuck",
     Regime.UNBOUNDED: "unbounded",
+    Regime.UNDERSAMPLED: "undersampled",
 }
 
 
 class Trend(StrEnum):
-    """Change of the amplitude in a motion that is not steady."""
+    """Change of a motion that is not steady: of its amplitude, or of position or force."""
 
     DECAYING = "decaying"
     GROWING = "growing"
     VARYING = "varying"
+    DRIFTING = "drifting"
 
 
-def with_trend(regime: str, trend: str | None) -> str:
-    """Return the display text of a regime with its trend, if it is not steady."""
-    return f"{regime}, not steady: {trend}" if trend else regime
+def trend_text(values: Mapping[str, Any], show: Callable[[float, str], str] = quantity) -> str:
+    """Return the display text of the trend of measures by name, a drift with rates; or nothing."""
+    trend, drift = values.get("trend"), values.get("drift")
+    if trend != Trend.DRIFTING or not drift:
+        return trend or ""
+    units = {"force": "N/s"}
+    rates = [f"{each} {show(rate, units.get(each, 'm/s'))}" for each, rate in drift.items()]
+    return ", ".join([trend, *rates])
 
 
 class Cycle(NamedTuple):
@@ -140,14 +159,17 @@ class Measures:
     steady: bool | None = None
     """Whether the motion has settled; None if there is too little data.
 
-    The amplitudes of the measured cycles, at least three, differ by a thousandth at most. A rest
-    is steady once it has lasted for as many cycles as the window has, if small cycles around it do
-    not grow. An unbounded motion is steady, too.
+    The amplitudes of the measured cycles, at least three, differ by a thousandth at most, and
+    nothing drifts. A rest is steady once it has lasted for as many cycles as the window has, if
+    small cycles around it do not grow. An unbounded motion is steady, too.
     """
     trend: Trend | None = None
-    """Change of the amplitude; None unless `steady` is False."""
+    """How the motion changes; None unless `steady` is False."""
     errors: Mapping[str, float] | None = None
     """Standard error of each mean by the name of the measure; None below three cycles."""
+    drift: Mapping[str, float] | None = None
+    """Rate of each quantity that would change by a hundredth in one more such run: `position` and
+    `amplitude`, m/s, and `force`, N/s; None without one."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the measures by name, ready for JSON.
@@ -158,6 +180,16 @@ class Measures:
             Value of each attribute by its name.
         """
         return asdict(self)
+
+
+def with_drift(measures: Measures, drift: Drift) -> Measures:
+    """Return the measures of a run with these trends."""
+    unknown = measures.regime in (None, Regime.UNBOUNDED, Regime.UNDERSAMPLED)
+    rates = {} if unknown else drift.rates(measures.period)
+    if not rates:
+        return measures
+    trend = measures.trend or Trend.DRIFTING
+    return replace(measures, steady=False, trend=trend, drift=rates)
 
 
 def measures_of(report: Mapping[str, Any]) -> Measures:
@@ -247,6 +279,10 @@ class CycleMeter:
     """
 
     def __init__(self, window: int) -> None:
+        self.drift = Drift()
+        """Trends of the run, for its user to feed."""
+        self.within = 0.0
+        """Range, m, in which a slide counts as held."""
         self._cycles: deque[Cycle] = deque(maxlen=window)
         self._amplitudes: deque[float] = deque(maxlen=max(window, LEAST_CYCLES))
         self._belt_speed = self._fastest_belt = 0.0
@@ -333,6 +369,9 @@ class CycleMeter:
         """
         if self._unbounded:
             return without_cycles(None, Regime.UNBOUNDED, steady=True)
+        return with_drift(self._measures(), self.drift)
+
+    def _measures(self) -> Measures:
         period = self._cycles[-1].period if self._cycles else 0.0
         now = self._open.end if self._open else 0.0
         since = self._sticking_since
@@ -340,6 +379,12 @@ class CycleMeter:
             steady = True if self._lasts(now - since) else None
             return without_cycles(self._recent_motion(), Regime.STUCK, steady=steady)
         since_turn = self._open.duration if self._open else 0.0
+        held = self._held(since_turn > STALE_PERIODS * period) if self.within else None
+        if held is not None:
+            # What rounding leaves of a motion may grow over a few cycles by chance.
+            enough = len(self._amplitudes) > 2 * LEAST_CYCLES
+            trend = _trend(self._amplitudes, True, STEADY) if enough else None
+            return without_cycles(held, Regime.HELD, steady=trend is None, trend=trend)
         if not self._cycles or since_turn > STALE_PERIODS * period:
             recent = self._recent_motion()
             if (
@@ -352,7 +397,10 @@ class CycleMeter:
             return without_cycles(recent, Regime.EQUILIBRIUM, steady=steady)
         mean = Cycle(*np.mean(self._cycles, axis=0).tolist())
         resting = mean.velocity_amplitude < self._equilibrium_speed
-        trend = _trend(self._amplitudes, resting)
+        share = STEADY
+        if self.drift.resolution > 0.0:  # what the sensor tells differs from cycle to cycle
+            share = max(STEADY_UNDER_NOISE, self.drift.resolution / max(self._amplitudes))
+        trend = _trend(self._amplitudes, resting, share)
         steady = trend is None if len(self._amplitudes) >= LEAST_CYCLES else None
         count = len(self._cycles)
         if resting:
@@ -366,6 +414,19 @@ class CycleMeter:
             trend=trend,
             errors=errors_of_means(self._cycles),
         )
+
+    def _held(self, at_rest: bool) -> Cycle | None:
+        """Return the motion of three cycles and since, or only since; None beyond `within`."""
+        recent = self._recent_motion()
+        motions = [] if at_rest else list(self._cycles)[-LEAST_CYCLES:]
+        motions += [] if recent is None else [recent]
+        if not motions or (not self._cycles and motions[0].stick_fraction > 0.0):
+            return None
+        size, fastest, middle = np.array([motion[:3] for motion in motions]).T
+        highest, lowest = float((middle + size).max()), float((middle - size).min())
+        middle, half = (highest + lowest) / 2.0, (highest - lowest) / 2.0
+        held = Cycle(half, float(fastest.max()), middle, 0.0, 0.0, 0.0)
+        return held if highest - lowest <= self.within else None
 
     def _lasts(self, rest: float) -> bool:
         """Return whether a rest of this duration (s) has lasted for a window of the last cycles."""
@@ -435,7 +496,7 @@ class CycleMeter:
             self._sticking_since = float(breakpoints.time[row]) if len(breakpoints) > 1 else None
 
 
-def _trend(amplitudes: Sequence[float], resting: bool) -> Trend | None:
+def _trend(amplitudes: Sequence[float], resting: bool, share: float) -> Trend | None:
     """Return the change of the amplitude from cycle to cycle; None without one or with few cycles.
 
     Around a slide that is `resting` only growth from each cycle to the next counts: otherwise it is
@@ -444,31 +505,20 @@ def _trend(amplitudes: Sequence[float], resting: bool) -> Trend | None:
     if len(amplitudes) < LEAST_CYCLES:
         return None
     first, last = amplitudes[0], amplitudes[-1]
-    grows = last - first > STEADY * first
+    grows = last - first > share * first
     if resting:
         monotone = all(before < after for before, after in pairwise(amplitudes))
         return Trend.GROWING if grows and monotone else None
     largest = max(amplitudes)
-    if largest - min(amplitudes) <= STEADY * largest:
+    if largest - min(amplitudes) <= share * largest:
         return None
     if grows:
         return Trend.GROWING
-    return Trend.DECAYING if first - last > STEADY * first else Trend.VARYING
+    return Trend.DECAYING if first - last > share * first else Trend.VARYING
 
 
 def errors_of_means(cycles: Sequence[Cycle]) -> dict[str, float] | None:
-    """Return the standard error of the mean of each measure by its name, from their scatter.
-
-    Parameters
-    ----------
-    cycles : sequence of Cycle
-        Cycles of the window.
-
-    Returns
-    -------
-    dict or None
-        None below three cycles.
-    """
+    """Return the standard error of each mean by its name, from the scatter; None below 3 cycles."""
     if len(cycles) < LEAST_CYCLES:
         return None
     errors = np.std(cycles, axis=0, ddof=1) / len(cycles) ** 0.5

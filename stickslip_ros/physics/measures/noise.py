@@ -8,12 +8,18 @@ from stickslip_ros.arrays import BoolArray, FloatArray
 
 _ORDERS = (6, 8, 10, 12, 14)
 """Orders of the differences that suppress the motion and leave the noise."""
-_AGREEING = 1.4
+_LARGEST_RATIO = 1.4
 """Ratio of the noise by one order to that by the next, up to which both have found noise."""
 _NORMAL_MEDIAN = 0.6745
 """Median magnitude of a normal variable of deviation 1."""
 _IMPULSE = 10.0
 """Size of an impulse, in standard deviations of the noise."""
+_LINE = 3
+"""Half of the width of a line in the spectrum, in frequencies."""
+_LINE_SHARE, _LINE_MEDIANS = 0.2, 30.0
+"""Least power of a line, as a share of all and in medians."""
+FEW_SAMPLES, LEAST_SAMPLES = 10.0, 4.0
+"""Samples per cycle below which cycles are measured together only, and not at all."""
 FEWEST = 32
 """Number of samples from which the noise is estimated."""
 
@@ -23,18 +29,8 @@ def white_noise(signal: FloatArray) -> float:
 
     High differences suppress a smooth motion: at 60 samples per cycle the sixth leaves a millionth
     of it. Their median is robust against stick edges and impulses. Where no three successive
-    orders agree, the differences are of the motion itself, and the noise counts as zero.
-
-    Parameters
-    ----------
-    signal : array, shape (n,)
-        Signal in any unit.
-
-    Returns
-    -------
-    float
-        Standard deviation in the unit of the signal; 0 for a signal without noise or with fewer
-        than 32 samples.
+    orders agree, or the spectrum is one of lines, the differences are of the motion itself, and the
+    noise counts as zero; so it does below 32 samples.
     """
     if len(signal) < FEWEST:
         return 0.0
@@ -45,28 +41,25 @@ def white_noise(signal: FloatArray) -> float:
     ]
     for low, middle, high in zip(deviations, deviations[1:], deviations[2:], strict=False):
         if _agree(low, middle) and _agree(middle, high):
-            return middle / _NORMAL_MEDIAN
+            noise = middle / _NORMAL_MEDIAN
+            line = strongest_line(signal)
+            if line is None or line * FEW_SAMPLES < 1.0:
+                return noise
+            if line * LEAST_SAMPLES > 1.0:
+                return 0.0
+            # Noise is between the lines, too; motion with few samples per cycle is not.
+            return min(noise, float(np.median(_spectrum(signal)) / np.log(2.0)) ** 0.5)
     return 0.0
 
 
 def _agree(lower: float, higher: float) -> bool:
-    return lower / _AGREEING < higher < _AGREEING * lower
+    return lower / _LARGEST_RATIO < higher < _LARGEST_RATIO * lower
 
 
 def impulses(signal: FloatArray, noise: float) -> BoolArray:
     """Return which samples are impulses: single samples far from both of their neighbours.
 
-    Parameters
-    ----------
-    signal : array, shape (n,)
-        Signal in any unit.
-    noise : float
-        Standard deviation of its noise.
-
-    Returns
-    -------
-    array of bool, shape (n,)
-        True for each impulse; the first two and last two samples never are.
+    `noise` is the standard deviation. The first two and the last two samples never are impulses.
     """
     found = np.zeros(len(signal), np.bool_)
     if len(signal) < 5:
@@ -81,3 +74,29 @@ def impulses(signal: FloatArray, noise: float) -> BoolArray:
     larger = np.maximum(np.abs(before), np.abs(after))
     found[2:-2] &= size > larger
     return found
+
+
+def strongest_line(signal: FloatArray) -> float | None:
+    """Return the cycles per sample of the motion that the spectrum of 32 samples or more shows.
+
+    None where no line has a fifth of the power and stands out from noise.
+    """
+    power = _spectrum(signal)
+    at = int(np.argmax(power))
+    around = slice(max(at - _LINE, 0), at + _LINE + 1)
+    stands_out = power[at] > _LINE_MEDIANS * float(np.median(power))
+    if at <= _LINE or not stands_out or power[around].sum() < _LINE_SHARE * power.sum():
+        return None
+    bins = np.arange(len(power))[around]
+    return float(bins @ power[around] / power[around].sum()) / len(signal)
+
+
+def _spectrum(signal: FloatArray) -> FloatArray:
+    """Return the power of a signal without its trend, for frequencies from 0 to a half."""
+    from scipy.signal import detrend  # takes long to import
+
+    count = len(signal)
+    window = np.sin(np.pi * (np.arange(count) + 0.5) / count) ** 4
+    scale = max(float(np.abs(signal).max()), 1e-300)
+    power: FloatArray = np.abs(np.fft.rfft(detrend(signal / scale) * window)) ** 2
+    return power * scale**2 / float(window @ window)

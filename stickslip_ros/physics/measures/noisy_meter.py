@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import pi, sqrt
+from math import inf, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from stickslip_ros.physics.measures.cycle_measures import (
     EQUILIBRIUM_SPEED,
     LEAST_CYCLES,
     STALE_PERIODS,
+    STEADY_UNDER_NOISE,
     Cycle,
     Measures,
     Regime,
@@ -21,12 +22,19 @@ from stickslip_ros.physics.measures.cycle_measures import (
     errors_of_means,
     without_cycles,
 )
-from stickslip_ros.physics.measures.noise import impulses, white_noise
+from stickslip_ros.physics.measures.drift import resolved
+from stickslip_ros.physics.measures.noise import (
+    FEW_SAMPLES,
+    FEWEST,
+    LEAST_SAMPLES,
+    impulses,
+    strongest_line,
+    white_noise,
+)
 
-STEADY_UNDER_NOISE = 0.01
-"""Change of the amplitude over the window, as a share, from which a motion is not steady."""
-
-_PASSING = 1.15
+_FEW_STEPS = 25.0
+"""Amplitude, in steps of an encoder without noise, below which the errors are not known."""
+_PASSING_SHARE = 1.15
 """Share of the belt speed beyond which a slide has passed the belt; calibrations err by less."""
 LEAST_STICK = 0.03
 """Stick fraction up to which a single cycle counts as one without a stick."""
@@ -40,7 +48,7 @@ _QUANTUM = 1.73
 _STEP = 32
 """Number of samples after which cycles are looked for."""
 _LOOKS = 512
-"""Number of samples after which the noise is estimated anew."""
+"""Number of samples after which the noise is estimated again."""
 _FIRST_LOOK = 128
 """Number of samples after which the noise is estimated first."""
 _LOOKED_AT = 2048
@@ -51,9 +59,11 @@ _MARGIN = 64
 """Number of samples that are kept before the window, for the fits at its start."""
 _ROUNDING = 1e-7
 """Noise below this share of the motion is rounding, or an imperfection of the estimate."""
+_STEP_DEVIATION = 1e-3
+"""Largest deviation of whole numbers of steps."""
 _PRECISION = 1e-12
 """Noise below this share of the largest values is rounding of the numbers, not of a sensor."""
-_SLIPPING = 0.1
+_SLIP_SHARE = 0.1
 """Share of the belt speed by which a slide at rest may seem to move."""
 
 
@@ -123,15 +133,10 @@ class NoisyCycleMeter:
 
     A cycle lasts from one lowest position to the next, each fitted by a parabola; reversals within
     the noise are none. The measures are those of the mean cycle, see `MeanCycle`, as long as the
-    cycles are alike; otherwise they are means over the cycles.
+    cycles are alike; otherwise they are means over the cycles, the last `window` at most.
 
     The noise is found from the positions. Velocities are used for one purpose: to tell whether they
     have noise.
-
-    Parameters
-    ----------
-    window : int
-        Largest number of cycles to average over: the last ones.
     """
 
     def __init__(self, window: int) -> None:
@@ -141,6 +146,10 @@ class NoisyCycleMeter:
         """Standard deviation of the noise of the positions, m, as far as it is known."""
         self.noisy = False
         """Whether positions or velocities have noise."""
+        self.step = 0.0
+        """Step of the positions, m, that they are multiples of; 0 as long as none is found."""
+        self.within = 0.0
+        """Range, m, in which a slide is held as far as its actuator can."""
         self.ends: list[float] = []
         """Time, s, at which each cycle ended that `feed` returned last."""
         self._count = 0
@@ -163,7 +172,6 @@ class NoisyCycleMeter:
         self._starts.clear()
         self._scanned = self._extreme = 0
         self._rising: bool | None = None
-        self._low: int | None = None
         self._high: int | None = None
         self._waiting: deque[tuple[int, int | None]] = deque()
         self._last_turn: _Turn | None = None
@@ -172,13 +180,7 @@ class NoisyCycleMeter:
     def feed(
         self, time: FloatArray, position: FloatArray, velocity: FloatArray, belt: FloatArray
     ) -> list[Cycle]:
-        """Add the samples that follow; return the cycles that they complete.
-
-        Parameters
-        ----------
-        time, position, velocity, belt : array, shape (n,)
-            Time, s, displacement, m, velocity and velocity of the belt, m/s.
-        """
+        """Add the samples that follow (s, m, m/s); return the cycles that they complete."""
         self.ends = []
         completed: list[Cycle] = []
         new = _Samples(time, position, velocity, belt, position)
@@ -195,45 +197,110 @@ class NoisyCycleMeter:
                 completed += self._advance()
         return completed
 
+    @property
+    def line(self) -> float | None:
+        """Frequency of the line in the spectrum of the last positions, see `strongest_line`."""
+        position = self._recent().position
+        # An encoder that rounds a steady motion has lines, too.
+        if len(position) < FEWEST:
+            return None
+        flat = position - np.linspace(position[0], position[-1], len(position))
+        least = max(self._resolved, _PRECISION * float(np.abs(position).max()))
+        return strongest_line(flat) if np.ptp(flat) > least else None
+
     def measures(self, *, quick: bool = False) -> tuple[Measures, MeanCycle | None]:
         """Return the measures of the last whole cycles, and the mean cycle if they are alike.
 
-        Parameters
-        ----------
-        quick : bool
-            Whether means over single cycles will do.
+        With `quick`, means over single cycles will do.
         """
+        recent = self._recent()
+        # Few samples after a gap tell less than the cycles before it.
+        enough = len(recent.time) >= (FEWEST if self._before.cycles else 1)
+        if enough and 0.0 < self._resolved >= float(np.ptp(recent.position)):
+            return self._rest(recent, Regime.HELD), None
         held, cycles, starts = self._held.samples, tuple(self._cycles), tuple(self._starts)
+        resting = not cycles or self._resting()
         if len(cycles) < LEAST_CYCLES and self._before.cycles and not self._resting():
-            held, cycles, starts = self._before
-        elif not cycles or self._resting():
-            return self._rest(), None
+            (held, cycles, starts), resting = self._before, False
+        line = self.line
+        if line is not None and (resting or line * FEW_SAMPLES > 1.0):
+            return self._by_line(recent, line)
+        if resting:
+            return self._rest(self._since_cycles()), None
         fit = None if quick else self._fit(held, starts)
         if fit is not None:
-            mean, amplitudes, sticks = fit.cycle, fit.amplitudes, fit.sticks
-            errors = fit.errors._asdict()
-        else:
-            mean = Cycle(*np.mean(cycles, axis=0).tolist())
-            amplitudes = np.array([cycle.amplitude for cycle in cycles])
-            # Half of the cycles: a single one may seem to stick for a moment.
-            sticks = 2 * sum(cycle.stick_fraction > 0.0 for cycle in cycles) > len(cycles)
-            errors = errors_of_means(cycles)
-        enough = len(cycles) >= LEAST_CYCLES
+            errors = None if self._coarse(fit.noise, fit.cycle) else fit.errors._asdict()
+            return self._found(held, fit.cycle, fit.amplitudes, fit.sticks, errors), fit
+        mean = Cycle(*np.mean(cycles, axis=0).tolist())
+        # Half of the cycles: a single one may seem to stick for a moment.
+        sticks = 2 * sum(cycle.stick_fraction > 0.0 for cycle in cycles) > len(cycles)
+        amplitudes = np.array([cycle.amplitude for cycle in cycles])
+        errors = None if self._coarse(self.noise, mean) else errors_of_means(cycles)
+        return self._found(held, mean, amplitudes, sticks, errors), None
+
+    def _by_line(self, samples: _Samples, line: float) -> tuple[Measures, MeanCycle | None]:
+        """Return the measures of the cycles that a line of the spectrum shows."""
+        if line * LEAST_SAMPLES > 1.0:
+            return without_cycles(None, Regime.UNDERSAMPLED), None
+        time, window = samples.time, self._cycles.maxlen or 0
+        period = float(time[-1] - time[0]) / (len(time) - 1) / line
+        cycles = min(int(float(time[-1] - time[0]) / period), window)
+        fit = self._fit(samples, (time[-1] - period * np.arange(cycles, -1.0, -1.0)).tolist())
+        if fit is None:
+            few = line * FEW_SAMPLES > 1.0
+            return without_cycles(None, Regime.UNDERSAMPLED if few else None), None
+        errors = None if self._coarse(fit.noise, fit.cycle) else fit.errors._asdict()
+        return self._found(samples, fit.cycle, fit.amplitudes, fit.sticks, errors), fit
+
+    def _found(
+        self,
+        samples: _Samples,
+        mean: Cycle,
+        amplitudes: FloatArray,
+        sticks: bool,
+        errors: dict[str, float] | None,
+    ) -> Measures:
+        """Return the measures of cycles in samples."""
+        enough, count = len(amplitudes) >= LEAST_CYCLES, len(amplitudes)
         trend = self._trend(amplitudes) if enough else None
-        steady, count = trend is None if enough else None, len(cycles)
-        moving = float(held.belt[-1]) != 0.0
+        steady = trend is None if enough else None
+        moving = float(samples.belt[-1]) != 0.0
         if moving and mean.velocity_amplitude < EQUILIBRIUM_SPEED * self._fastest_belt:
-            found = without_cycles(mean, Regime.EQUILIBRIUM, count, steady=steady, trend=trend)
-        else:
-            found = Measures(
-                **mean._asdict(),
-                cycles=count,
-                regime=Regime.STICK_SLIP if sticks else Regime.PURE_SLIP,
-                steady=steady,
-                trend=trend,
-                errors=errors,
-            )
-        return found, fit
+            return without_cycles(mean, Regime.EQUILIBRIUM, count, steady=steady, trend=trend)
+        return Measures(
+            **mean._asdict(),
+            cycles=count,
+            regime=Regime.STICK_SLIP if sticks else Regime.PURE_SLIP,
+            steady=steady,
+            trend=trend,
+            errors=errors,
+        )
+
+    def _coarse(self, noise: float, mean: Cycle) -> bool:
+        """Return whether an encoder without noise has too few steps for standard errors."""
+        return noise < self.step / 2.0 and mean.amplitude < _FEW_STEPS * self.step
+
+    @property
+    def _resolved(self) -> float:
+        """Range of positions, m, within which the sensor or the actuator resolves no motion."""
+        return max(resolved(self.step, self.noise), self.within)
+
+    def _recent(self) -> _Samples:
+        """Return the samples of the last part of the run, of several cycles if there are any."""
+        samples = self._held.samples
+        row = len(samples.time) - min(max(self._count // 4, _FIRST_LOOK), _LOOKED_AT)
+        if self._cycles and 2.0 * self._cycles[-1].amplitude > self._resolved:
+            # What seems to be a last cycle may have ended by noise, long after.
+            period = min(cycle.period for cycle in self._cycles)
+            since = samples.time[-1] - LEAST_CYCLES * period
+            row = min(row, int(np.searchsorted(samples.time, since)))
+        return samples.part(slice(max(row, 0), None))
+
+    def _since_cycles(self) -> _Samples:
+        """Return the second half of the samples since the last cycle."""
+        samples = self._held.samples
+        first = np.searchsorted(samples.time, self._starts[-1]) if self._cycles else 0
+        return samples.part(slice((int(first) + len(samples.time)) // 2, None))
 
     @property
     def _least(self) -> float:
@@ -265,6 +332,11 @@ class NoisyCycleMeter:
         farthest = float(np.abs(recent.position).max(initial=0.0))
         if noise > max(_ROUNDING * moved, _PRECISION * farthest):
             self.noise, self.noisy = noise, True
+        levels = np.diff(np.unique(recent.position))
+        if len(levels) > 0 and levels.min() > _PRECISION * farthest:
+            steps = levels / levels.min()
+            if np.abs(steps - np.rint(steps)).max() < _STEP_DEVIATION:
+                self.step = min(self.step or inf, float(levels.min()))
         fastest = float(np.abs(recent.velocity).max(initial=0.0))
         if white_noise(recent.velocity) > max(_ROUNDING * fastest, _PRECISION * self._fastest_belt):
             self.noisy = True
@@ -421,11 +493,8 @@ class NoisyCycleMeter:
         since = float(self._held.samples.time[-1]) - self._starts[-1]
         return since > STALE_PERIODS * self._cycles[-1].period
 
-    def _rest(self) -> Measures:
+    def _rest(self, samples: _Samples, regime: Regime = Regime.EQUILIBRIUM) -> Measures:
         """Return the measures of a motion without cycles."""
-        samples = self._held.samples
-        first = np.searchsorted(samples.time, self._starts[-1]) if self._cycles else 0
-        samples = samples.part(slice((int(first) + len(samples.time)) // 2, None))
         none = without_cycles(None, None)
         if len(samples.time) < 8:
             return none
@@ -433,7 +502,8 @@ class NoisyCycleMeter:
         belt_speed = abs(float(samples.belt[-1]))
         slope = float(np.polyfit(time, samples.position - samples.position[0], 1)[0])
         spread = float(np.std(samples.position))
-        if belt_speed > 0.0 and abs(slope) > _SLIPPING * belt_speed:
+        far = max(self._resolved, _REVERSAL * self.noise, _PRECISION * abs(samples.position[0]))
+        if abs(slope) > _SLIP_SHARE * belt_speed and abs(slope) * float(time[-1]) > far:
             return none
         window = self._cycles.maxlen or 0
         lasts = not self._cycles or float(time[-1]) * 2.0 >= window * self._cycles[-1].period
@@ -445,8 +515,8 @@ class NoisyCycleMeter:
             frequency=0.0,
             stick_fraction=0.0 if belt_speed > 0.0 else 1.0,
         )
-        regime = Regime.EQUILIBRIUM if belt_speed > 0.0 else Regime.STUCK
-        found = without_cycles(rest, regime, steady=True if lasts else None)
+        regime = regime if belt_speed > 0.0 else Regime.STUCK
+        found = without_cycles(rest, regime, steady=lasts or regime is Regime.HELD or None)
         return replace(found, velocity_amplitude=None)  # the positions do not tell it
 
     def _fit(self, held: _Samples, starts: Sequence[float]) -> MeanCycle | None:
@@ -458,12 +528,14 @@ class NoisyCycleMeter:
         if float(np.ptp(part.belt)) > 1e-6 * abs(belt):
             return None
         with np.errstate(over="ignore", invalid="ignore"):  # squares of very large positions
-            return fit_mean_cycle(part.time, part.position, belt, np.array(starts), self.noise)
+            return fit_mean_cycle(
+                part.time, part.position, belt, np.array(starts), self.noise, self.step
+            )
 
     def _trend(self, amplitudes: FloatArray) -> Trend | None:
         """Return the change of the amplitude over the window; None without one."""
         mean = float(np.mean(amplitudes))
-        least = max(STEADY_UNDER_NOISE * mean, _QUANTUM * self.noise)
+        least = max(STEADY_UNDER_NOISE * mean, _QUANTUM * self.noise, self.step)
         order = np.linspace(-0.5, 0.5, len(amplitudes))
         change = float(order @ (amplitudes - mean) / (order @ order))
         # Half of the change that is never to be called steady: the estimate has noise, too.
@@ -504,7 +576,7 @@ def _stick_time(time: FloatArray, velocity: FloatArray, belt_speed: float, error
     # A slide that passes the belt and moves on does not stick.
     riding = np.flatnonzero(np.abs(velocity - belt_speed) < margin)
     highest = float(velocity.max())
-    near = belt_speed - margin / 2.0 <= highest <= _PASSING * belt_speed + 2.0 * error
+    near = belt_speed - margin / 2.0 <= highest <= _PASSING_SHARE * belt_speed + 2.0 * error
     if not near or len(riding) == 0:
         return 0.0
     first, last = int(riding[0]), int(riding[-1])

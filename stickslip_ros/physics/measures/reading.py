@@ -10,7 +10,7 @@ from stickslip_ros.physics.model.friction import LAWS
 from stickslip_ros.physics.model.sensor import Sensor
 
 
-class Reading(NamedTuple):
+class SampleAssumptions(NamedTuple):
     """How samples are to be read. Without arguments they are exact."""
 
     stick_speed: float | None = 0.0
@@ -18,9 +18,13 @@ class Reading(NamedTuple):
     on a belt whose speed is not known, see `STICK_SHARE`."""
     noisy: bool | None = False
     """Whether the samples have noise; None if it is to be found from them."""
+    within: float = 0.0
+    """Step of the actuator over the stiffness, m: the range in which it can hold the slide."""
+    varies: bool = False
+    """Whether belt, load, disturbance or reference vary: then nothing is a drift."""
 
-    def checked(self) -> "Reading":
-        """Return the reading. Raises InvalidInputError for a stick speed that is not possible."""
+    def checked(self) -> "SampleAssumptions":
+        """Return these. Raises InvalidInputError for a stick speed that is not possible."""
         speed = self.stick_speed
         if speed is not None and not (isfinite(speed) and speed >= 0.0):
             raise InvalidInputError(
@@ -29,38 +33,30 @@ class Reading(NamedTuple):
         return self
 
 
-EXACT = Reading()
-"""Reading of exact samples."""
+EXACT = SampleAssumptions()
+"""Assumptions for exact samples."""
 
-UNKNOWN = Reading(0.0, None)
-"""Reading of samples of which nothing is known."""
+UNKNOWN = SampleAssumptions(0.0, None)
+"""Assumptions for samples of which nothing is known."""
+
+
+_CHANGING = ("ramp", "sine", "trapezoid", "table", "topic")
+"""Kinds of courses and references that keep changing."""
 
 
 def reading_of(
     plant: Mapping[str, Any], fastest_belt: float = 0.0, *, given: float | None = None
-) -> Reading:
-    """Return how samples of a plant are to be read.
+) -> SampleAssumptions:
+    """Return how samples of a plant are to be read, by its parameters as far as they are known.
 
     Samples of an exact sensor stick at exactly the speed of the belt, those of friction with a
-    memory at `STICK_SHARE` of it. A sensor that errs gives samples with noise.
-
-    Parameters
-    ----------
-    plant : mapping
-        Parameters of the plant by flat name, as far as they are known. Those that no plant can have
-        count as unknown.
-    fastest_belt : float, optional
-        Fastest belt speed, m/s. By default it is not known beforehand.
-    given : float, optional
-        Stick speed that the user gives, m/s: then the samples are read as exact ones.
-
-    Returns
-    -------
-    Reading
-        Stick speed, and whether the samples have noise.
+    memory at `STICK_SHARE` of its fastest speed, m/s. A sensor that errs gives samples with noise.
+    Parameters that no plant can have count as unknown. With a stick speed that is `given`, m/s, the
+    samples are read as exact ones.
     """
+    (noisy, within), changing = _resolution(plant), varies(plant)
     if given is not None:
-        return Reading(given)
+        return SampleAssumptions(given, within=within, varies=changing)
     if not plant:
         return UNKNOWN
     law = LAWS.get(str(plant.get("friction.law")))
@@ -68,17 +64,28 @@ def reading_of(
         stick_speed = 0.0
     else:
         stick_speed = STICK_SHARE * fastest_belt if fastest_belt else None
-    return Reading(stick_speed, _errs(plant))
+    return SampleAssumptions(stick_speed, noisy, within, changing)
 
 
-def _errs(plant: Mapping[str, Any]) -> bool | None:
-    """Return whether the sensor errs; None where its values are not those of a sensor."""
+def varies(parameters: Mapping[str, Any]) -> bool:
+    """Return whether a course or a reference among the parameters of a node keeps changing."""
+    return any(
+        name.endswith(".kind") and str(value) in _CHANGING for name, value in parameters.items()
+    )
+
+
+def _resolution(plant: Mapping[str, Any]) -> tuple[bool | None, float]:
+    """Return whether the sensor errs, and the step of the actuator over the stiffness, m.
+
+    None and 0 where the values are not those of a sensor and an actuator.
+    """
     prefix = "sensor."
     values = {name.removeprefix(prefix): plant[name] for name in plant if name.startswith(prefix)}
     try:
         sensor = Sensor.from_values(values)
         lengths = sensor.position_resolution, sensor.position_noise, sensor.velocity_noise
-        known = all(0.0 <= float(value) < inf for value in lengths)
+        within = float(plant.get("actuator.resolution", 0.0)) / float(plant.get("stiffness") or inf)
+        known = all(0.0 <= float(value) < inf for value in (*lengths, within))
     except (ArithmeticError, TypeError, ValueError):
-        return None
-    return not sensor.exact if known else None
+        return None, 0.0
+    return (not sensor.exact, within) if known else (None, 0.0)

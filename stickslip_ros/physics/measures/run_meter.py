@@ -1,15 +1,163 @@
-"""The measures of a run: those of its samples and those of its control forces."""
+"""The measures of a run: those of its samples, and those of its control forces and which acted."""
 
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import islice
+from math import isfinite
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from stickslip_ros.physics.measures.control_forces import ForceMeter, ForceSettler, SettledForces
-from stickslip_ros.physics.measures.observer import RunObserver
-from stickslip_ros.physics.measures.reading import EXACT, Reading
-from stickslip_ros.physics.measures.sample_meter import SampleMeter
+from stickslip_ros.arrays import BoolArray, FloatArray, IntArray
+from stickslip_ros.physics.measures.cycle_fit import MeanCycle
+from stickslip_ros.physics.measures.reading import EXACT, SampleAssumptions
+from stickslip_ros.physics.measures.sample_meter import MotionObserver, SampleMeter
 from stickslip_ros.samples import ForceColumns
 from stickslip_ros.stamps import NANOSECONDS
+
+HELD_FORCES = 20_000
+"""Number of later forces during which a force may still be reported as dropped."""
+
+
+class ForceMeter:
+    """Measures the control force, fed in blocks of columns of any length.
+
+    The result does not depend on how the run is divided into blocks. The meter keeps only past
+    magnitudes that are larger than all later ones: no other can be the largest up to the end.
+    """
+
+    def __init__(self) -> None:
+        self._peak = 0.0
+        self._first: int | None = None
+        self._stamp = np.empty(0, dtype=np.int64)
+        self._magnitude = np.empty(0)
+
+    def feed(self, forces: ForceColumns) -> None:
+        """Add the forces that follow.
+
+        Forces that are not finite are skipped. Where time goes back, the last tenth is
+        that of the time from there.
+        """
+        finite = np.isfinite(forces.force)
+        stamp = np.concatenate([self._stamp, forces.stamp[finite]])
+        magnitude = np.concatenate([self._magnitude, np.abs(forces.force[finite])])
+        if len(stamp) == 0:
+            return
+        self._peak = max(self._peak, float(magnitude.max()))
+        restarts = np.flatnonzero(np.diff(stamp) < 0) + 1
+        if len(restarts) > 0:
+            stamp, magnitude = stamp[restarts[-1] :], magnitude[restarts[-1] :]
+        if self._first is None or len(restarts) > 0:
+            self._first = int(stamp[0])
+        largest_later = np.maximum.accumulate(magnitude[:0:-1])[::-1]
+        kept = np.append(magnitude[:-1] > largest_later, True)
+        last = int(stamp[-1])
+        kept &= stamp >= last - (last - self._first) // 10
+        self._stamp, self._magnitude = stamp[kept], magnitude[kept]
+
+    @property
+    def peak_force(self) -> float | None:
+        """Largest magnitude of the force, N; None without forces."""
+        return None if self._first is None else self._peak
+
+    @property
+    def resting_force(self) -> float | None:
+        """Final force, the largest magnitude in the last tenth of the time, N, or None."""
+        return None if self._first is None else float(self._magnitude[0])
+
+
+class SettledForces(NamedTuple):
+    """Published forces, and whether each acted."""
+
+    sent: ForceColumns
+    acted: BoolArray
+
+
+class DroppedForces:
+    """Forces that are reported as dropped, each kept until it is found among the published ones."""
+
+    def __init__(self) -> None:
+        self._number: dict[tuple[int, float], int] = {}
+
+    def add(self, forces: ForceColumns) -> None:
+        """Add forces that were dropped; forces that are not finite never act anyway."""
+        for dropped in zip(forces.stamp.tolist(), forces.force.tolist(), strict=True):
+            if isfinite(dropped[1]):
+                self._number[dropped] = self._number.get(dropped, 0) + 1
+        for oldest in list(islice(self._number, max(0, len(self._number) - HELD_FORCES))):
+            del self._number[oldest]
+
+    def among(self, sent: ForceColumns) -> IntArray:
+        """Return the rows of published forces that were dropped; each drop counts once."""
+        if not self._number:
+            return np.empty(0, np.int64)
+        rows: list[int] = []
+        known = np.isin(sent.stamp, [stamp for stamp, _ in self._number])
+        for row in np.flatnonzero(known).tolist():
+            force = int(sent.stamp[row]), float(sent.force[row])
+            if force in self._number:
+                rows.append(row)
+                self._number[force] -= 1
+                if self._number[force] == 0:
+                    del self._number[force]
+        return np.array(rows, np.int64)
+
+
+class ForceSettler:
+    """Determines which published forces acted, from those that were dropped.
+
+    A force and the report that it was dropped may come in either order, up to 20,000 forces apart.
+    """
+
+    def __init__(self) -> None:
+        self._held = ForceColumns(np.empty(0, np.int64), np.empty(0))
+        self._acted = np.empty(0, np.bool_)
+        """Whether each held force acted, as far as it is known."""
+        self._dropped = DroppedForces()
+
+    def feed(self, sent: ForceColumns, dropped: ForceColumns) -> SettledForces:
+        """Add published forces and dropped ones; return the forces that are settled."""
+        self._held = self._held.followed_by(sent)
+        self._acted = np.concatenate([self._acted, np.isfinite(sent.force)])
+        self._dropped.add(dropped)
+        undecided = ForceColumns(self._held.stamp, np.where(self._acted, self._held.force, np.nan))
+        self._acted[self._dropped.among(undecided)] = False
+        return self._release(max(len(self._held) - HELD_FORCES, 0))
+
+    def finish(self) -> SettledForces:
+        """Return the forces still held: no more reports follow."""
+        return self._release(len(self._held))
+
+    def _release(self, number: int) -> SettledForces:
+        settled = SettledForces(self._held[:number], self._acted[:number])
+        self._held, self._acted = self._held[number:], self._acted[number:]
+        return settled
+
+
+@dataclass(frozen=True)
+class RunAnalysis:
+    """Results of a record beyond its measures."""
+
+    mean_cycle: MeanCycle | None
+    """Mean cycle under noise; None for exact samples, and cycles that are not alike."""
+    slips: Mapping[str, Any] | None
+    """Slips as `SlipMeter.report` has them; None if they were not asked for."""
+
+
+class RunObserver(MotionObserver, Protocol):
+    """Receives a run as it is measured; times in s from the start of the run, SI units."""
+
+    def take_friction(self, time: FloatArray, force: FloatArray) -> None:
+        """Receive the friction force on the slide at the samples that follow; NaN if unknown."""
+        ...
+
+    def take_control(self, time: FloatArray, force: FloatArray, acted: BoolArray) -> None:
+        """Receive the control forces that follow, and whether each acted, as far as it is known."""
+        ...
+
+    def take_conclusions(self, conclusions: RunAnalysis) -> None:
+        """Receive what was concluded, at the end of the run."""
+        ...
 
 
 class RunMeter:
@@ -21,7 +169,7 @@ class RunMeter:
         *,
         dropped_known: bool = False,
         observer: RunObserver | None = None,
-        reading: Reading = EXACT,
+        reading: SampleAssumptions = EXACT,
     ) -> None:
         """Average over the last `window` cycles at most; an `observer` receives motion and forces.
 
@@ -42,6 +190,7 @@ class RunMeter:
     def feed_forces(self, forces: ForceColumns, dropped: ForceColumns) -> SettledForces:
         """Add the forces that follow, published and dropped; return those that are settled."""
         self.force.feed(forces)
+        self.motion.drift.force.feed(forces.stamp / NANOSECONDS, forces.force)
         self.dropped += len(dropped)
         return self._apply(self._settler.feed(forces, dropped))
 
@@ -70,8 +219,16 @@ class RunMeter:
                 "the one before, and the motion is cut there: the plant was restarted, or the "
                 "samples of several plants are mixed"
             )
+        measures, step = motion.measures(quick=quick), motion.drift.resolution
+        if step and measures.amplitude and measures.cycles > 2 and measures.errors is None:
+            notes.append(
+                f"the amplitude is only {measures.amplitude / step:.2g} steps of the encoder: the "
+                "standard errors are not known"
+            )
+        if not motion.drift.judged:
+            notes.append("belt, load, disturbance or reference vary: a drift is not judged")
         return {
-            **motion.measures(quick=quick).as_dict(),
+            **measures.as_dict(),
             "position_noise": motion.position_noise,
             "peak_force": self.force.peak_force,
             "resting_force": self.force.resting_force,

@@ -1,28 +1,61 @@
 """The measures of a motion from its samples."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import inf
+from typing import Protocol
 
 import numpy as np
 
 from stickslip_ros.arrays import BoolArray, FloatArray
-from stickslip_ros.physics.measures.breakpoints import STICK_SHARE, breakpoints_from_samples
+from stickslip_ros.physics.measures.breakpoints import (
+    STICK_SHARE,
+    Breakpoints,
+    breakpoints_from_samples,
+)
 from stickslip_ros.physics.measures.cycle_fit import MeanCycle
 from stickslip_ros.physics.measures.cycle_measures import (
     UNBOUNDED_BELT_SPEEDS,
     Cycle,
     CycleMeter,
     Measures,
+    Regime,
+    with_drift,
+    without_cycles,
 )
+from stickslip_ros.physics.measures.drift import Drift
+from stickslip_ros.physics.measures.noise import FEW_SAMPLES, LEAST_SAMPLES
 from stickslip_ros.physics.measures.noisy_meter import NoisyCycleMeter
-from stickslip_ros.physics.measures.observer import MeasuredMotion, MotionObserver
-from stickslip_ros.physics.measures.reading import EXACT, Reading
+from stickslip_ros.physics.measures.reading import EXACT, SampleAssumptions
 from stickslip_ros.physics.measures.sampling_grid import LONGEST_GAP, SamplingGrid
 from stickslip_ros.samples import SampleColumns
 from stickslip_ros.stamps import NANOSECONDS
 
 _SEVERAL = 4
 """Number of fast samples in one direction that are no impulse of a noisy record."""
+
+
+@dataclass(frozen=True)
+class MeasuredMotion:
+    """Breakpoints that continue a motion, and the cycles measured with them."""
+
+    breakpoints: Breakpoints
+    belt_velocity: FloatArray
+    """Velocity of the belt at each breakpoint, m/s."""
+    cycles: Sequence[Cycle]
+    """Cycles completed by these breakpoints."""
+    cycle_ends: Sequence[float]
+    """Time at which each of these cycles ended, s."""
+    longest_step: float = inf
+    """Longest time between two breakpoints, s, over which the motion between them is known."""
+
+
+class MotionObserver(Protocol):
+    """Receives a motion as it is measured; times in s from the start of the run, SI units."""
+
+    def take_motion(self, motion: MeasuredMotion) -> None:
+        """Receive the motion that follows."""
+        ...
 
 
 class SampleMeter:
@@ -39,7 +72,7 @@ class SampleMeter:
         window: int,
         observer: MotionObserver | None = None,
         *,
-        reading: Reading = EXACT,
+        reading: SampleAssumptions = EXACT,
     ) -> None:
         """Average over the last `window` cycles at most; an `observer` receives the motion.
 
@@ -57,20 +90,24 @@ class SampleMeter:
         self._grid = SamplingGrid()
         self._meter = CycleMeter(window)
         self._noisy_meter = NoisyCycleMeter(window)
+        self.drift = Drift()
+        """Trends of the run; those of the control force are for its user to feed."""
         self._last: SampleColumns | None = None
         self._elapsed = 0
         self._fastest_belt = self._fastest_slip = 0.0
+        self._belt_varies = False
+        self._per_cycle = inf  # samples of the last cycle of exact samples
         # Highest speed above the limit at its sample: a belt that starts to move is slow at first.
         self._unbounded_speed = 0.0
 
     def feed(self, samples: SampleColumns) -> list[Cycle]:
         """Add the samples that follow; return the cycles completed by them.
 
-        Samples that are not valid, see `SampleColumns.believed`, count as lost.
+        Samples that are not valid, see `SampleColumns.is_valid`, count as lost.
         """
-        believed = samples.believed
-        if not believed.all():
-            samples = samples[believed]
+        is_valid = samples.is_valid
+        if not is_valid.all():
+            samples = samples[is_valid]
         self.samples += len(samples)
         if self._last is not None:
             samples = self._last.followed_by(samples)
@@ -89,7 +126,10 @@ class SampleMeter:
                 self._meter.interrupt()
                 self._noisy_meter.interrupt()
                 self._last = None
-            cycles += self._feed_segment(segment, jittered)
+            found = self._feed_segment(segment, jittered)
+            ends = (self._noisy_meter if self.noisy else self._meter).ends
+            self.drift.feed_cycles(ends, found)
+            cycles += found
         self._last = samples[-1:]
         return cycles
 
@@ -106,8 +146,8 @@ class SampleMeter:
     @property
     def noisy(self) -> bool:
         """Whether the samples have noise, as far as it is known."""
-        told = self.reading.noisy
-        return self._noisy_meter.noisy if told is None else told
+        given = self.reading.noisy
+        return self._noisy_meter.noisy if given is None else given
 
     @property
     def position_noise(self) -> float | None:
@@ -133,22 +173,34 @@ class SampleMeter:
         limit = UNBOUNDED_BELT_SPEEDS * self._fastest_belt
         unbounded = self._unbounded_speed > limit
         self._meter.report_run_away(unbounded)
-        if self.noisy and not unbounded:
-            return self._noisy_meter.measures(quick=quick)[0]
-        return self._meter.measures()
+        self._meter.within = self._noisy_meter.within = self.reading.within
+        few = not self.noisy and self._per_cycle < FEW_SAMPLES and self._noisy_meter.line
+        if unbounded or not (self.noisy or few):
+            found = self._meter.measures()
+        elif few and self._per_cycle < LEAST_SAMPLES:
+            found = without_cycles(None, Regime.UNDERSAMPLED)
+        else:
+            found = self._noisy_meter.measures(quick=quick)[0]
+        self.drift.resolution = self._noisy_meter.step
+        self.drift.judged = not (self.reading.varies or self._belt_varies)
+        return with_drift(found, self.drift)
 
     def _feed_segment(self, samples: SampleColumns, jittered: bool) -> list[Cycle]:
         stamp = samples.stamp
         time = (stamp - stamp[0] + float(self._elapsed)) * 1e-9
         self._elapsed += int(stamp[-1] - stamp[0])
-        told, cycles, cycle_ends = self.reading.noisy, list[Cycle](), list[float]()
-        if told is not False:
-            new = slice(0 if self._last is None else 1, None)
-            cycles = self._noisy_meter.feed(
+        given, cycles, cycle_ends = self.reading.noisy, list[Cycle](), list[float]()
+        new = slice(0 if self._last is None else 1, None)
+        self.drift.position.feed(time[new], samples.position[new])
+
+        def feed_noisy() -> list[Cycle]:
+            return self._noisy_meter.feed(
                 time[new], samples.position[new], samples.velocity[new], samples.belt_velocity[new]
             )
-            cycle_ends = self._noisy_meter.ends
-            if told and self._observer is None:
+
+        if given is not False:
+            cycles, cycle_ends = feed_noisy(), self._noisy_meter.ends
+            if given and self._observer is None:
                 return cycles
         with np.errstate(over="ignore", invalid="ignore"):
             breakpoints = breakpoints_from_samples(
@@ -162,6 +214,10 @@ class SampleMeter:
         if self._last is not None:
             breakpoints = breakpoints[1:]  # the first sample was fed with the previous block
         exact = self._meter.feed(breakpoints, float(samples.belt_velocity[-1]), self._fastest_belt)
+        if exact and len(time) > 1:
+            self._per_cycle = exact[-1].period / float(np.median(np.diff(time)))
+        if self._per_cycle < FEW_SAMPLES and given is False:
+            feed_noisy()
         if not self.noisy:
             cycles, cycle_ends = exact, self._meter.ends
         if self._observer is not None:
@@ -189,6 +245,7 @@ class SampleMeter:
 
     def _look_for_unbounded(self, samples: SampleColumns) -> None:
         belt_speed = np.abs(samples.belt_velocity)
+        self._belt_varies |= bool(np.ptp(belt_speed) > 1e-6 * belt_speed[0])
         np.maximum.accumulate(np.maximum(belt_speed, self._fastest_belt), out=belt_speed)
         self._fastest_belt = float(belt_speed[-1])
         speed = np.abs(samples.velocity)

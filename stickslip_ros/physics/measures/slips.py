@@ -10,12 +10,13 @@ import numpy as np
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.physics.measures.drift import fit_line
 
 _MEDIAN = 5
 """Number of samples of the median that suppresses impulses."""
-_STICKING = 2.5
+_STICKING_RATIO = 2.5
 """Time from a slip to the next, in slip times, from which a motion sticks; in a sine it is two."""
-_FEWEST = 8
+_LEAST_SAMPLES = 8
 """Number of samples for the fit of a stick."""
 _PART = 4096
 """Number of samples that are searched at once."""
@@ -43,7 +44,7 @@ class Slip(NamedTuple):
 
 @dataclass(frozen=True)
 class SlipThreshold:
-    """What counts as a slip of a slide that sticks and slips.
+    """Least size of a slip of a slide that sticks and slips.
 
     Parameters
     ----------
@@ -81,11 +82,6 @@ class SlipMeter:
     A slip is a drop of more than a threshold within a time, of medians over five samples. It ends
     at the lowest position before a rise by half the threshold, or before this time without a lower
     one. Its duration is that from a tenth to nine tenths of the drop.
-
-    Parameters
-    ----------
-    threshold : SlipThreshold
-        What counts as a slip.
     """
 
     def __init__(self, threshold: SlipThreshold) -> None:
@@ -104,13 +100,7 @@ class SlipMeter:
         self._span = 0
 
     def feed(self, time: FloatArray, position: FloatArray) -> list[Slip]:
-        """Add the samples that follow; return the slips that they complete.
-
-        Parameters
-        ----------
-        time, position : array, shape (n,)
-            Time, s, and displacement of the slide, m.
-        """
+        """Add the samples that follow, in s and m; return the slips that they complete."""
         found: list[Slip] = []
         for first in range(0, len(time), _PART):
             self._time = np.append(self._time, time[first : first + _PART])
@@ -124,17 +114,9 @@ class SlipMeter:
         return found
 
     def report(self, belt_speed: float) -> dict[str, Any]:
-        """Return distributions over the slips by name, ready for JSON; SI units.
+        """Return `count`, threshold, `regime`, distributions and each slip, for JSON; SI units.
 
-        Parameters
-        ----------
-        belt_speed : float
-            Belt speed, m/s, for the share of the sticks' velocity; 0 if it is not known.
-
-        Returns
-        -------
-        dict
-            `count`, threshold, `regime`, the distributions, and every slip in `each`.
+        The belt speed is for the share of the sticks' velocity; 0 if it is not known.
         """
         slips = list(self._slips)
         columns = {name: [slip[k] for slip in slips] for k, name in enumerate(Slip._fields)}
@@ -148,7 +130,9 @@ class SlipMeter:
         for name in ("stick_time", "drop", "slip_time", "stick_velocity"):
             report[name] = _distribution(np.array(columns[name]))
         if report["stick_time"] is not None:
-            longer = report["stick_time"]["median"] > _STICKING * report["slip_time"]["median"]
+            longer = (
+                report["stick_time"]["median"] > _STICKING_RATIO * report["slip_time"]["median"]
+            )
             report["regime"] = Regime.STICK_SLIP if longer else Regime.PURE_SLIP
         each = {
             name: [value if isfinite(value) else None for value in values]
@@ -164,7 +148,8 @@ class SlipMeter:
         smooth = median_filter(self._position, _MEDIAN, mode="nearest")[: -(_MEDIAN // 2)]
         if self._span == 0:
             step = float(time[_MEDIAN * 2] - time[0]) / (_MEDIAN * 2)
-            self._span = max(round(self.threshold.within / step), 1) if step > 0.0 else 1
+            span = min(self.threshold.within / step, _MOST_SAMPLES) if step > 0.0 else 1
+            self._span = max(round(span), 1)
         span, found = self._span, list[Slip]()
         before = maximum_filter1d(smooth, span + 1, origin=span // 2, mode="nearest")
         while True:
@@ -203,12 +188,12 @@ class SlipMeter:
         end = top + int(np.flatnonzero(rows <= smooth[bottom] + tenth)[0])
         first, self._ended, whole, self._whole = self._ended, bottom, self._whole, True
         stick_time = slope = error = nan
-        if whole and start - first >= _FEWEST:
+        if whole and start - first >= _LEAST_SAMPLES:
             stick_time = float(self._time[start] - self._time[first])
             # Before a slip the contact creeps.
             half = slice(first, (first + start) // 2 + 1)
             time = self._time[half]
-            slope, error = _line(time - float(time.mean()), smooth[half])
+            slope, error = fit_line(time - float(time.mean()), smooth[half])
         return [
             Slip(
                 time=float(self._time[start]),
@@ -219,22 +204,6 @@ class SlipMeter:
                 stick_velocity_error=error,
             )
         ]
-
-
-def _line(time: FloatArray, position: FloatArray) -> tuple[float, float]:
-    """Return the slope of a line and its standard error; the mean of the times is zero.
-
-    Residuals that follow each other count as one, by their first autocorrelation.
-    """
-    square = float(time @ time)
-    value, slope = float(position.mean()), float(time @ position) / square
-    residual = position - value - slope * time
-    variance = float(residual @ residual) / max(len(time) - 2, 1)
-    if variance == 0.0:
-        return slope, 0.0
-    follow = float(residual[1:] @ residual[:-1]) / float(residual @ residual)
-    share = min(max(follow, 0.0), 0.999)
-    return slope, (variance / square * (1.0 + share) / (1.0 - share)) ** 0.5
 
 
 def _distribution(values: FloatArray) -> dict[str, float] | None:

@@ -11,7 +11,7 @@ _STEPS = 24
 """Steps of the integration on each side of the stick."""
 _MARGIN = 0.5
 """Part of the reach of the data by which the integration reaches further: edges move."""
-_FAR = 10.0
+_LARGEST_SPEED = 10.0
 """Largest velocity of the fit, in belt speeds."""
 _CURVATURE = 1.0
 """Prior standard deviation of the friction's second and third power, in natural units."""
@@ -68,27 +68,11 @@ def fit_stick(
     *,
     sticks: bool = True,
 ) -> StickFit:
-    """Fit the motion around a stick at time 0.
+    """Fit the motion around a stick at time 0, with a drop of the friction where the data show one.
 
-    Parameters
-    ----------
-    time : array, shape (n,)
-        Time of the samples around the stick, s.
-    relative : array, shape (n,)
-        Displacement relative to the belt, x - v_b t, m.
-    belt_speed : float
-        Belt speed, m/s, above 0.
-    frequency : float
-        Angular frequency of the cycle, rad/s: the scale of the fit.
-    stick_time : float
-        First guess of the duration of the stick, s.
-    sticks : bool
-        Whether the motion sticks; otherwise the highest speed is below that of the belt.
-
-    Returns
-    -------
-    StickFit
-        The best fit, with a drop of the friction at departure where the data show one.
+    `relative` is the displacement relative to the belt, x - v_b t, m, at each `time`, s. The scale
+    of the fit is the angular `frequency` of the cycle, rad/s, and `stick_time`, s, the first guess.
+    Without `sticks` the highest speed is below that of the belt, which is above 0 m/s.
     """
     reach = float(np.abs(time).max()) - stick_time / 2.0
     problem = _Problem(
@@ -222,7 +206,7 @@ class _Problem:
 
         def rate(position: FloatArray, velocity: FloatArray, time: FloatArray) -> FloatArray:
             # Far from the solution the motion diverges within reach.
-            velocity = np.maximum(np.minimum(velocity, _FAR), -_FAR)
+            velocity = np.maximum(np.minimum(velocity, _LARGEST_SPEED), -_LARGEST_SPEED)
             friction = velocity * (slope + velocity * (second + velocity * third))
             return friction + limit - stiffness * (position + time - early)
 

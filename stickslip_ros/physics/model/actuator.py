@@ -13,7 +13,7 @@ _FINEST = 2.0**53
 
 @dataclass(frozen=True)
 class Actuator:
-    """What exerts the control force on the slide. By default it exerts exactly what is commanded.
+    """The actuator of the control force. By default it exerts exactly the force that is commanded.
 
     A command passes `limiter` when it arrives: it is limited, rounded to the resolution, half to
     even, and limited again. This held force F acts through a lag of first order, tau F_a' = F - F_a
@@ -48,7 +48,7 @@ class Actuator:
 
     @property
     def limiter(self) -> Callable[[float], float] | None:
-        """What turns a command (N) into the force (N) that is held; None if they are equal."""
+        """Function from a command (N) to the force (N) that is held; None if they are equal."""
         limit, resolution = self.limit, self.resolution
         if limit == inf and not resolution:
             return None

@@ -1,8 +1,8 @@
-"""The constants of a part of a drive: unit, bounds, default and meaning, in its dataclass."""
+"""The constants of a part of a drive: their description, their units, and symbols for them."""
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from enum import StrEnum
 from functools import cache
 from math import inf
@@ -82,8 +82,9 @@ def constant(
     meaning : str
         Meaning, as a sentence; shown in help texts and in the documentation.
     unit : str, optional
-        Unit of m, s, N, kg, Hz and rad, such as "N s/m"; the scaling derives from it. In a course
-        `value` is the unit of what the course gives. By default the constant is a pure number.
+        Unit of m, s, N, kg, Hz and rad, such as "N s/m" or "N/(m s)"; the scaling derives from it.
+        In a course `value` is the unit of what the course gives. By default the constant is a pure
+        number.
     at_least : float, optional
         Smallest allowed value.
     positive : bool, optional
@@ -193,10 +194,91 @@ def unit_powers(unit: str | None) -> tuple[int, int, int, int]:
 
 def _factors(unit: str) -> Iterator[tuple[int, str, int]]:
     """Yield sign, name and power of each factor; everything after a slash is divided by."""
-    numerator, *denominators = unit.split("/")
+    numerator, *denominators = re.sub(r"/\(([^()/]+)\)", r"/\1", unit).split("/")
     for sign, part in ((1, numerator), *((-1, each) for each in denominators)):
         for factor in part.split():
             name, _, power = factor.partition("^")
             if not re.fullmatch(r"\d*", power):
                 raise ValueError(f"unit {unit!r}: the power of {name} must be a whole number")
             yield sign, name, int(power or 1)
+
+
+def numbers(part: Any, prefix: str) -> dict[str, float]:
+    """Return the constants of a part by name; those of a table or of a part of it one by one."""
+    if not _fields(type(part)):
+        return {}
+    return {
+        name: number
+        for field, value in _values(part).items()
+        for name, number in _items(f"{prefix}.{field}", value).items()
+    }
+
+
+def with_symbols(part: _Part, prefix: str, symbols: Mapping[str, Any]) -> _Part:
+    """Return a part with the expressions of these names for its constants, see `numbers`."""
+    changes: dict[str, Any] = {}
+    for name, value in _values(part).items():
+        own = f"{prefix}.{name}"
+        if is_dataclass(value):
+            changes[name] = with_symbols(value, own, symbols)
+            continue
+        found = [symbols[each] for each in _items(own, value)]
+        changes[name] = tuple(found) if isinstance(value, tuple) else found[0]
+    return replace(part, **changes)  # type: ignore[type-var]
+
+
+def structure(part: Any) -> Any:
+    """Return what of a part, apart from the numbers in it, makes its equations; hashable."""
+    if not is_dataclass(part):
+        return part
+    kind = type(part)
+    if not _fields(kind):
+        return kind
+    found: list[Any] = [kind]
+    for name, constant in _fields(kind):
+        value = getattr(part, name)
+        if constant is not None and (constant.whole or constant.simplifies):
+            found.append(value if constant.stays(value) else None)
+        elif isinstance(value, tuple):
+            found.append(len(value) if constant is not None else None)
+        elif not isinstance(value, int | float):
+            found.append(structure(value))
+    return tuple(found)
+
+
+def _values(part: Any) -> dict[str, Any]:
+    """Return the fields of a part that its equations have as symbols, by name.
+
+    These are numbers, tuples of them, and parts with such fields. Tuples without a description are
+    data from which switches are made.
+    """
+    found: dict[str, Any] = {}
+    for name, constant in _fields(type(part)):
+        value = getattr(part, name)
+        if isinstance(value, int | float):
+            plain = constant is None or not (constant.whole or constant.simplifies)
+            if plain or constant is None or not constant.stays(value):
+                found[name] = value
+        elif isinstance(value, tuple):
+            if constant is not None:
+                found[name] = value
+        elif is_dataclass(value):
+            found[name] = value
+    return found
+
+
+@cache
+def _fields(kind: type) -> tuple[tuple[str, Constant | None], ...]:
+    """Return the names of the fields of a class, each with its description if it has one."""
+    constants = constants_of(kind)
+    return tuple((each.name, constants.get(each.name)) for each in fields(kind))
+
+
+def _items(name: str, value: Any) -> dict[str, float]:
+    """Return a number, or those of a tuple or of a part, by name."""
+    if is_dataclass(value):
+        return numbers(value, name)
+    if not isinstance(value, tuple):
+        return {name: float(value)}
+    items: tuple[float, ...] = value
+    return {f"{name}[{number}]": float(each) for number, each in enumerate(items)}

@@ -8,6 +8,7 @@ from math import inf
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from typing_extensions import override
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,7 @@ class Course(ABC):
     A course is a frozen dataclass of its constants, each described by `constant`; the unit of what
     it gives is called "value" there. Its equations accept floats, complex numbers and heyoka
     expressions. A course with corners has `switches`, values that are constant between two corners,
-    and says in `corner` when the next one comes.
+    and says in `next_switch_time` when the next one comes.
 
     Examples
     --------
@@ -154,7 +155,7 @@ class Course(ABC):
         """
         return ()
 
-    def corner(self, switches: Sequence[float]) -> float:
+    def next_switch_time(self, switches: Sequence[float]) -> float:
         """Return the time of the next corner, where `switches_at` gives the next mode.
 
         Parameters
@@ -174,48 +175,22 @@ class Course(ABC):
 class NoCourse(Course):
     """Zero at any time: what follows it is constant."""
 
+    @override
     def value(self, time: Any, switches: Sequence[Any]) -> Any:
-        """Return 0; see `Course.value`.
-
-        Parameters
-        ----------
-        time : float, complex or expression
-            Time from the start of the motion, s.
-        switches : sequence of float or expression
-            Values of `switches`; none.
-
-        Returns
-        -------
-        float
-            0.
-        """
         return 0.0
 
     @cached_property
+    @override
     def bounds(self) -> tuple[float, float]:
-        """Zero and zero."""
         return 0.0, 0.0
 
     @cached_property
+    @override
     def steepest(self) -> float:
-        """Zero."""
         return 0.0
 
+    @override
     def integral(self, start: float, end: float) -> float:
-        """Return 0; see `Course.integral`.
-
-        Parameters
-        ----------
-        start : float
-            Start of the interval, s.
-        end : float
-            End of the interval, s.
-
-        Returns
-        -------
-        float
-            0.
-        """
         return 0.0
 
 

@@ -11,6 +11,8 @@ from math import cos, inf, isfinite, pi
 from math import sin as float_sin
 from typing import Any, ClassVar, NamedTuple, Self
 
+from typing_extensions import override
+
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.course import Course, NoCourse
 from stickslip_ros.physics.model.functions import sin
@@ -90,67 +92,20 @@ class PiecewiseCourse(Course):
         """The equations that all courses of straight lines share; see `Course.equations`."""
         return _LINES
 
+    @override
     def value(self, time: Any, switches: Sequence[Any]) -> Any:
-        """Return the value; see `Course.value`.
-
-        Parameters
-        ----------
-        time : float, complex or expression
-            Time from the start of the motion, s.
-        switches : sequence of float or expression
-            Piece.
-
-        Returns
-        -------
-        float, complex or expression
-            Value.
-        """
         return self.equations.value(time, switches)
 
+    @override
     def switches_at(self, time: float) -> Sequence[float]:
-        """Return the piece at a time; see `Course.switches_at`.
-
-        Parameters
-        ----------
-        time : float
-            Time from the start of the motion, s.
-
-        Returns
-        -------
-        sequence of float
-            Piece.
-        """
         return self._pieces[bisect_right(self._ends, time)]
 
-    def corner(self, switches: Sequence[float]) -> float:
-        """Return the end of a piece; see `Course.corner`.
-
-        Parameters
-        ----------
-        switches : sequence of float
-            Piece.
-
-        Returns
-        -------
-        float
-            Time, s.
-        """
+    @override
+    def next_switch_time(self, switches: Sequence[float]) -> float:
         return switches[-1]
 
     def rates(self, time: float) -> tuple[float, float]:
-        """Return first and second derivative by time.
-
-        Parameters
-        ----------
-        time : float
-            Time from the start of the motion, s.
-
-        Returns
-        -------
-        tuple of float
-            Derivatives, per second and per second squared; at a corner those after it. A jump has
-            none.
-        """
+        """Return first and second derivative, at a corner those after it; a jump has none."""
         origin, _, slope, swing, rate, _ = self.switches_at(time)
         if not swing:
             return slope, 0.0
@@ -158,20 +113,7 @@ class PiecewiseCourse(Course):
         return slope + swing * rate * cos(turn), -swing * rate * rate * float_sin(turn)
 
     def integral(self, start: float, end: float) -> float:
-        """Return the integral over an interval, exactly.
-
-        Parameters
-        ----------
-        start : float
-            Start of the interval, s.
-        end : float
-            End of the interval, s; not before its start.
-
-        Returns
-        -------
-        float
-            Integral.
-        """
+        """Return the exact integral; see `Course.integral`."""
         total = 0.0
         while True:
             origin, offset, slope, swing, rate, last = self.switches_at(start)
@@ -186,14 +128,14 @@ class PiecewiseCourse(Course):
             start = until
 
     @cached_property
+    @override
     def bounds(self) -> tuple[float, float]:
-        """Lowest and highest value; see `Course.bounds`."""
         values = [value for piece in self._used for value in self._extremes(piece)]
         return min(values), max(values)
 
     @cached_property
+    @override
     def steepest(self) -> float:
-        """Largest absolute rate; see `Course.steepest`."""
         return max(abs(piece.slope) + abs(piece.swing) * piece.rate for piece in self._used)
 
     def _extremes(self, piece: Piece) -> list[float]:
@@ -253,8 +195,8 @@ class Step(PiecewiseCourse):
     start: float = constant(0.0, "Time of the step.", "s", at_least=0.0)
     duration: float = constant(inf, "Time that it lasts.", "s", at_least=0.0)
 
+    @override
     def pieces(self) -> Sequence[Piece]:
-        """Return zero, the amplitude and zero."""
         end = self.start + self.duration
         return [_held(0.0, self.start), _held(self.amplitude, end), _held(0.0, inf)]
 
@@ -265,19 +207,8 @@ class Impulse(Step):
 
     name: ClassVar[str] = "impulse"
 
+    @override
     def sampled(self, period: float) -> Self:
-        """Return the impulse with the duration of one sample.
-
-        Parameters
-        ----------
-        period : float
-            Sample period, s.
-
-        Returns
-        -------
-        Impulse
-            Impulse of this duration.
-        """
         return replace(self, duration=period)
 
 
@@ -298,14 +229,14 @@ class Ramp(PiecewiseCourse):
     start: float = constant(0.0, "Start of the rise.", "s", at_least=0.0)
     duration: float = constant(1.0, "Time of the rise.", "s", positive=True)
 
+    @override
     def pieces(self) -> Sequence[Piece]:
-        """Return zero, the rise and the amplitude."""
         end = self.start + self.duration
         rise = _line(self.start, 0.0, end, self.amplitude)
         return [_held(0.0, self.start), rise, _held(self.amplitude, inf)]
 
+    @override
     def refusal(self) -> str | None:
-        """Return why the duration is refused, or None."""
         return _refused_duration(self)
 
 
@@ -328,12 +259,12 @@ class Sine(PiecewiseCourse):
     frequency: float = constant(1.0, "Frequency.", "Hz", positive=True)
 
     @property
+    @override
     def equations(self) -> Course:
-        """The equations with a sine; see `Course.equations`."""
         return _LINES_AND_SINES
 
+    @override
     def pieces(self) -> Sequence[Piece]:
-        """Return zero, the sine and zero."""
         end = self.start + self.duration
         rate = 2.0 * pi * self.frequency
         wave = Piece(self.start, 0.0, 0.0, self.amplitude, rate, end)
@@ -361,8 +292,8 @@ class Trapezoid(PiecewiseCourse):
         1.0, "One over the time of the rise, and of the fall.", "Hz", positive=True
     )
 
+    @override
     def pieces(self) -> Sequence[Piece]:
-        """Return zero, the rise, the amplitude, the fall and zero."""
         edge, end = 1.0 / self.frequency, self.start + self.duration
         top, fall = self.start + edge, end - edge
         return [
@@ -373,8 +304,8 @@ class Trapezoid(PiecewiseCourse):
             _held(0.0, inf),
         ]
 
+    @override
     def refusal(self) -> str | None:
-        """Return why the duration is refused, or None."""
         refusal = _refused_duration(self)
         if refusal is None and self.duration * self.frequency < 2.0:
             least = 2.0 / self.frequency
@@ -401,25 +332,24 @@ class Table(PiecewiseCourse):
     times: tuple[float, ...] = constant((0.0,), "Times of the points, increasing.", "s")
     values: tuple[float, ...] = constant((0.0,), "Values at these times.", "value")
 
+    @override
     def pieces(self) -> Sequence[Piece]:
-        """Return the first value, the lines and the last value."""
         points = list(zip(self.times, self.values, strict=True))
         lines = [_line(*before, *after) for before, after in pairwise(points)]
         return [_held(self.values[0], self.times[0]), *lines, _held(self.values[-1], inf)]
 
+    @override
     def refusal(self) -> str | None:
-        """Return why the points are refused, or None."""
         if not self.times or len(self.times) != len(self.values):
             return (
                 f"times and values have {len(self.times)} and {len(self.values)} numbers: must "
                 "have as many, at least one"
             )
-        for number in (*self.times, *self.values):
-            if not isfinite(number):
-                return f"times and values = {number}: must be finite"
-        for before, after in pairwise(self.times):
+        if not all(map(isfinite, (*self.times, *self.values))):
+            return "times and values must be finite"
+        for number, (before, after) in enumerate(pairwise(self.times), start=2):
             if after <= before:
-                return f"time = {after} s after {before} s: the times must increase"
+                return f"point {number} of the table: the time must be above the one before"
         if not isfinite(self.steepest):
             return "times and values rise too steeply: the slopes must be finite"
         return None

@@ -82,7 +82,7 @@ class CreepingDrive(DriveSystem):
                 Guard(1.0 - constants["creep.limit"] / reached, type(self).slow_down),
                 Guard(1.0 - constants["creep.least"] / reached, type(self).pass_belt),
             )
-            return Flow(flow.rates, (*flow.guards, *slow), flow.marks, flow.pace)
+            return Flow(flow.rates, (*flow.guards, *slow), flow.marks, flow.step_limiters)
         return self._creep.flow
 
     @cached_property
@@ -145,7 +145,7 @@ class CreepingDrive(DriveSystem):
         instant.state[SPEED] = self.belt_speed(mode, instant.time)
         return self._slip(mode, -mode.switches[0], instant)
 
-    def separate(self, mode: Mode, instant: Instant) -> None:
+    def nudge_off_guard(self, mode: Mode, instant: Instant) -> None:
         """Move a slide that slips off the speed of the belt."""
         if mode.flow != SLIP:
             return
@@ -170,9 +170,9 @@ class CreepingDrive(DriveSystem):
         """Slip in the other direction, or creep."""
         return self._slowed(super().reach_belt(mode, instant), instant)
 
-    def turn(self, mode: Mode, instant: Instant) -> Mode:
+    def switch_inputs(self, mode: Mode, instant: Instant) -> Mode:
         """Return the mode after the corners and steps of the courses up to an instant."""
-        return self._slowed(super().turn(mode, instant), instant)
+        return self._slowed(super().switch_inputs(mode, instant), instant)
 
     def settled(self, mode: Mode | None, instant: Instant) -> Mode:
         """Return creep of a slow slide, or slip; see the class."""

@@ -11,6 +11,7 @@ import heyoka as hy
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model import equations
+from stickslip_ros.physics.model.constants import numbers, structure, with_symbols
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.course import Course, NoCourse
 from stickslip_ros.physics.model.drive import Drive
@@ -24,7 +25,6 @@ from stickslip_ros.physics.model.hybrid import (
     structure_number,
     with_switches,
 )
-from stickslip_ros.physics.model.symbols import numbers, structure, with_symbols
 
 POSITION, SPEED, MEMORY = 0, 1, 2
 """Indices of X and Y in a state, and of the first state of the law's memory."""
@@ -81,7 +81,7 @@ class _SymbolicDrive(NamedTuple):
 
 @dataclass(frozen=True)
 class _Expressions:
-    """What the flows of a drive consist of, as expressions."""
+    """The parts of the flows of a drive, as expressions."""
 
     drive: Drive
     switches: _Parts
@@ -112,14 +112,9 @@ class DriveSystem(HybridSystem):
     Otherwise it passes that speed or slips the other way. In stick it moves with the belt until the
     reaction leaves these limits.
 
-    Parameters
-    ----------
-    drive : Drive
-        Drive in SI units.
-    control : ContinuousControl, optional
-        Continuous controller in SI units, eq. 19; it acts without the actuator. By default the
-        force is the input `force`. An actuator with states receives that input, and the input
-        `disturbance` is added to its force.
+    Drive and control are in SI units. Continuous control, eq. 19, acts without the actuator;
+    without it the force is the input `force`. An actuator with states receives that input, and the
+    input `disturbance` is added to its force.
     """
 
     def __init__(self, drive: Drive, control: ContinuousControl | None = None) -> None:
@@ -167,7 +162,7 @@ class DriveSystem(HybridSystem):
             )
         )
         self._steady = isinstance(self.drive.belt, NoCourse)
-        self._paced = law.characteristic_speed != inf and not law.sticks
+        self._limits_by_series = law.characteristic_speed != inf and not law.sticks
         self._frequency, self._stiffness = drive.angular_frequency, self.drive.stiffness
         self.constants = {
             "damping": self.drive.damping,
@@ -182,8 +177,8 @@ class DriveSystem(HybridSystem):
             **({} if law.sticks else {"stick_speed": 0.0}),
             **(
                 {}
-                if not self._paced
-                else {"pace": 1.0 / (_CHANGE_IN_A_STEP * law.characteristic_speed)}
+                if not self._limits_by_series
+                else {"step_limiter": 1.0 / (_CHANGE_IN_A_STEP * law.characteristic_speed)}
             ),
         }
         self._friction = law.friction
@@ -246,17 +241,17 @@ class DriveSystem(HybridSystem):
                 *self._guards_of_parts(relative_speed),
             ),
             marks=self._marks_of_slip(y, acceleration, relative_speed),
-            pace=self._pace_of(relative_speed),
+            step_limiters=self._step_limiters(relative_speed),
         )
 
-    def _pace_of(self, relative_speed: Any) -> tuple[Any, ...]:
+    def _step_limiters(self, relative_speed: Any) -> tuple[Any, ...]:
         """Return what makes heyoka see an exponential that is negligible, see `longest_step`.
 
         The acceleration of a slide with a memory has no useful bound.
         """
-        if not self._paced:
+        if not self._limits_by_series:
             return ()
-        return (0.2 + 0.1 * hy.cos(relative_speed * self.symbols.constants["pace"]),)
+        return (0.2 + 0.1 * hy.cos(relative_speed * self.symbols.constants["step_limiter"]),)
 
     def _marks_of_slip(self, speed: Any, acceleration: Any, relative_speed: Any) -> tuple[Any, ...]:
         """Return turning points and peaks, and where a slide that never sticks becomes slow.
@@ -323,12 +318,14 @@ class DriveSystem(HybridSystem):
             mode, 1, self.drive.friction.switches_after(margin, mode.switches[0], own)
         )
 
-    def corner(self, mode: Mode) -> float:
+    def next_switch_time(self, mode: Mode) -> float:
         """Return the time of the next corner of the courses."""
         own = self._by_part(mode.switches)
-        return min(self.drive.belt.corner(own.belt), self.drive.load.corner(own.load))
+        return min(
+            self.drive.belt.next_switch_time(own.belt), self.drive.load.next_switch_time(own.load)
+        )
 
-    def turn(self, mode: Mode, instant: Instant) -> Mode:
+    def switch_inputs(self, mode: Mode, instant: Instant) -> Mode:
         """Return the mode after the corners and steps of the courses up to an instant."""
         time, own = instant.time, self._by_part(mode.switches)
         before = self.belt_speed(mode, time)
@@ -355,7 +352,7 @@ class DriveSystem(HybridSystem):
             mode = self._starting(instant)
             self._check_contact(mode, instant)
         elif self.has_parts:
-            if (following := self.past(mode, instant)) is not mode:
+            if (following := self.apply_pending_guards(mode, instant)) is not mode:
                 return following
         elif not sticks and self._steepest < inf:
             # The belt has changed its speed by so much at most.
@@ -370,7 +367,7 @@ class DriveSystem(HybridSystem):
         if relative_speed == 0.0:
             settled = self._resting(mode, instant)
             if settled is mode:
-                self.separate(mode, instant)
+                self.nudge_off_guard(mode, instant)
             return settled
         sign = 1.0 if relative_speed > 0.0 else -1.0
         return mode if mode.switches[0] == sign else self._slip(mode, sign, instant)
@@ -379,7 +376,7 @@ class DriveSystem(HybridSystem):
         if self._may_lift and self.normal_force(mode, instant.time) < -_LIFT_ROUNDING:
             self.lift(mode, instant)
 
-    def past(self, mode: Mode, instant: Instant) -> Mode:
+    def apply_pending_guards(self, mode: Mode, instant: Instant) -> Mode:
         """Return the mode after the margins of the law that rounding has put below zero."""
         for _ in range(_MOST_AT_ONCE):
             enter = self._due(mode, instant)
@@ -408,7 +405,7 @@ class DriveSystem(HybridSystem):
         """Return whether the slide is faster than `UNBOUNDED_SPEED`."""
         return abs(instant.state[SPEED]) > UNBOUNDED_SPEED
 
-    def separate(self, mode: Mode, instant: Instant) -> None:
+    def nudge_off_guard(self, mode: Mode, instant: Instant) -> None:
         """Move a slide that starts to slip, or sticks near its limit, by rounding errors."""
         state, sign = instant.state, mode.switches[0]
         x, y = state[POSITION], state[SPEED]
@@ -606,16 +603,16 @@ class DriveSystem(HybridSystem):
         return forward if accelerates else self._slip(mode, -1.0, instant)
 
 
-def _guards(margins: Sequence[Any], leads: Callable[..., Mode]) -> list[Guard]:
+def _guards(margins: Sequence[Any], transition: Callable[..., Mode]) -> list[Guard]:
     return [
-        Guard(margin + _HYSTERESIS, partial(leads, margin=number))
+        Guard(margin + _HYSTERESIS, partial(transition, margin=number))
         for number, margin in enumerate(margins)
     ]
 
 
 def _after(course: Course, switches: Sequence[float], time: float) -> Sequence[float]:
     """Return the switches of a course after its corners up to a time, or within its rounding."""
-    while (corner := course.corner(switches)) <= time * (1.0 + TIME_ROUNDING):
+    while (corner := course.next_switch_time(switches)) <= time * (1.0 + TIME_ROUNDING):
         switches = course.switches_at(corner)
     return switches
 

@@ -7,10 +7,7 @@ its constants. The integrator of the motion and all derivatives are compiled fro
 from collections.abc import Sequence
 from typing import Any
 
-from stickslip_ros.deprecated_names import moved_from
 from stickslip_ros.physics.model.drive import Drive
-
-__getattr__ = moved_from(__name__)
 
 
 def reaction(drive: Drive, position: Any, velocity: Any, force: Any) -> Any:

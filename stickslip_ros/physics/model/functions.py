@@ -1,5 +1,6 @@
-"""Elementary functions of floats, complex numbers, arrays and heyoka expressions alike."""
+"""Elementary functions of numbers, arrays and heyoka expressions alike, and zeros of functions."""
 
+from collections.abc import Callable
 from math import sin as float_sin
 from typing import Any
 
@@ -9,6 +10,8 @@ _SMALLEST_SQUARE = 2.0**-80
 """Square of the smallest base of a power in an expression: the step of an integration that starts
 there is not lost in the rounding of time.
 """
+
+_ROUNDING: Any = 4.0 * np.finfo(float).eps
 
 
 def _function(name: str, x: Any) -> Any:
@@ -48,3 +51,11 @@ def power(base: Any, exponent: Any) -> Any:
     if isinstance(base, int | float | np.ndarray | np.generic):
         return np.maximum(base, 0.0) ** exponent
     return (base * base + _SMALLEST_SQUARE) ** (0.5 * exponent)
+
+
+def zero_between(function: Callable[[float], float], low: float, high: float) -> float:
+    """Return where `function` changes sign; it must have opposite signs at `low` and `high`."""
+    from scipy.optimize import brentq  # importing it takes longer than numpy and heyoka together
+
+    found: Any = brentq(function, low, high, xtol=1e-300, rtol=_ROUNDING, maxiter=1000)
+    return float(found)

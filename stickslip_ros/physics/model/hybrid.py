@@ -40,7 +40,7 @@ class Instant:
     """Time from the start of the motion."""
 
 
-Leads = Callable[[Any, Mode, Instant], Mode | None]
+Transition = Callable[[Any, Mode, Instant], Mode | None]
 """Method of a system: the mode that follows, or None at the end of the motion.
 
 It may set the state. It is not bound to a system, since those of one structure share their flows.
@@ -53,7 +53,7 @@ class Guard:
 
     margin: Any
     """Expression that is above zero in the mode."""
-    leads: Leads
+    transition: Transition
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Flow:
     guards: tuple[Guard, ...]
     marks: tuple[Any, ...] = ()
     """Expressions at whose zeros a recorded motion has breakpoints."""
-    pace: tuple[Any, ...] = ()
+    step_limiters: tuple[Any, ...] = ()
     """Expressions above zero whose series the steps of the integration resolve, too."""
     slaved: Mapping[int, Any] = field(default_factory=dict[int, Any])
     """Expressions of states, by index, that follow from the others; `HybridSystem.slave` sets them.
@@ -74,9 +74,9 @@ class Flow:
     """
 
     @cached_property
-    def leads(self) -> tuple[Leads, ...]:
+    def transitions(self) -> tuple[Transition, ...]:
         """Where each guard leads."""
-        return tuple(guard.leads for guard in self.guards)
+        return tuple(guard.transition for guard in self.guards)
 
 
 class Symbols(NamedTuple):
@@ -133,7 +133,7 @@ class HybridSystem(ABC):
         """Return whether a motion that starts here counts as unbounded."""
         return False
 
-    def separate(self, mode: Mode, instant: Instant) -> None:  # noqa: B027 - none by default
+    def nudge_off_guard(self, mode: Mode, instant: Instant) -> None:  # noqa: B027 - none by default
         """Move the state, by rounding errors, off a guard of a mode that starts on it."""
 
     def has_closed_form(self, mode: Mode) -> bool:
@@ -146,18 +146,18 @@ class HybridSystem(ABC):
         """Advance the state for `duration` or up to a guard; return the guard and the time."""
         raise NotImplementedError
 
-    def corner(self, mode: Mode) -> float:
+    def next_switch_time(self, mode: Mode) -> float:
         """Return the time at which a mode ends whatever the state; infinite by default."""
         return inf
 
-    def turn(self, mode: Mode, instant: Instant) -> Mode:
+    def switch_inputs(self, mode: Mode, instant: Instant) -> Mode:
         """Return the mode after the corners that an instant has reached."""
         return mode
 
     has_parts = False
-    """Whether several margins may fall to zero at one instant, see `past`."""
+    """Whether several margins may fall to zero at one instant, see `apply_pending_guards`."""
 
-    def past(self, mode: Mode, instant: Instant) -> Mode:
+    def apply_pending_guards(self, mode: Mode, instant: Instant) -> Mode:
         """Return the mode after all margins that are below zero at an instant.
 
         heyoka finds the first guard of several at one instant; rounding may put the others behind.

@@ -8,7 +8,6 @@ from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.course import NoCourse
 from stickslip_ros.physics.model.creeping_drive import CreepingDrive
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_in_units import DriveInUnits, FreeDriveSystem
 from stickslip_ros.physics.model.drive_system import (
     POSITION,
     SLIP,
@@ -17,6 +16,7 @@ from stickslip_ros.physics.model.drive_system import (
     DriveSystem,
 )
 from stickslip_ros.physics.model.hybrid import Instant, Mode
+from stickslip_ros.physics.model.scaled_drive import FreeDriveSystem, ScaledDrive
 
 _STUCK, _FORWARD, _BACKWARD = Mode(STICK, (0.0,)), Mode(SLIP, (1.0,)), Mode(SLIP, (-1.0,))
 """All modes of such a drive."""
@@ -76,7 +76,7 @@ class PlainDriveSystem(DriveSystem):
         if held < -self.forward_limit:
             return _FORWARD
         if mode is _STUCK and self.control is not None:
-            self.separate(_STUCK, instant)
+            self.nudge_off_guard(_STUCK, instant)
         return _STUCK
 
     def reach_belt(self, mode: Mode, instant: Instant) -> Mode:
@@ -100,7 +100,7 @@ class PlainDriveSystem(DriveSystem):
         super().overflow(mode, instant)
         return _FORWARD if instant.state[SPEED] > 0.0 else _BACKWARD
 
-    def separate(self, mode: Mode, instant: Instant) -> None:
+    def nudge_off_guard(self, mode: Mode, instant: Instant) -> None:
         """Move a slide that starts to slip, or sticks near its limit, by rounding errors."""
         state, sign = instant.state, mode.switches[0]
         y = state[SPEED]
@@ -144,21 +144,8 @@ class PlainDriveSystem(DriveSystem):
 
 
 def drive_system(drive: Drive, control: ContinuousControl | None = None) -> DriveSystem:
-    """Return the system of a drive with a held force or with continuous control.
-
-    Parameters
-    ----------
-    drive : Drive
-        Drive in SI units.
-    control : ContinuousControl, optional
-        Continuous controller in SI units, eq. 19. By default the force is the input `force`.
-
-    Returns
-    -------
-    DriveSystem
-        System, dimensionless.
-    """
-    if isinstance(drive, DriveInUnits):
+    """Return the dimensionless system of a drive and its continuous control, both in SI units."""
+    if isinstance(drive, ScaledDrive):
         return FreeDriveSystem(drive, control)
     law, courses = drive.friction, (drive.belt, drive.load)
     constant = all(isinstance(course, NoCourse) for course in courses)

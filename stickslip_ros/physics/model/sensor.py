@@ -28,7 +28,7 @@ _FINEST = 2.0**53
 
 
 class MeasuredVelocity(StrEnum):
-    """What a sensor tells as the velocity."""
+    """Source of the measured velocity."""
 
     EXACT = "exact"
     DIFFERENCE = "difference"
@@ -36,7 +36,7 @@ class MeasuredVelocity(StrEnum):
 
 @dataclass(frozen=True)
 class Sensor:
-    """What measures the slide: an encoder, and what gives the velocity. By default it is exact.
+    """The sensor of the slide: an encoder, and the source of the velocity. By default it is exact.
 
     The measured position is the true one with noise, rounded to the resolution, half to even. The
     velocity is exact, with noise if asked, or the difference of measured positions over n samples,
@@ -136,7 +136,7 @@ class Sensor:
         of_velocity = _Noise(self.velocity_noise, self.seed, 1) if self.velocity_noise else None
         positions = deque[float](maxlen=self.spans + 1) if self.spans else None
 
-        # Without calls or objects that could be avoided: it is a part of each tick.
+        # Without calls or objects that could be avoided: it is a part of each sample.
         def measure(number: int, position: float, velocity: float) -> tuple[float, float]:
             if of_position is not None:
                 position += next(of_position.upcoming or of_position.start(number))

@@ -5,8 +5,8 @@ from math import inf
 
 import heyoka as hy
 
-from stickslip_ros.physics.model.hybrid import HybridSystem, Instant, Leads, Mode
-from stickslip_ros.physics.motion.compiled_flow import CompiledFlow, Detail, FlowLoans
+from stickslip_ros.physics.model.hybrid import HybridSystem, Instant, Mode, Transition
+from stickslip_ros.physics.motion.compiled_flow import CompiledFlow, Detail, IntegratorPool
 
 STEPS_PER_UNIT = 10_000
 """Integration steps that a motion may take for each unit of time, in the long run."""
@@ -27,7 +27,7 @@ _STEP_LIMIT = hy.taylor_outcome.step_limit.value
 _NOT_FINITE = hy.taylor_outcome.err_nf_state.value
 
 
-_Prepared = tuple[CompiledFlow | None, tuple[Leads, ...]]
+_Prepared = tuple[CompiledFlow | None, tuple[Transition, ...]]
 """Integrator with the constants of the system, None with a closed form; where its guards lead."""
 
 
@@ -51,7 +51,7 @@ class HybridMotion:
         """Whether the motion is unbounded; then it does not advance any further."""
         self._steps_left = _SPARE_STEPS
         self._detail, self._watched = detail, detail is not Detail.STATES
-        self._loans = FlowLoans()
+        self._integrators = IntegratorPool()
         self._flow: CompiledFlow | None = None
         self._instant = Instant(memoryview(array("d")), [0.0] * len(system.inputs))
         self._use(system)
@@ -60,7 +60,7 @@ class HybridMotion:
     def _use(self, system: HybridSystem) -> None:
         """Continue with a system that has the same states; its mode is found by `_set_state`."""
         self._system = system
-        self._clocked, self._corner = not system.autonomous, inf
+        self._clocked, self._switch_time = not system.autonomous, inf
         self._constants = array("d", system.constants.values())
         self._prepared_by_detail: dict[Detail, dict[str, _Prepared]] = {}
         self._prepared = self._prepared_by_detail.setdefault(self._detail, {})
@@ -92,14 +92,14 @@ class HybridMotion:
         """Continue in a mode."""
         self._mode = mode
         if self._clocked:
-            self._corner = self._system.corner(mode)
+            self._switch_time = self._system.next_switch_time(mode)
         prepared = self._prepared.get(mode.flow) or self._prepare(mode)
-        self._flow, self._leads = prepared
+        self._flow, self._transitions = prepared
         flow = prepared[0]
         if flow is None:
             return
         instant, parameters = self._instant, flow.parameters
-        self._system.separate(mode, instant)
+        self._system.nudge_off_guard(mode, instant)
         for number, index in flow.inputs:
             parameters[index] = instant.inputs[number]
         if mode is not flow.mode:
@@ -115,9 +115,9 @@ class HybridMotion:
         """Load the constants into the integrator of a mode's flow, unless it has a closed form."""
         name, system, flow = mode.flow, self._system, None
         if self._detail.integrates_derivatives or not system.has_closed_form(mode):
-            flow = self._loans.flow(system, name, self._detail)
+            flow = self._integrators.flow(system, name, self._detail)
             flow.load(self._constants)
-        prepared = self._prepared[name] = flow, system.shared_flow(name).leads
+        prepared = self._prepared[name] = flow, system.shared_flow(name).transitions
         return prepared
 
     def _advance(self, duration: float) -> None:
@@ -135,7 +135,7 @@ class HybridMotion:
         limits_steps, clocked, has_parts = system.limits_steps, self._clocked, system.has_parts
         slaves = system.slaves
         while now < duration:
-            end, corner = duration, self._corner - epoch
+            end, corner = duration, self._switch_time - epoch
             if corner < end:
                 end = corner
             if watched:
@@ -176,8 +176,8 @@ class HybridMotion:
             if guard is None:
                 following = mode
                 if now >= corner:
-                    instant.time = self._corner
-                    following = system.turn(mode, instant)
+                    instant.time = self._switch_time
+                    following = system.switch_inputs(mode, instant)
                 if watched:
                     self._pass(mode, None, following, now)
                 if following is not mode:
@@ -188,9 +188,11 @@ class HybridMotion:
                 instant.time = epoch + now
             if watched:
                 self._reach_guard()
-            following = None if guard == _DIVERGED else self._leads[guard](system, mode, instant)
+            following = (
+                None if guard == _DIVERGED else self._transitions[guard](system, mode, instant)
+            )
             if has_parts and following is not None:
-                following = system.past(following, instant)
+                following = system.apply_pending_guards(following, instant)
             if watched:
                 self._pass(mode, guard, following, now)
             if following is None:

@@ -294,8 +294,8 @@ class Motion(HybridMotion):
         self._time = time = before + duration
         self._lost = (time - before) - duration
         self._instant.time = time = (time - self._origin) * frequency
-        if time + TIME_ROUNDING * time >= self._corner:
-            self._enter(self._system.turn(self._mode, self._instant))
+        if time + TIME_ROUNDING * time >= self._switch_time:
+            self._enter(self._system.switch_inputs(self._mode, self._instant))
 
     def _set_clock(self) -> None:
         """Set the time of the courses: sums of the scaled durations would drift."""

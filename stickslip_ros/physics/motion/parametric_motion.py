@@ -8,9 +8,9 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_in_units import in_units_of
 from stickslip_ros.physics.model.drive_system import POSITION, SPEED, STICK
 from stickslip_ros.physics.model.hybrid import HybridSystem, Mode
+from stickslip_ros.physics.model.scaled_drive import in_units_of
 from stickslip_ros.physics.motion.compiled_flow import (
     CompiledFlow,
     Detail,
@@ -25,33 +25,12 @@ _GRAZING = 1e-12
 class ParametricMotion(Motion):
     """Motion with the derivatives of its state by the state at the start and by constants.
 
-    All derivatives are dimensionless, in the units of the drive. heyoka integrates the variational
-    equations along with the motion. At a guard the derivatives jump by the saltation matrix (Leine
-    and Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, ch. 7), which
-    has here a part for guards that depend on the constants. What a law computes from its constants
-    apart from its equations, as the elastic limit of `ElastoPlastic`, is held.
-
-    Parameters
-    ----------
-    drive : Drive
-        Drive in motion, with a spring.
-    position : float
-        Displacement of the slide at the start, m.
-    velocity : float
-        Velocity of the slide at the start, m/s.
-
-    Examples
-    --------
-    A slide that sticks moves with the belt, whatever the stiffness:
-
-    >>> from stickslip_ros.physics.model.drive import Drive
-    >>> from stickslip_ros.physics.model.friction import Coulomb
-    >>> from stickslip_ros.physics.motion.parametric_motion import ParametricMotion
-    >>> drive = Drive(100.0, 0.0, 1e6, 1000.0, 0.04, Coulomb(0.3))
-    >>> motion = ParametricMotion(drive, 0.0, 0.04)
-    >>> motion.advance(0.005)
-    >>> motion.derivatives[0].tolist()[:5]
-    [1.0, 0.0, 0.0, 0.0, 0.0]
+    The drive must have a spring. All derivatives are dimensionless, in the units of the drive.
+    heyoka integrates the variational equations along with the motion. At a guard the derivatives
+    jump by the saltation matrix (Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth
+    Mechanical Systems, 2004, ch. 7), which has here a part for guards that depend on the constants.
+    What a law computes from its constants apart from its equations, as the elastic limit of
+    `ElastoPlastic`, is held.
     """
 
     _first_detail = Detail.SENSITIVITIES

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.measures.breakpoints import STICK_SHARE, Breakpoints
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
@@ -85,8 +84,6 @@ class RecordedMotion(Motion):
             return
         self._set_detail(self._first_detail if recording else Detail.STATES)
         self._append_present()
-
-    take_knots = Renamed("take_breakpoints")
 
     def take_breakpoints(self) -> Breakpoints:
         """Return the breakpoints recorded since the last call, and clear them.

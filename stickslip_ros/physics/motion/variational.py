@@ -13,8 +13,7 @@ from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import MEMORY, SLIP, SPEED
 from stickslip_ros.physics.model.hybrid import Mode
-from stickslip_ros.physics.motion.compiled_flow import Detail
-from stickslip_ros.physics.motion.derivatives import flow_rates, parameter_values
+from stickslip_ros.physics.motion.compiled_flow import Detail, flow_rates, parameter_values
 from stickslip_ros.physics.motion.recorded_motion import RecordedMotion
 
 _GREATEST_EFFORT = 8e6

@@ -1,6 +1,6 @@
 """Equilibria and limit cycles over the belt speed, stable and unstable, joined to branches.
 
-This is the bifurcation diagram of the theory. That of `studies/bifurcation.py` shows the motions
+This is the bifurcation diagram of the theory. That of `studies/sweep.py` shows the motions
 that a simulation settles on, which are stable.
 """
 

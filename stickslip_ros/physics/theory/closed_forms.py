@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import Self
 
-from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Stribeck
 from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SPRING, require
@@ -45,8 +44,6 @@ class CubicLoop:
     """Damping coefficient 2 beta."""
     belt_speed: float
     """Belt speed v0, above zero."""
-
-    of = Renamed("from_drive")
 
     @classmethod
     def from_drive(cls, drive: Drive) -> Self | None:

@@ -11,6 +11,7 @@ from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
+from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.theory.linear import Expansion, expand, hurwitz_determinants, jacobians
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
@@ -19,7 +20,6 @@ from stickslip_ros.physics.theory.requirements import (
     SYMMETRIC,
     require,
 )
-from stickslip_ros.physics.theory.roots import zero_between
 
 _BELT_SPEEDS = np.geomspace(1e-6, 1e3, 4001)
 """Dimensionless belt speeds, half a percent apart, between which sign changes are searched for."""

@@ -19,10 +19,11 @@ from stickslip_ros.physics.measures.cycle_measures import EQUILIBRIUM_SPEED, Cyc
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import POSITION, SPEED, UNBOUNDED_SPEED
+from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.model.hybrid import Mode
 from stickslip_ros.physics.motion.variational import SensitiveMotion, TooStiffError
-from stickslip_ros.physics.theory.averaging import averaged_growth
 from stickslip_ros.physics.theory.cycle_bounds import (
+    averaged_growth,
     follow,
     largest_cycle,
     least_cycle,
@@ -38,12 +39,11 @@ from stickslip_ros.physics.theory.requirements import (
     SYMMETRIC,
     require,
 )
-from stickslip_ros.physics.theory.roots import zero_between
 
 _ROUNDING = 1e-13
 """Share of the displacement below which a difference is rounding."""
 
-_NEAR = 1e-6
+_AGREEMENT = 1e-6
 """Relative tolerance for a turn of a run, or a measured period, to agree with the previous one."""
 
 _CORNER = 1e-6
@@ -262,7 +262,7 @@ def _cycle_ahead(motion: SensitiveMotion, turns: int) -> LimitCycle | None:
         state, duration = found
         if motion.rate[SPEED] < EQUILIBRIUM_SPEED * abs(drive.belt_speed) / drive.speed_scale:
             return None
-        if np.abs(state - before).max() < _NEAR * np.abs(state).max():
+        if np.abs(state - before).max() < _AGREEMENT * np.abs(state).max():
             break
     return _solve(motion, state, duration, motion.mode)
 
@@ -525,7 +525,7 @@ def _cycle(motion: SensitiveMotion, shot: _Shot) -> LimitCycle | None:
     meter = CycleMeter(window=1)
     meter.feed(motion.take_breakpoints(), drive.belt_speed)
     measures = meter.measures()
-    if measures.period is not None and not isclose(measures.period, period, rel_tol=_NEAR):
+    if measures.period is not None and not isclose(measures.period, period, rel_tol=_AGREEMENT):
         return None
     return LimitCycle(
         position=float(start[0]) * drive.length_scale,

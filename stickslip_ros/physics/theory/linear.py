@@ -13,14 +13,18 @@ import numpy as np
 import numpy.typing as npt
 
 from stickslip_ros.arrays import FloatArray
+from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR
 from stickslip_ros.physics.model.control import ContinuousControl
 from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.model.drive_system import SLIP
+from stickslip_ros.physics.model.drive_system import MEMORY, SLIP, SPEED, DriveSystem
 from stickslip_ros.physics.model.plain_drive import drive_system
-from stickslip_ros.physics.motion.derivatives import flow_tensors
-from stickslip_ros.physics.theory.equilibrium import equilibria
+from stickslip_ros.physics.motion.compiled_flow import flow_rates, flow_tensors
 from stickslip_ros.physics.theory.requirements import AUTONOMOUS, SPRING, require
+
+_ITERATIONS = 50
+_CONVERGED_STEP = 1e-14
+"""Step, relative to the state or to one, below which Newton's method has converged."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +52,14 @@ class Expansion:
         return np.array(sorted(found, key=lambda value: (-round(value.real, 14), -value.imag)))
 
     @property
-    def stable(self) -> bool:
-        """Whether a small deviation decays, by the criterion of Routh and Hurwitz."""
+    def stable(self) -> bool | None:
+        """Whether a small deviation decays, by the criterion of Routh and Hurwitz.
+
+        None for a neutral equilibrium, where it neither decays nor grows.
+        """
+        values = self.eigenvalues
+        if abs(values.real.max()) <= 1e-14 * np.abs(values).max():  # a growth by rounding
+            return None
         return bool(np.all(hurwitz_determinants(self.jacobian) > 0.0))
 
 
@@ -175,3 +185,34 @@ def _at_equilibrium(
             values[system.index[f"law.{name}"], column] = value
     states = equilibria(system, values)
     return states, flow_tensors(system, SLIP, "belt_speed").at(states, values)
+
+
+def equilibria(system: DriveSystem, parameters: FloatArray) -> FloatArray:
+    """Return the equilibria for m columns of parameter values, shape (n, m), dimensionless.
+
+    By Newton's method from rest at X = 0 with the law's memory of steady slip; for a static law the
+    first step is exact. The values are in the order of `system.index`. Raises RunError if the
+    iteration does not converge.
+    """
+    rates, index, law = flow_rates(system, SLIP), system.index, system.drive.friction
+    order = len(system.states)
+    states = np.zeros((order, parameters.shape[1]))
+    if law.states:
+        speeds, signs = -parameters[index["belt_speed"]], parameters[index["sign"]]
+        memory = [
+            law.memory_at(*each) for each in zip(speeds.tolist(), signs.tolist(), strict=True)
+        ]
+        states[MEMORY : MEMORY + len(law.states)] = np.array(memory).T
+    for _ in range(_ITERATIONS):
+        rate, gradients = rates.at(states, parameters)
+        jacobians = np.moveaxis(gradients[:order], -1, 0)
+        try:
+            step = np.linalg.solve(jacobians, -rate.T[..., np.newaxis])[..., 0].T
+        except np.linalg.LinAlgError:
+            break
+        states += step
+        # X' is zero there. Rounding, which differs between processors, would give it a sign.
+        states[SPEED] = 0.0
+        if np.all(np.abs(step) <= _CONVERGED_STEP * np.maximum(1.0, np.abs(states).max(axis=0))):
+            return states
+    raise RunError(f"the friction law {law.name}: the equilibrium was not found")

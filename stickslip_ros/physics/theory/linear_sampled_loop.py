@@ -14,7 +14,6 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from stickslip_ros.arrays import FloatArray
-from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.loop.sampled_loop import whole_and_rest
 from stickslip_ros.physics.model.constants import scaled
@@ -81,7 +80,7 @@ class LinearSampledLoop:
     The slide of a machine tool, sampled at 1 kHz without delay:
 
     >>> from stickslip_ros.physics.model.drive import Drive
-        >>> from stickslip_ros.physics.model.control import WashoutGains
+    >>> from stickslip_ros.physics.model.control import WashoutGains
     >>> from stickslip_ros.physics.model.friction import Stribeck
     >>> from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
     >>> drive = Drive(mass=100.0, damping=200.0, stiffness=1e6, normal_force=1000.0,
@@ -103,8 +102,6 @@ class LinearSampledLoop:
     """Jacobian of the open loop, dimensionless (see `Expansion.jacobian`); shape (n, n)."""
     difference_samples: int = 0
     """Samples that a difference for the velocity spans; 0 if the velocity is exact."""
-
-    of = Renamed("from_drive")
 
     @classmethod
     def from_drive(

@@ -1,4 +1,4 @@
-"""What a function of the theory needs of a drive; it refuses every other drive by name."""
+"""Requirements of the theory on a drive; a function refuses every other drive by name."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,36 +19,13 @@ class Requirement:
     """Property of a drive that some of the theory needs."""
 
     need: str
-    """What is needed, for a sentence."""
+    """The need, for a sentence."""
     lack: Callable[[Drive], str | None]
     """Returns what a drive has instead, for a sentence; None if it has the property."""
 
 
 def require(function: str, drive: Drive, *requirements: Requirement) -> None:
-    """Refuse a drive that a function of the theory does not cover.
-
-    Parameters
-    ----------
-    function : str
-        Name of what is computed, for the message.
-    drive : Drive
-        Drive to check.
-    *requirements : Requirement
-        Properties that the drive must have.
-
-    Raises
-    ------
-    NotCoveredError
-        If it lacks one of them; the sentence names function and drive.
-
-    Examples
-    --------
-    >>> from stickslip_ros.physics.model.drive import Drive
-    >>> from stickslip_ros.physics.model.friction import Coulomb
-    >>> from stickslip_ros.physics.theory.requirements import AUTONOMOUS, STATIC, require
-    >>> drive = Drive(1.0, 0.02, 1.0, 1.0, 0.4, Coulomb(0.4))
-    >>> require("limit cycles", drive, AUTONOMOUS, STATIC)
-    """
+    """Raise NotCoveredError, which names the function, if a drive lacks one of the requirements."""
     for requirement in requirements:
         lack = requirement.lack(drive)
         if lack is not None:
@@ -72,7 +49,7 @@ def _memory(drive: Drive) -> str | None:
 
 def _kinks(drive: Drive) -> str | None:
     law = drive.friction
-    return f"the friction law {law.name} has no second derivative there" if law.kinked else None
+    return f"the friction law {law.name} has no second derivative there" if law.nonsmooth else None
 
 
 def _asymmetry(drive: Drive) -> str | None:

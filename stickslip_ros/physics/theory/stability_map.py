@@ -10,6 +10,7 @@ from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
 from stickslip_ros.physics.theory.critical_gains import critical_gains
+from stickslip_ros.physics.theory.gain_intervals import nearest_to_zero
 from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
 
 
@@ -55,6 +56,8 @@ class CriticalGainCurves:
     """s, shape (n,)."""
     linear_gains: FloatArray
     """See `LinearSampledLoop.critical_linear_gain`, N s/m; (m, n), NaN if there is none."""
+    other_ends: FloatArray
+    """Other ends of the stable intervals that these gains end, N s/m; (m, n)."""
 
     @classmethod
     def over(
@@ -66,11 +69,13 @@ class CriticalGainCurves:
         sensor: Sensor = EXACT_SENSOR,
     ) -> Self:
         """Return the curves of a drive for this cutoff frequency (rad/s)."""
-        gains = np.full((len(rates), len(force_delays)), np.nan)
+        ends = np.full((2, len(rates), len(force_delays)), np.nan)
         for row, rate in enumerate(rates.tolist()):
             for column, force_delay in enumerate(force_delays.tolist()):
                 loop = LinearSampledLoop.from_drive(drive, rate, force_delay, sensor)
-                critical = loop.critical_linear_gain(corner_frequency) if loop else None
-                if critical is not None:
-                    gains[row, column] = critical
-        return cls(rates, force_delays, gains)
+                intervals = loop.stable_linear_gains(corner_frequency) if loop else []
+                if intervals:
+                    interval = nearest_to_zero(intervals)
+                    order = 1 if interval[0] == interval.critical else -1
+                    ends[:, row, column] = interval[::order]
+        return cls(rates, force_delays, *ends)

@@ -9,9 +9,14 @@ import numpy as np
 
 from stickslip_ros.physics.measures.breakpoints import Breakpoints
 from stickslip_ros.physics.model.drive import Drive
+from stickslip_ros.physics.model.functions import zero_between
 from stickslip_ros.physics.motion import RecordedMotion
-from stickslip_ros.physics.theory.averaging import averaged_growth
-from stickslip_ros.physics.theory.cycle_bounds import follow, least_cycle, release_position
+from stickslip_ros.physics.theory.cycle_bounds import (
+    averaged_growth,
+    follow,
+    least_cycle,
+    release_position,
+)
 from stickslip_ros.physics.theory.requirements import (
     AUTONOMOUS,
     SPRING,
@@ -19,7 +24,6 @@ from stickslip_ros.physics.theory.requirements import (
     SYMMETRIC,
     require,
 )
-from stickslip_ros.physics.theory.roots import zero_between
 
 _AVERAGED = np.geomspace(1e-4, 1e4, 200)
 """Dimensionless belt speeds between which averaging searches for an onset."""

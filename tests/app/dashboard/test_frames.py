@@ -103,12 +103,12 @@ def test_values_are_in_the_units_of_their_axes(
     assert time.min() >= -motion["window"]
 
 
-@pytest.mark.parametrize("parameters", [{}, {"mass": 1.0, "of another version": 2.0}])
-def test_a_drive_that_is_not_known_is_shown_by_its_own_frequency(parameters: Any) -> None:
-    body, _ = decoded(fed(parameters, 5.0, 1000.0).frame(PERIODS[0]))
-    assert body["motion"]["window"] == pytest.approx(PERIODS[0] / 8.0)
-    assert body["motion"]["equilibrium"] is None
-    assert body["motion"]["labels"][0] == "displacement (m)"
+def test_a_drive_that_is_not_known_is_shown_by_its_own_frequency() -> None:
+    for parameters in ({}, {"mass": 1.0, "of another version": 2.0}):
+        body, _ = decoded(fed(parameters, 5.0, 1000.0).frame(PERIODS[0]))
+        assert body["motion"]["window"] == pytest.approx(PERIODS[0] / 8.0)
+        assert body["motion"]["equilibrium"] is None
+        assert body["motion"]["labels"][0] == "displacement (m)"
 
 
 def test_on_a_belt_at_rest_no_place_is_the_equilibrium() -> None:
@@ -124,9 +124,9 @@ def test_a_frame_stays_small_whatever_the_rate() -> None:
         assert len(frame) < 100_000
 
 
-@pytest.mark.parametrize("frequency", [0.0, 1e-300, 1e300, float("inf"), float("nan"), -1.0])
-def test_any_published_frequency_is_accepted(frequency: float) -> None:
+def test_any_published_frequency_is_accepted() -> None:
     frames = fed({}, 5.0, 1000.0)
-    frames._listener.cycles[FREQUENCY].append(frequency)
-    body, _ = decoded(frames.frame(PERIODS[0]))
-    assert body["motion"]["window"] == PERIODS[0]
+    for frequency in (0.0, 1e-300, 1e300, float("inf"), float("nan"), -1.0):
+        frames._listener.cycles[FREQUENCY].append(frequency)
+        body, _ = decoded(frames.frame(PERIODS[0]))
+        assert body["motion"]["window"] == PERIODS[0], frequency

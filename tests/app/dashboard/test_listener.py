@@ -4,12 +4,15 @@ from functools import partial
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rcl_interfaces.msg import ParameterEvent
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterEvent, ParameterValue
 from rclpy.parameter import Parameter
 
 from stickslip_ros.app.dashboard import listener as listener_module
-from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, ListenerNode
+from stickslip_ros.app.dashboard.frames import Frames
+from stickslip_ros.app.dashboard.listener import ABSENT, SILENT, Answer, Health, ListenerNode
+from stickslip_ros.app.dashboard.theory import Theory
 from stickslip_ros.messages.topics import (
     AMPLITUDE,
     APPLIED_DISTURBANCE,
@@ -22,6 +25,7 @@ from stickslip_ros.nodes.controller import ControllerNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.samples import ForceColumns, SampleColumns
+from stickslip_ros.scenarios.files import load_scenario
 from tests.nodes.graph import Graph
 
 pytestmark = pytest.mark.usefixtures("often_diagnosed")
@@ -66,11 +70,11 @@ def outcome(graph: Graph, answer: Answer) -> str:
     return answer.result()
 
 
-def run_loop(graph: Graph, observer: ListenerNode, **plant: object) -> None:
+def run_loop(graph: Graph, observer: ListenerNode, **values: object) -> PlantNode:
     """Let all three run, until the observer has heard of them all and knows their parameters."""
     graph.add(AnalyzerNode)
     graph.add(WashoutControllerNode)
-    graph.add(PlantNode, **{"pace": "realtime", "belt_speed": 0.2, **plant})
+    plant = graph.add(PlantNode, **{"pace": "realtime", "belt_speed": 0.2, **values})
     graph.wait_until(
         lambda: (
             len(observer.health) == 3
@@ -79,6 +83,7 @@ def run_loop(graph: Graph, observer: ListenerNode, **plant: object) -> None:
         ),
         "the observer knows all nodes",
     )
+    return plant
 
 
 def test_it_hears_states_forces_and_cycles(
@@ -100,7 +105,7 @@ def test_it_hears_states_forces_and_cycles(
 def test_a_value_is_taken_or_refused_with_the_reason_of_the_node(
     graph: Graph, observer: ListenerNode
 ) -> None:
-    run_loop(graph, observer)
+    plant = run_loop(graph, observer)
     assert observer.parameters["plant"]["belt_speed"] == 0.2
     assert not outcome(graph, observer.set_parameter("plant", "belt_speed", 0.3))
     graph.wait_until(lambda: observer.parameters["plant"]["belt_speed"] == 0.3, "the new value")
@@ -108,28 +113,8 @@ def test_a_value_is_taken_or_refused_with_the_reason_of_the_node(
     assert "corner_frequency = -1.0 is refused: must be a finite number above 0" in refusal
     assert observer.parameters["washout_controller"]["corner_frequency"] == 2.0
     assert "rate cannot be changed" in outcome(graph, observer.set_parameter("plant", "rate", 1.0))
-
-
-def test_what_others_set_is_noticed(graph: Graph, observer: ListenerNode) -> None:
-    plant = graph.add(PlantNode, pace="realtime", expects_control=False)
-    graph.wait_until(lambda: observer.parameters["plant"], "the plant's parameters")
-    plant.set_parameters([Parameter("damping", value=0.5)])
+    plant.set_parameters([Parameter("damping", value=0.5)])  # by others
     graph.wait_until(lambda: observer.parameters["plant"]["damping"] == 0.5, "the new value")
-
-
-def test_one_value_is_not_all_that_is_known(graph: Graph, observer: ListenerNode) -> None:
-    publisher = observer.create_publisher(ParameterEvent, "/parameter_events", 10)
-    graph.wait_until(publisher.get_subscription_count, "the observer listens")
-    observer.parameters = observer.parameters | {"analyzer": {"window": 8}}
-    for node, name, value in (("plant", "duration", 2.0), ("analyzer", "window", 9)):
-        changed = [Parameter(name, value=value).to_parameter_msg()]
-        publisher.publish(ParameterEvent(node=f"/test/{node}", changed_parameters=changed))
-    graph.wait_until(lambda: observer.parameters["analyzer"].get("window") == 9, "the change")
-    assert observer.parameters["plant"] == {}
-
-
-def test_the_controller_is_switched_off_and_on(graph: Graph, observer: ListenerNode) -> None:
-    run_loop(graph, observer)
     for active, state in ((False, "inactive"), (True, "active")):
         assert not outcome(graph, observer.set_active("washout_controller", active))
         graph.wait_until(
@@ -138,6 +123,71 @@ def test_the_controller_is_switched_off_and_on(graph: Graph, observer: ListenerN
     assert [each.text for each in observer.events if "inactive" in each.text] == [
         "washout_controller inactive"
     ]
+
+
+FOREIGN = (
+    *(("plant", "mass", value) for value in ("abc", True, [1.0], -1.0, float("nan"), 1e300)),
+    *(("plant", "friction.file", value) for value in ("/etc/passwd", 3)),
+    *(("plant", name, "abc") for name in ("rate", "belt_speed", "reply_timeout", "pace")),
+    *(("washout_controller", name, "abc") for name in ("start_after", "linear_gain")),
+)
+"""Values of parameters that no node of ours has."""
+
+
+def test_a_value_that_a_parameter_cannot_have_is_not_known(
+    graph: Graph, observer: ListenerNode
+) -> None:
+    publisher = observer.create_publisher(ParameterEvent, "/parameter_events", 100)
+    graph.wait_until(publisher.get_subscription_count, "the observer listens")
+    sound = load_scenario("feed_drive").as_dict()
+    active = Health("active", heard_at=1e9)
+    observer.health = dict.fromkeys(("analyzer", "plant", "washout_controller"), active)
+    observer._answering_since = 0.0
+    frames, theory = Frames(observer), Theory(observer)
+    for node, name, value in FOREIGN:
+        observer.parameters = observer.parameters | sound
+        parameters = [Parameter(name, value=value).to_parameter_msg()]
+        publisher.publish(ParameterEvent(node=f"/test/{node}", changed_parameters=parameters))
+        graph.wait_until(
+            lambda n=node, p=name: observer.parameters[n][p] is None, f"{name} {value}"
+        )
+        assert (frames.drive is None) == (node == "plant")
+        theory.follow()
+        assert observer.acts_in >= 0.0
+        assert observer.waits_for_reply >= 0.0
+    assert not observer.events
+
+
+def test_a_single_value_is_not_all_that_is_known(graph: Graph, observer: ListenerNode) -> None:
+    """And one of an unknown type is ignored."""
+    publisher = observer.create_publisher(ParameterEvent, "/parameter_events", 10)
+    graph.wait_until(publisher.get_subscription_count, "the observer listens")
+    observer.parameters = observer.parameters | {"analyzer": {"window": 8}}
+    strange = ParameterMessage(name="window", value=ParameterValue(type=99))
+    duration, window = Parameter("duration", value=2.0), Parameter("window", value=9)
+    for node, changed in (
+        ("plant", duration.to_parameter_msg()),
+        ("analyzer", strange),
+        ("analyzer", window.to_parameter_msg()),
+    ):
+        publisher.publish(ParameterEvent(node=f"/test/{node}", changed_parameters=[changed]))
+    graph.wait_until(lambda: observer.parameters["analyzer"].get("window") == 9, "the change")
+    assert observer.parameters["plant"] == {}
+
+
+def test_any_number_in_diagnostics_is_accepted(observer: ListenerNode) -> None:
+    observer.parameters = observer.parameters | {"plant": {"rate": 1e-6}}
+    keys = "answered", "samples", "late_forces"
+    for number in ("٣", "²", "abc", "nan", "-1", "9" * 400, "9" * 5000, ""):
+        figures = [KeyValue(key=key, value=number) for key in keys]
+        status = [
+            DiagnosticStatus(name=f"/test/{node}", values=figures, level=b"\xff")
+            for node in ("plant", "washout_controller")
+        ]
+        for _ in range(2):
+            observer._on_diagnostics(DiagnosticArray(status=status))
+        assert observer.acts_in == 0.0
+        assert observer.health["plant"].figures["samples"] == number
 
 
 def test_the_controller_is_the_one_that_is_heard(graph: Graph, observer: ListenerNode) -> None:
@@ -173,18 +223,15 @@ def test_a_tap_lasts_for_its_simulated_time_and_ends(
     assert end - begin > 0.15  # at most what was under way when it began
 
 
-def test_an_impulse_without_a_subscriber_is_refused(graph: Graph, observer: ListenerNode) -> None:
-    assert outcome(graph, observer.tap(1.0, 0.1)) == "no node subscribes to /test/disturbance_force"
-
-
-@pytest.mark.parametrize(
-    ("force", "duration"), [(float("nan"), 1.0), (float("inf"), 1.0), (1.0, 0.0), (1.0, 1e300)]
-)
 def test_an_impossible_tap_is_refused(
-    graph: Graph, observer: ListenerNode, force: float, duration: float
+    graph: Graph, observer: ListenerNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    refusal = outcome(graph, observer.tap(force, duration))
-    assert refusal.startswith("an impulse needs a finite force and a duration above 0, at most")
+    for force, duration in ((float("nan"), 1.0), (float("inf"), 1.0), (1.0, 0.0), (1.0, 1e300)):
+        refusal = outcome(graph, observer.tap(force, duration))
+        assert refusal.startswith("an impulse needs a finite force and a duration above 0, at most")
+    assert outcome(graph, observer.tap(1.0, 0.1)) == "no node subscribes to /test/disturbance_force"
+    monkeypatch.setattr(listener_module, "_ANSWER_TIMEOUT", 0.3)
+    assert outcome(graph, observer.reset()) == "plant does not answer"
 
 
 def test_a_node_that_was_started_again_at_once_is_asked_again(
@@ -226,13 +273,6 @@ def test_a_push_ends_with_the_observer(graph: Graph, observer: ListenerNode) -> 
     graph.wait_until(lambda: [m.wrench.force.x for m in applied][-1:] == [0.05], "the force")
     observer.close()
     graph.wait_until(lambda: applied[-1].wrench.force.x == 0.0, "no force")
-
-
-def test_a_node_that_is_not_there_does_not_answer(
-    graph: Graph, observer: ListenerNode, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(listener_module, "_ANSWER_TIMEOUT", 0.3)
-    assert outcome(graph, observer.reset()) == "plant does not answer"
 
 
 def test_a_node_that_falls_silent_and_comes_back_is_shown_as_that(

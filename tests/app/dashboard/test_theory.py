@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from multiprocessing import active_children
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,7 +11,6 @@ import pytest
 
 from stickslip_ros.app.dashboard import theory as module
 from stickslip_ros.app.dashboard.controls import (
-    described,
     main_parameters,
     other_parameters,
     slider_range,
@@ -31,6 +31,7 @@ from stickslip_ros.app.dashboard.theory_charts import (
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.scenarios.keywords import described
 from stickslip_ros.scenarios.parameters import CONTROLLER_PARAMETERS
 from stickslip_ros.studies.stability import stability
 from tests.nodes.graph import wait_for
@@ -58,6 +59,19 @@ def theory(listener: Any) -> Iterator[Theory]:
     found = Theory(listener)
     yield found
     found.close()
+
+
+@pytest.mark.process
+def test_a_long_computation_does_not_delay_the_end(
+    listener: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    theory = Theory(listener)
+    monkeypatch.setattr(theory, "_inputs", lambda computation: (3600.0,))
+    for result in theory._results.values():
+        result.compute = time.sleep
+    wait_for(lambda: theory.follow() or active_children(), "the computation has started")
+    theory.close()
+    wait_for(lambda: not active_children(), "the computation has ended")
 
 
 def settle(theory: Theory) -> None:
@@ -144,6 +158,12 @@ def test_only_what_a_parameter_changes_is_computed_again(listener: Any, theory: 
     settle(theory)
     versions = {each: theory.result(each).version for each in (bifurcation, stability_map, decay)}
     assert set(versions.values()) == {1}
+    # The same values as another message brings them: a NaN that is not the same object.
+    unset = {name: float("nan") for name, value in PLANT.items() if value != value}
+    assert unset
+    listener.parameters = listener.parameters | {"plant": PLANT | unset}
+    theory.follow()
+    assert not theory.busy
     slower = listener.parameters["plant"] | {"belt_speed": 0.039}
     listener.parameters = listener.parameters | {"plant": slower}
     settle(theory)
@@ -154,24 +174,10 @@ def test_only_what_a_parameter_changes_is_computed_again(listener: Any, theory: 
     settle(theory)
     assert theory.result(stability_map).version == 2
     assert theory.result(decay).version == 3
-
-
-@pytest.mark.process
-def test_values_that_are_received_again_change_nothing(listener: Any, theory: Theory) -> None:
+    loose = listener.parameters["plant"] | {"stiffness": 0.0}
+    listener.parameters = listener.parameters | {"plant": loose}
     settle(theory)
-    # As another message brings them: a NaN that is not the same object.
-    unset = {name: float("nan") for name, value in PLANT.items() if value != value}
-    assert unset
-    listener.parameters = listener.parameters | {"plant": PLANT | unset}
-    theory.follow()
-    assert not theory.busy
-
-
-@pytest.mark.process
-def test_what_the_theory_does_not_cover_is_said(listener: Any, theory: Theory) -> None:
-    listener.parameters["plant"] |= {"stiffness": 0.0}
-    settle(theory)
-    for each in (bifurcation, stability_map, decay):
+    for each in (bifurcation, stability_map, decay):  # what the theory does not cover is said
         assert theory.result(each).value is None
         assert "spring" in theory.result(each).refusal
     assert theory.result(friction_curve).value is not None
@@ -198,17 +204,18 @@ def test_an_unknown_drive_has_no_theory(listener: Any, theory: Theory) -> None:
     assert not theory.busy
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "low", "high"),
-    [
+def test_a_slider_has_room_on_both_sides_of_any_value() -> None:
+    for name, value, low, high in (
         ("plant.belt_speed", 0.04, 0.0, 0.125),
         ("plant.belt_speed", 0.045, 0.0, 0.125),
         ("washout_controller.linear_gain", -3000.0, -8192.0, 2048.0),
         ("washout_controller.corner_frequency", 20.0, 0.0, 64.0),
-    ],
-)
-def test_a_slider_has_room_on_both_sides(name: str, value: float, low: float, high: float) -> None:
-    assert slider_range(value, described(name))[:2] == (low, high)
+    ):
+        assert slider_range(value, described(name))[:2] == (low, high)
+    for value in (0.0, -0.0, 5e-324, -5e-324, 1e-30, 1e30, -1e30):
+        low, high, step = slider_range(value, described("plant.belt_speed"))
+        assert low < high
+        assert step > 0.0
 
 
 def test_a_slider_for_each_own_constant_of_a_law() -> None:

@@ -3,13 +3,11 @@
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.publisher import Publisher
-from std_msgs.msg import Float64, Header
+from std_msgs.msg import Float64
 
 from stickslip_ros.messages.codec import pack_header
 from stickslip_ros.messages.topics import AMPLITUDE, DIAGNOSTICS, RECORDED
 from stickslip_ros.nodes.base.managed import OK, WARN, ManagedNode
-from stickslip_ros.nodes.base.ros_topics import qos_profile
 from stickslip_ros.scenarios.parameters import NodeParameters
 from tests.nodes.graph import Graph
 
@@ -35,16 +33,10 @@ class Listener(ManagedNode[NodeParameters]):
         self.subscribe(AMPLITUDE, lambda message: self.amplitudes.append(message.data))
 
 
-def writer(graph: Graph, readers: int = 2) -> Publisher:
-    made = graph.observer.create_publisher(Header, RECORDED.name, qos_profile(RECORDED))
-    graph.wait_until(lambda: made.get_subscription_count() == readers, "matched")
-    return made
-
-
 def test_messages_come_decoded_and_unless_asked_for_only_while_active(graph: Graph) -> None:
     node = graph.add(Listener, autostart=False)
     node.trigger_configure()
-    publisher = writer(graph)
+    publisher = graph.publisher(RECORDED, 2)
     publisher.publish(pack_header(1))
     graph.wait_until(lambda: node.always == [1], "one comes while inactive")
     node.trigger_activate()
@@ -55,8 +47,8 @@ def test_messages_come_decoded_and_unless_asked_for_only_while_active(graph: Gra
 
 def test_a_topic_without_a_decoder_gives_the_objects_of_ros(graph: Graph) -> None:
     node = graph.add(Listener)
-    publisher = graph.observer.create_publisher(Float64, AMPLITUDE.name, 10)
-    graph.wait_until(lambda: publisher.get_subscription_count() and node.active, "matched")
+    publisher = graph.publisher(AMPLITUDE, 1)
+    graph.wait_until(lambda: node.active, "active")
     publisher.publish(Float64(data=0.25))
     graph.wait_until(lambda: node.amplitudes == [0.25], "decoded")
 
@@ -64,7 +56,7 @@ def test_a_topic_without_a_decoder_gives_the_objects_of_ros(graph: Graph) -> Non
 def test_what_cannot_be_decoded_is_told_until_the_next_activation(graph: Graph) -> None:
     told: list[DiagnosticArray] = graph.listen(DIAGNOSTICS)
     node = graph.add(Listener)
-    publisher = writer(graph)
+    publisher = graph.publisher(RECORDED, 2)
     graph.wait_until(lambda: node.active, "active")
     publisher.publish(b"\0\1\0\0")
     graph.wait_until(lambda: node.diagnose()[0] == WARN, "dropped")

@@ -5,8 +5,9 @@ from typing import Any
 import pytest
 from rclpy.client import Client
 from rclpy.node import Node
+from std_srvs.srv import Trigger
 
-from stickslip_ros.nodes.base.service_call import parameters_call
+from stickslip_ros.nodes.base.service_call import ServiceCall, parameters_call
 from stickslip_ros.nodes.plant import PlantNode
 from tests.nodes.graph import Graph
 
@@ -53,3 +54,24 @@ def test_for_a_node_that_is_not_there_one_client_is_enough(graph: Graph, unlucky
     graph.wait_until(lambda: call.pursue() or next(rounds, None) is None, "many rounds")
     assert unlucky.clients_made == 1
     call.close()
+
+
+def test_a_service_that_runs_late_still_finds_the_clients_that_asked_before(
+    graph: Graph, unlucky: _Unlucky, recwarn: pytest.WarningsRecorder
+) -> None:
+    asked: list[None] = []
+
+    def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        asked.append(None)
+        return response
+
+    late = Node("late", context=graph.context, namespace="/test")
+    late.create_service(Trigger, "late", answer)
+    call = ServiceCall(unlucky, Trigger, "late", answer_time=0.05)
+    call.start(Trigger.Request())
+    graph.wait_until(lambda: call.pursue() or unlucky.clients_made == 4, "it repeats")
+    graph.adopt(late)
+    graph.wait_until(lambda: call.pursue() and len(asked) >= 2, "each request is answered")
+    call.close()
+    assert not [each for each in recwarn if "failed to send response" in str(each.message)]
+    assert not list(unlucky.clients)

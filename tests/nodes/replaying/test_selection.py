@@ -1,41 +1,75 @@
-"""The part of a bag that is replayed, and refusals."""
+"""The part of a bag that is replayed, its quality of service, and refusals."""
 
 from math import inf
 from pathlib import Path
 
 import pytest
 from mcap.writer import Writer
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    LivelinessPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+)
+from sensor_msgs.msg import JointState
 
-from stickslip_ros.bags.recorder import QosProfile, Recorder
+from stickslip_ros.bags.recorder import QosProfile
 from stickslip_ros.errors import BagError, InvalidInputError
 from stickslip_ros.messages.codec import pack_header
-from stickslip_ros.nodes.replaying.selection import Selection
-from stickslip_ros.nodes.replaying.timeline import JITTER
+from stickslip_ros.messages.topics import DEEP, JOINT_STATES
+from stickslip_ros.nodes.base.ros_topics import qos_profile
+from stickslip_ros.nodes.replaying.player import JITTER
+from stickslip_ros.nodes.replaying.selection import (
+    Selection,
+    installed_message_class,
+    recorded_profile,
+)
 from stickslip_ros.scenarios.parameters import ReplayParameters
+from tests.bags.runs import write_bag
 
 SECOND = 1_000_000_000
 STATES = "/drive/joint_states"
 FORCES = "/drive/control_force"
 RECORDED = "/drive/recorded"
-TYPES = {
-    STATES: "sensor_msgs/msg/JointState",
-    FORCES: "geometry_msgs/msg/WrenchStamped",
-    RECORDED: "std_msgs/msg/Header",
-    "/other/recorded": "std_msgs/msg/Header",
-    "/clock": "rosgraph_msgs/msg/Clock",
-}
+TOPICS = (STATES, FORCES, RECORDED, "/other/recorded", "/clock")
+STATE_TYPE = "sensor_msgs/msg/JointState"
+
+# As rosbag2 keeps them: names since Iron, numbers before; `unknown` is what Fast DDS tells.
+NUMBERS = """
+- history: 3
+  depth: 0
+  reliability: 2
+  durability: 2
+  deadline:
+    sec: 2
+    nsec: 500000000
+  lifespan:
+    sec: 2147483647
+    nsec: 4294967295
+  liveliness: 1
+  liveliness_lease_duration:
+    sec: 9223372036
+    nsec: 854775807
+  avoid_ros_namespace_conventions: false
+"""
+NAMES = """
+- history: unknown
+  depth: 0
+  reliability: best_effort
+  durability: volatile
+  deadline: {sec: 2, nsec: 500000000}
+  lifespan: {sec: 2147483647, nsec: 4294967295}
+  liveliness: automatic
+  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
+  avoid_ros_namespace_conventions: false
+"""
 
 
 def record(bag: Path, *messages: tuple[str, float]) -> str:
     """Write messages of a topic and a log time (s) to a bag; return its path."""
-    with Recorder(bag) as recorder:
-        channels = {
-            topic: recorder.add_topic(topic, kind, QosProfile(depth=10))
-            for topic, kind in TYPES.items()
-        }
-        for topic, time in messages:
-            stamp = round(time * SECOND)
-            recorder.write(channels[topic], pack_header(stamp), stamp)
+    stamps = [(topic, round(time * SECOND)) for topic, time in messages]
+    write_bag(bag, [(topic, stamp, pack_header(stamp)) for topic, stamp in stamps], topics=TOPICS)
     return str(bag)
 
 
@@ -91,8 +125,8 @@ def test_a_segment_of_earlier_log_times_follows_the_one_before(tmp_path: Path) -
 
 def test_topics_of_live_nodes_only_are_omitted_unless_requested(tmp_path: Path) -> None:
     bag = record(tmp_path / "bag", (STATES, 1.0), (RECORDED, 1.0))
-    assert set(selection(bag).topics) == set(TYPES) - {RECORDED}
-    assert set(selection(bag, clock=True).topics) == set(TYPES) - {RECORDED, "/clock"}
+    assert set(selection(bag).topics) == set(TOPICS) - {RECORDED}
+    assert set(selection(bag, clock=True).topics) == set(TOPICS) - {RECORDED, "/clock"}
     assert set(selection(bag, topics=[RECORDED]).topics) == {RECORDED}
 
 
@@ -109,7 +143,7 @@ def foreign_bag(file: Path, types: dict[str, str]) -> str:
 
 
 def test_what_cannot_be_published_is_left_out_with_the_reason(tmp_path: Path) -> None:
-    types = {STATES: TYPES[STATES], "/thing": "nosuch_msgs/msg/Thing", "/a b": TYPES[FORCES]}
+    types = {STATES: STATE_TYPE, "/thing": "nosuch_msgs/msg/Thing", "/a b": STATE_TYPE}
     part = selection(foreign_bag(tmp_path / "bag.mcap", types))
     assert part.topics.keys() == {STATES}
     assert [topic for topic, _, _ in part.messages()] == [STATES]
@@ -129,29 +163,61 @@ def test_what_the_bag_lacks_is_known_when_it_was_read(tmp_path: Path) -> None:
     assert "metadata.yaml" in " ".join(part.lacking)
 
 
-@pytest.mark.parametrize(
-    ("parameters", "named"),
-    [
+def test_invalid_input_is_refused(tmp_path: Path) -> None:
+    bag = record(tmp_path / "bag", (STATES, 1.0), (STATES, 2.0), (STATES, 5.0))
+    refusals: list[tuple[dict[str, object], tuple[str, ...]]] = [
         ({"bag": ""}, ("/replay: bag = ''", "path of a bag")),
         ({"bag": "nosuch"}, ("nosuch", "does not exist")),
+        ({"bag": record(tmp_path / "empty")}, ("no messages",)),
         ({"start": 5.0}, ("/replay: start = 5.0 s", "nothing was recorded", "4 s long")),
         ({"start": 1e300}, ("/replay: start = 1e+300", "at most 1e+10 s")),
         ({"start": 1.5, "duration": 1.0}, ("duration = 1.0 s", "nothing was recorded")),
         ({"topics": [RECORDED]}, ("nothing was recorded then on /drive/recorded",)),
         ({"topics": ["/nosuch"]}, ("/replay: topics = ['/nosuch']", STATES, FORCES)),
         ({"topics": ["joint_states"]}, ("topics = ['joint_states']", STATES)),
-    ],
-)
-def test_invalid_input_is_refused(
-    tmp_path: Path, parameters: dict[str, object], named: tuple[str, ...]
-) -> None:
-    bag = record(tmp_path / "bag", (STATES, 1.0), (STATES, 2.0), (STATES, 5.0))
-    with pytest.raises(InvalidInputError) as refusal:
-        selection(**{"bag": bag, **parameters})
-    for text in named:
-        assert text in str(refusal.value)
+    ]
+    for parameters, named in refusals:
+        with pytest.raises(InvalidInputError) as refusal:
+            selection(**{"bag": bag, **parameters})
+        for text in named:
+            assert text in str(refusal.value)
 
 
-def test_an_empty_bag_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="no messages"):
-        selection(record(tmp_path / "bag"))
+def test_a_recorded_profile_is_offered_again() -> None:
+    profile = recorded_profile(NAMES)
+    assert recorded_profile(NUMBERS) == profile
+    assert profile.reliability is ReliabilityPolicy.BEST_EFFORT
+    assert profile.durability is DurabilityPolicy.VOLATILE
+    assert profile.liveliness is LivelinessPolicy.AUTOMATIC
+    assert profile.deadline.nanoseconds == 2_500_000_000
+    assert (profile.history, profile.depth) == (HistoryPolicy.KEEP_LAST, DEEP)
+    ours = recorded_profile(QosProfile(depth=JOINT_STATES.depth).to_yaml())
+    for policy in ("history", "depth", "reliability", "durability"):
+        assert getattr(ours, policy) == getattr(qos_profile(JOINT_STATES), policy)
+    # No depth is too deep for the middleware; a latched topic keeps what it kept.
+    assert recorded_profile(f"- {{history: keep_last, depth: {2**40}}}").depth == 100_000
+    latched = recorded_profile("- {durability: transient_local, depth: 1, history: keep_last}")
+    assert (latched.durability, latched.depth) == (DurabilityPolicy.TRANSIENT_LOCAL, 1)
+
+
+def test_where_no_profile_can_be_taken_over_the_topic_is_reliable() -> None:
+    for recorded in (
+        "", "[]", "nonsense", "{unfinished", "- 3", "- reliability: superb",
+        "- reliability: [reliable]", "- depth: many", "- deadline: soon",
+        "- reliability: unknown\n  durability: system_default",
+        f"{NAMES}- reliability: reliable", "[" * 500,
+    ):  # fmt: skip
+        assert recorded_profile(recorded) == QoSProfile(
+            history=HistoryPolicy.KEEP_LAST,
+            depth=DEEP,
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.VOLATILE,
+            liveliness=LivelinessPolicy.AUTOMATIC,
+        ), recorded
+
+
+def test_a_type_is_found_by_its_name_or_refused() -> None:
+    assert installed_message_class("sensor_msgs/msg/JointState") is JointState
+    for name in ("nosuch_msgs/msg/A", "sensor_msgs/msg/Nosuch", "JointState", "os/msg/path", ""):
+        with pytest.raises(BagError, match="message type"):
+            installed_message_class(name)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from stickslip_ros.errors import RunError
 from stickslip_ros.physics.loop.controller import Controller, answer
 from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
@@ -217,18 +218,44 @@ def test_a_controller_at_work_goes_to_another_process(
 
 def test_a_law_that_follows_no_reference_receives_none() -> None:
     assert Controller(Constant(3.0), RAMP).answer(at(1)) == 3.0
+    assert Controller(Constant(-inf, force_limit=5.0)).answer(at(1)) == -5.0
+    assert answer(SampledLoop(Motion(PAPER, 0.0, 0.0), 100.0, 0), None) == 0.0
 
 
-@pytest.mark.parametrize(("force", "sent"), [(nan, 5.0), (inf, 5.0), (-inf, -5.0), (7.0, 5.0)])
-def test_a_limit_bounds_whatever_a_law_returns(force: float, sent: float) -> None:
-    assert Controller(Constant(force, force_limit=5.0)).answer(at(1)) == sent
-
-
-def test_a_force_that_overflows_is_not_applied() -> None:
+@pytest.mark.parametrize(("force", "limit"), [(nan, 5.0), (inf, inf)])
+def test_a_force_that_is_not_finite_is_not_applied(force: float, limit: float) -> None:
     loop = SampledLoop(Motion(PAPER, 0.0, 0.0), 100.0, 0)
-    assert answer(loop, Controller(Constant(inf))) == inf
+    with pytest.raises(RunError) as failed:
+        answer(loop, Controller(Constant(force, force_limit=limit)))
+    reason = f"its force is {force}, which must be a finite number"
+    assert str(failed.value) == f"the control law constant fails at 0 s: {reason}"
     assert not loop.answered
-    assert loop.dropped.total() == 1
+
+
+@dataclass(frozen=True)
+class Fragile(ControlLaw):
+    """Time since the start; fails while the slide moves."""
+
+    name: ClassVar[str] = "fragile"
+
+    def initial_state(self, sample: Sample, reference: Reference) -> State:
+        return (0.0 / (sample.velocity - 1.0),)
+
+    def respond(
+        self, state: State, elapsed: float, sample: Sample, reference: Reference
+    ) -> tuple[float, State]:
+        time = state[0] + elapsed / (sample.velocity == 0.0)
+        return time, (time,)
+
+
+def test_the_sample_after_a_failure_continues_from_the_last_good_one() -> None:
+    controller = Controller(Fragile())
+    with pytest.raises(RunError, match="fails at 0 s: ZeroDivisionError"):
+        controller.answer(at(0, velocity=1.0))
+    assert controller.answer(at(1000 * MILLISECOND)) == 0.0
+    with pytest.raises(RunError, match=r"fails at 1\.5 s: ZeroDivisionError"):
+        controller.answer(at(2500 * MILLISECOND, velocity=0.5))
+    assert controller.answer(at(3000 * MILLISECOND)) == 2.0
 
 
 def test_an_integral_of_the_error_follows_a_step() -> None:
@@ -245,15 +272,3 @@ def test_an_integral_of_the_error_follows_a_step() -> None:
         loop.advance()
     assert abs(ends[0]) < 1e-2
     assert motion.position == pytest.approx(0.6, abs=1e-6)
-
-
-def test_without_control_nothing_is_offered() -> None:
-    loop = SampledLoop(Motion(PAPER, 0.0, 0.0), 100.0, 10**9)
-    assert answer(loop, None) == 0.0
-    assert not loop.answered
-    controller = Controller(VelocityFeedback(velocity_gain=-2.0))
-    loop.reset(0.0, 0.5)
-    loop.advance()
-    assert answer(loop, controller) == -1.0
-    assert loop.answered
-    assert answer(loop, controller) == 0.0

@@ -1,78 +1,17 @@
 """References over time: values, derivatives, corners, refusals."""
 
-from math import inf, nan, pi
+from math import pi
 
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.loop.reference import ReferenceCourse, ReferenceKind
+from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import NO_REFERENCE, Reference
-from tests.examples import examples
+from stickslip_ros.physics.model.courses import Ramp, Sine, Step
 
 AT_REST = Reference(0.0, 0.0, 0.0)
-SHAPES = [ReferenceKind.STEP, ReferenceKind.RAMP, ReferenceKind.SINE, ReferenceKind.TRAPEZOID]
-STEP = 1e-4
-
-
-@st.composite
-def courses(draw: st.DrawFn) -> ReferenceCourse:
-    course = ReferenceCourse(
-        draw(st.sampled_from(SHAPES)),
-        amplitude=draw(st.floats(-2.0, 2.0)),
-        start=draw(st.floats(0.0, 2.0)),
-        duration=draw(st.floats(0.1, 5.0)),
-        frequency=draw(st.floats(0.1, 20.0)),
-    )
-    assume(course.refusal() is None)
-    return course
-
-
-def corners(course: ReferenceCourse) -> list[float]:
-    rise = 1.0 / course.frequency
-    return [course.start + t for t in (0.0, rise, course.duration - rise, course.duration)]
-
-
-def values(course: ReferenceCourse, time: float) -> tuple[float, float, float]:
-    position, velocity, acceleration = course(time)
-    assert position is not None
-    assert velocity is not None
-    assert acceleration is not None
-    return position, velocity, acceleration
-
-
-@given(courses(), st.floats(-0.2, 1.2))
-@examples(quick=50, thorough=500)
-def test_velocity_and_acceleration_are_derivatives(course: ReferenceCourse, share: float) -> None:
-    time = course.start + share * course.duration
-    assume(all(abs(time - corner) > 2.0 * STEP for corner in corners(course)))
-    before, now, after = (values(course, time + h) for h in (-STEP, 0.0, STEP))
-    # Central differences, with the largest third derivative of the sine.
-    error = abs(course.amplitude) * (2.0 * pi * course.frequency) ** 3 * STEP**2 + 1e-9
-    assert now[1] == pytest.approx((after[0] - before[0]) / (2.0 * STEP), abs=error)
-    error = error * 2.0 * pi * course.frequency + 1e-9
-    assert now[2] == pytest.approx((after[1] - before[1]) / (2.0 * STEP), abs=error)
-
-
-@given(courses(), st.floats(-1.0, 8.0))
-def test_it_stays_within_its_amplitude_and_rests_before_and_after(
-    course: ReferenceCourse, time: float
-) -> None:
-    position, velocity, acceleration = values(course, time)
-    assert abs(position) <= abs(course.amplitude) * (1.0 + 1e-12)
-    if time < course.start:
-        assert course(time) == AT_REST
-    elif time >= course.start + course.duration + 1e-9:
-        kept = course.amplitude if course.kind is ReferenceKind.RAMP else 0.0
-        assert (position, velocity, acceleration) == (kept, 0.0, 0.0)
-
-
-@given(courses())
-def test_only_a_step_and_the_end_of_a_sine_jump(course: ReferenceCourse) -> None:
-    assume(course.kind in (ReferenceKind.RAMP, ReferenceKind.TRAPEZOID))
-    for corner in corners(course):
-        before, after = values(course, corner - 1e-9), values(course, corner + 1e-9)
-        assert before[0] == pytest.approx(after[0], abs=1e-6)
 
 
 def test_a_corner_has_the_derivatives_after_it() -> None:
@@ -111,22 +50,12 @@ def test_without_a_course_there_is_no_reference(kind: ReferenceKind, time: float
     assert course(time) is NO_REFERENCE
 
 
-@pytest.mark.parametrize("duration", [inf, 0.0, -1.0, nan])
-@pytest.mark.parametrize("kind", [ReferenceKind.RAMP, ReferenceKind.TRAPEZOID])
-def test_a_rise_needs_a_duration(kind: ReferenceKind, duration: float) -> None:
-    refusal = ReferenceCourse(kind, 1.0, duration=duration).refusal()
-    assert refusal == f"duration = {duration} s: must be above 0 and finite for a {kind}"
-
-
-def test_a_trapezoid_has_the_time_to_rise_and_fall() -> None:
+def test_it_is_a_course_with_its_rates() -> None:
+    for course in (Step(2.0, 0.5, 1.0), Ramp(2.0, 0.5, 1.0), Sine(2.0, 0.5, 1.0, 3.0)):
+        constants = [getattr(course, name) for name in constants_of(type(course))]
+        reference = ReferenceCourse(ReferenceKind(course.name), *constants)
+        assert reference.refusal() is None
+        for time in (0.0, 0.5, 0.7, 1.5, 9.0):
+            assert reference(time) == Reference(course.at(time), *course.rates(time))
     refusal = ReferenceCourse(ReferenceKind.TRAPEZOID, 1.0, duration=0.9, frequency=2.0).refusal()
     assert refusal == "duration = 0.9 s: must be at least 2/frequency = 1 s for a trapezoid"
-    triangle = ReferenceCourse(ReferenceKind.TRAPEZOID, 1.0, duration=1.0, frequency=2.0)
-    assert triangle.refusal() is None
-    assert triangle(0.25).position == triangle(0.75).position == 0.5
-
-
-@pytest.mark.parametrize("kind", [ReferenceKind.STEP, ReferenceKind.SINE])
-@pytest.mark.parametrize("duration", [inf, 0.0])
-def test_a_step_and_a_sine_last_any_time(kind: ReferenceKind, duration: float) -> None:
-    assert ReferenceCourse(kind, 1.0, duration=duration).refusal() is None

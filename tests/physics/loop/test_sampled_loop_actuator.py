@@ -7,34 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stickslip_ros.physics.loop.controller import Controller
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.loop.simulation import simulate_sampled
-from stickslip_ros.physics.measures import CycleMeter, Regime
 from stickslip_ros.physics.model.actuator import Actuator
-from stickslip_ros.physics.model.control import Washout
 from stickslip_ros.physics.model.disturbance import Disturbance, DisturbanceKind
-from stickslip_ros.physics.model.drive import Drive
-from stickslip_ros.physics.motion import Motion, RecordedMotion
+from stickslip_ros.physics.motion import Motion
 from tests.examples import examples
-from tests.physics.actuators import lag
-from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.physics.drives import PAPER
+from tests.physics.parts import lag
 
 SECOND = 10**9
 
 
 def commands(number: int) -> float:
     return 0.5 * (-1.0) ** number * (1.0 + 0.1 * number)
-
-
-class Counting(Actuator):
-    """Counts the commands that it limits."""
-
-    taken: list[float] = []  # noqa: RUF012 - of the class, since a lag is frozen
-
-    def limiter(self, command: float) -> float:  # type: ignore[override]
-        self.taken.append(command)
-        return command / 2.0
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.3, 1.0, 2.25])
@@ -59,17 +44,6 @@ def test_a_disturbance_is_not_limited() -> None:
     loop.offer(SECOND, 3.0)
     loop.advance()
     assert motion.force == 5.1
-
-
-def test_each_command_passes_the_actuator_once() -> None:
-    Counting.taken.clear()
-    motion = Motion(replace(PAPER, actuator=Counting()), 0.0, 0.0)
-    loop = SampledLoop(motion, 10.0, SECOND, force_delay=0.13, force_jitter=0.04)
-    for number in range(6):
-        loop.offer(loop.sample.stamp, commands(number))
-        loop.advance()
-    assert Counting.taken == [0.0, *(commands(number) for number in range(5))]
-    assert motion.force == commands(4) / 2.0
 
 
 @pytest.mark.parametrize("time_constant", [0.0, 0.05])
@@ -154,16 +128,3 @@ def test_a_new_drive_keeps_the_lag_in_the_loop() -> None:
             loop.change_drive(replace(PAPER, normal_force=3.0, actuator=lag(0.5)))
         loop.advance()
     assert motion.applied_force == pytest.approx(1.0 - exp(-2.0), rel=1e-12)
-
-
-def controlled(drive: Drive) -> Regime:
-    motion = RecordedMotion(drive, 0.0, 0.0)
-    loop = SampledLoop(motion, 1000.0, SECOND)
-    law = Controller(Washout(20.0, -3000.0, 0.0, start_after=0.5))
-    return simulate_sampled(loop, motion, law, 5.0, CycleMeter(20)).regime
-
-
-def test_a_small_lag_leaves_the_washout_stable_and_a_large_one_does_not() -> None:
-    """As a delay does, by up to 10.45 ms."""
-    assert controlled(replace(FEED_DRIVE, actuator=lag(0.002))) is Regime.EQUILIBRIUM
-    assert controlled(replace(FEED_DRIVE, actuator=lag(0.05))) is Regime.STICK_SLIP

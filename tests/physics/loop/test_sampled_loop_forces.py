@@ -197,15 +197,6 @@ def test_realtime_gives_a_force_up_that_is_too_old() -> None:
     assert loop.acting == 0.25
 
 
-def test_the_default_timeout_of_the_plant_holds_for_a_tenth_of_a_second() -> None:
-    loop = Loop(realtime=True, force_timeout=0.1)
-    loop.answer(0, 0.5)
-    loop.advance_by(11)
-    assert loop.acting == 0.5
-    loop.advance()
-    assert loop.acting == 0.0
-
-
 @paces
 def test_nothing_is_late_where_no_control_is_expected(realtime: bool) -> None:
     loop = Loop(realtime, expects_control=False)

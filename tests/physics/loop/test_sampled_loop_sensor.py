@@ -1,6 +1,6 @@
 """The sensor in the loop: what a controller sees, and what is measured of the motion."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from random import Random
 from typing import Any
 
@@ -68,15 +68,6 @@ def test_samples_are_measured_and_the_motion_is_true() -> None:
         true.advance()
 
 
-def test_the_belt_is_known_and_its_joint_continues() -> None:
-    measured, true = loops()
-    for number in range(10):
-        if number == 5:
-            for loop in (measured, true):
-                loop.change_drive(replace(PAPER, belt_speed=-0.3))
-        assert measured.advance()[4:] == true.advance()[4:]
-
-
 def test_a_reset_starts_its_history_again() -> None:
     loop, _ = loops()
     for _ in range(5):
@@ -89,15 +80,6 @@ def test_a_reset_starts_its_history_again() -> None:
     before = loop.sample.position
     loop.advance()
     assert loop.sample.velocity == pytest.approx((loop.sample.position - before) * RATE)
-
-
-def test_an_answer_finds_its_sample() -> None:
-    loop, _ = loops()
-    for _ in range(5):
-        loop.offer(loop.sample.stamp, 0.1)
-        assert loop.answered
-        loop.advance()
-    assert loop.late_forces == 0
 
 
 def test_a_controller_sees_what_is_measured_and_the_record_is_true() -> None:
@@ -129,17 +111,3 @@ def test_a_controller_sees_what_is_measured_and_the_record_is_true() -> None:
         hand.advance(1.0 / RATE)
     assert len(seen) == len(trajectory) == 31
     assert np.ptp(trajectory.control_force) > 0.0
-
-
-def test_a_loop_may_have_the_same_sensor_as_another() -> None:
-    """The history is that of the loop."""
-    sensor = Encoder()
-    first = SampledLoop(Motion(PAPER, 0.1, -0.2), RATE, SECOND, sensor=sensor)
-    expected = [first.sample, *(first.advance() for _ in range(5))]
-    one, other = (
-        SampledLoop(Motion(PAPER, 0.1, -0.2), RATE, SECOND, sensor=sensor) for _ in range(2)
-    )
-    for number in range(6):
-        assert one.sample == other.sample == expected[number]
-        one.advance()
-        other.advance()

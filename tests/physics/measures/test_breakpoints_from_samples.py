@@ -11,7 +11,7 @@ from stickslip_ros.physics.measures.breakpoints import Breakpoints, breakpoints_
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion import RecordedMotion
-from tests.physics.drives import LIMIT_CYCLES, PAPER
+from tests.physics.drives import PAPER
 
 CYCLES = 15
 
@@ -41,7 +41,7 @@ def measured(breakpoints: Breakpoints, belt_speed: float) -> Measures:
     return meter.measures()
 
 
-@pytest.mark.parametrize("belt_speed", [cycle.belt_speed for cycle in LIMIT_CYCLES] + [-0.3])
+@pytest.mark.parametrize("belt_speed", [0.2, 0.46, -0.3])
 @pytest.mark.parametrize(
     ("per_cycle", "error", "stick_error"), [(600, 1e-8, 1e-5), (100, 1e-6, 1e-4)]
 )
@@ -129,8 +129,7 @@ def stick_time(samples: Columns, stick_speed: float) -> float:
     return float(np.diff(breakpoints.time)[breakpoints.sticking[1:]].sum())
 
 
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("per_period", [30, 100, 300, 1000, 3000])
+@pytest.mark.parametrize(("per_period", "seed"), [(30, 0), (100, 1), (3000, 2)])
 def test_the_stick_fraction_of_noisy_samples_converges(per_period: int, seed: int) -> None:
     samples, expected = stick_and_sine(per_period, seed)
     breakpoints = breakpoints_from_samples(*samples, stick_speed=STICK_SPEED)
@@ -143,7 +142,7 @@ def test_the_stick_fraction_of_noisy_samples_converges(per_period: int, seed: in
     assert exact.stick_fraction == 0.0
 
 
-@pytest.mark.parametrize(("per_period", "error"), [(25, 4e-3), (50, 1e-3), (100, 2.5e-4)])
+@pytest.mark.parametrize(("per_period", "error"), [(25, 4e-3), (100, 2.5e-4)])
 def test_a_smooth_motion_sticks_while_it_is_near_the_velocity_of_the_belt(
     per_period: int, error: float
 ) -> None:

@@ -53,22 +53,18 @@ def blocks(breakpoints: Breakpoints, starts: range | list[int]) -> Iterator[Brea
 def test_cycles_of_a_vibration() -> None:
     meter = CycleMeter(window=20)
     # The first cycle starts at the first crossing, which is at the second trough.
-    (first, second) = meter.feed(vibration(3.25, speed=0.5, centre=2.0), belt_speed=1.0)
+    breakpoints = vibration(3.25, speed=0.5, centre=2.0)
+    assert meter.feed(Breakpoints.empty(), 1.0) == []
+    (first, second) = meter.feed(breakpoints, belt_speed=1.0)
     assert first == pytest.approx((0.5, 0.5, 2.0, 2 * pi, 1 / (2 * pi), 0.0), rel=1e-12)
     assert second == pytest.approx(first, rel=1e-12)
     measures = meter.measures()
     assert measures.cycles == 2
     assert measures.regime is Regime.PURE_SLIP
     assert measures.period == pytest.approx(2 * pi, rel=1e-12)
-
-
-def test_stick_time_is_what_the_breakpoints_say() -> None:
-    breakpoints = vibration(3.25)
-    breakpoints.sticking[[5, 6, 9]] = (
-        True  # two quarters of the first whole cycle, one of the second
-    )
-    (first, second) = CycleMeter(window=20).feed(breakpoints, belt_speed=1.0)
-    assert (first.stick_fraction, second.stick_fraction) == pytest.approx((0.5, 0.25))
+    breakpoints.sticking[[5, 6, 9]] = True  # two quarters of the first cycle, one of the second
+    found = CycleMeter(window=20).feed(breakpoints, belt_speed=1.0)
+    assert [cycle.stick_fraction for cycle in found] == pytest.approx([0.5, 0.25])
 
 
 def test_measures_are_means_over_the_last_cycles_of_the_window() -> None:
@@ -134,12 +130,6 @@ def test_cycles_of_long_ago_do_not_count() -> None:
     check_equilibrium(meter.measures(), 0.2584)
 
 
-def test_the_approach_to_equilibrium_is_not_yet_equilibrium() -> None:
-    measures = measured(recorded(OVERDAMPED, 0.0, 0.0, 3.0), 0.4)
-    assert measures.regime is None
-    assert measures.cycles == 0
-
-
 def test_riding_a_belt_at_rest_is_stuck() -> None:
     measures = measured(recorded(AT_REST, 3.0, 0.0, 60.0), 0.0)
     assert measures.regime is Regime.STUCK
@@ -178,12 +168,6 @@ def test_too_short_a_motion_has_no_cycle_and_no_regime(duration: float) -> None:
     assert measures == Measures(None, None, None, None, None, None, 0, None)
 
 
-def test_nothing_has_no_measures() -> None:
-    meter = CycleMeter(window=20)
-    assert meter.feed(Breakpoints.empty(), 0.4) == []
-    assert meter.measures() == Measures(None, None, None, None, None, None, 0, None)
-
-
 def test_no_cycle_spans_an_interruption() -> None:
     meter = CycleMeter(window=20)
     whole = vibration(8.0)
@@ -197,9 +181,7 @@ def test_no_cycle_spans_an_interruption() -> None:
 
 MOTIONS = {
     "stick-slip": (PAPER, 0.0, 0.0, 60.0),
-    "pure slip": (replace(PAPER, belt_speed=0.46), 0.0, 0.0, 60.0),
     "towards equilibrium": (ABOVE_HOPF, 0.0, 0.0, 60.0),
-    "equilibrium": (ABOVE_HOPF, 0.0, 0.0, 300.0),
     "overdamped": (OVERDAMPED, 0.0, 0.0, 60.0),
     "stuck": (AT_REST, 3.0, 0.0, 60.0),
     "too short": (PAPER, 0.0, 0.0, 9.0),
@@ -298,12 +280,6 @@ def test_a_rest_is_steady_once_it_has_lasted_for_a_window() -> None:
         meter.feed(still, 1.0)
         assert meter.measures().regime is Regime.EQUILIBRIUM
         assert meter.measures().steady is steady
-
-
-def test_the_paper_s_drive_becomes_steady_and_one_that_is_damped_decays() -> None:
-    assert measured(recorded(PAPER, 0.0, 0.0, 300.0), 0.4).steady is True
-    dying = measured(recorded(ABOVE_HOPF, 0.0, 0.0, 60.0), 0.6)
-    assert (dying.steady, dying.trend) == (False, Trend.DECAYING)
 
 
 def test_a_cycle_that_only_touches_the_belts_speed_slips_all_the_time() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.measures.reading import UNKNOWN, Reading, reading_of
+from stickslip_ros.physics.measures.reading import UNKNOWN, SampleAssumptions, reading_of
 
 ENCODER = {"sensor.position_resolution": 1e-6, "sensor.velocity": "difference"}
 STATIC = {"friction.law": "stribeck", "belt_speed": 0.04}
@@ -17,23 +17,25 @@ MEMORY = {"friction.law": "lugre", "belt_speed": -0.04}
     ("plant", "fastest_belt", "expected"),
     [
         ({}, 0.0, UNKNOWN),
-        (STATIC, 0.04, Reading(0.0, noisy=False)),
-        ({**STATIC, **ENCODER}, 0.04, Reading(0.0, noisy=True)),
-        ({**STATIC, "sensor.velocity_noise": 1e-6}, 0.04, Reading(0.0, noisy=True)),
-        ({**STATIC, "sensor.velocity": "exact"}, 0.04, Reading(0.0, noisy=False)),
-        (MEMORY, 0.0, Reading(None, noisy=False)),
-        (MEMORY, 0.05, Reading(5e-4, noisy=False)),
-        ({**MEMORY, **ENCODER}, 0.05, Reading(5e-4, noisy=True)),
+        (STATIC, 0.04, SampleAssumptions(0.0, noisy=False)),
+        ({**STATIC, **ENCODER}, 0.04, SampleAssumptions(0.0, noisy=True)),
+        ({**STATIC, "sensor.velocity_noise": 1e-6}, 0.04, SampleAssumptions(0.0, noisy=True)),
+        ({**STATIC, "sensor.velocity": "exact"}, 0.04, SampleAssumptions(0.0, noisy=False)),
+        (MEMORY, 0.0, SampleAssumptions(None, noisy=False)),
+        (MEMORY, 0.05, SampleAssumptions(5e-4, noisy=False)),
+        ({**MEMORY, **ENCODER}, 0.05, SampleAssumptions(5e-4, noisy=True)),
     ],
 )
 def test_law_belt_and_sensor_decide(
-    plant: dict[str, Any], fastest_belt: float, expected: Reading
+    plant: dict[str, Any], fastest_belt: float, expected: SampleAssumptions
 ) -> None:
     assert reading_of(plant, fastest_belt) == expected
 
 
 def test_a_stick_speed_that_is_given_is_for_samples_as_they_are() -> None:
-    assert reading_of({**STATIC, **ENCODER}, 0.04, given=1e-3) == Reading(1e-3, noisy=False)
+    assert reading_of({**STATIC, **ENCODER}, 0.04, given=1e-3) == SampleAssumptions(
+        1e-3, noisy=False
+    )
 
 
 @pytest.mark.parametrize(
@@ -55,4 +57,4 @@ def test_whether_a_sensor_errs_that_there_cannot_be_is_found_from_the_samples(
 @pytest.mark.parametrize("stick_speed", [-1e-9, np.inf, np.nan])
 def test_a_stick_speed_that_is_none_is_refused(stick_speed: float) -> None:
     with pytest.raises(InvalidInputError, match=r"stick_speed = .* must be finite"):
-        Reading(stick_speed).checked()
+        SampleAssumptions(stick_speed).checked()

@@ -86,14 +86,6 @@ def test_an_oscillation_is_no_stick_slip() -> None:
     assert report["regime"] is Regime.PURE_SLIP
 
 
-def test_without_slips_there_is_no_distribution() -> None:
-    meter = SlipMeter(SlipThreshold(1e-4))
-    meter.feed(np.arange(100) * 1e-3, np.zeros(100))
-    report = meter.report(0.0)
-    assert report["count"] == 0
-    assert report["regime"] is report["drop"] is None
-
-
 @pytest.mark.parametrize("threshold", [(0.0, 0.1), (1e-6, 0.0), (float("nan"), 0.1)])
 def test_a_threshold_that_is_none_is_refused(threshold: tuple[float, float]) -> None:
     with pytest.raises(InvalidInputError, match=r"is refused: must be above 0"):
@@ -108,6 +100,7 @@ def columns(stiffness: int, speed: int) -> dict[str, str]:
     }
 
 
+@pytest.mark.process
 @recorded
 def test_the_slips_of_paper_on_paper_are_those_that_are_seen() -> None:
     samples = read_table(DATA / "k168Nm_v42.mat", columns(168, 42)).samples
@@ -118,6 +111,8 @@ def test_the_slips_of_paper_on_paper_are_those_that_are_seen() -> None:
     assert meter.count == pytest.approx(COUNTED_BY_HAND, rel=0.05)
 
 
+@pytest.mark.long
+@pytest.mark.process
 @recorded
 @pytest.mark.parametrize(("speed", "regime"), [(42, "stick_slip"), (4300, "pure_slip")])
 def test_stick_slip_is_told_apart_from_inertial_motion(speed: int, regime: str) -> None:

@@ -4,10 +4,11 @@ from math import cos, sin
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from stickslip_ros.physics.measures.stick_fit import fit_stick
+from tests.examples import examples
 
 FREQUENCY = 100.0
 BELT = 0.04
@@ -36,7 +37,7 @@ def around_a_stick(stick_time: float, drop: float = 0.0) -> tuple[np.ndarray, np
     return time, relative
 
 
-@settings(max_examples=20)
+@examples(quick=10, thorough=50)
 @given(st.floats(0.003, 0.04), st.floats(-0.002, 0.002), st.floats(0.0, 0.3))
 def test_edges_of_an_exact_motion_are_found(stick_time: float, shift: float, drop: float) -> None:
     """Also where the friction drops at the departure, which is then of second order."""
@@ -47,7 +48,10 @@ def test_edges_of_an_exact_motion_are_found(stick_time: float, shift: float, dro
     assert fit.offset == pytest.approx(0.0, abs=2e-8)
 
 
-@pytest.mark.parametrize("stick_time", [0.003, 0.010, 0.030])
+@pytest.mark.parametrize(
+    "stick_time",
+    [0.010, *(pytest.param(each, marks=pytest.mark.long) for each in (0.003, 0.030))],
+)
 def test_under_noise_the_stick_time_is_within_its_error(stick_time: float) -> None:
     """The errors of 40 seeds, over their standard error, have a deviation near one."""
     time, relative = around_a_stick(stick_time)

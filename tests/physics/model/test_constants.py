@@ -70,6 +70,8 @@ def test_the_default_of_a_constant_is_that_of_its_field() -> None:
         ("N s^3/m^3", (-3, 3, 1)),
         ("N/m/s", (-1, -1, 1)),
         ("N/m s", (-1, -1, 1)),  # all after the slash is divided by
+        ("N/(m s)", (-1, -1, 1)),
+        ("N s/(m^2 rad)", (-2, 1, 1)),
         ("kg", (-1, 2, 1)),
         ("kg m/s^2", (0, 0, 1)),
     ],

@@ -15,8 +15,6 @@ from scipy.integrate import quad
 from stickslip_ros.physics.model.constants import Scales, scaled
 from stickslip_ros.physics.model.course import NO_COURSE
 from stickslip_ros.physics.model.courses import (
-    COURSES,
-    CourseKind,
     Impulse,
     PiecewiseCourse,
     Ramp,
@@ -119,7 +117,7 @@ def test_rates_are_derivatives(course: PiecewiseCourse, time: float) -> None:
 
 
 @given(courses())
-@examples(quick=50, thorough=500)
+@examples(quick=15, thorough=500)
 def test_bounds_are_the_extremes(course: PiecewiseCourse) -> None:
     ends = corners(course)
     times = [*np.linspace(0.0, 30.0, 30_001).tolist(), *ends, *(end - 1e-12 for end in ends)]
@@ -161,10 +159,6 @@ def test_no_course() -> None:
     assert NO_COURSE.refusal() is None
 
 
-def test_every_kind_has_a_course() -> None:
-    assert list(COURSES) == list(CourseKind)
-
-
 @pytest.mark.parametrize(
     ("course", "refusal"),
     [
@@ -181,13 +175,13 @@ def test_every_kind_has_a_course() -> None:
         ),
         (
             Table((0.0, 0.0), (1.0, 2.0)),
-            "time = 0.0 s after 0.0 s: the times must increase",
+            "point 2 of the table: the time must be above the one before",
         ),
         (
             Table((0.0,), (1.0, 2.0)),
             "times and values have 1 and 2 numbers: must have as many, at least one",
         ),
-        (Table((0.0, nan), (1.0, 2.0)), "times and values = nan: must be finite"),
+        (Table((0.0, nan), (1.0, 2.0)), "times and values must be finite"),
         (
             Table((0.0, 1e-300), (0.0, 1e30)),
             "times and values rise too steeply: the slopes must be finite",
@@ -196,8 +190,3 @@ def test_every_kind_has_a_course() -> None:
 )
 def test_refusals(course: PiecewiseCourse, refusal: str) -> None:
     assert course.refusal() == refusal
-
-
-@given(courses())
-def test_others_are_not_refused(course: PiecewiseCourse) -> None:
-    assert course.refusal() is None

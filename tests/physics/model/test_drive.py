@@ -5,13 +5,7 @@ import pytest
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.friction import Coulomb
-from tests.physics.drives import FEED_DRIVE, PAPER
-
-
-def test_the_scales_of_the_paper_are_one() -> None:
-    assert PAPER.angular_frequency == PAPER.length_scale == PAPER.speed_scale == 1.0
-    assert PAPER.damping_coefficient == 0.02
-    assert PAPER.natural_period == 2.0 * pi
+from tests.physics.drives import FEED_DRIVE
 
 
 def test_scales_of_a_feed_drive() -> None:

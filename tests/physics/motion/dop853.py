@@ -184,7 +184,10 @@ class Solution:
 
 @dataclass
 class Dop853Drive:
-    """Drive in any units; `forward` is its law for v > 0 and `backward` that for v < 0."""
+    """Drive in any units; `forward` is its law for v > 0 and `backward` that for v < 0.
+
+    Without a spring the unit of time is 1 s.
+    """
 
     mass: float
     damping: float
@@ -199,10 +202,10 @@ class Dop853Drive:
     """In units of sqrt(m/k), as the guards are looked at from step to step."""
 
     def __post_init__(self) -> None:
-        self._time = (self.mass / self.stiffness) ** 0.5
+        self._time = (self.mass / self.stiffness) ** 0.5 if self.stiffness else 1.0
         sizes = [abs(value(start)) for start, value, _ in self.normal.pieces if start >= 0.0]
         self._newton = max([*sizes, abs(self.normal.at(0.0)[0](0.0))])
-        self._length = self._newton / self.stiffness
+        self._length = self._newton / self.mass * self._time**2
         self._speed = self._length / self._time
 
     def run(self, position: float, velocity: float, times: Array) -> Solution:

@@ -10,7 +10,7 @@ import pytest
 
 from stickslip_ros.errors import RunError
 from stickslip_ros.physics.loop.sampled_loop import SampledLoop
-from stickslip_ros.physics.model.course import NO_COURSE, Course
+from stickslip_ros.physics.model.course import Course
 from stickslip_ros.physics.model.courses import (
     COURSES,
     Ramp,
@@ -51,7 +51,7 @@ def random_cases() -> Generator[Any]:
     """Five drives for each course in each place; where time is short, for each course and law."""
     for seed, (i, kind), (j, place) in product(range(5), enumerate(KINDS), enumerate(PLACES)):
         law = LAWS[(seed + i) % len(LAWS)]
-        marks = () if (seed + i + j) % 4 == 0 else pytest.mark.long
+        marks = () if (seed + i + 3 * j) % 10 == 0 else pytest.mark.long
         yield pytest.param(law, kind, place, seed, marks=marks)
 
 
@@ -99,12 +99,6 @@ def test_a_belt_that_accelerates_too_much_tears_it_loose(height: float, sticks: 
     assert motion.velocity == pytest.approx(expected, rel=1e-6)
 
 
-def test_a_falling_load_tears_a_slide_loose() -> None:
-    drive = replace(REST, load=Ramp(-1.0, start=1.0, duration=4.0))
-    motion = RecordedMotion(drive, 0.1, 0.0)
-    assert release(motion, 5.0) == pytest.approx(1.0 + 4.0 * 0.75, abs=1e-9)
-
-
 def test_a_load_and_an_accelerating_belt_together() -> None:
     """Broken loose where 0.05 (1 + t^2/2) reaches 0.4 (1 - t/10)."""
     drive = replace(REST, belt=Ramp(1.0, duration=20.0), load=Ramp(-0.8, duration=8.0))
@@ -118,29 +112,6 @@ def test_a_step_of_the_belt_tears_a_sticking_slide_loose() -> None:
     motion = RecordedMotion(drive, 0.0, 0.1)
     assert release(motion, 0.6) == pytest.approx(0.5, abs=1e-12)
     assert motion.belt_speed == pytest.approx(0.3)
-
-
-@pytest.mark.parametrize(
-    "load", [NO_COURSE, Sine(0.05, frequency=3.0), Trapezoid(0.5, duration=9.0, frequency=0.5)]
-)
-def test_stick_is_stick(load: Course) -> None:
-    """On a belt at rest under 0.9 of the break-away force of the smallest normal force."""
-    drive = replace(REST, load=load)
-    motion = Motion(drive, 0.0, 0.0)
-    motion.force = 0.9 * 0.4 * (1.0 + load.bounds[0])
-    for _ in range(4):
-        motion.advance(900.0)
-        assert motion.sticking
-        assert motion.position == 0.0
-
-
-def test_a_feed_from_rest_and_back() -> None:
-    """A trapezoid of the belt speed: the slide starts at rest, and ends at rest on the belt."""
-    drive = replace(REST, damping=0.3, belt=Trapezoid(0.2, 1.0, 40.0, 0.2))
-    motion = RecordedMotion(drive, 0.0, 0.0)
-    motion.advance(100.0)
-    assert motion.sticking
-    assert motion.velocity == 0.0
 
 
 def test_courses_go_through_corners_at_the_samples_that_are_meant() -> None:
@@ -178,13 +149,6 @@ def test_a_reset_continues_the_courses_and_a_segment_starts_them() -> None:
     assert motion.belt_speed == 0.0
     motion.advance(1.0)
     assert motion.belt_speed == pytest.approx(0.1)
-
-
-def test_a_constant_belt_gets_a_course_while_it_moves() -> None:
-    motion = Motion(PAPER, 0.0, 0.0)
-    motion.advance(3.0)
-    motion.drive = replace(PAPER, belt=Ramp(0.1, start=2.0, duration=4.0))
-    assert motion.belt_speed == pytest.approx(0.4 + 0.1 * 0.25)
 
 
 @pytest.mark.parametrize(

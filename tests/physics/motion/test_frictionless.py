@@ -19,16 +19,6 @@ laws = pytest.mark.parametrize("law", FRICTIONLESS, ids=lambda law: law.name)
 
 
 @laws
-@pytest.mark.parametrize("belt_speed", [0.2, 0.0])
-def test_at_rest_it_stays_at_rest(law: FrictionLaw, belt_speed: float) -> None:
-    motion = RecordedMotion(replace(PAPER, belt_speed=belt_speed, friction=law), 0.0, 0.0)
-    motion.advance(100.0)
-    assert motion.position == pytest.approx(0.0, abs=1e-12)
-    assert motion.velocity == pytest.approx(0.0, abs=1e-12)
-    assert motion.friction_force == pytest.approx(0.0, abs=1e-12)
-
-
-@laws
 @pytest.mark.parametrize("belt_speed", [0.2, 0.0, -0.5])
 def test_it_passes_the_speed_of_the_belt_unmoved(law: FrictionLaw, belt_speed: float) -> None:
     drive = replace(PAPER, damping=0.0, belt_speed=belt_speed, friction=law)

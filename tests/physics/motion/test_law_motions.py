@@ -1,35 +1,40 @@
 """Every friction law, in each direction, against scipy's DOP853 with events of its own."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import (
     Coulomb,
-    Directional,
     Exponential,
     FrictionLaw,
     Linear,
     Stribeck,
-    Table,
 )
-from stickslip_ros.physics.motion import Motion
+from stickslip_ros.physics.motion import Motion, RecordedMotion
 from tests.physics.drives import PAPER
-from tests.physics.motion.dop853 import Array
+from tests.physics.motion import dop853
+from tests.physics.motion.dop853 import Dop853Drive, Signal
 from tests.physics.motion.random_drives import (
     LAWS,
     RandomCourse,
     difference,
     random_drive,
     sticks_of,
+    without_short,
 )
 
+LONG_CASES = [
+    pytest.param(seed, directional, marks=pytest.mark.long)
+    for seed in range(2, 5)
+    for directional in (False, True)
+]
 
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("directional", [False, True], ids=["", "by direction"])
+
+@pytest.mark.parametrize(
+    ("seed", "directional"), [(0, True), (1, False), *LONG_CASES], ids=lambda part: str(part)
+)
 @pytest.mark.parametrize("law", LAWS)
 def test_the_motion_is_that_of_an_independent_solver(
     law: str, seed: int, *, directional: bool
@@ -54,69 +59,44 @@ def test_the_motion_is_that_of_an_independent_solver(
     assert errors.events < 1e-7
 
 
-TOP_SPEED = 3.0
-"""Faster, in V, than any motion of the drives below relative to their belts."""
+SAME = [
+    (Stribeck(0.4, 0.25, 0.5), dop853.stribeck(0.4, 0.25, 0.5)),
+    (Coulomb(0.4), dop853.coulomb(0.4, 0.0)),
+    (Linear(0.4, 0.1), dop853.linear(0.4, 0.1)),
+    (Exponential(0.4, 0.25, 0.3, 0.02), dop853.exponential(0.4, 0.25, 0.3, 0.02, 1.0)),
+]
 
 
-def states(drive: Drive, periods: float) -> Array:
-    motion = Motion(drive, 0.3, 0.0)
-    found = [(motion.position, motion.velocity)]
-    for _ in range(round(20 * periods)):
-        motion.advance(drive.natural_period / 20.0)
-        found.append((motion.position, motion.velocity))
-    return np.array(found)
+@pytest.mark.parametrize(("law", "curve"), SAME, ids=lambda part: getattr(part, "name", ""))
+@pytest.mark.parametrize("belt", [0.3, -0.3])
+def test_same_motion(law: FrictionLaw, curve: dop853.Curve, belt: float) -> None:
+    """Through many phases, under forces that are held in turn."""
+    starts, forces = [0.0, 9.0, 13.0, 18.0], [0.0, 0.5, -0.7, 0.1]
+    levels = [dop853.level(*each) for each in zip([-np.inf, *starts[1:]], forces, strict=True)]
+    belts = dop853.none().plus(belt)
+    solver = Dop853Drive(1.0, 0.02, 1.0, curve, curve, belts, force=Signal(levels))
+    times = np.array([*starts, 25.0])
+    expected = solver.run(0.1, 0.9, times)
+    motion = RecordedMotion(replace(PAPER, belt_speed=belt, friction=law), 0.1, 0.9)
+    for number, force in enumerate(forces, start=1):
+        motion.force = force
+        motion.advance(times[number] - times[number - 1])
+        assert motion.position == pytest.approx(expected.position[number], rel=0.0, abs=1e-9)
+        assert motion.velocity == pytest.approx(expected.velocity[number], rel=0.0, abs=1e-9)
+    found = without_short(sticks_of(motion.take_breakpoints()), 1e-9)
+    assert len(expected.sticks) > 2
+    assert np.array(found) == pytest.approx(np.array(expected.sticks), rel=0.0, abs=1e-9)
 
 
-def table_of(curve: Callable[[Array], Array], points: int) -> Table:
-    speeds = np.linspace(0.0, TOP_SPEED, points)
-    values = np.asarray(curve(speeds)) * np.ones(points)
-    return Table((*zip(speeds.tolist(), values.tolist(), strict=True), (2.0 * TOP_SPEED, 0.0)))
-
-
-def directional(make: Callable[[float], FrictionLaw]) -> FrictionLaw:
-    return Directional(make(1.0), make(0.8))
-
-
-@pytest.mark.parametrize("belt_speed", [0.1, -0.3, 0.0])
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda share: Coulomb(share * 0.4),
-        lambda share: Coulomb(share * 0.4, 0.05),
-        lambda share: Linear(share * 0.4, 0.05),
-    ],
-    ids=["constant", "rising", "falling"],
-)
-def test_the_table_of_a_straight_law_gives_its_motion(
-    make: Callable[[float], FrictionLaw], belt_speed: float
-) -> None:
-    """The interpolation is exact for a straight line."""
-
-    def table(share: float) -> FrictionLaw:
-        law = make(share)
-        return table_of(lambda speed: -law.coefficient(speed, 1.0), 7)
-
-    drive = replace(PAPER, belt_speed=belt_speed, friction=directional(make))
-    expected = states(drive, 20.0)
-    assert np.abs(expected[:, 1] - belt_speed).max() < TOP_SPEED / 2.0
-    found = states(replace(drive, friction=directional(table)), 20.0)
-    assert np.abs(found - expected).max() < 1e-9
-
-
-@pytest.mark.parametrize(
-    "law",
-    [Stribeck(0.4, 0.25, 2.0), Exponential(0.4, 0.25, 0.5, 0.02, 2.0)],
-    ids=lambda law: law.name,
-)
-def test_the_table_of_a_curve_gives_its_motion_to_the_accuracy_of_the_table(
-    law: FrictionLaw,
-) -> None:
-    drive = replace(PAPER, belt_speed=0.1, friction=law)
-    expected = states(drive, 5.0)
-    between = np.linspace(0.0, TOP_SPEED / 2.0, 100_001)
-    for points in (31, 121, 481):
-        table = table_of(lambda speed: -law.coefficient(speed, 1.0), points)
-        accuracy = np.abs(table.coefficient(between, 1.0) - law.coefficient(between, 1.0)).max()
-        error = np.abs(states(replace(drive, friction=table), 5.0) - expected).max()
-        assert accuracy < 0.1 * (30.0 / points) ** 2
-        assert error < 10.0 * accuracy
+@pytest.mark.parametrize("decay_speed", [0.1, 0.01, 0.001])
+def test_a_law_that_changes_suddenly_is_not_stepped_over(decay_speed: float) -> None:
+    """The steps of the integrator fit what comes, be they asked for in one go or one by one."""
+    law = Exponential(0.4, 0.25, decay_speed, 0.0)
+    in_one_go, one_by_one = (
+        Motion(replace(PAPER, belt_speed=0.2, friction=law), 0.0, 0.0) for _ in range(2)
+    )
+    in_one_go.advance(100.0)
+    for _ in range(10_000):
+        one_by_one.advance(0.01)
+    assert in_one_go.position == pytest.approx(one_by_one.position, rel=0.0, abs=1e-9)
+    assert in_one_go.velocity == pytest.approx(one_by_one.velocity, rel=0.0, abs=1e-9)

@@ -23,26 +23,23 @@ def test_turning_points_have_a_velocity_of_exactly_zero() -> None:
     assert np.unique(np.round(turning.time, 9)) == pytest.approx([0.0, pi, 2 * pi, 3 * pi])
     assert turning.time[-1] == pytest.approx(3.0 * pi, rel=1e-13)
     assert turning.position[-1] == pytest.approx(0.1, rel=1e-13)
-
-
-def test_velocity_extremes_are_breakpoints() -> None:
-    motion = RecordedMotion(FREE, 0.7, 0.0)
-    motion.advance(10.0)
-    breakpoints = motion.take_breakpoints()
     fastest = breakpoints[np.abs(np.abs(breakpoints.velocity) - 0.3) < 1e-13]
     assert fastest.time == pytest.approx([pi / 2, 3 * pi / 2, 5 * pi / 2], rel=1e-12)
     assert fastest.position == pytest.approx([0.4, 0.4, 0.4], rel=1e-12)
+    assert len(motion.take_breakpoints()) == 0
+    motion.recording = False
+    motion.advance(10.0)
+    assert len(motion.take_breakpoints()) == 0
 
 
-@pytest.mark.parametrize("step", [0.001, 0.01])
-def test_no_sampled_state_is_beyond_the_breakpoints(step: float) -> None:
+def test_no_sampled_state_is_beyond_the_breakpoints() -> None:
     """Between neighbouring breakpoints displacement and speed have no extremes."""
     drive = replace(FEED_DRIVE, belt_speed=0.02)
     coarse = RecordedMotion(drive, 0.0, 0.0)
     coarse.advance(0.3)
     breakpoints = coarse.take_breakpoints()
     sampled = Motion(drive, 0.0, 0.0)
-    slack = 1e-12
+    slack, step = 1e-12, 0.001
     for number in range(1, round(0.3 / step)):
         sampled.advance(step)
         after = int(np.searchsorted(breakpoints.time, number * step))
@@ -52,32 +49,6 @@ def test_no_sampled_state_is_beyond_the_breakpoints(step: float) -> None:
         ):
             low, high = sorted(column[after - 1 : after + 1])
             assert low - slack <= value <= high + slack
-
-
-def test_breakpoints_are_in_si_units_and_end_where_the_motion_is() -> None:
-    motion = RecordedMotion(FEED_DRIVE, 0.0, 0.0)
-    motion.advance(0.05)
-    motion.advance(0.02)
-    breakpoints = motion.take_breakpoints()
-    assert breakpoints.time[0] == 0.0
-    assert breakpoints.time[-1] == pytest.approx(0.07, rel=1e-14)
-    assert breakpoints.position[-1] == motion.position
-    assert breakpoints.velocity[-1] == motion.velocity
-
-
-def test_breakpoints_are_taken_once() -> None:
-    motion = RecordedMotion(PAPER, 0.0, 0.0)
-    motion.advance(1.0)
-    assert len(motion.take_breakpoints()) > 1
-    assert len(motion.take_breakpoints()) == 0
-
-
-def test_a_motion_that_does_not_record_has_none() -> None:
-    motion = RecordedMotion(PAPER, 0.0, 0.0)
-    motion.recording = False
-    motion.take_breakpoints()
-    motion.advance(10.0)
-    assert len(motion.take_breakpoints()) == len(Breakpoints.empty())
 
 
 def test_a_stick_begins_at_the_landing() -> None:

@@ -24,25 +24,16 @@ changes = pytest.mark.parametrize("changed", CHANGES.values(), ids=CHANGES.keys(
 
 
 @changes
-def test_a_new_drive_takes_over_position_velocity_and_force(changed: Drive) -> None:
-    motion = Motion(FEED_DRIVE, 0.0, 0.0)
-    motion.force = 30.0
-    motion.advance(0.05)
-    position, velocity = motion.position, motion.velocity
-    motion.drive = changed
-    assert motion.position == pytest.approx(position, rel=1e-14)
-    assert motion.velocity == pytest.approx(velocity, rel=1e-14)
-    assert motion.force == pytest.approx(30.0, rel=1e-14)
-
-
-@changes
 def test_from_then_on_it_moves_as_the_new_drive(changed: Drive) -> None:
     motion = Motion(FEED_DRIVE, 0.0, 0.0)
     motion.force = 30.0
     motion.advance(0.05)
-    fresh = Motion(changed, motion.position, motion.velocity)
+    position, velocity = motion.position, motion.velocity
+    fresh = Motion(changed, position, velocity)
     fresh.force = 30.0
     motion.drive = changed
+    found = motion.position, motion.velocity, motion.force
+    assert found == pytest.approx((position, velocity, 30.0), rel=1e-14)
     motion.advance(0.2)
     fresh.advance(0.2)
     assert motion.position == pytest.approx(fresh.position, rel=1e-9)
@@ -91,31 +82,6 @@ def test_restart_puts_the_filter_of_the_continuous_controller_to_rest() -> None:
     motion.restart(1e-4, -0.08)
     # It has let nothing through of the constant speed that it is taken to have seen.
     assert control_force(motion) == pytest.approx(0.0, abs=1e-2)
-
-
-def test_friction_is_that_under_the_force_held_up_to_now() -> None:
-    """Stuck at x = 0.2, friction balances spring, damper and force."""
-    motion = Motion(PAPER, 0.0, 0.4)
-    motion.force = 0.1
-    motion.advance(0.5)
-    assert motion.friction_force == pytest.approx(0.2 + 0.02 * 0.4 - 0.1, rel=1e-12)
-
-
-def test_friction_while_slipping_is_that_of_the_law() -> None:
-    motion = Motion(FEED_DRIVE, 0.0, 0.0)
-    # At rest the belt slips past at 0.8 v_m: mu = 0.4 - 0.45 0.4 + 0.6 0.4^3.
-    assert motion.friction_force == pytest.approx(1000.0 * 0.2584, rel=1e-12)
-
-
-@changes
-def test_a_new_drive_takes_over_the_gains_of_the_continuous_controller(changed: Drive) -> None:
-    motion = Motion(FEED_DRIVE, 0.0, 0.0, WashoutGains(20.0, -3000.0, -1e4))
-    motion.drive = changed
-    fresh = Motion(changed, 0.0, 0.0, WashoutGains(20.0, -3000.0, -1e4))
-    motion.advance(0.1)
-    fresh.advance(0.1)
-    assert motion.position == pytest.approx(fresh.position, rel=1e-9)
-    assert motion.velocity == pytest.approx(fresh.velocity, rel=1e-9)
 
 
 @changes

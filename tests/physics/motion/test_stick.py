@@ -5,7 +5,6 @@ the friction that holds the slide at x is h = x + 0.02 v - u, and 0.4 is the mos
 """
 
 from dataclasses import replace
-from math import sqrt
 
 import pytest
 from hypothesis import example, given
@@ -46,17 +45,6 @@ def test_it_breaks_away_where_friction_can_no_longer_hold_it(direction: float) -
     assert breakpoints.position[breakpoints.sticking][1] == pytest.approx(
         direction * limit, rel=1e-14
     )
-
-
-@directions
-def test_a_start_at_the_limit_sticks_only_if_the_belt_relieves_the_spring(direction: float) -> None:
-    drive = replace(PAPER, belt_speed=direction * BELT, damping=0.0)
-    tightening = Motion(drive, direction * 0.4, direction * BELT)
-    tightening.advance(0.01)
-    assert not tightening.sticking
-    relieving = Motion(drive, -direction * 0.4, direction * BELT)
-    relieving.advance(0.01)
-    assert relieving.sticking
 
 
 @given(st.floats(0.0, 0.5), st.floats(0.05, 1.0), st.floats(-1.0, 1.0), st.integers(-3, 3))
@@ -114,16 +102,6 @@ def test_a_jump_of_the_force_breaks_the_stick_at_once(direction: float) -> None:
     assert not motion.take_breakpoints().sticking.any()
 
 
-@directions
-def test_a_force_within_the_limit_only_moves_the_friction(direction: float) -> None:
-    motion = Motion(SLOW, 0.0, BELT)
-    motion.advance(1.0)
-    motion.force = direction * 0.19
-    motion.advance(0.01)
-    assert motion.sticking
-    assert motion.friction_force == pytest.approx(0.202 + 0.004 - direction * 0.19, rel=1e-12)
-
-
 def test_a_short_hop_off_the_belt_ends_where_it_lands() -> None:
     """With Coulomb friction and no damping the hop is a piece of a harmonic motion.
 
@@ -164,13 +142,3 @@ def test_on_a_belt_at_rest_coulomb_friction_takes_the_same_from_every_swing(
     assert motion.sticking
     assert motion.velocity == 0.0
     assert motion.position == pytest.approx(end, rel=1e-12)
-
-
-def test_it_slips_towards_equilibrium_without_touching_a_fast_belt() -> None:
-    """Friction on a Coulomb belt is constant: a free vibration about mu_s with speed amplitude."""
-    drive = replace(PAPER, damping=0.0, belt_speed=1.0, friction=Coulomb(0.4))
-    motion = Motion(drive, 0.4 + 0.9, 0.0)
-    motion.advance(2.0)
-    speed = -0.9 * sqrt(1.0 - 0.41614683654714241**2)  # cos 2 = -0.416...
-    assert motion.position == pytest.approx(0.4 - 0.9 * 0.41614683654714241, rel=1e-13)
-    assert motion.velocity == pytest.approx(speed, rel=1e-13)

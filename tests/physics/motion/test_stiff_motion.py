@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 
 from stickslip_ros.errors import RunError
-from stickslip_ros.physics.model.friction import Coulomb
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.physics.motion.variational import SensitiveMotion, TooStiffError
 from tests.physics.drives import PAPER
@@ -46,14 +45,6 @@ def test_a_long_motion_that_is_not_stiff_is_followed_to_its_end() -> None:
     assert not motion.unbounded
 
 
-def test_a_motion_sampled_often_is_followed_to_its_end() -> None:
-    often, once = Motion(PAPER, 0.0, 0.0), Motion(PAPER, 0.0, 0.0)
-    for _ in range(1000):
-        often.advance(1e-6)
-    once.advance(1e-3)
-    assert often.velocity == pytest.approx(once.velocity, rel=1e-11)
-
-
 def test_a_stick_however_long_is_followed_to_its_end() -> None:
     motion = Motion(replace(PAPER, belt_speed=1e-20), 0.0, 1e-20)
     motion.advance(1e19)
@@ -65,15 +56,6 @@ def test_theory_takes_it_for_too_stiff() -> None:
     motion = SensitiveMotion(STIFF)
     with pytest.raises(TooStiffError):
         motion.advance(0.1)
-
-
-def test_a_law_that_was_used_before_is_as_it_was() -> None:
-    changed, steady = Motion(PAPER, 0.0, 0.0), Motion(PAPER, 0.0, 0.0)
-    for drive in (replace(PAPER, friction=Coulomb(0.4)), PAPER) * 2:
-        changed.drive = drive
-    for motion in (changed, steady):
-        motion.advance(30.0)
-    assert changed.position == pytest.approx(steady.position, rel=1e-11)
 
 
 def test_after_a_restart_nothing_of_a_refused_motion_is_recorded(

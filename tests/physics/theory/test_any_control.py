@@ -5,19 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stickslip_ros.physics.measures.cycle_measures import Regime
 from stickslip_ros.physics.model.control import StateFeedback
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.motion.variational import SensitiveMotion
-from stickslip_ros.physics.theory.critical_gains import critical_gains
+from stickslip_ros.physics.theory.critical_gains import critical_gains, limit_cycle_from_hopf
 from stickslip_ros.physics.theory.cycle_bounds import least_cycle
 from stickslip_ros.physics.theory.hopf import HopfPoint, hopf_points
-from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import (
     LimitCycle,
     limit_cycle_of_run,
     limit_cycles,
-    shoot,
 )
 from stickslip_ros.physics.theory.linear import expand, jacobians
 from tests.physics.drives import FEED_DRIVE, PAPER
@@ -103,13 +100,6 @@ def test_its_limit_cycle_is_that_of_that_drive(drive: Drive, gains: StateFeedbac
     assert found.multipliers == pytest.approx(expected.multipliers, abs=1e-8)
 
 
-def test_of_all_these_loops_some_vibrate_and_some_do_not() -> None:
-    vibrating = [limit_cycle_of_run(drive, 0.0, gains=gains) for drive, gains in GAINS]
-    regimes = {cycle.measures.regime for cycle in vibrating if cycle is not None}
-    assert Regime.STICK_SLIP in regimes
-    assert None in vibrating
-
-
 def test_enough_velocity_feedback_leaves_no_cycle() -> None:
     assert least_cycle(PAPER, StateFeedback(0.0, -0.1)) == least_cycle(
         altered(PAPER, StateFeedback(0.0, -0.1))
@@ -142,20 +132,3 @@ def test_a_cycle_with_two_states_closes() -> None:
     motion.start(start)
     motion.advance(cycle.period)
     assert motion.state == pytest.approx(start, abs=1e-11)
-
-
-def test_a_guess_of_two_states_leads_to_it() -> None:
-    cycle = cycle_with_lags()
-    guess = [1.02 * state for state in cycle.filter_states]
-    found = shoot(PAPER, 1.02 * cycle.position, cycle.period, gains=LAGS, filter_state=guess)
-    assert found is not None
-    assert found.period == pytest.approx(cycle.period, rel=1e-10)
-    assert found.filter_states == pytest.approx(cycle.filter_states, rel=1e-9)
-
-
-def test_fast_lags_are_velocity_feedback() -> None:
-    fast, plain = TwoLags(1e4, -0.04, -0.06), StateFeedback(0.0, -0.1)
-    found, expected = expand(PAPER, fast), expand(PAPER, plain)
-    assert found is not None
-    assert expected is not None
-    assert found.eigenvalues[:2] == pytest.approx(expected.eigenvalues, abs=1e-4)

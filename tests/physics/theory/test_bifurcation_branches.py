@@ -50,8 +50,13 @@ def test_the_branch_of_the_paper_goes_through_the_reference_cycles_to_the_hopf_p
     assert found.sticking_onset == sticking_onset(PAPER).exact
 
 
-def test_the_equilibrium_changes_stability_at_the_hopf_point() -> None:
-    found = BifurcationBranches.over(PAPER, np.linspace(0.3, 0.6, 4))
+@pytest.fixture(scope="module")
+def ahead() -> BifurcationBranches:
+    return BifurcationBranches.over(PAPER, np.linspace(0.3, 0.6, 4))
+
+
+def test_the_equilibrium_changes_stability_at_the_hopf_point(ahead: BifurcationBranches) -> None:
+    found = ahead
     assert [branch.stable for branch in found.equilibria] == [False, True]
     unstable, stable = found.equilibria
     assert unstable.belt_speeds[0] == 0.3
@@ -94,10 +99,9 @@ def test_a_range_without_the_hopf_point_has_open_ends() -> None:
     assert (found.hopf_points, found.sticking_onset, found.folds) == ((), None, [])
 
 
-def test_a_reversed_belt_mirrors_the_branches() -> None:
-    speeds = np.linspace(0.3, 0.6, 4)
-    ahead = BifurcationBranches.over(PAPER, speeds)
-    back = BifurcationBranches.over(PAPER, -speeds[::-1])
+@pytest.mark.long
+def test_a_reversed_belt_mirrors_the_branches(ahead: BifurcationBranches) -> None:
+    back = BifurcationBranches.over(PAPER, -np.linspace(0.3, 0.6, 4)[::-1])
     assert back.hopf_points[0].belt_speed == -ahead.hopf_points[0].belt_speed
     assert back.sticking_onset == -(ahead.sticking_onset or 0.0)
     (one,), (other,) = ahead.cycles, back.cycles
@@ -106,19 +110,7 @@ def test_a_reversed_belt_mirrors_the_branches() -> None:
     assert np.array_equal(other.sticks, one.sticks[::-1])
 
 
-def test_units_scale_the_branches() -> None:
-    speeds = np.linspace(0.3, 0.6, 4)
-    (unit,) = BifurcationBranches.over(PAPER, speeds).cycles
-    (metric,) = BifurcationBranches.over(FEED_DRIVE, 0.1 * speeds).cycles
-    assert np.allclose(metric.greatest, 1e-3 * unit.greatest, rtol=1e-8)
-
-
-def test_energy_that_is_never_gained_leaves_a_stable_equilibrium() -> None:
-    found = BifurcationBranches.around(replace(PAPER, friction=Coulomb(0.4)), points=5)
-    assert [branch.stable for branch in found.equilibria] == [True]
-    assert found.cycles == found.hopf_points == ()
-
-
+@pytest.mark.long
 def test_cycles_without_a_hopf_point_meet_in_a_fold() -> None:
     drive = replace(PAPER, friction=Linear(0.4, 0.3))
     found = BifurcationBranches.over(drive, np.linspace(0.6, 1.0, 5))
@@ -127,6 +119,7 @@ def test_cycles_without_a_hopf_point_meet_in_a_fold() -> None:
     assert [branch.stable for branch in found.equilibria] == [False]
 
 
+@pytest.mark.long
 def test_friction_with_a_memory_has_no_onset() -> None:
     drive = replace(FEED_DRIVE, friction=LuGre(CURVE, 1e5, 100.0))
     found = BifurcationBranches.over(drive, np.array([0.04, 0.1]))

@@ -57,22 +57,6 @@ def test_the_general_theory_agrees_with_the_closed_forms(
     assert critical.cubic * speed**3 / force == pytest.approx(cubic_gain, rel=1e-9, abs=1e-12)
 
 
-def test_closed_forms_to_twelve_digits_at_the_papers_drive() -> None:
-    forms = CubicLoop.from_drive(PAPER)
-    assert forms is not None
-    for corner_frequency in (0.1, 0.2, 0.5, 1.0, 2.0):
-        critical = critical_gains(PAPER, WashoutGains(corner_frequency, 0.0, -1.0))
-        assert critical is not None
-        sigma = forms.critical_lyapunov_coefficient(corner_frequency, -1.0)
-        assert critical.linear == pytest.approx(
-            forms.critical_linear_gain(corner_frequency), rel=1e-12
-        )
-        assert critical.first_lyapunov_coefficient == pytest.approx(sigma, rel=1e-12)
-        assert critical.cubic == pytest.approx(
-            forms.critical_cubic_gain(corner_frequency), rel=1e-12
-        )
-
-
 @pytest.mark.parametrize("law", [PAPER.friction, Exponential(0.4, 0.25, 0.2, 0.01)])
 def test_the_pair_is_on_the_axis_at_the_critical_gain(law: Exponential) -> None:
     drive = replace(PAPER, friction=law)

@@ -8,10 +8,9 @@ import pytest
 from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures, Regime
 from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.motion.variational import SensitiveMotion
-from stickslip_ros.physics.theory.critical_gains import critical_gains
-from stickslip_ros.physics.theory.hopf_cycles import limit_cycle_from_hopf
+from stickslip_ros.physics.theory.critical_gains import critical_gains, limit_cycle_from_hopf
 from stickslip_ros.physics.theory.limit_cycles import limit_cycle_of_run
-from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.physics.drives import PAPER
 
 SUBCRITICAL = WashoutGains(0.2, -0.16, 2.0)
 """Beyond the critical gain (-0.148), with more cubic gain than the critical one (0.649)."""
@@ -63,21 +62,6 @@ def test_a_stable_cycle_is_the_one_that_a_run_leads_to(corner_frequency: float) 
     assert cycle.stable
     assert cycle.position == pytest.approx(by_run.position, rel=1e-9)
     assert cycle.period == pytest.approx(by_run.period, rel=1e-9)
-
-
-@pytest.mark.long
-def test_si_units() -> None:
-    force, speed = FEED_DRIVE.normal_force, FEED_DRIVE.speed_scale
-    gains = WashoutGains(
-        SUBCRITICAL.corner_frequency * FEED_DRIVE.angular_frequency,
-        SUBCRITICAL.linear * force / speed,
-        SUBCRITICAL.cubic * force / speed**3,
-    )
-    si, unit = limit_cycle_from_hopf(FEED_DRIVE, gains), limit_cycle_from_hopf(PAPER, SUBCRITICAL)
-    assert si is not None
-    assert unit is not None
-    assert si.position == pytest.approx(unit.position * FEED_DRIVE.length_scale, rel=1e-9)
-    assert si.multipliers[0] == pytest.approx(unit.multipliers[0], rel=1e-9)
 
 
 def test_none_on_the_other_side_of_the_critical_gain() -> None:

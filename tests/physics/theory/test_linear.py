@@ -11,7 +11,7 @@ from stickslip_ros.physics.model.control import WashoutGains
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import Coulomb, Exponential, FrictionLaw, Linear, Stribeck
 from stickslip_ros.physics.theory.linear import expand, hurwitz_determinants, jacobians
-from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.physics.drives import PAPER
 
 LAWS = [
     Stribeck(0.4, 0.25, 0.5),
@@ -55,27 +55,6 @@ def test_derivatives_are_those_of_the_law(law: FrictionLaw) -> None:
         assert np.count_nonzero(tensor) <= 1
 
 
-def test_units_do_not_matter() -> None:
-    gains = WashoutGains(20.0, -3000.0, -5e4)
-    si, unit = expand(FEED_DRIVE, gains), expand(PAPER, gains.scaled(FEED_DRIVE))
-    assert si is not None
-    assert unit is not None
-    assert si.jacobian == pytest.approx(unit.jacobian, abs=1e-14)
-    assert si.cubic == pytest.approx(unit.cubic, abs=1e-12)
-
-
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
-def test_a_reversed_belt_mirrors_the_equilibrium(law: FrictionLaw) -> None:
-    drive = replace(PAPER, friction=law)
-    there, back = expand(drive), expand(replace(drive, belt_speed=-drive.belt_speed))
-    assert there is not None
-    assert back is not None
-    assert back.equilibrium[0] == -there.equilibrium[0]
-    assert back.jacobian == pytest.approx(there.jacobian)
-    assert back.quadratic == pytest.approx(-there.quadratic)
-    assert back.cubic == pytest.approx(there.cubic)
-
-
 def test_nothing_smooth_surrounds_a_slide_on_a_belt_at_rest() -> None:
     assert expand(replace(PAPER, belt_speed=0.0)) is None
 
@@ -103,3 +82,19 @@ def test_continuous_control_is_the_jacobian_of_the_paper() -> None:
     assert expansion is not None
     rows = [[0.0, 1.0, 0.0], [-1.0, 0.44 - 1.8 * 0.49**2 - 0.3, 0.6], [0.0, 1.0, -2.0]]
     assert expansion.jacobian == pytest.approx(np.array(rows), abs=1e-15)
+
+
+def test_a_neutral_equilibrium_is_neither_stable_nor_unstable() -> None:
+    for damping, stable in ((0.0, None), (0.02, True), (1e-9, True)):
+        expansion = expand(replace(PAPER, damping=damping, friction=Coulomb(0.4)))
+        assert expansion is not None
+        assert expansion.stable is stable
+
+
+@pytest.mark.parametrize("order", [4, 5])
+def test_determinants_agree_with_eigenvalues(order: int) -> None:
+    random = np.random.default_rng(1)
+    matrices = random.normal(size=(500, order, order)) - 1.5 * np.eye(order)
+    stable = np.linalg.eigvals(matrices).real.max(axis=-1) < 0.0
+    assert 20 < stable.sum() < 480
+    np.testing.assert_array_equal((hurwitz_determinants(matrices) > 0.0).all(axis=-1), stable)

@@ -105,39 +105,6 @@ def test_it_is_the_loop_that_runs(
     assert found == pytest.approx(np.array(expected), abs=2e-6 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize(("drive", "rate", "force_delay", "gains"), LOOPS)
-def test_a_small_vibration_grows_by_the_spectral_radius(
-    drive: Drive, rate: float, force_delay: float, gains: WashoutGains
-) -> None:
-    """What grows by r per sample satisfies x_(n+2) = 2 r cos(phi) x_(n+1) - r^2 x_n."""
-    loop = loop_of(drive, rate, force_delay)
-    moduli = np.sort(np.abs(np.linalg.eigvals(loop.transition_matrix(gains))))[::-1]
-    alone = int(log(1e-7) / log(moduli[2] / moduli[0]))
-    start = min(1e-7 * moduli[0] ** -alone, 1e-3)
-    late = simulated(loop, gains, alone + 40, start)[alone:, 0]
-    system = np.stack([late[1:-1], late[:-2]], axis=1)
-    _, square = np.linalg.lstsq(system, late[2:], rcond=None)[0]
-    assert np.sqrt(-square) == pytest.approx(loop.spectral_radius(gains), abs=1e-6)
-
-
-@pytest.mark.parametrize("rate_and_delay", [(100.0, 0.0), (20.0, 0.13), (5.0, 0.2), (2.0, 0.4)])
-def test_the_loop_is_stable_on_one_side_of_the_critical_gain(
-    rate_and_delay: tuple[float, float],
-) -> None:
-    rate, force_delay = rate_and_delay
-    loop = loop_of(PAPER, rate, force_delay)
-    critical = loop.critical_linear_gain(0.2)
-    assert critical is not None
-    amplitudes = []
-    for factor in (1.3, 0.7):
-        gains = WashoutGains(0.2, factor * critical, 0.0)
-        distances = np.hypot(*simulated(loop, gains, int(150.0 * rate)).T)
-        amplitudes.append(distances[-int(7.0 * rate) :].max() / 1e-7)
-    stable, unstable = amplitudes
-    assert stable < 0.5
-    assert unstable > 2.0
-
-
 rates = st.floats(0.2, 200.0)
 speeds = st.floats(0.1, 0.7)
 corners = st.floats(0.02, 10.0)
@@ -204,12 +171,6 @@ def test_without_any_damping_zero_is_the_critical_gain(
     assert str(loop.critical_linear_gain(2.0)) == "0.0"
 
 
-@pytest.mark.parametrize(("corner_frequency", "critical"), [(2.0, -0.935), (0.2, -0.148)])
-def test_critical_gains_of_the_continuous_loop(corner_frequency: float, critical: float) -> None:
-    found = loop_of(PAPER, 1e5).critical_linear_gain(corner_frequency)
-    assert found == pytest.approx(critical, abs=5e-4)
-
-
 @given(speeds, corners)
 @examples(quick=10, thorough=25)
 def test_the_critical_gain_tends_to_that_of_the_continuous_loop(
@@ -232,23 +193,6 @@ def test_the_critical_gain_tends_to_that_of_the_continuous_loop(
     assert max(errors) < 100.0 * (1.0 + corner_frequency) ** 4
 
 
-@given(st.floats(0.5, 50.0), st.floats(0.0, 3.0), corners, st.floats(-1.0, 1.0))
-@examples(quick=10, thorough=30)
-def test_a_delay_of_whole_periods_hardly_differs_from_almost_as_much(
-    rate: float, periods: float, corner_frequency: float, gain: float
-) -> None:
-    gains = WashoutGains(corner_frequency, gain, 0.0)
-    whole = round(periods)
-    exact = loop_of(PAPER, rate, whole / rate)
-    assert exact.under_way == whole
-    for further in (-1e-7, 1e-7):
-        if whole + further > 0.0:
-            near = loop_of(PAPER, rate, (whole + further) / rate)
-            assert near.under_way == whole + (further > 0.0)
-            radius = exact.spectral_radius(gains)
-            assert near.spectral_radius(gains) == pytest.approx(radius, abs=1e-3)
-
-
 def test_units_do_not_matter() -> None:
     """The feed drive is the paper's drive at 100 rad/s, with 1e4 N s/m for a gain of one."""
     paper, feed = loop_of(PAPER, 10.0, 0.13), loop_of(FEED_DRIVE, 1000.0, 0.0013)
@@ -257,32 +201,8 @@ def test_units_do_not_matter() -> None:
     assert feed.spectral_radius(other) == pytest.approx(paper.spectral_radius(one), rel=1e-12)
     assert feed.decay_rate(other) == pytest.approx(100.0 * paper.decay_rate(one))
     assert feed.settling_time(other) == pytest.approx(paper.settling_time(one) / 100.0)
-
-
-def test_settling_time() -> None:
-    loop = loop_of(PAPER, 10.0)
-    gains = WashoutGains(0.2, -1.0, 0.0)
-    time = loop.settling_time(gains)
-    assert time == pytest.approx(log(100.0) / loop.decay_rate(gains))
-    assert loop.settling_time(WashoutGains(0.2, -0.1, 0.0)) is None
-
-
-def test_a_slow_washout_at_the_hopf_point_has_a_triple_root() -> None:
-    """At p = 0, (l + r)^3 = l^3 + (d - k1) l^2 + l + d for r = 1/sqrt(3), d = r^3, k1 = d - 3 r."""
-    cubic = CubicLoop.from_drive(PAPER)
-    assert cubic is not None
-    assert cubic.hopf_speed is not None
-    loop = loop_of(replace(PAPER, belt_speed=cubic.hopf_speed), 1e6)
-    r = 3.0**-0.5
-    assert loop.decay_rate(WashoutGains(r**3, r**3 - 3.0 * r, 0.0)) == pytest.approx(r, rel=0.02)
-
-
-def test_no_gain_is_stable_where_every_sample_falls_on_the_same_phase() -> None:
-    """A free slide sampled once per period shows nothing of its vibration."""
-    drive = replace(PAPER, damping=0.0)
-    loop = loop_of(drive, 1.0 / (2.0 * pi))
-    assert loop.stable_linear_gains(0.2) == []
-    assert loop.critical_linear_gain(0.2) is None
+    assert paper.settling_time(one) == pytest.approx(log(100.0) / paper.decay_rate(one))
+    assert paper.settling_time(WashoutGains(0.2, -0.1, 0.0)) is None
 
 
 def test_a_map_has_the_decay_rate_of_each_pair() -> None:
@@ -315,6 +235,7 @@ def test_the_reason_for_no_linear_loop_is_given() -> None:
     assert why_no_linear_loop(PAPER, 100.0, 3.0) is None
 
 
+@pytest.mark.long
 def test_the_longest_delay_and_the_highest_rate() -> None:
     assert loop_of(PAPER, 100.0, LONGEST_DELAY / 100.0).critical_linear_gain(0.1) is not None
     critical = loop_of(PAPER, 1e9).critical_linear_gain(2.0)
@@ -323,7 +244,7 @@ def test_the_longest_delay_and_the_highest_rate() -> None:
     assert critical == pytest.approx(cubic.critical_linear_gain(2.0), rel=1e-6)
 
 
-@pytest.mark.parametrize("force_delay", [0.0, 0.03, 0.1, 0.25])
+@pytest.mark.parametrize("force_delay", [0.03, 0.25])
 @pytest.mark.parametrize(
     ("drive", "law"),
     [
@@ -359,22 +280,6 @@ def test_any_linear_law_in_the_loop_that_runs(
         state = matrix @ state
     assert np.abs(expected).max() < 0.4  # the slide does not overtake the belt
     assert found == pytest.approx(np.array(expected), abs=2e-6 * np.abs(expected).max())
-
-
-def test_velocity_feedback_that_is_sampled_fast_is_damping() -> None:
-    law = VelocityFeedback(velocity_gain=-0.2)
-    sampled, damped = loop_of(PAPER, 1e5), replace(PAPER, damping=PAPER.damping + 0.2)
-    expansion = expand(damped)
-    assert expansion is not None
-    decay_rate = -expansion.eigenvalues[0].real
-    assert sampled.decay_rate(law) == pytest.approx(decay_rate, rel=1e-4)
-    assert sampled.settling_time(law) == pytest.approx(log(100.0) / decay_rate, rel=1e-4)
-
-
-def test_a_law_and_its_gains_make_the_same_loop() -> None:
-    loop, gains = loop_of(PAPER, 10.0, 0.25), WashoutGains(0.5, -0.1, -1.0)
-    law = Washout(0.5, -0.1, -1.0)
-    assert np.array_equal(loop.transition_matrix(gains), loop.transition_matrix(law))
 
 
 def test_a_law_that_is_not_linear_is_refused_by_name() -> None:

@@ -59,9 +59,10 @@ def response(drive: Drive, law: Any, delay: float, spans: int) -> np.ndarray:
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
 @pytest.mark.parametrize("drive", [FEED_DRIVE, LUGRE], ids=["static", "memory"])
-@pytest.mark.parametrize("delay", [0.0, 0.4e-3, 2.7e-3])
-@pytest.mark.parametrize("lag", [0.0, 1e-3, 5e-3])
-@pytest.mark.parametrize("spans", [0, 1, 3])
+@pytest.mark.parametrize(
+    ("delay", "lag", "spans"),
+    [(0.0, 0.0, 3), (0.4e-3, 1e-3, 1), (2.7e-3, 5e-3, 0), (0.4e-3, 0.0, 0), (2.7e-3, 1e-3, 3)],
+)
 def test_the_matrix_is_that_of_the_loop(
     law: Any, drive: Drive, delay: float, lag: float, spans: int
 ) -> None:
@@ -83,15 +84,16 @@ def test_the_matrix_is_that_of_the_loop(
 
 
 @pytest.mark.parametrize("drive", [FEED_DRIVE, LUGRE], ids=["static", "memory"])
-@pytest.mark.parametrize("delay", [0.0, 0.4e-3, 2.7e-3])
-@pytest.mark.parametrize("lag", [0.0, 1e-3])
-@pytest.mark.parametrize("spans", [0, 1, 2, 3, 8])
+@pytest.mark.parametrize(
+    ("delay", "lag", "spans"),
+    [(0.0, 0.0, 8), (0.4e-3, 1e-3, 2), (2.7e-3, 1e-3, 3), (2.7e-3, 0.0, 1), (0.0, 1e-3, 0)],
+)
 def test_the_stable_gains(drive: Drive, delay: float, lag: float, spans: int) -> None:
     """Against the eigenvalues at very many gains."""
     loop = linear_loop(replace(drive, actuator=Actuator(time_constant=lag)), delay, spans)
     intervals = loop.stable_linear_gains(20.0)
     scale = max([5000.0, *(abs(end) for interval in intervals for end in interval)])
-    gains = np.linspace(-1.47 * scale, 1.43 * scale, 3001)
+    gains = np.linspace(-1.47 * scale, 1.43 * scale, 601)
     rates = loop.decay_rates(np.array([20.0]), gains)[0]
     inside = np.any([(low < gains) & (gains < high) for low, high in intervals], axis=0)
     assert np.array_equal(rates > 0.0, np.broadcast_to(inside, rates.shape))
@@ -108,12 +110,3 @@ def test_what_is_not_linear_is_left_out() -> None:
     smooth = linear_loop(FEED_DRIVE, 0.0, 2)
     assert rough is not None
     assert np.array_equal(rough.transition_matrix(LAWS[0]), smooth.transition_matrix(LAWS[0]))
-
-
-def test_a_coarser_loop_has_nearly_the_same_gains() -> None:
-    fine = LinearSampledLoop.from_drive(FEED_DRIVE, 2e4, 2e-3, sensor(30))
-    assert fine is not None
-    coarse = fine.coarsened()
-    assert coarse.under_way + coarse.difference_samples < fine.difference_samples
-    gains = [loop.critical_linear_gain(20.0) for loop in (fine, coarse)]
-    assert gains[1] == pytest.approx(gains[0], rel=0.02)

@@ -1,4 +1,4 @@
-"""What a control law is: a force for each sample, and, where it has equations, their form."""
+"""The base of the control laws: a force for each sample, and equations where there are some."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence

@@ -4,18 +4,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import expm1
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
+from typing_extensions import override
 
 from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.control.base import ControlLaw, LinearFeedback, State
+from stickslip_ros.physics.model.control.base import (
+    ContinuousControl,
+    ControlLaw,
+    LinearFeedback,
+    State,
+)
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.samples import Reference, Sample
 
 
 @dataclass(frozen=True)
-class WashoutGains:
+class WashoutGains(ContinuousControl):
     """Cutoff frequency and gains of a washout controller, eq. 17 and 18.
 
     The equations are written once, for floats, arrays and heyoka expressions, in SI units or
@@ -39,26 +45,16 @@ class WashoutGains:
     cubic: Any
     """Cubic gain k2, N s^3/m^3."""
 
-    def scaled(self, drive: Drive) -> "WashoutGains":
-        """Convert from SI units to dimensionless values.
-
-        Parameters
-        ----------
-        drive : Drive
-            Drive that defines the scales.
-
-        Returns
-        -------
-        WashoutGains
-            The same controller, dimensionless.
-        """
-        return WashoutGains(
-            self.corner_frequency / drive.angular_frequency,
-            self.linear * drive.speed_scale / drive.normal_force,
-            self.cubic * drive.speed_scale**3 / drive.normal_force,
+    @override
+    def scaled(self, drive: Drive) -> Self:
+        return replace(
+            self,
+            corner_frequency=self.corner_frequency / drive.angular_frequency,
+            linear=self.linear * drive.speed_scale / drive.normal_force,
+            cubic=self.cubic * drive.speed_scale**3 / drive.normal_force,
         )
 
-    def silenced(self) -> "WashoutGains":
+    def silenced(self) -> Self:
         """Return the filter alone, which gives no force."""
         return replace(self, linear=0.0, cubic=0.0)
 
@@ -95,67 +91,19 @@ class WashoutGains:
         return self.linear * filtered + self.cubic * filtered * filtered * filtered
 
     def rest(self, position: Any, speed: Any) -> Sequence[Any]:
-        """Return the state of a filter without output, w = y/d.
-
-        Parameters
-        ----------
-        position, speed : float, array or expression
-            Displacement x and speed y of the slide.
-
-        Returns
-        -------
-        sequence of float, array or expression
-            State w.
-        """
+        """Return w = y/d: the filter has no output; see `ContinuousControl.rest`."""
         return (speed / self.corner_frequency,)
 
     def state_rates(self, position: Any, speed: Any, states: Sequence[Any]) -> Sequence[Any]:
-        """Return the rates of the states, w' = v, eq. 17.
-
-        Parameters
-        ----------
-        position, speed : float, array or expression
-            Displacement x and speed y of the slide.
-        states : sequence of float, array or expression
-            State w of the filter.
-
-        Returns
-        -------
-        sequence of float, array or expression
-            Rate of w, in the unit of `speed`.
-        """
+        """Return w' = v, eq. 17; see `ContinuousControl.state_rates`."""
         return (self.filtered(speed, states[0]),)
 
     def control_force(self, position: Any, speed: Any, states: Sequence[Any]) -> Any:
-        """Return the force without sampling, eq. 17 and 18.
-
-        Parameters
-        ----------
-        position, speed : float, array or expression
-            Displacement x and speed y of the slide.
-        states : sequence of float, array or expression
-            State w of the filter.
-
-        Returns
-        -------
-        float, array or expression
-            Control force u, in the unit of the gains.
-        """
+        """Return u, eq. 17 and 18; see `ContinuousControl.control_force`."""
         return self.force(self.filtered(speed, states[0]))
 
     def state_scales(self, drive: Drive) -> Sequence[float]:
-        """Return the factor from W, dimensionless, to z = d w, the state of the sampled law.
-
-        Parameters
-        ----------
-        drive : Drive
-            Drive that defines the scales.
-
-        Returns
-        -------
-        sequence of float
-            One factor, m/s.
-        """
+        """Return that from W to z = d w, m/s; see `ContinuousControl.state_scales`."""
         return (self.corner_frequency / drive.angular_frequency * drive.speed_scale,)
 
     def linear_feedback(self, period: float) -> LinearFeedback:
@@ -180,23 +128,13 @@ class WashoutGains:
         )
 
     def bound(self, speed: Any) -> Any:
-        """Return forces on the speed that give a cycle at least the energy of the controller.
+        """Return forces that give at least the energy; see `ContinuousControl.bound`.
 
         With v = w' and d w the parts of y that pass the filter and do not, both periodic,
         int v w = 0: int v y = int v^2 <= int y^2. Where k2 < 0, by Young's inequality
         -int v^3 y = -int (v^4 + v^3 d w) <= (27/256) int (d w)^4 <= (27/256) int y^4.
         Otherwise, by Hoelder's, int v^3 y <= 8 int y^4, since v is at most twice as large as y in
         L^4.
-
-        Parameters
-        ----------
-        speed : ndarray
-            Speeds y.
-
-        Returns
-        -------
-        ndarray
-            Forces, shape of `speed`.
         """
         cubic = -27.0 / 256.0 * self.cubic if self.cubic < 0.0 else 8.0 * self.cubic
         return max(self.linear, 0.0) * speed + cubic * speed**3
@@ -241,67 +179,24 @@ class Washout(ControlLaw):
         return WashoutGains(self.corner_frequency, self.linear_gain, self.cubic_gain)
 
     @property
+    @override
     def continuous(self) -> WashoutGains:
-        """The law without sampling, eq. 19."""
         return self.gains
 
     def initial_state(self, sample: Sample, reference: Reference) -> State:
-        """Return a filter at rest: the low-passed speed, and the speed that is held.
-
-        Parameters
-        ----------
-        sample : Sample
-            First sample.
-        reference : Reference
-            Not used.
-
-        Returns
-        -------
-        tuple of float
-            Low-passed speed z and held velocity y, m/s.
-        """
+        """Return a filter at rest: z = y, and y, m/s; see `ControlLaw.initial_state`."""
         return sample.velocity, sample.velocity
 
+    @override
     def respond(
         self, state: State, elapsed: float, sample: Sample, reference: Reference
     ) -> tuple[float, State]:
-        """Return the force for a sample, and the state after it; see `ControlLaw.respond`.
-
-        Parameters
-        ----------
-        state : tuple of float
-            Low-passed speed z and held velocity y, m/s.
-        elapsed : float
-            Time since the last sample, s.
-        sample : Sample
-            Sample to answer.
-        reference : Reference
-            Not used.
-
-        Returns
-        -------
-        force : float
-            Control force, N.
-        state : tuple of float
-            State after the sample.
-        """
         low_passed, held = state
         velocity = sample.velocity
         if elapsed > 0.0:
             low_passed -= expm1(-self.corner_frequency * elapsed) * (held - low_passed)
         return self.gains.force(velocity - low_passed), (low_passed, velocity)
 
+    @override
     def linear_feedback(self, period: float) -> LinearFeedback:
-        """Return the law near the equilibrium; see `WashoutGains.linear_feedback`.
-
-        Parameters
-        ----------
-        period : float
-            Sample period T, s.
-
-        Returns
-        -------
-        LinearFeedback
-            Law with the one state z.
-        """
         return self.gains.linear_feedback(period)

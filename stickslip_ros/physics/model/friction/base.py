@@ -2,14 +2,12 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from functools import partial
+from dataclasses import dataclass, fields, replace
 from math import inf, isinf
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from stickslip_ros.deprecated_names import Renamed
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.constants import Scales, constant, scaled
 
@@ -58,12 +56,10 @@ class FrictionLaw(ABC):
     """Unit of each state of the memory by name; empty for a static law."""
     switches: ClassVar[Sequence[str]] = ()
     """Names of the values that are constant in each mode of the law."""
-    kinked: ClassVar[bool] = False
+    nonsmooth: ClassVar[bool] = False
     """Whether friction has no second derivative in steady slip: no Lyapunov coefficient exists."""
-    undirected: ClassVar[Sequence[str]] = ()
+    direction_independent: ClassVar[Sequence[str]] = ()
     """Constants that must be the same in both directions of slip: otherwise friction would jump."""
-    inverse_speed_power: ClassVar[dict[str, int]] = {}
-    """Power n of the unit (s/m)^n of constants without description: laws of version 0.1."""
 
     static: Any = constant(0.4, "Static (break-away) coefficient mu_s.", at_least=0.0)
 
@@ -429,15 +425,6 @@ class FrictionLaw(ABC):
         """
         raise NotImplementedError
 
-    sudden_speed = Renamed("characteristic_speed")
-
-    def __init_subclass__(cls) -> None:  # for laws written for version 0.1
-        if "sudden_speed" in vars(cls):
-            type.__setattr__(cls, "characteristic_speed", vars(cls)["sudden_speed"])
-        for name, kind in vars(cls).get("__annotations__", {}).items():
-            if name not in vars(cls) and "ClassVar" not in str(kind):
-                type.__setattr__(cls, name, field(default_factory=partial(_no_default, name)))
-
     @property
     def characteristic_speed(self) -> float:
         """Speed that may change the coefficient by a factor, m/s; infinite for polynomials."""
@@ -463,12 +450,7 @@ class FrictionLaw(ABC):
         FrictionLaw
             Law of the same class.
         """
-        undescribed = {
-            name: getattr(self, name) * speed**power
-            for name, power in self.inverse_speed_power.items()
-        }
-        law = scaled(self, Scales(length, speed))
-        return replace(law, **undescribed) if undescribed else law
+        return scaled(self, Scales(length, speed))
 
     @classmethod
     def constants(cls) -> tuple[str, ...]:
@@ -480,7 +462,3 @@ class FrictionLaw(ABC):
             Names in the order of the dataclass fields.
         """
         return tuple(each.name for each in fields(cls))
-
-
-def _no_default(name: str) -> Any:
-    raise TypeError(f"missing constant {name!r}, which has no default")

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from typing_extensions import override
+
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
 
@@ -22,19 +24,6 @@ class Coulomb(FrictionLaw):
 
     viscous: Any = constant(0.0, "Increase of the coefficient with speed.", "s/m", simplifies=True)
 
+    @override
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        """Return mu(v_r); see `FrictionLaw.coefficient`.
-
-        Parameters
-        ----------
-        relative_speed : float, array or expression
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float, array or expression
-            sgn(v_r), -1 or 1.
-
-        Returns
-        -------
-        float, array or expression
-            Coefficient, dimensionless.
-        """
         return -self.static * sign - self.viscous * relative_speed

@@ -1,13 +1,29 @@
-"""The base class of the laws with a memory whose steady friction is a static law."""
+"""The laws whose contact is a spring that yields; the base of those that follow a static law."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import exp
 from typing import Any, ClassVar, Self
 
+from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
-from stickslip_ros.physics.model.friction.bristles import LEAST_SIZE, bristle_stiffness
 from stickslip_ros.physics.model.friction.exponential import Exponential
+
+LEAST_SIZE = 1e-12
+"""Least coefficient at which bristles yield."""
+
+
+def bristle_stiffness() -> Any:
+    """Describe the constant of this name."""
+    return constant(
+        1000.0, "Stiffness S of the contact, per unit of normal force.", "1/m", positive=True
+    )
+
+
+def approached(deflection: float, steady: float, path: float) -> float:
+    """Return the deflection after a path (m), with z' = v_r (1 - s z / |steady|)."""
+    return steady + (deflection - steady) * exp(-path / abs(steady))
 
 
 @dataclass(frozen=True)
@@ -18,7 +34,7 @@ class CurveFollower(FrictionLaw):
     immediately. Switches of the curve, such as the pieces of a table, follow those of the law.
     """
 
-    undirected: ClassVar[Sequence[str]] = ("bristle_stiffness",)
+    direction_independent: ClassVar[Sequence[str]] = ("bristle_stiffness",)
     own_switches: ClassVar[Sequence[str]] = ()
     """Switches of the law itself."""
     static: ClassVar[Any]  # type: ignore[misc]

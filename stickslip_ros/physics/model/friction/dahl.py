@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from stickslip_ros.physics.model.friction.base import FrictionLaw
-from stickslip_ros.physics.model.friction.bristles import (
+from stickslip_ros.physics.model.friction.curve_follower import (
     LEAST_SIZE,
     approached,
     bristle_stiffness,
@@ -33,7 +33,7 @@ class Dahl(FrictionLaw):
 
     name: ClassVar[str] = "dahl"
     states: ClassVar[Mapping[str, str | None]] = {"z": "m"}
-    undirected: ClassVar[Sequence[str]] = ("bristle_stiffness",)
+    direction_independent: ClassVar[Sequence[str]] = ("bristle_stiffness",)
 
     bristle_stiffness: Any = bristle_stiffness()
 

@@ -37,7 +37,7 @@ class ElastoPlastic(LuGre):
     """
 
     name: ClassVar[str] = "elasto_plastic"
-    kinked: ClassVar[bool] = True
+    nonsmooth: ClassVar[bool] = True
     own_switches: ClassVar[Sequence[str]] = ("elastic", "plastic", "limit")
 
     break_away: Any = constant(

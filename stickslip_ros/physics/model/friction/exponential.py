@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from typing_extensions import override
+
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
 from stickslip_ros.physics.model.functions import exp, power
@@ -41,21 +43,8 @@ class Exponential(FrictionLaw):
         """The decay speed divided by the exponent, v_s/n, m/s."""
         return float(self.decay_speed / self.exponent)
 
+    @override
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        """Return mu(v_r); see `FrictionLaw.coefficient`.
-
-        Parameters
-        ----------
-        relative_speed : float, array or expression
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float, array or expression
-            sgn(v_r), -1 or 1.
-
-        Returns
-        -------
-        float, array or expression
-            Coefficient, dimensionless.
-        """
         speed = relative_speed * sign
         drop = self.static - self.kinetic
         if isinstance(self.exponent, int | float) and self.exponent == 1.0:
@@ -70,13 +59,7 @@ class Exponential(FrictionLaw):
         return (self.kinetic, self.static) if self.viscous == 0.0 else super().size_range
 
     def refusal(self) -> str | None:
-        """Refuse a kinetic coefficient above the static one, and a drop that is nearly a step.
-
-        Returns
-        -------
-        str or None
-            Sentence with the values; see `FrictionLaw.refusal`.
-        """
+        """Refuse a kinetic coefficient above the static one, and a drop that is nearly a step."""
         if self.exponent > _LARGEST_EXPONENT:
             return f"exponent = {self.exponent} must not exceed {_LARGEST_EXPONENT}"
         return self.above_static("kinetic")

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from math import copysign, inf
 from typing import Any, ClassVar
 
+from typing_extensions import override
+
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
 
@@ -23,21 +25,8 @@ class Linear(FrictionLaw):
 
     slope: Any = constant(0.45, "Decrease of the coefficient with relative speed.", "s/m")
 
+    @override
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        """Return mu(v_r); see `FrictionLaw.coefficient`.
-
-        Parameters
-        ----------
-        relative_speed : float, array or expression
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float, array or expression
-            sgn(v_r), -1 or 1.
-
-        Returns
-        -------
-        float, array or expression
-            Coefficient, dimensionless.
-        """
         return -self.static * sign + self.slope * relative_speed
 
     @property

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from stickslip_ros.physics.model.constants import constant
-from stickslip_ros.physics.model.friction.bristles import approached
-from stickslip_ros.physics.model.friction.curve_follower import CurveFollower
+from stickslip_ros.physics.model.friction.curve_follower import CurveFollower, approached
 
 
 @dataclass(frozen=True)

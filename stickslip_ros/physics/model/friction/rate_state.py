@@ -43,7 +43,7 @@ class RateState(FrictionLaw):
 
     name: ClassVar[str] = "rate_state"
     states: ClassVar[Mapping[str, str | None]] = {"log_age": None}
-    undirected: ClassVar[Sequence[str]] = ("slip_distance", "reference_speed")
+    direction_independent: ClassVar[Sequence[str]] = ("slip_distance", "reference_speed")
     static: ClassVar[Any]  # type: ignore[misc]
 
     kinetic: Any = constant(0.25, "Kinetic coefficient mu_k.", at_least=0.0)

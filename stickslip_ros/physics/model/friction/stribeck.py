@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any, ClassVar
 
+from typing_extensions import override
+
 from stickslip_ros.physics.model.constants import constant
 from stickslip_ros.physics.model.friction.base import FrictionLaw
 
@@ -29,21 +31,8 @@ class Stribeck(FrictionLaw):
         0.5, "Relative speed v_m at which the coefficient is smallest.", "m/s", positive=True
     )
 
+    @override
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        """Return mu(v_r), eq. 3; see `FrictionLaw.coefficient`.
-
-        Parameters
-        ----------
-        relative_speed : float, array or expression
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float, array or expression
-            sgn(v_r), -1 or 1.
-
-        Returns
-        -------
-        float, array or expression
-            Coefficient, dimensionless.
-        """
         drop = self.static - self.minimum
         ratio = relative_speed / self.minimum_speed
         return -self.static * sign + drop / 2.0 * (3.0 * ratio - ratio * ratio * ratio)
@@ -54,11 +43,5 @@ class Stribeck(FrictionLaw):
         return self.minimum, inf
 
     def refusal(self) -> str | None:
-        """Refuse a smallest coefficient above the static one; see `FrictionLaw.refusal`.
-
-        Returns
-        -------
-        str or None
-            Sentence with both values.
-        """
+        """Refuse a smallest coefficient above the static one; see `FrictionLaw.refusal`."""
         return self.above_static("minimum")

@@ -8,6 +8,7 @@ from math import isfinite, nextafter
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from typing_extensions import override
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.model.friction.base import FrictionLaw
@@ -43,21 +44,8 @@ class Table(FrictionLaw):
             first = self.points[0][1] if self.points else 0.0
             object.__setattr__(self, "static", first)
 
+    @override
     def coefficient(self, relative_speed: Any, sign: Any) -> Any:
-        """Return mu(v_r); see `FrictionLaw.coefficient`.
-
-        Parameters
-        ----------
-        relative_speed : float or array
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float or array
-            sgn(v_r), -1 or 1.
-
-        Returns
-        -------
-        float or array
-            Coefficient, dimensionless.
-        """
         speed = np.asarray(relative_speed * sign)
         piece = np.maximum(np.searchsorted(self._speeds, speed, side="right") - 1, 0)
         return self.friction(
@@ -67,24 +55,7 @@ class Table(FrictionLaw):
     def friction(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Any:
-        """Return the coefficient in a piece; see `FrictionLaw.friction`.
-
-        Parameters
-        ----------
-        relative_speed : float, array or expression
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float, array or expression
-            sgn(v_r), -1 or 1.
-        memory : sequence of float or expression
-            None.
-        switches : sequence of float or expression
-            Piece.
-
-        Returns
-        -------
-        float, array or expression
-            Coefficient, dimensionless.
-        """
+        """Return the coefficient in a piece; see `FrictionLaw.friction`."""
         lower, _, _, _, c0, c1, c2, c3 = switches
         speed = relative_speed * sign - lower
         return -sign * (c0 + speed * (c1 + speed * (c2 + speed * c3)))
@@ -92,24 +63,7 @@ class Table(FrictionLaw):
     def margins(
         self, relative_speed: Any, sign: Any, memory: Sequence[Any], switches: Sequence[Any]
     ) -> Sequence[Any]:
-        """Return the distances to the ends of a piece; see `FrictionLaw.margins`.
-
-        Parameters
-        ----------
-        relative_speed : float or expression
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float or expression
-            sgn(v_r), -1 or 1.
-        memory : sequence of float or expression
-            None.
-        switches : sequence of float or expression
-            Piece.
-
-        Returns
-        -------
-        sequence of float or expression
-            Distances to the lower and the upper end; 1 where there is none.
-        """
+        """Return the distances to the ends of a piece, 1 for no end; see `FrictionLaw.margins`."""
         lower, upper, first, last, *_ = switches
         speed = relative_speed * sign
         return (
@@ -120,43 +74,13 @@ class Table(FrictionLaw):
     def switches_at(
         self, relative_speed: float, sign: float, memory: Sequence[float]
     ) -> Sequence[float]:
-        """Return the piece at a speed; see `FrictionLaw.switches_at`.
-
-        Parameters
-        ----------
-        relative_speed : float
-            Speed v_r of the slide relative to the belt, m/s.
-        sign : float
-            sgn(v_r), -1 or 1.
-        memory : sequence of float
-            None.
-
-        Returns
-        -------
-        sequence of float
-            Piece.
-        """
+        """Return the piece at a speed; see `FrictionLaw.switches_at`."""
         return self._piece(relative_speed * sign)
 
     def switches_after(
         self, margin: int, sign: float, switches: Sequence[float]
     ) -> Sequence[float]:
-        """Return the piece below or above; see `FrictionLaw.switches_after`.
-
-        Parameters
-        ----------
-        margin : int
-            0 at the lower end, 1 at the upper end.
-        sign : float
-            sgn(v_r), -1 or 1.
-        switches : sequence of float
-            Piece so far.
-
-        Returns
-        -------
-        sequence of float
-            Piece that follows.
-        """
+        """Return the piece below (margin 0) or above (1); see `FrictionLaw.switches_after`."""
         lower, upper, *_ = switches
         return self._piece(upper) if margin else self._piece(nextafter(lower, 0.0))
 
@@ -167,42 +91,23 @@ class Table(FrictionLaw):
         return min(sizes), max(sizes)
 
     def refusal(self) -> str | None:
-        """Refuse points that make no table; see `FrictionLaw.refusal`.
-
-        Returns
-        -------
-        str or None
-            Sentence with the number of the point and its values.
-        """
+        """Refuse points that make no table, without what may be from a foreign file."""
         if not self.points:
             return "the table has no points: must have at least one"
         before = None
         for number, (speed, coefficient) in enumerate(self.points, start=1):
             place = f"point {number} of the table"
             if not (isfinite(coefficient) and coefficient >= 0.0):
-                return f"{place}: coefficient = {coefficient} must be a finite number at least 0"
+                return f"{place}: the coefficient must be a finite number at least 0"
             if before is None and speed != 0.0:
-                return f"{place}: speed = {speed} must be 0"
+                return f"{place}: the speed must be 0"
             if before is not None and not (isfinite(speed) and speed > before):
-                return f"{place}: speed = {speed} must be finite and above the one before, {before}"
+                return f"{place}: the speed must be finite and above the one before"
             before = speed
         return None
 
+    @override
     def scaled(self, speed: float, length: float = 1.0) -> Self:
-        """Return the same law in another unit of speed; see `FrictionLaw.scaled`.
-
-        Parameters
-        ----------
-        speed : float
-            New unit of speed, m/s.
-        length : float, optional
-            New unit of length, m; the law does not depend on it.
-
-        Returns
-        -------
-        Table
-            Law with scaled speeds.
-        """
         return replace(self, points=tuple((each / speed, value) for each, value in self.points))
 
     @cached_property

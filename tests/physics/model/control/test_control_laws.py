@@ -1,9 +1,7 @@
 """Properties of every control law that ships."""
 
-import pickle
 from dataclasses import replace
 from math import inf, isfinite
-from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +24,7 @@ from stickslip_ros.physics.model.control import (
 )
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.samples import Sample
-from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.physics.drives import FEED_DRIVE
 
 LAWS: list[ControlLaw] = [Washout(20.0, -3000.0, -1e4), VelocityFeedback(-500.0, 2e4)]
 laws = pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
@@ -94,23 +92,6 @@ def test_its_linear_form_is_that_of_its_answers(law: ControlLaw, period: float) 
         expected.append(float(linear.output @ z + linear.direct @ move))
         z = linear.state @ z + linear.input @ move
     np.testing.assert_allclose(differences, expected, rtol=1e-6, atol=1e-6)
-
-
-@laws
-@pytest.mark.parametrize("drive", [PAPER, FEED_DRIVE], ids=["paper", "feed_drive"])
-def test_its_equations_are_the_same_in_other_units(law: ControlLaw, drive: Any) -> None:
-    control = law.continuous
-    assert control is not None
-    scaled = control.scaled(drive)
-    x, y = 0.3 * drive.length_scale, -0.7 * drive.speed_scale
-    own = [0.2 * drive.length_scale] * len(control.states)
-    unit = [0.2] * len(control.states)
-    force = control.control_force(x, y, own) / drive.normal_force
-    assert scaled.control_force(0.3, -0.7, unit) == pytest.approx(force, rel=1e-12)
-    rates = [rate / drive.speed_scale for rate in control.state_rates(x, y, own)]
-    assert list(scaled.state_rates(0.3, -0.7, unit)) == pytest.approx(rates, rel=1e-12)
-    rest = [each / drive.length_scale for each in control.rest(x, y)]
-    assert list(scaled.rest(0.3, -0.7)) == pytest.approx(rest, rel=1e-12)
 
 
 @laws
@@ -202,10 +183,3 @@ def test_a_change_of_drive_or_constants_keeps_its_state(law: ControlLaw) -> None
     assert motion.applied_force == 0.0
     motion.control = WashoutGains(50.0, -1.0, 0.0) if motion.control_state else control
     assert motion.control_state == pytest.approx(state, rel=1e-14)
-
-
-@laws
-def test_it_goes_to_another_process(law: ControlLaw) -> None:
-    law = replace(law, force_limit=10.0)
-    assert pickle.loads(pickle.dumps(law)) == law
-    assert law.refusal() is None

@@ -1,0 +1,227 @@
+"""Drawing the paper's figures: bifurcation diagrams and phase portraits."""
+
+import re
+from collections.abc import Mapping
+from itertools import cycle
+from math import ceil
+from pathlib import Path
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.paper.figures import BifurcationFigure, Panel, PaperFigure, PortraitFigure
+from stickslip_ros.paper.portraits import LAST_CYCLES, Portrait
+from stickslip_ros.physics.measures.breakpoints import Breakpoints
+from stickslip_ros.plots.regimes import REGIMES
+from stickslip_ros.plots.style import (
+    BLUE,
+    DASHES,
+    GREEN,
+    ORANGE,
+    SCREEN,
+    FigureStyle,
+    finish,
+    save,
+    styled,
+)
+from stickslip_ros.plots.units import Units, typeset
+
+_FIRST, _LATER, _BELT = "#888888", "#DDDDDD", "black"
+
+_FIRST_PERIODS = 20
+"""Natural periods from rest that are emphasized; more of them would merge."""
+
+_FRAME = 10.0
+"""Speed, in belt speeds, at which a diverging motion leaves the frame."""
+
+_LEAST_STICK_FRACTION = 0.1
+"""Upper end of its axis, at least."""
+
+_KEPT_DOTS, _KEPT_COLOURS = 110.0, 128
+"""Dots per inch and colours of the figures for the screen, which are kept with the sources."""
+
+_LETTERS = 44
+"""Letters in a line of a column in print."""
+
+_UNITS = Units(dimensionless=True, terse=True)
+
+
+def paper_figure(
+    figure: PaperFigure,
+    marks: Mapping[str, float] | None = None,
+    unstable: FloatArray | None = None,
+    *,
+    style: FigureStyle = SCREEN,
+) -> Figure:
+    """Return the drawing of a figure.
+
+    Of a bifurcation diagram, `marks` are vertical lines: the values of the parameter, by a name
+    such as that of a Hopf point. `unstable` is the displacement of the unstable equilibrium for
+    each value of the parameter, NaN where there is none.
+    """
+    if isinstance(figure, BifurcationFigure):
+        return _bifurcation(figure, marks or {}, unstable, style=style)
+    return _portraits(figure, style=style)
+
+
+def save_paper_figure(drawn: Figure, path: Path, style: FigureStyle = SCREEN) -> None:
+    """Write a drawing to `path`; the format follows the ending."""
+    if style.printed:
+        save(drawn, path, dots_per_inch=style.dots_per_inch)
+    else:
+        save(drawn, path, colours=_KEPT_COLOURS, dots_per_inch=_KEPT_DOTS)
+
+
+@styled
+def _bifurcation(
+    figure: BifurcationFigure,
+    marks: Mapping[str, float],
+    unstable: FloatArray | None,
+    *,
+    style: FigureStyle,
+) -> Figure:
+    drawn = style.figure(8.0, 5.5, narrow=1.25)
+    style.set_title(drawn, *figure.title.split(": "))
+    above, below = drawn.subplots(2, 1, sharex=True, height_ratios=(3.0, 1.0))
+    diagram = figure.diagram
+    handles: list[Artist] = []
+    regimes = [measures.regime for measures in diagram.measures]
+    for regime, look in REGIMES.items():
+        of_regime = np.array([found is regime for found in regimes])
+        rows = of_regime[diagram.row]
+        if rows.any():
+            values = figure.values[diagram.row[rows]]
+            marker: Any = {"marker": look.marker, "color": look.colour, "ls": "", "mew": 0.0}
+            above.plot(values, diagram.position[rows], **marker, ms=1.8)
+            handles.append(Line2D([], [], **marker, ms=5.0, label=look.label))
+    if unstable is not None and np.isfinite(unstable).any():
+        dashed: Any = {"color": GREEN, "lw": 1.2, "ls": (0, (4.0, 2.0))}
+        above.plot(figure.values, unstable, **dashed)
+        handles.append(Line2D([], [], **dashed, label="unstable equilibrium"))
+    above.set_ylabel(_UNITS.named("turning points"))
+    stick = [np.nan if m.stick_fraction is None else m.stick_fraction for m in diagram.measures]
+    below.plot(figure.values, stick, color=ORANGE, lw=1.5)
+    below.set_ylabel("stick fraction")
+    below.set_ylim(0.0, max(1.05 * float(np.nanmax(stick, initial=0.0)), _LEAST_STICK_FRACTION))
+    below.set_xlabel(typeset(figure.parameter))
+    below.margins(x=0.01)
+    for (name, value), dashes in zip(marks.items(), cycle(DASHES)):
+        for axes in (above, below):
+            line = axes.axvline(
+                value, color="black", lw=1.0, ls=dashes, label=f"{name} {value:.5g}"
+            )
+        handles.append(line)
+    style.legend_below(drawn, handles)
+    finish(drawn)
+    return drawn
+
+
+@styled
+def _portraits(figure: PortraitFigure, *, style: FigureStyle) -> Figure:
+    largest = max(len(panel.portraits) for panel in figure.panels)
+    columns = largest if largest <= 5 else 4
+    width, height = 2.5, 2.8
+    if style.width is not None:
+        columns = min(columns, 3 if style.narrow else 5)
+        width = style.width / columns
+        height = width + 0.5
+    rows = [ceil(len(panel.portraits) / columns) for panel in figure.panels]
+    heights = [height * count + 0.3 for count in rows]
+    drawn = Figure(figsize=(width * columns, sum(heights) + 0.6))
+    style.set_title(drawn, *figure.title.split(": "))
+    parts = drawn.add_gridspec(len(heights), 1, height_ratios=heights)
+    for number, (panel, count) in enumerate(zip(figure.panels, rows, strict=True)):
+        _panel(drawn.add_subfigure(parts[number, 0]), panel, count, columns, style)
+    handles: list[Artist] = [
+        Line2D([], [], color=_FIRST, lw=1.0, label=f"first {_FIRST_PERIODS} periods"),
+        Line2D([], [], color=_LATER, lw=4.0, label="later"),
+        Line2D([], [], color=BLUE, lw=2.0, label=f"last {LAST_CYCLES} cycles"),
+        Line2D([], [], color=_BELT, lw=0.8, ls="--", label="belt speed"),
+        Line2D([], [], color=GREEN, ls="", marker="o", ms=5.0, label="equilibrium"),
+    ]
+    if any(portrait.measures.stick_fraction for portrait in figure.portraits):
+        handles.insert(3, Line2D([], [], color=ORANGE, lw=4.0, label="sticking"))
+    style.legend_below(drawn, handles)
+    return drawn
+
+
+def _panel(subfigure: SubFigure, panel: Panel, rows: int, columns: int, style: FigureStyle) -> None:
+    title = fill(panel.title, _LETTERS) if style.narrow else panel.title
+    subfigure.suptitle(typeset(title), fontweight="bold")
+    bounded = [portrait for portrait in panel.portraits if not portrait.runs_away]
+    # A diverging motion gets a frame of its own: in a common one the others would be too small.
+    share = len(bounded) == len(panel.portraits)
+    grid = subfigure.subplots(rows, columns, sharex=share, sharey=share, squeeze=False)
+    belt_speeds = np.array([portrait.drive.belt_speed for portrait in panel.portraits])
+    for axes in grid.flat[len(panel.portraits) :]:
+        axes.set_visible(False)
+    for number, (axes, portrait) in enumerate(zip(grid.flat, panel.portraits, strict=False)):
+        _portrait(axes, portrait, style)
+        shown = [_framed(other) for other in ([portrait] if portrait.runs_away else bounded)]
+        axes.set_xlim(_range(*(breakpoints.position for breakpoints in shown)))
+        axes.set_ylim(_range(*(breakpoints.velocity for breakpoints in shown), belt_speeds))
+        if number % columns == 0:
+            axes.set_ylabel(_UNITS.named("velocity", short=True))
+        if number + columns >= len(panel.portraits):
+            axes.set_xlabel(_UNITS.named("displacement", short=True))
+            axes.tick_params(labelbottom=True)
+
+
+def _portrait(axes: Axes, portrait: Portrait, style: FigureStyle) -> None:
+    last, measures, belt_speed = portrait.last_cycles, portrait.measures, portrait.drive.belt_speed
+    whole = _framed(portrait)
+    first = whole[whole.time <= _FIRST_PERIODS * portrait.drive.natural_period]
+    axes.plot(whole.position, whole.velocity, color=_LATER, lw=0.8)
+    axes.plot(first.position, first.velocity, color=_FIRST, lw=0.5)
+    axes.axhline(belt_speed, color=_BELT, lw=0.8, ls="--")
+    if measures.period is not None:
+        axes.plot(last.position, last.velocity, color=BLUE, lw=1.6)
+        stuck = np.where(last.stuck, last.position, np.nan)
+        axes.plot(stuck, np.full(len(last), belt_speed), color=ORANGE, lw=3.0)
+    axes.plot(portrait.drive.equilibrium_position, 0.0, "o", color=GREEN, ms=4.0)
+    outcome = _outcome(portrait)
+    if style.printed:
+        outcome = re.sub(r"(?<=[,:]) ", "\n", outcome)
+    if style.narrow:
+        outcome = outcome.replace("amplitude", "ampl.")
+    title = f"{typeset(portrait.case.label)}\n{outcome}"
+    axes.set_title(title, fontsize="small")
+    axes.locator_params(nbins=4 if style.printed else 5, steps=[1.0, 2.0, 5.0, 10.0])
+
+
+def _framed(portrait: Portrait) -> Breakpoints:
+    """Return the trajectory; that of a diverging motion ends where it leaves the frame."""
+    trajectory = portrait.trajectory
+    if not portrait.runs_away:
+        return trajectory
+    beyond = np.abs(trajectory.velocity) > _FRAME * abs(portrait.drive.belt_speed)
+    return trajectory[: int(np.argmax(beyond))]
+
+
+def _outcome(portrait: Portrait) -> str:
+    measures = portrait.measures
+    outcome = REGIMES[measures.regime].label
+    if portrait.runs_away:
+        time = portrait.time_beyond(_FRAME * abs(portrait.drive.belt_speed))
+        return f"{outcome}: {typeset(f'{_FRAME:g} v0 at τ = {time:.1f}')}"
+    if measures.period is None or measures.amplitude is None:
+        return outcome
+    if measures.stick_fraction:
+        outcome = f"sticks {measures.stick_fraction:.1%}"
+    if portrait.settling_time is None:
+        outcome = "still settling"
+    return f"{outcome}, amplitude {measures.amplitude:#.3g}"
+
+
+def _range(*columns: FloatArray) -> tuple[float, float]:
+    """Return limits with a margin around all values."""
+    lowest = min(float(column.min()) for column in columns)
+    highest = max(float(column.max()) for column in columns)
+    room = 0.06 * (highest - lowest)
+    return lowest - room, highest + room

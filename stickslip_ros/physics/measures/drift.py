@@ -1,0 +1,143 @@
+"""Drift: a trend of a run that looks steady from cycle to cycle and would not be later."""
+
+from collections.abc import Sequence
+from math import sqrt
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from stickslip_ros.arrays import FloatArray
+
+_PARTS = 128
+"""Least number of parts of a long run; the trend is that over the last quarter of them."""
+_NOISES = 6.0
+"""Range of the noise, in standard deviations."""
+_LEAST_PARTS = 8
+"""Number of parts from which a trend is looked for."""
+_LEAST_ERRORS = 3.0
+"""Trend, in standard errors, above which it is one."""
+_LEAST_CHANGE = 0.01
+"""Change over one more run, as a share of the largest magnitude, above which it matters."""
+
+
+def resolved(step: float, noise: float = 0.0) -> float:
+    """Return the range of positions, m, within which a sensor with this step and noise tells none.
+
+    Rounding to the step is noise, too.
+    """
+    return step + _NOISES * max(noise, step / sqrt(12.0)) if step else 0.0
+
+
+class TrendMeter:
+    """Means of a quantity over equal parts of a run, in constant memory.
+
+    The parts overlap with weights that rise and fall like a triangle: where a part has a whole
+    number of cycles of a vibration, but for a little, plain means would have a slow beat.
+    """
+
+    def __init__(self) -> None:
+        self._sums = np.zeros((2 * _PARTS + 1, 3))
+        """Weight, and weighted time and value, of each part."""
+        self._count, self._each, self._largest = 0, 1, 0.0
+
+    def feed(self, time: npt.ArrayLike, value: npt.ArrayLike) -> None:
+        """Add the times, s, and values that follow, in blocks of any length."""
+        new = np.array([np.ones(np.shape(time)), time, value]).T
+        new = new[np.isfinite(new[:, 2])]
+        self._largest = max(self._largest, float(np.abs(new[:, 2]).max(initial=0.0)))
+        while len(new) > 0:
+            part, new = np.split(new, [2 * _PARTS * self._each - self._count])
+            place = (self._count + np.arange(len(part))) / self._each
+            before = np.floor(place)
+            weights = np.column_stack([1.0 - place + before, place - before])
+            rows = np.column_stack([before, before + 1.0]).astype(np.int64)
+            with np.errstate(over="ignore", invalid="ignore"):
+                np.add.at(self._sums, rows, weights[:, :, None] * part[:, None, :])
+            self._count += len(part)
+            if self._count == 2 * _PARTS * self._each:
+                odd = self._sums[1::2] / 2.0
+                self._sums[: _PARTS + 1] = self._sums[::2]
+                self._sums[:_PARTS] += odd
+                self._sums[1 : _PARTS + 1] += odd
+                self._sums[_PARTS + 1 :] = 0.0
+                self._each *= 2
+
+    def rate(self, span: float = 0.0, least: float = 0.0) -> float | None:
+        """Return the rate of change, 1/s, if it is certain and matters; else None.
+
+        The trend is that over the last quarter of the run, and at least over `span` (s), or over
+        the last half, if that of the quarter agrees. It matters if one more such run would change
+        the quantity by a hundredth, and by more than `least`, the step of a sensor: half the sum or
+        difference of two positions has an error of at least its rounding.
+        """
+        weight, *sums = self._sums.T
+        with np.errstate(invalid="ignore"):
+            every, values = np.array(sums)[:, weight == self._each] / self._each
+        run = float(every[-1] - every[0]) if len(every) else 0.0
+        last: tuple[float, float] | None = None
+        for length in (max(run / 4.0, span), run / 2.0):
+            rows = every >= every[-1:] - length
+            if length > run or np.count_nonzero(rows) < _LEAST_PARTS:
+                continue
+            with np.errstate(over="ignore", invalid="ignore"):
+                slope, error = fit_line(
+                    every[rows] - every[rows].mean(), values[rows], least / sqrt(24.0)
+                )
+                matters = abs(slope) * run > max(_LEAST_CHANGE * self._largest, least)
+            if last is not None and abs(slope - last[0]) > 2.0 * last[1]:
+                break
+            if matters and abs(slope) > _LEAST_ERRORS * error:
+                return slope
+            last = slope, error
+        return None
+
+
+def fit_line(time: FloatArray, value: FloatArray, noise: float = 0.0) -> tuple[float, float]:
+    """Return the slope of a line and its standard error; the mean of the times is zero.
+
+    Each value has at least the standard deviation `noise`: few may agree by chance. Residuals that
+    follow each other count as one, by their first autocorrelation.
+    """
+    square = float(time @ time)
+    mean, slope = float(value.mean()), float(time @ value) / square
+    residual = value - mean - slope * time
+    freedom = max(len(time) - 2, 1)
+    total = max(float(residual @ residual), freedom * noise**2)
+    if total == 0.0:
+        return slope, 0.0
+    variance, follow = total / freedom, float(residual[1:] @ residual[:-1]) / total
+    share = min(max(follow, 0.0), 0.999)
+    return slope, (variance / square * (1.0 + share) / (1.0 - share)) ** 0.5
+
+
+class Drift:
+    """Trends of the position, the amplitude and the control force of a run."""
+
+    resolution = 0.0
+    """Step of the sensor, m: a smaller change of position does not matter."""
+    judged = True
+    """Whether a trend is a drift; not where a course or a reference varies."""
+
+    def __init__(self) -> None:
+        self.position, self.force = TrendMeter(), TrendMeter()
+        self._midpoint, self._amplitude = TrendMeter(), TrendMeter()
+
+    def feed_cycles(self, ends: Sequence[float], cycles: Sequence[Any]) -> None:
+        """Add the cycles that follow, and the times (s) at which they end."""
+        self._midpoint.feed(ends, [cycle.midpoint for cycle in cycles])
+        self._amplitude.feed(ends, [cycle.amplitude for cycle in cycles])
+
+    def rates(self, period: float | None) -> dict[str, float]:
+        """Return the rate of each quantity that drifts, 1/s, given the period of cycles (s)."""
+        if not self.judged:
+            return {}
+        span = _LEAST_PARTS / 2 * (period or 0.0)
+        # Parts of cycles have other means than whole ones.
+        position = self._midpoint if period else self.position
+        found = {
+            "position": position.rate(span, self.resolution),
+            "amplitude": self._amplitude.rate(span, self.resolution) if period else None,
+            "force": self.force.rate(span),
+        }
+        return {name: rate for name, rate in found.items() if rate is not None}

@@ -1,0 +1,266 @@
+"""The tables of studies: sweeps, basins of attraction, designs, and what theory says."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict
+from itertools import groupby, islice
+from typing import Any, cast
+
+from stickslip_ros.physics.measures.cycle_measures import Regime, Trend
+from stickslip_ros.plots.measure_table import measure_table
+from stickslip_ros.plots.units import Units
+from stickslip_ros.scenarios.files import Scenario
+from stickslip_ros.studies.basin import Attractor, Basins
+from stickslip_ros.studies.design import Design
+from stickslip_ros.studies.plan import Grid
+from stickslip_ros.studies.stability import Notes, Section
+from stickslip_ros.studies.study import Point, Study
+from stickslip_ros.tables import TextTable
+
+_MOST_RANGES = 60
+"""Rows of the table of a sweep; where there are more, only their regimes are counted."""
+
+# Label and unit of each value of a design, by its name in JSON.
+CONTROLLER = {
+    "corner_frequency": ("cutoff frequency", "rad/s"),
+    "linear_gain": ("linear gain", "N s/m"),
+    "cubic_gain": ("cubic gain", "N s^3/m^3"),
+    "force_limit": ("force limit", "N"),
+    "start_after": ("start after", "s"),
+}
+MARGINS = {
+    "gain_down": ("unstable below this share of the linear gain", ""),
+    "gain_up": ("unstable above this multiple of it", ""),
+    "delay": ("delay margin", "s"),
+}
+WORST = {
+    "predicted_settling_time": ("1 % settling time, predicted", "s"),
+    "settling_time": ("simulated", "s"),
+    "predicted_peak_force": ("peak force, predicted", "N"),
+    "peak_force": ("simulated", "N"),
+}
+CHECKS = {"belt_speed": ("belt speed", "m/s"), "vibrates": ("vibrates", "")} | WORST
+_REST = {
+    "amplitude": ("amplitude", "m"),
+    "peak_force": ("peak force", "N"),
+    "rms_force": ("rms force", "N"),
+}
+
+_LOOP = {
+    "equilibrium_position": ("equilibrium position", "m"),
+    "eigenvalues": ("eigenvalues", "1/s"),
+    "stable": ("stable", ""),
+    "hopf_speeds": ("Hopf speeds", "m/s"),
+}
+
+_HOPF_POINTS = {
+    "crossing_speeds": ("crossing speed of the eigenvalues", "1/m"),
+    "first_lyapunov_coefficients": ("first Lyapunov coefficient", ""),
+}
+
+_SECTIONS: dict[str, dict[str, tuple[str, str]]] = {
+    "open_loop": _LOOP
+    | {"hopf_angular_frequencies": ("angular frequency there", "rad/s")}
+    | _HOPF_POINTS,
+    "sticking": {
+        "onset_speed_approximate": ("onset of sticking, by averaging", "m/s"),
+        "onset_speed": ("onset of sticking, exactly", "m/s"),
+        "speed_ranges": ("belt speeds that stick", "m/s"),
+    },
+    "closed_loop": _LOOP
+    | _HOPF_POINTS
+    | {
+        "critical_linear_gain": ("critical linear gain", "N s/m"),
+        "first_lyapunov_coefficient": ("first Lyapunov coefficient there", ""),
+        "critical_cubic_gain": ("critical cubic gain", "N s^3/m^3"),
+    },
+    "sampled_loop": {
+        "spectral_radius": ("spectral radius", ""),
+        "stable": ("stable", ""),
+        "decay_rate": ("decay rate", "1/s"),
+        "settling_time": ("1 % settling time", "s"),
+        "critical_linear_gain": ("critical linear gain", "N s/m"),
+        "stable_linear_gains": ("stable linear gains", "N s/m"),
+    },
+}
+"""Label and unit of the values of each section of `stability`."""
+
+
+def _direction_and_regime(point: Point, plan: Grid) -> str:
+    """Return what the points of a row of the table on the screen have in common."""
+    regime = Regime.label(point.measures.regime)
+    if point.measures.regime in (None, Regime.UNBOUNDED):
+        regime = point.reason or regime
+    elif not point.steady:
+        regime += ", not steady" + (f": {Trend.DRIFTING}" if point.reason else "")
+    return f"{plan.direction(point.number) or ''} {regime}".lstrip()
+
+
+def sweep_table(study: Study, points: Callable[[], Iterable[Point]]) -> TextTable:
+    """Return in which ranges of the parameter there is which regime; of a map, how often.
+
+    `points` yields the points of the study in their order, each time that it is called.
+    """
+    plan = study.plan
+    assert isinstance(plan, Grid)
+    title = f"{study.scenario.name}, {plan.size} points"
+    if len(plan.axes) == 1:
+        rows = list(islice(_ranges(points, plan, units_of(study)), _MOST_RANGES + 1))
+        if len(rows) <= _MOST_RANGES:
+            headings = ["regime", plan.parameters[0], "points", "amplitude", "stick fraction"]
+            return TextTable(title, headings, rows)
+    counts = Counter(_direction_and_regime(point, plan) for point in points())
+    return TextTable(title, ["regime", "points"], [[each, str(n)] for each, n in counts.items()])
+
+
+def units_of(study: Study) -> Units:
+    """Return the units in which the points of a study are shown."""
+    return Units.for_drive(study.scenario.plant.as_drive(), study.plan.parameters)
+
+
+def _ranges(points: Callable[[], Iterable[Point]], plan: Grid, units: Units) -> Iterator[list[str]]:
+    largest = max((point.measures.amplitude or 0.0 for point in points()), default=0.0)
+    for kind, group in groupby(points(), lambda point: _direction_and_regime(point, plan)):
+        measured = [
+            (point.measures.amplitude, point.measures.stick_fraction, point.number)
+            for point in group
+        ]
+        amplitudes, stick_fractions, numbers = zip(*measured, strict=True)
+        yield [
+            kind,
+            _range([plan.values(number)[0] for number in numbers], plan.axes[0].unit, units),
+            str(len(numbers)),
+            _range(amplitudes, "m", units, largest),
+            _range(stick_fractions, "", units),
+        ]
+
+
+def _range(values: Iterable[float | None], unit: str, units: Units, largest: float = 0.0) -> str:
+    known = [value for value in values if value is not None]
+    if not known:
+        return "-"
+    low, high = units.texts([min(known), max(known)], unit, largest=largest)
+    return low if low == high else f"{low.split()[0]} to {high}"
+
+
+def basin_table(study: Study, basins: Basins) -> TextTable:
+    """Return the attractors of a study, that with most starts first."""
+    units = Units.for_drive(study.scenario.plant.as_drive())
+    rows = [
+        [
+            attractor_name(attractor),
+            units.text(attractor.amplitude, "m"),
+            units.text(attractor.midpoint, "m"),
+            str(attractor.count),
+            f"{attractor.share:.4f}",
+            f"{attractor.standard_error:.4f}",
+        ]
+        for attractor in basins.attractors
+    ]
+    headings = ["motion", "amplitude", "midpoint", "starts", "share", "standard error"]
+    return TextTable(f"{study.scenario.name}, {study.plan.size} starts", headings, rows)
+
+
+def attractor_name(attractor: Attractor) -> str:
+    """Return what an attractor is called: its regime, and whether it is steady."""
+    name = Regime.label(attractor.regime)
+    return name if attractor.steady or attractor.regime is None else f"{name}, not steady"
+
+
+def design_tables(name: str, found: Design) -> Iterator[TextTable | str]:
+    """Yield the tables of a design for the scenario of that name, and the remark on it."""
+    units = Units.for_drive(found.task.drive)
+    speeds = units.texts(sorted({*found.task.belt_speeds}), "m/s")
+    task = f"{name}, belt speed {' to '.join(speeds)}"
+    if found.controller is None:
+        yield f"{task}: nothing to propose"
+    else:
+        values = {
+            name: None if value == float("inf") else value
+            for name, value in asdict(found.controller).items()
+        }
+        yield TextTable(task, ["proposal", ""], _rows(values, CONTROLLER, units))
+        if found.margins is not None:
+            margins = _rows(asdict(found.margins), MARGINS, units)
+            yield TextTable("margins at the worst of these belt speeds", ["margins", ""], margins)
+        checks = [asdict(check) for check in found.checks]
+        columns = [
+            units.texts([check[key] for check in checks], unit) for key, (_, unit) in CHECKS.items()
+        ]
+        headings = [label for label, _ in CHECKS.values()]
+        rows = list(zip(*columns, strict=True))
+        yield TextTable("verification", headings, rows)
+        yield from _at_rest(found, units)
+    if found.remark is not None:
+        yield found.remark
+
+
+def _at_rest(found: Design, units: Units) -> Iterator[TextTable]:
+    """Yield what noise and rounding leave at the equilibrium, if there are any."""
+    left = [(check.belt_speed, check.rest) for check in found.checks if check.rest is not None]
+    if not left:
+        return
+    columns = [units.texts([speed for speed, _ in left], "m/s")]
+    for name, (_, unit) in _REST.items():
+        columns.append(units.texts([getattr(rest, name) for _, rest in left], unit))
+    headings = ["belt speed", *(label for label, _ in _REST.values())]
+    yield TextTable("at rest, by noise and rounding", headings, list(zip(*columns, strict=True)))
+
+
+def _rows(
+    values: Mapping[str, Any], labels: Mapping[str, tuple[str, str]], units: Units
+) -> list[list[str]]:
+    return [[label, units.text(values[key], unit)] for key, (label, unit) in labels.items()]
+
+
+def stability_tables(scenario: Scenario, found: Section, notes: Notes) -> Iterator[TextTable | str]:
+    """Yield the tables of what `stability` has found, and its notes."""
+    units = Units.for_drive(scenario.plant.as_drive())
+    rows: list[list[str]] = []
+    for section, labels in _SECTIONS.items():
+        values = found[section]
+        rows.append([section.replace("_", " "), ""])
+        for name, (label, unit) in labels.items():
+            value = values[name]
+            if name == "decay_rate" and value is not None and value < 0.0:
+                label, value = "growth rate", -value
+            shown = _shown(name, value, unit, units)
+            if name == "speed_ranges" and value and value[0][0] == values["searched_speeds"][0]:
+                low, _, rest = shown.partition(" to ")
+                shown = f"up to {rest} (searched from {low})"
+            rows.append([f"  {label}", shown])
+    yield TextTable(f"{scenario.name}, by theory", ["", ""], rows)
+    for loop in ("open_loop", "closed_loop"):
+        cycles: list[Section] = found[loop]["limit_cycles"]
+        if cycles:
+            columns = {
+                f"{number}, {'stable' if cycle['stable'] else 'unstable'}": {
+                    **cycle, "multipliers": _complex(cycle["multipliers"], ""),
+                }
+                for number, cycle in enumerate(cycles, 1)
+            }  # fmt: skip
+            title = f"limit cycles, {loop.replace('_', ' ')}"
+            yield measure_table(title, columns, dict.fromkeys(columns, units))
+    for place, reason in notes.items():
+        yield f"{place.replace('_', ' ').replace('.', ', ')}: {reason}"
+
+
+def _shown(name: str, value: Any, unit: str, units: Units) -> str:
+    if value is None or not isinstance(value, list):
+        return units.texts([value], unit, digits=8 if name == "spectral_radius" else 4)[0]
+    items = cast(list[Any], value)
+    if name == "eigenvalues":
+        return _complex(items, units.of_unit(unit))
+    if name in ("stable_linear_gains", "speed_ranges"):
+        return "; ".join(" to ".join(units.texts(ends, unit)) for ends in items) or "-"
+    return ", ".join(units.texts(items, unit)) or "-"
+
+
+def _complex(pairs: list[list[float]], unit: str) -> str:
+    """Return complex numbers given as [real, imaginary], of a conjugate pair once."""
+    texts = [
+        f"{real:.4g} ± {imaginary:.4g}j" if imaginary else f"{real:.4g}"
+        for real, imaginary in pairs
+        if imaginary >= 0.0
+    ]
+    return f"{', '.join(texts)} {unit}".rstrip()

@@ -1,0 +1,335 @@
+"""Figures of a sweep: a bifurcation diagram over one parameter, a map over two."""
+
+from collections.abc import Iterator, Sequence
+from itertools import chain, cycle
+from math import prod
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from stickslip_ros.arrays import FloatArray
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.physics.measures.cycle_measures import Regime
+from stickslip_ros.plots.regimes import REGIMES, Look, draw_cells, patch
+from stickslip_ros.plots.style import (
+    DASHES,
+    GREY,
+    LIGHT_GREY,
+    MANY,
+    SCREEN,
+    FigureStyle,
+    finish,
+    styled,
+    title_of,
+)
+from stickslip_ros.plots.units import Units
+from stickslip_ros.studies.columns import Columns
+from stickslip_ros.studies.plan import Axis, Continuation, Grid
+from stickslip_ros.studies.study import Study
+from stickslip_ros.studies.transitions import TransitionMap, transition_map, transitions
+from stickslip_ros.text import shown
+
+_FULL: Any = {"mew": 0.0}
+_HOLLOW: Any = {"mfc": "white", "mew": 0.8}
+"""Markers of steady motions, and of motions that are not steady yet."""
+
+_MOST_SHOWN = 4
+"""Largest number of values of one transition in the legend."""
+
+_HYSTERESIS = "#FBF6C9"
+
+_HATCH: Any = {"facecolor": "white", "edgecolor": GREY, "hatch": "////"}
+"""Look of cells without a result."""
+
+_AWAY = REGIMES[Regime.UNBOUNDED]._replace(colour=LIGHT_GREY, hatch="...")
+"""Look of diverging motions next to a colour bar, which starts with a near black."""
+
+_MEASURES = {"amplitude": ("amplitude", "m"), "stick_fraction": ("stick fraction", "")}
+"""Measures that are drawn in addition to the regimes: name and unit."""
+
+
+Colour = Literal["regime", "amplitude", "stick_fraction"]
+"""Quantity that a map shows."""
+
+
+def sweep_figure(
+    columns: Columns, study: Study, colour: Colour = "regime", *, style: FigureStyle = SCREEN
+) -> Figure:
+    """Return the bifurcation diagram of a sweep over one parameter, the map of one over two.
+
+    Raises InvalidInputError for an unknown `colour`, and in a diagram for any but the regime.
+    """
+    colours = ("regime", *_MEASURES)
+    if colour not in colours:
+        raise InvalidInputError(
+            f"colour = {shown(colour)} is refused: must be one of {', '.join(colours)}"
+        )
+    if len(_grid(study).axes) == 2:
+        return map_figure(columns, study, colour, style=style)
+    if colour != "regime":
+        raise InvalidInputError(f"colour = {colour}: is for maps, of two parameters")
+    return diagram_figure(columns, study, style=style)
+
+
+@styled
+def diagram_figure(columns: Columns, study: Study, *, style: FigureStyle = SCREEN) -> Figure:
+    """Return the bifurcation diagram of a sweep over one parameter.
+
+    It shows turning points by regime, amplitude, stick fraction, and the transitions by theory.
+    Markers of motions that are not steady yet are hollow. If the sweep is carried both ways,
+    upward results are narrow and dark, downward results wide and pale.
+    """
+    grid = _grid(study)
+    (axis,) = grid.axes
+    both = grid.continuation is Continuation.BOTH
+    own = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
+    units, terse = own.shortened(terse=style.crowded(8.5, 8.0)), own.shortened()
+    figure = style.figure(8.5, 8.0, narrow=1.7)
+    what = "Bifurcation diagram"
+    style.set_title(figure, title_of(what, study.scenario, grid.parameters))
+    panels: list[Axes] = list(figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.0, 1.0)))
+    section, *lines = panels
+    every = np.fromiter(chain.from_iterable(columns.turning_points), dtype=float)
+    length, label = terse.axis(terse.named("turning points"), "m", every)
+    section.set_ylabel(label)
+    scaled = {
+        name: terse.axis(title, unit, getattr(columns, name))
+        for name, (title, unit) in _MEASURES.items()
+    }
+    # Wide markers are drawn below the narrow ones.
+    for rows, direction in reversed(list(_passes(grid))):
+        wide = both and direction is Continuation.DOWN
+        _draw_section(section, columns, axis, rows, length, wide=wide)
+        look: Any = {"color": LIGHT_GREY, "lw": 5.0} if wide else {"color": "black", "lw": 1.2}
+        for axes, (name, (scale, label)) in zip(lines, scaled.items(), strict=True):
+            values: FloatArray = getattr(columns, name)[rows]
+            axes.plot(columns.values[axis.parameter][rows], values / scale, **look)
+            axes.set_ylabel(label)
+    handles: list[Artist] = [
+        Line2D([], [], color=look.colour, marker=look.marker, ms=5.0, ls="", label=look.label)
+        for _, look in _present(columns)
+    ]
+    black: Any = {"color": "black", "marker": "o"}
+    if np.any(~columns.steady & ~_are(columns.regime, None)):
+        look = {**black, **_HOLLOW, "ms": 5.0, "ls": ""}
+        handles.append(Line2D([], [], **look, label="not steady yet"))
+    if both:
+        handles += [
+            Line2D([], [], **black, ms=2.5, label="carried up"),
+            Line2D([], [], color=LIGHT_GREY, marker="o", ms=7.0, lw=5.0, label="carried down"),
+            *_shade_hysteresis(panels, columns, axis),
+        ]
+    handles += _mark_transitions(panels, study, axis, units)
+    for axes in lines:
+        axes.set_ylim(bottom=0.0)
+    lines[-1].set_xlabel(units.label(units.named(axis.parameter), axis.unit))
+    lines[-1].set_xscale(**_scale(axis))
+    lines[-1].margins(x=0.01)
+    style.legend_below(figure, handles, most=3)
+    finish(figure)
+    return figure
+
+
+@styled
+def map_figure(
+    columns: Columns,
+    study: Study,
+    colour: Colour = "regime",
+    *,
+    style: FigureStyle = SCREEN,
+) -> Figure:
+    """Return the map of a sweep over two parameters, the first one on the horizontal axis.
+
+    Cells are coloured by regime, amplitude or stick fraction, and hatched without a result. Curves
+    show the transitions by theory. If the sweep is carried both ways, there are two panels.
+    """
+    grid = _grid(study)
+    first, second = grid.axes
+    count = len(grid.directions)
+    units = Units.for_drive(study.scenario.plant.as_drive(), grid.parameters)
+    figure = style.figure(1.0 + 6.0 * count, 6.2, narrow=0.3 + 0.9 * count)
+    name = "regime" if colour == "regime" else _MEASURES[colour][0]
+    what = f"Map of the {name} of settled motions"
+    style.set_title(figure, title_of(what, study.scenario, grid.parameters))
+    shape = (count, 1) if style.narrow else (1, count)
+    panels: list[Axes] = list(figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).flat)
+    found = transition_map(study, (first, second))
+    mesh: Any = None
+    scale, bar = 1.0, ""
+    if colour != "regime":
+        scale, bar = units.axis(*_MEASURES[colour], getattr(columns, colour))
+    for axes, (rows, direction) in zip(panels, _passes(grid), strict=True):
+        axes.set_xscale(**_scale(first))
+        axes.set_yscale(**_scale(second))
+        axes.grid(visible=False)
+        axes.patch.set(**_HATCH)
+        if colour == "regime":
+            _draw_regimes(axes, columns, grid, rows)
+        else:
+            mesh = _draw_values(axes, columns, grid, rows, getattr(columns, colour) / scale)
+        for _, margins, dashes in _curves(found):
+            # White below black is visible on any colour.
+            for black, width, pattern in ((False, 3.5, "-"), (True, 1.5, dashes)):
+                axes.contour(
+                    found.first, found.second, margins, levels=[0.0],
+                    colors="black" if black else "white", linewidths=width, linestyles=pattern,
+                )  # fmt: skip
+        if axes in (panels[-1], *panels[: 0 if style.narrow else count]):
+            axes.set_xlabel(units.label(units.named(first.parameter), first.unit))
+        if axes is panels[0] or style.narrow:
+            axes.set_ylabel(units.label(units.named(second.parameter), second.unit))
+        if direction is not None:
+            axes.set_title(f"carried {direction} along the {units.named(second.parameter)}")
+    if mesh is not None:
+        figure.colorbar(mesh, ax=panels, label=bar)
+    handles: list[Artist] = []
+    for regime, look in _present(columns):
+        if regime is not None and colour == "regime":
+            handles.append(patch(look, look.label))
+        elif regime is Regime.UNBOUNDED:
+            handles.append(patch(_AWAY, look.label))
+    if _are(columns.regime, None).any():
+        handles.append(Patch(**_HATCH, label="no result"))
+    handles += [
+        Line2D([], [], color="black", ls=dashes, label=name) for name, _, dashes in _curves(found)
+    ]
+    style.legend_below(figure, handles, most=4)
+    finish(figure)
+    return figure
+
+
+def _grid(study: Study) -> Grid:
+    assert isinstance(study.plan, Grid)
+    return study.plan
+
+
+def _passes(grid: Grid) -> Iterator[tuple[slice, Continuation | None]]:
+    """Yield the points of each direction."""
+    count = prod(grid.shape)
+    for number, direction in enumerate(grid.directions):
+        yield slice(number * count, (number + 1) * count), direction
+
+
+def _present(columns: Columns) -> Iterator[tuple[Regime | None, Look]]:
+    for regime, look in REGIMES.items():
+        if _are(columns.regime, regime).any():
+            yield regime, look if regime is not None else look._replace(label="no result")
+
+
+def _draw_section(
+    axes: Axes, columns: Columns, axis: Axis, rows: slice, length: float, *, wide: bool
+) -> None:
+    """Draw turning points, and strokes at the lower edge for points without any."""
+    values, regimes = columns.values[axis.parameter][rows], columns.regime[rows]
+    points = columns.turning_points[rows]
+    counts = np.array([len(found) for found in points])
+    positions = np.fromiter(chain.from_iterable(points), dtype=float, count=int(counts.sum()))
+    size = float(np.clip(800.0 / axis.count, 1.8, 3.0)) + 5.0 * wide
+    rasterized = len(positions) > MANY
+    for regime, (colour, _, marker, _) in REGIMES.items():
+        shown = _are(regimes, regime)
+        pale = tuple(1.0 - 0.4 * (1.0 - part) for part in to_rgb(colour))
+        look: Any = {"color": pale if wide else colour, "ls": "", "rasterized": rasterized}
+        for steady, filled in ((True, _FULL), (False, _HOLLOW)):
+            some = shown & (columns.steady[rows] == steady)
+            places = np.repeat(values[some], counts[some])
+            heights = positions[np.repeat(some, counts)] / length
+            axes.plot(places, heights, marker=marker, ms=size, **look, **filled)
+        without = values[shown & (counts == 0)]
+        height = np.full(len(without), 0.06 if wide else 0.02)
+        axes.plot(without, height, marker="|", ms=9.0, transform=axes.get_xaxis_transform(), **look)
+
+
+def _shade_hysteresis(panels: Sequence[Axes], columns: Columns, axis: Axis) -> list[Artist]:
+    """Shade the ranges where up and down differ; return their legend entry."""
+    up, down = columns.amplitude.reshape(2, -1)
+    largest = float(np.nanmax(columns.amplitude, initial=0.0))
+    differs = np.abs(up - down) > 0.02 * largest  # less is not hysteresis
+    differs |= np.isnan(up) != np.isnan(down)
+    if not differs.any():
+        return []
+    edges = np.repeat(_edges(axis), 2)[1:-1]
+    for axes in panels:
+        axes.fill_between(
+            edges, 0.0, 1.0, where=np.repeat(differs, 2), transform=axes.get_xaxis_transform(),
+            color=_HYSTERESIS, lw=0.0, zorder=0.0,
+        )  # fmt: skip
+    return [Patch(color=_HYSTERESIS, label="up and down differ (hysteresis)")]
+
+
+def _mark_transitions(
+    panels: Sequence[Axes], study: Study, axis: Axis, units: Units
+) -> list[Artist]:
+    """Draw lines at the transitions; return their legend entries."""
+    handles: list[Artist] = []
+    for (name, values), dashes in zip(transitions(study, axis).items(), cycle(DASHES)):
+        look: Any = {"color": "black", "lw": 1.2, "ls": dashes}
+        for axes in panels:
+            for value in values:
+                axes.axvline(value, **look)
+        more = [] if len(values) <= _MOST_SHOWN else ["..."]
+        shown = ", ".join([f"{value:.5g}" for value in values[:_MOST_SHOWN]] + more)
+        unit = units.of_unit(axis.unit)
+        handles.append(Line2D([], [], **look, label=f"{name} {shown} {unit}".rstrip()))
+    return handles
+
+
+def _draw_regimes(axes: Axes, columns: Columns, grid: Grid, rows: slice) -> None:
+    x, y = (_edges(axis) for axis in grid.axes)
+    for regime, look in _present(columns):
+        if regime is not None:
+            of_it = _are(columns.regime[rows], regime).reshape(grid.shape).T
+            draw_cells(axes, x, y, of_it, look)
+
+
+def _draw_values(axes: Axes, columns: Columns, grid: Grid, rows: slice, values: FloatArray) -> Any:
+    """Draw the cells of a map by a measure; return the mesh for a colour bar."""
+    x, y = (_edges(axis) for axis in grid.axes)
+    away = _are(columns.regime[rows], Regime.UNBOUNDED).reshape(grid.shape).T
+    draw_cells(axes, x, y, away, _AWAY)
+    cells = np.ma.masked_invalid(values[rows].reshape(grid.shape).T)
+    largest = float(np.nanmax(values, initial=0.0)) or 1.0
+    rasterized = cells.size > MANY
+    return axes.pcolormesh(
+        x, y, cells, cmap="viridis", vmin=0.0, vmax=largest, rasterized=rasterized
+    )
+
+
+def _curves(found: TransitionMap) -> Iterator[tuple[str, npt.NDArray[Any], str]]:
+    """Yield the transitions within the map: name, margins by row, and dashes."""
+    for (name, margins), dashes in zip(found.margins.items(), cycle(DASHES)):
+        if np.nanmin(margins) < 0.0 < np.nanmax(margins):
+            yield name, np.ma.masked_invalid(margins.T), dashes
+
+
+def _are(regimes: npt.NDArray[np.object_], regime: Regime | None) -> npt.NDArray[np.bool_]:
+    return np.array([found is regime for found in regimes])
+
+
+def _edges(axis: Axis) -> FloatArray:
+    """Return the edges of the cells around the values of an axis, one more than these.
+
+    The first and the last cell are half as wide, since there is no result beyond their values.
+    """
+    values = axis.values()
+    if axis.logarithmic:
+        values = np.log(np.abs(values))
+    middles = (values[:-1] + values[1:]) / 2.0
+    edges = np.concatenate([values[:1], middles, values[-1:]])
+    return np.copysign(np.exp(edges), axis.first) if axis.logarithmic else edges
+
+
+def _scale(axis: Axis) -> dict[str, Any]:
+    """Return the scale of a figure's axis; a logarithmic one may have negative values."""
+    if not axis.logarithmic:
+        return {"value": "linear"}
+    if axis.first > 0.0:
+        return {"value": "log"}
+    return {"value": "symlog", "linthresh": min(abs(axis.first), abs(axis.last))}

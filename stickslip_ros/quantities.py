@@ -1,0 +1,59 @@
+"""Numbers with units, as users write them: `30mm/s`."""
+
+import re
+from contextlib import suppress
+from fractions import Fraction
+from functools import cache
+from sys import float_info
+from typing import Any
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.text import shown
+
+# All that pint gets to read: no arithmetic, and no large power.
+_UNIT = r"[A-Za-zµμ]+(?: ?(?:\^|\*\*) ?-?\d|[²³])?"
+_JOIN = r"(?: ?[*·/] ?| )"
+_GROUP = rf"(?:{_UNIT}|\({_UNIT}(?:{_JOIN}{_UNIT})*\))"
+QUANTITY = re.compile(
+    r"(?a)(?=.{1,80}\Z)\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)"
+    rf"\s*((?:1?/ ?)?{_GROUP}(?:{_JOIN}{_GROUP})*)\s*"
+)
+"""A number and its unit."""
+
+
+def number_of(name: str, given: Any, unit: str | None) -> float:
+    """Return a number given in `unit`, or as a text with a unit that converts to it, or refuse."""
+    found = QUANTITY.fullmatch(given) if isinstance(given, str) else None
+    with suppress(OverflowError, TypeError, ValueError):
+        if found is None:
+            return float(given)
+        if unit:
+            return _converted(found[1], found[2], unit)
+    allowed = f" in {unit}, or in a unit that converts to it" if unit else " without a unit"
+    turns = "; Hz and rpm count turns, of 2 pi rad" if unit and "rad" in unit else ""
+    raise InvalidInputError(f"{name} = {shown(given)} is refused: must be a number{allowed}{turns}")
+
+
+def _converted(number: str, given: str, unit: str) -> float:
+    """Return a number of one unit in another one, rounded once; ValueError if there is none."""
+    from pint import PintError
+
+    registry = _registry()
+    with suppress(AssertionError, PintError, TypeError):  # ambiguous, unknown, logarithmic
+        units = registry.parse_units(f"1{given}" if given[0] == "/" else given), unit
+        value, offset = (registry.convert(Fraction(each), *units) for each in (number, 0))
+        if not offset and (not value or float_info.min <= abs(value) <= float_info.max):
+            return float(value)
+    raise ValueError
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    create: Any = pint.UnitRegistry
+    registry = create(None, non_int_type=Fraction, on_redefinition="ignore")
+    registry.load_definitions(f"{pint.__path__[0]}/default_en.txt")  # by itself it would cache rpm
+    for angle in ("radian", "turn"):  # numbers for pint, for which 1 Hz is 1 rad/s
+        registry.define(f"{angle} = [{angle}]")
+    return registry

@@ -1,0 +1,106 @@
+"""The bag that the page reads and offers: only the one that it was given, and no link."""
+
+import asyncio
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from stickslip_ros.app.dashboard.ended_run import EndedRun
+from stickslip_ros.app.dashboard.listener import Health
+from tests.bags.runs import STAMPS, record
+
+SECRET = b"secret"
+FILE = "bag_0.mcap"
+
+
+def ended(named: Path | str, *readable: Path) -> EndedRun:
+    """Return what is known of a run whose analyzer, or another node, named a bag."""
+    listener: Any = SimpleNamespace(
+        health={"analyzer": Health(figures={"bag": str(named)})}, readable=[*map(str, readable)]
+    )
+    run = EndedRun(listener)
+    asyncio.run(run.read())
+    return run
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    (tmp_path / "secret").write_bytes(SECRET)
+    record(tmp_path / "bag", STAMPS[:50], STAMPS[:50])
+    return tmp_path / "bag"
+
+
+def linked(file: Path, secret: Path) -> None:
+    file.unlink()
+    file.symlink_to(secret)
+
+
+def hard_linked(file: Path, secret: Path) -> None:
+    file.unlink()
+    file.hardlink_to(secret)
+
+
+def renamed(file: Path, secret: Path) -> None:
+    secret.rename(file)
+
+
+def in_a_linked_directory(file: Path, secret: Path) -> None:
+    file.parent.rename(secret.parent / "other")
+    secret.rename(secret.parent / "other" / file.name)
+    file.parent.symlink_to("other")
+
+
+def directory(file: Path, secret: Path) -> None:
+    file.unlink()
+    file.mkdir()
+    secret.rename(file / "secret.mcap")
+
+
+def pipe(file: Path, secret: Path) -> None:
+    file.unlink()
+    os.mkfifo(file)
+
+
+ATTACKS = [linked, hard_linked, renamed, in_a_linked_directory, directory, pipe]
+Attack = Callable[[Path, Path], None]
+
+
+def test_the_bag_that_was_given_is_read_and_offered(bag: Path) -> None:
+    run = ended(bag, bag)
+    assert run._report["samples"] == 50
+    assert run.file is not None
+    assert run.file.read_bytes() == (bag / FILE).read_bytes()
+    shutil.copy(bag / FILE, bag / "bag_1.mcap")
+    run = ended(bag, bag)
+    assert run._report
+    assert run.file is None  # of several files none is offered
+
+
+def test_a_bag_that_a_node_only_names_is_not_looked_at(bag: Path) -> None:
+    for named in (bag, "/no/such/bag", "x" * 5000, "a\0b", ""):
+        run = ended(named)
+        assert (run.file, run._report, run._problem) == (None, {}, "")
+
+
+@pytest.mark.parametrize("attack", ATTACKS)
+def test_a_file_put_in_place_of_the_bag_is_refused(bag: Path, attack: Attack) -> None:
+    attack(bag / FILE, bag.parent / "secret")
+    run = ended(bag, bag)
+    assert run.file is None
+    assert not run._report
+    assert str(bag) in run._problem
+    assert "secret" not in run._problem
+
+
+@pytest.mark.parametrize("attack", ATTACKS)
+def test_a_file_put_in_place_later_is_not_served(bag: Path, attack: Attack) -> None:
+    recorded = (bag / FILE).read_bytes()
+    run = ended(bag, bag)
+    attack(bag / FILE, bag.parent / "secret")
+    assert run.file is not None
+    assert run.file.read_bytes() == recorded

@@ -1,0 +1,69 @@
+"""Nodes in lockstep give what `stickslip simulate` does, bit for bit."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stickslip_ros.bags.reader import Recording
+from tests.app.conftest import Run
+
+BRISTLES = "-p plant.friction.bristle_stiffness=1e5 -p plant.friction.bristle_damping=100.0"
+CURVE = "-p plant.friction.curve=exponential -p plant.friction.decay_speed=0.02"
+LUGRE = f"-p plant.friction.law=lugre {BRISTLES} {CURVE} -p plant.friction.kinetic=0.25"
+SLIPS = "-p plant.friction.slip_distance=1e-5 -p plant.friction.evolution_effect=0.03"
+LATE = "-p washout_controller.start_after=1.0 --duration 1.5"
+ENCODER = (
+    "-p plant.sensor.position_resolution=1e-6 -p plant.sensor.position_noise=1e-7 "
+    "-p plant.sensor.velocity=difference -p plant.sensor.difference_samples=4 "
+)
+DRIVE = (
+    "-p plant.sensor.seed=3 "
+    "-p plant.actuator.limit=100 -p plant.actuator.resolution=0.5 "
+    "-p plant.actuator.time_constant=0.001"
+)
+RUNS: Mapping[str, tuple[str, str]] = {
+    "moving belt": ("feed_profile --duration 1.8", "--composed"),
+    "load": ("vibrating_load --duration 1.8", ""),
+    "no spring": ("axis -p plant.initial.position=1e-3 --duration 1.5", "--composed"),
+    "lugre": (f"feed_drive {LUGRE} {LATE}", "--composed"),
+    "rate and state": (f"feed_drive -p plant.friction.law=rate_state {SLIPS} {LATE}", ""),
+    "sensor and actuator": (f"feed_drive {ENCODER} {DRIVE} {LATE}", ""),
+    "sensor and actuator, composed": (f"feed_drive {ENCODER} {DRIVE} {LATE}", "--composed"),
+}
+"""Drive, and how it is run."""
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("name", RUNS)
+def test_nodes_in_lockstep_give_what_simulate_does(
+    stickslip: Run, tmp_path: Path, name: str
+) -> None:
+    drive, how = (words.split() for words in RUNS[name])
+    truth = ("--pace", "lockstep", "-p", "plant.publish_truth=true")
+    run = stickslip.json("run", *drive, *how, *truth, "--bag", "bag")
+    assert (run["lost_samples"], run["late_forces"]) == (0, 0)
+    simulated = stickslip.json("simulate", *drive, "--out", "motion.csv")
+    table = np.genfromtxt(tmp_path / "motion.csv", delimiter=",", names=True)
+    with Recording(tmp_path / "bag") as recording:
+        told, true = recording.joint_states, recording.true_joint_states
+        commands, applied = recording.control_forces, recording.applied_forces
+        stick_speed = recording.metadata("stickslip_ros/analyzer")["stick_speed"]
+    assert len(true) == len(told) == len(table) == run["samples"] > 1500
+    assert (told.stamp - told.stamp[0]).tolist() == np.rint(1e9 * table["time"]).tolist()
+    for column in ("position", "velocity", "friction_force", "belt_position", "belt_velocity"):
+        assert getattr(true, column).tolist() == table[column].tolist(), column
+    measured = "measured_" if "sensor" in name else ""
+    assert told.position.tolist() == table[f"{measured}position"].tolist()
+    assert told.velocity.tolist() == table[f"{measured}velocity"].tolist()
+    assert commands.force.tolist() == table["control_force"].tolist()
+    if measured:
+        assert simulated["truth"]["regime"] == "stick_slip"
+        assert 50.0 < np.abs(applied.force).max() <= 100.0 < np.abs(commands.force).max()
+    assert (stick_speed == "0.0004") == (name in ("lugre", "rate and state"))
+    found = stickslip.json("report", "bag")
+    for measure in ("amplitude", "period", "stick_fraction", "regime"):
+        assert found[measure] == run["report"][measure], measure
+        if measured:
+            assert found[measure] == simulated[measure], measure

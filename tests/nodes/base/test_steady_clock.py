@@ -1,0 +1,83 @@
+"""Waits of nodes while the system's clock is set back."""
+
+import platform
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.nodes.graph import PATIENCE
+
+# What the library waits for by the system's clock takes as much longer as that is set back.
+_CLOCK = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <pthread.h>
+#include <time.h>
+
+static volatile long back;
+static int (*gettime)(clockid_t, struct timespec *);
+static int (*wait)(pthread_cond_t *, pthread_mutex_t *, const struct timespec *);
+
+__attribute__((constructor)) static void find(void) {
+    gettime = dlsym(RTLD_NEXT, "clock_gettime");
+    wait = dlvsym(RTLD_NEXT, "pthread_cond_timedwait", "GLIBC_2.3.2");
+}
+
+void set_back(long seconds) { back = seconds; }
+
+int clock_gettime(clockid_t clock, struct timespec *time) {
+    if (!gettime) find();
+    int failed = gettime(clock, time);
+    if (clock == CLOCK_REALTIME) time->tv_sec -= back;
+    return failed;
+}
+
+int pthread_cond_timedwait(
+    pthread_cond_t *condition, pthread_mutex_t *mutex, const struct timespec *deadline) {
+    if (deadline->tv_sec < 1000000000) return wait(condition, mutex, deadline);
+    for (;;) {
+        long before = back;
+        struct timespec due = {deadline->tv_sec + before, deadline->tv_nsec};
+        int failed = wait(condition, mutex, &due);
+        if (failed != ETIMEDOUT || before == back) return failed;
+    }
+}
+"""
+
+_WAIT = """
+import ctypes, sys, threading, time
+from rclpy.node import Node
+from stickslip_ros.nodes.base.process import initialise
+from stickslip_ros.running.spinner import Spinner
+
+initialise()
+spinner = Spinner()
+spinner.add(Node("waiting"))
+before = time.time()
+threading.Timer(0.2, ctypes.CDLL(sys.argv[1]).set_back, [1000]).start()
+assert not spinner.spin_until(lambda: False, 0.5)
+assert time.time() < before
+spinner.close()
+"""
+
+
+@pytest.mark.process
+def test_a_wait_ends_though_the_clock_is_set_back(
+    tmp_path: Path, process_environment: dict[str, str]
+) -> None:
+    compiler = shutil.which("cc")
+    if compiler is None or platform.libc_ver()[0] != "glibc":
+        pytest.skip("the clock cannot be replaced here")
+    (tmp_path / "clock.c").write_text(_CLOCK)
+    clock = tmp_path / "clock.so"
+    subprocess.run([compiler, "-shared", "-fPIC", "-o", clock, tmp_path / "clock.c"], check=True)
+    subprocess.run(
+        [sys.executable, "-c", _WAIT, clock],
+        env={**process_environment, "LD_PRELOAD": str(clock)},
+        timeout=PATIENCE,
+        check=True,
+    )

@@ -1,0 +1,175 @@
+"""The map of decay rates and its figure."""
+
+from dataclasses import replace
+from functools import cache
+from math import inf
+
+import numpy as np
+import pytest
+
+from stickslip_ros.physics.model.control import WashoutGains
+from stickslip_ros.physics.theory.closed_forms import CubicLoop
+from stickslip_ros.physics.theory.linear_sampled_loop import LinearSampledLoop
+from stickslip_ros.physics.theory.stability_map import CriticalGainCurves, StabilityMap
+from stickslip_ros.plots.stability_figure import design_figure, stability_figure
+from stickslip_ros.plots.style import STYLES
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.studies.design import Design, Task, design
+from tests.physics.drives import FEED_DRIVE, PAPER
+from tests.plots.texts import faults, legend_texts
+
+GAINS = WashoutGains(20.0, -3000.0, 0.0)
+
+
+def map_of(force_delay: float = 0.0025, gains: WashoutGains = GAINS) -> StabilityMap:
+    loop = LinearSampledLoop.from_drive(FEED_DRIVE, 1000.0, force_delay)
+    assert loop is not None
+    return StabilityMap.around(loop, gains, points=21)
+
+
+def test_the_map_is_around_the_gains() -> None:
+    found = map_of()
+    assert found.corner_frequencies[[0, -1]] == pytest.approx([2.0, 200.0])
+    assert found.linear_gains[[0, -1]] == pytest.approx([-6000.0, 1500.0])
+    assert found.decay_rates.shape == (21, 21)
+    row, column = 10, 8
+    assert found.corner_frequencies[row] == pytest.approx(20.0)
+    assert found.linear_gains[column] == pytest.approx(-3000.0)
+    rate = found.loop.decay_rate(GAINS)
+    assert found.decay_rates[row, column] == pytest.approx(rate)
+
+
+def test_decay_rates_change_sign_at_the_critical_gain() -> None:
+    found = map_of()
+    for row, corner_frequency in enumerate(found.corner_frequencies):
+        (interval,) = found.loop.stable_linear_gains(float(corner_frequency))
+        inside = (found.linear_gains > interval.low) & (found.linear_gains < interval.high)
+        assert np.array_equal(found.decay_rates[row] > 0.0, inside)
+
+
+def test_the_continuous_loop_has_its_closed_form() -> None:
+    found = map_of()
+    cubic = CubicLoop.from_drive(PAPER)
+    assert cubic is not None
+    expected = [cubic.critical_linear_gain(d / 100.0) for d in found.corner_frequencies.tolist()]
+    assert found.continuous == pytest.approx(1e4 * np.array(expected), rel=1e-9)
+
+
+def test_without_gains_it_is_around_the_critical_one() -> None:
+    found = map_of(gains=WashoutGains(20.0, 0.0, 0.0))
+    critical = found.loop.critical_linear_gain(20.0)
+    assert critical is not None
+    assert found.linear_gains[0] == pytest.approx(2.0 * critical)
+
+
+def test_critical_gains_over_rate_and_delay() -> None:
+    rates, delays = np.array([100.0, 1000.0]), np.array([0.0, 0.005, 0.015])
+    found = CriticalGainCurves.over(FEED_DRIVE, 20.0, rates, delays)
+    for row, rate in enumerate(rates):
+        for column, delay in enumerate(delays):
+            loop = LinearSampledLoop.from_drive(FEED_DRIVE, rate, delay)
+            assert loop is not None
+            critical = loop.critical_linear_gain(20.0)
+            assert found.linear_gains[row, column] == pytest.approx(critical or np.nan, nan_ok=True)
+    assert np.isnan(found.linear_gains[:, 2]).all()
+
+
+@cache
+def critical_gains() -> CriticalGainCurves:
+    rates, delays = np.array([100.0, 300.0, 1000.0]), np.linspace(0.0, 0.006, 4)
+    return CriticalGainCurves.over(FEED_DRIVE, 20.0, rates, delays)
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_the_map_of_a_loop_and_its_critical_gains(style: str) -> None:
+    found = map_of(force_delay=0.003)
+    title = "Stability of the sampled loop, feed_drive, washout control"
+    figure = stability_figure(found, critical_gains(), title=title, style=STYLES[style])
+    assert faults(figure) == []
+    axes, curves, bar = figure.axes
+    assert axes.get_xlabel() == "cutoff frequency $d$ (rad/s)"
+    assert axes.get_ylabel() == "linear gain $k_1$ (N s/m)"
+    assert bar.get_ylabel() == "decay rate (1/s)"
+    shown = figure.get_suptitle().replace("\n", " ")
+    assert shown == f"{title} belt speed 40 mm/s, sample rate 1 kHz, force delay 3 ms"
+    # Each side of the limit is named where it is.
+    names = {text.get_text(): text.get_position() for text in axes.texts}
+    assert names.keys() == {"stable", "unstable"}
+    for name, (corner_frequency, gain) in names.items():
+        rate = found.loop.decay_rate(WashoutGains(corner_frequency, gain, 0.0))
+        assert (rate > 0.0) == (name == "stable")
+    # The colour bar has round numbers.
+    ticks = bar.get_yticks()
+    step = ticks[1] - ticks[0]
+    assert ticks[0] == 0.0
+    assert np.allclose(ticks, step * np.arange(len(ticks)))
+    assert f"{step:.0e}"[0] in "125"
+    assert ticks[-1] >= found.decay_rates.max()
+    # The curves differ in more than colour.
+    assert curves.get_xlabel() == "force delay (ms)"
+    *others, own = curves.lines[:3]
+    assert [line.get_label() for line in (*others, own)] == ["100 Hz", "300 Hz", "1 kHz, this loop"]
+    assert len({line.get_linestyle() for line in (*others, own)}) == 3
+    assert np.max(own.get_xdata()) == pytest.approx(6.0)
+    assert own.get_linewidth() > max(line.get_linewidth() for line in others)
+    (region,) = curves.collections
+    assert region.get_label() == "stable, this loop"
+    (path,) = region.get_paths()
+    for gain in (GAINS.linear, -1000.0, 1000.0):
+        stable = found.loop.decay_rate(replace(GAINS, linear=gain)) > 0.0
+        assert path.contains_point((3.0, gain)) == stable
+
+
+@cache
+def designed(force_limit: float) -> Design:
+    limit = f"washout_controller.force_limit={force_limit}"
+    return design(Task.from_scenario(load_scenario("feed_drive", [limit]), (0.04, 0.04)))
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_a_design_shows_the_force_limit_as_a_contour(style: str) -> None:
+    figure = design_figure(designed(200.0), style=STYLES[style])
+    assert faults(figure) == []
+    assert {"force limit 200 N", "needs a larger force"} <= set(legend_texts(figure))
+    assert "Designed gains, feed_drive, washout control" in figure.get_suptitle()
+
+
+def test_the_force_at_the_proposal_is_that_of_its_check() -> None:
+    found = designed(200.0)
+    around, controller = found.map_around(), found.controller
+    assert around is not None
+    assert controller is not None
+    forces = found.peak_forces(around)
+    row, column = 40, int(np.abs(around.linear_gains - controller.linear_gain).argmin())
+    assert around.corner_frequencies[row] == pytest.approx(controller.corner_frequency)
+    (check,) = found.checks
+    assert forces[row, column] == pytest.approx(check.peak_force, rel=0.1)
+    assert forces[row, column] < 200.0 < forces.max()
+
+
+def test_a_design_without_a_limit_shows_contours_of_the_force() -> None:
+    names = legend_texts(design_figure(designed(inf)))
+    assert "largest force at switch-on" in names
+    assert "needs a larger force" not in names
+
+
+def test_for_the_unit_drive_it_is_dimensionless() -> None:
+    loop = LinearSampledLoop.from_drive(PAPER, 100.0, 0.0)
+    assert loop is not None
+    found = StabilityMap.around(loop, WashoutGains(2.0, -1.0, -1.0), points=11)
+    figure = stability_figure(found, None)
+    axes, bar = figure.axes
+    assert axes.get_xlabel() == "cutoff frequency $d$ (dimensionless)"
+    assert bar.get_ylabel() == "decay rate (dimensionless)"
+    assert figure.get_suptitle() == "belt speed 0.4, sample rate 100"
+
+
+def test_where_nothing_is_stable_there_is_a_figure_all_the_same() -> None:
+    loop = LinearSampledLoop.from_drive(replace(FEED_DRIVE, belt_speed=0.02), 1000.0, 0.015)
+    assert loop is not None
+    found = StabilityMap.around(loop, replace(GAINS, linear=0.0), points=11)
+    assert -inf < found.decay_rates.max() < 0.0
+    figure = stability_figure(found, None, style=replace(STYLES["paper"], titled=False))
+    (axes,) = figure.axes
+    assert [text.get_text() for text in axes.texts] == ["unstable"]
+    assert faults(figure) == []

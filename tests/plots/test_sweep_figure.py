@@ -1,0 +1,211 @@
+"""The figures of sweeps: diagrams over one parameter, maps over two."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+
+from stickslip_ros.plots.style import BLUE, GREEN, LIGHT_GREY, ORANGE, STYLES
+from stickslip_ros.plots.sweep_figure import diagram_figure, map_figure
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.studies.columns import Columns
+from stickslip_ros.studies.journal import Journal
+from stickslip_ros.studies.plan import Axis, Continuation, Grid
+from stickslip_ros.studies.runner import run
+from stickslip_ros.studies.settling import SettlingOptions
+from stickslip_ros.studies.study import Study
+from tests.plots.texts import faults, legend_texts
+
+pytestmark = pytest.mark.usefixtures("coarse_maps")
+
+FREE = "plant.expects_control=false"
+LINEAR = "plant.friction.law=linear"
+HYSTERESIS = (
+    FREE,
+    "plant.friction.law=exponential",
+    "plant.friction.static=1.0",
+    "plant.friction.kinetic=0.5",
+    "plant.friction.decay_speed=0.5",
+    "plant.damping=0.1",
+)
+
+SHADED = "up and down differ (hysteresis)"
+
+Swept = tuple[Columns, Study]
+
+
+def swept(
+    *over: str, overrides: tuple[str, ...] = (FREE,), carry: Continuation | None = None
+) -> Swept:
+    axes = tuple(Axis.parse(text) for text in over)
+    study = Study(load_scenario("paper", overrides), Grid(axes, carry), SettlingOptions(60.0, 3))
+    with Journal(study) as journal:
+        run(journal)
+        return Columns.from_journal(journal), study
+
+
+@pytest.fixture(scope="module")
+def over_speed() -> Swept:
+    return swept("plant.belt_speed=0.1:0.8:15")
+
+
+@pytest.fixture(scope="module")
+def both_ways() -> Swept:
+    return swept("plant.belt_speed=0.8:2.2:15", overrides=HYSTERESIS, carry=Continuation.BOTH)
+
+
+@pytest.fixture(scope="module")
+def over_two() -> Swept:
+    """Of which the static coefficients below the minimum, 0.25, cannot be."""
+    return swept("plant.friction.static=0.1:0.6:6", "plant.belt_speed=0.1:0.7:5")
+
+
+def cells(axes: Axes) -> dict[str, tuple[float, float, int]]:
+    """Return the middle of the cells of each colour in a map, and how many they are."""
+    found: dict[str, tuple[float, float, int]] = {}
+    for mesh in axes.collections:
+        shown = getattr(mesh, "cmap", None) and mesh.get_array()
+        if shown is not None and np.ndim(shown) == 2:
+            corners: Any = mesh.get_coordinates()
+            middles = (corners[:-1, :-1] + corners[1:, 1:]) / 2.0
+            of_it = middles[~np.ma.getmaskarray(shown)]
+            x, y = of_it.mean(axis=0)
+            found[to_hex(mesh.cmap(0)).upper()] = float(x), float(y), len(of_it)
+    return found
+
+
+def test_a_diagram_names_axes_regimes_and_transitions(over_speed: Swept) -> None:
+    figure = diagram_figure(*over_speed)
+    assert faults(figure) == []
+    section, amplitude, stick_fraction = figure.axes
+    assert section.get_ylabel() == "turning points $X$"
+    assert amplitude.get_ylabel() == "amplitude"
+    assert stick_fraction.get_ylabel() == "stick fraction"
+    assert stick_fraction.get_xlabel() == "belt speed $v_0$ (dimensionless)"
+    assert "no control" in figure.get_suptitle()
+    assert legend_texts(figure) == [
+        "stick-slip", "pure slip", "equilibrium", "not steady yet",
+        "Hopf point 0.48876", "limit of sticking 0.43947",
+    ]  # fmt: skip
+    shown = {line.get_color(): line.get_marker() for line in section.lines if len(line.get_xdata())}
+    assert {shown[ORANGE], shown[BLUE], shown[GREEN]} == {"o", "^", "s"}
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_where_up_and_down_differ_a_diagram_is_shaded(both_ways: Swept, style: str) -> None:
+    figure = diagram_figure(*both_ways, style=STYLES[style])
+    assert faults(figure) == []
+    assert {"carried up", "carried down", SHADED, "Hopf point 1.1513"} <= set(legend_texts(figure))
+    for axes in figure.axes:
+        (shaded,) = axes.collections
+        corners = np.concatenate([path.vertices for path in shaded.get_paths()])
+        assert np.ptp(corners[:, 0]) == pytest.approx(0.7, abs=0.11)  # from 1.1 to 1.8 m/s
+
+
+def test_a_study_that_varies_the_scales_is_in_si() -> None:
+    overrides = (FREE, "plant.mass=1")
+    figure = diagram_figure(*swept("plant.stiffness=1e4:4e4:3", overrides=overrides))
+    section, amplitude, last = figure.axes
+    assert section.get_ylabel() == "turning points $x$ (µm)"
+    assert amplitude.get_ylabel() == "amplitude (µm)"
+    assert last.get_xlabel() == "stiffness $k$ (N/m)"
+
+
+def test_where_up_and_down_agree_nothing_is_shaded() -> None:
+    figure = diagram_figure(*swept("plant.belt_speed=0.1:0.3:5", carry=Continuation.BOTH))
+    assert SHADED not in legend_texts(figure)
+    assert not any(axes.collections for axes in figure.axes)
+
+
+def test_points_without_turning_points_are_not_left_out() -> None:
+    overrides = (FREE, LINEAR, "plant.belt_speed=0.2")
+    runs_away = swept("plant.friction.slope=0.7:0.9:3", overrides=overrides)
+    assert "unbounded" in legend_texts(diagram_figure(*runs_away))
+    # A static coefficient below the minimum, 0.25, cannot be. The axis is logarithmic, and falls.
+    figure = diagram_figure(*swept("plant.friction.static=0.3:0.03:4:log"))
+    assert "no result" in legend_texts(figure)
+    assert figure.axes[-1].get_xscale() == "log"
+
+
+def test_an_axis_may_be_logarithmic_below_zero() -> None:
+    overrides = (FREE, "plant.belt_speed=0.3", "plant.damping=0.03")
+    figure = diagram_figure(*swept("plant.belt_speed=-0.01:-1.0:7:log", overrides=overrides))
+    assert "Hopf point -0.48305" in legend_texts(figure)
+    # What varies is not in the title.
+    title = "Bifurcation diagram, paper plant.damping=0.03, no control"
+    assert figure.get_suptitle() == title
+
+
+def test_under_sampled_control_there_is_a_limit_of_stability() -> None:
+    found = swept("washout_controller.linear_gain=-1.5:0.5:3", overrides=("plant.rate=20",))
+    assert any(
+        text.startswith("limit of stability -0.8") for text in legend_texts(diagram_figure(*found))
+    )
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_a_map_has_each_regime_where_it_is(over_two: Swept, style: str) -> None:
+    """Static coefficients from left to right, belt speeds upward."""
+    figure = map_figure(*over_two, style=STYLES[style])
+    assert faults(figure) == []
+    (axes,) = figure.axes
+    assert axes.get_xlabel() == r"static friction coefficient $\mu_s$"
+    assert axes.get_xlim() == pytest.approx((0.1, 0.6))
+    assert axes.get_ylim() == pytest.approx((0.1, 0.7))
+    assert {"stick-slip", "no result", "Hopf point", "limit of sticking"} <= set(
+        legend_texts(figure)
+    )
+    found = cells(axes)
+    sticks, rests = found[ORANGE], found[GREEN]
+    assert sticks[0] > rests[0]
+    assert sticks[1] < rests[1]
+    assert min(sticks[2], rests[2]) > 3 > found.get(BLUE, (0.0, 0.0, 0))[2]
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_the_map_of_a_measure_has_a_colour_bar(over_two: Swept, style: str) -> None:
+    figure = map_figure(*over_two, "amplitude", style=STYLES[style])
+    assert faults(figure) == []
+    _, bar = figure.axes
+    assert bar.get_ylabel() == "amplitude (dimensionless)"
+    assert set(legend_texts(figure)) == {"no result", "Hopf point", "limit of sticking"}
+
+
+def test_a_map_with_logarithmic_axes_ends_where_the_sweep_does() -> None:
+    over = ("plant.damping=0.01:0.08:3:log", "plant.belt_speed=0.1:0.7:3:log")
+    (axes,) = map_figure(*swept(*over)).axes
+    assert axes.get_xlim() == pytest.approx((0.01, 0.08))
+    assert axes.get_ylim() == pytest.approx((0.1, 0.7))
+
+
+def test_a_stick_fraction_has_no_prefix() -> None:
+    si = (FREE, "plant.mass=100.0", "plant.stiffness=1e6", "plant.normal_force=1000.0")
+    over = ("plant.damping=0:800:3", "plant.belt_speed=0.002:0.06:3")
+    figure = map_figure(*swept(*over, overrides=si), "stick_fraction")
+    bar = figure.axes[-1]
+    assert bar.get_ylabel() == "stick fraction"
+    assert bar.get_ylim()[1] <= 1.0
+
+
+def test_a_map_carried_both_ways_has_two_panels() -> None:
+    found = swept(
+        "plant.damping=0.08:0.1:2",
+        "plant.belt_speed=0.8:2.2:8",
+        overrides=HYSTERESIS,
+        carry=Continuation.BOTH,
+    )
+    up, down = map_figure(*found).axes
+    assert [axes.get_title() for axes in (up, down)] == [
+        f"carried {direction} along the belt speed $v_0$" for direction in ("up", "down")
+    ]
+    assert cells(down)[GREEN][2] > 1.5 * cells(up)[GREEN][2]
+
+
+def test_beside_a_colour_bar_what_runs_away_is_grey() -> None:
+    overrides = (FREE, LINEAR, "plant.belt_speed=0.2")
+    found = swept("plant.friction.slope=0.7:0.9:2", "plant.damping=0.0:0.1:2", overrides=overrides)
+    figure = map_figure(*found, "amplitude")
+    assert cells(figure.axes[0])[LIGHT_GREY][2] >= 1
+    assert "unbounded" in legend_texts(figure)

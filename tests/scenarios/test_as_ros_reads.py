@@ -1,0 +1,81 @@
+"""Scenario files of any kind are read as ROS reads them, or refused."""
+
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given
+from hypothesis import strategies as st
+
+from stickslip_ros.errors import InvalidInputError
+from stickslip_ros.scenarios.files import load_scenario
+from stickslip_ros.scenarios.parameter_field import known_parameters
+from stickslip_ros.scenarios.parameters import NODE_PARAMETERS
+from stickslip_ros.scenarios.sections import read_file
+from tests.examples import examples
+from tests.scenarios.conftest import OWN, ReadByRos
+from tests.scenarios.files import refusal, scenario_file, section
+from tests.scenarios.fuzzed import fuzzed
+
+NODES = ("plant", "washout_controller", "analyzer")
+
+
+def taken(path: str) -> dict[str, dict[str, Any]]:
+    """Return the values by node that a scenario file sets itself; raise if it is refused."""
+    load_scenario(path)
+    values: dict[str, dict[str, Any]] = {node: {} for node in NODE_PARAMETERS}
+
+    def take(node: str, name: str, value: Any) -> None:
+        values[node][name] = value
+
+    read_file(Path(path), "/feed_drive").apply(take, "/feed_drive", other_nodes=False)
+    return values
+
+
+@given(seed=st.integers(0, 2**32))
+@examples(quick=60, thorough=3000, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_every_value_is_that_of_ros(tmp_path: Path, read_by_ros: ReadByRos, seed: int) -> None:
+    path = scenario_file(tmp_path, text := fuzzed(Random(seed)))
+    try:
+        values = taken(path)
+    except InvalidInputError:
+        return
+    for node in NODES:
+        known, own = known_parameters(NODE_PARAMETERS[node]), values[node]
+        # A section for all has what only one of them knows.
+        by_ros = {k: v for k, v in read_by_ros(path, node=node).items() if k in known}
+        ours = {name: value for name, value in own.items() if value is not OWN.get(name)}
+        # As text, an integer differs from a number, and nan is nan.
+        assert repr(sorted(ours.items())) == repr(sorted(by_ros.items())), text
+
+
+PLANT = "/**/plant:\n  ros__parameters:\n"
+TWICE = {
+    f"{PLANT}    mass: 1.0\n    mass: 2.0\n": "mass is already on line 3",
+    f"{PLANT}    mass: 1.0\n{PLANT}    mass: 2.0\n": "mass is already on line 3",
+    f"{PLANT}    mass: 1.0\n/**:\n  plant:\n    ros__parameters: {{mass: 2.0}}\n": "on line 3",
+    f"{PLANT}    friction.static: 0.5\n    friction:\n      static: 0.4\n": "already on line 3",
+    f"{PLANT}    friction: {{static: 0.5}}\n    friction: {{static: 0.4}}\n": "already on line 3",
+    f"{PLANT}    mass: 1.0\n  ros__parameters:\n    mass: 2.0\n": "nothing beside ros__parameters",
+    f"{PLANT}    mass: 1.0\n  other: {{}}\n": "line 4: is not YAML for ROS: there must be nothing",
+    f"{PLANT}    a: {{b.c: {{d: 1}}, e: 2}}\n": "inner group must have no .",
+    "/**:\n  a/plant: {ros__parameters: {mass: 1.0}}\n": "with no / in an inner one",
+}
+
+
+@pytest.mark.parametrize(("text", "reason"), TWICE.items(), ids=TWICE.values())
+def test_what_has_two_readings_is_refused(tmp_path: Path, text: str, reason: str) -> None:
+    assert reason in refusal(scenario_file(tmp_path, text))
+
+
+@pytest.mark.parametrize(("again", "rate"), [("/**/plant", 50.0), ("**/plant", 9.0)])
+def test_a_section_may_come_in_parts(
+    tmp_path: Path, read_by_ros: ReadByRos, again: str, rate: float
+) -> None:
+    """The first part has the place at which it counts."""
+    later = section("/**", "{rate: 50.0}") + section(again, "{rate: 9.0}")
+    path = scenario_file(tmp_path, f"{PLANT}    mass: 120.0\n{later}")
+    plant = load_scenario(path).plant
+    assert {"mass": plant.mass, "rate": plant.rate} == {"mass": 120.0, "rate": rate}
+    assert read_by_ros(path) == {"mass": 120.0, "rate": rate}
