@@ -9,9 +9,9 @@ import numpy as np
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.identification.record import Record
-from stickslip_ros.physics.model.courses import Table
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import SPEED
+from stickslip_ros.physics.model.signals import table
 from stickslip_ros.physics.motion.motion import Motion
 from stickslip_ros.physics.motion.parametric_motion import ParametricMotion
 
@@ -175,8 +175,9 @@ class Predictor:
         if len(self._corners) == 2 and belt[0] == belt[-1]:
             return replace(drive, belt_speed=float(belt[start]))
         places = np.array([start, *inside, end])
-        times = tuple(((places - start) * period).tolist())
-        return replace(drive, belt_speed=0.0, belt=Table(times, tuple(belt[places].tolist())))
+        times = ((places - start) * period).tolist()
+        points = list(zip(times, belt[places].tolist(), strict=True))
+        return replace(drive, belt_speed=0.0, belt=table(points))
 
 
 def delayed(record: Record, delay: float) -> Record:

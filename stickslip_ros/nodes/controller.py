@@ -17,7 +17,6 @@ from stickslip_ros.nodes.base.managed import OK, Diagnosis, ManagedNode, diagnos
 from stickslip_ros.nodes.base.parameters import first_line
 from stickslip_ros.nodes.base.process import run_node
 from stickslip_ros.physics.loop.controller import ReferenceSource
-from stickslip_ros.physics.loop.reference import ReferenceKind
 from stickslip_ros.samples import LARGEST, NO_REFERENCE, Reference, Sample
 from stickslip_ros.scenarios.files import known_law
 from stickslip_ros.scenarios.parameters import (
@@ -26,6 +25,7 @@ from stickslip_ros.scenarios.parameters import (
     ControllerParameters,
     controller_node,
 )
+from stickslip_ros.scenarios.signal_parameters import ReferenceKind
 
 
 class ControllerNode(ManagedNode[ControllerParameters]):
@@ -40,7 +40,7 @@ class ControllerNode(ManagedNode[ControllerParameters]):
     def connect(self) -> None:
         """Publish forces; subscribe to the newest reference only."""
         self._force = self.read_last = self.advertise(CONTROL_FORCE)
-        kind = self.parameters.as_reference().kind
+        kind = self.parameters.reference_group.kind
         self._given = NO_REFERENCE
         self._reference = None
         if kind is ReferenceKind.TOPIC:
@@ -76,8 +76,10 @@ class ControllerNode(ManagedNode[ControllerParameters]):
         )
 
     def _followed(self) -> ReferenceSource:
-        course = self.parameters.as_reference()
-        return (lambda _: self._given) if course.kind is ReferenceKind.TOPIC else course
+        follows = self.parameters.reference_group
+        if follows.kind is ReferenceKind.TOPIC:
+            return lambda _: self._given
+        return follows.signal(period=0.0).reference
 
     def _on_joint_state(self, sample: Sample) -> None:
         stamp, position, velocity = sample.stamp, sample.position, sample.velocity

@@ -136,7 +136,8 @@ class PlantNode(ManagedNode[PlantParameters]):
         if self.active:
             with self._lock:
                 self._loop.change_drive(self.parameters.as_drive())
-                self._loop.scenario_disturbance = self.parameters.as_disturbance()
+                period = self.parameters.period
+                self._loop.follow_disturbance(self.parameters.disturbance.signal(period))
         elif self.configured:
             self._motion.drive = self.parameters.as_drive()
             if not self._moved:

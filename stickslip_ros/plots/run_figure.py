@@ -15,7 +15,6 @@ from matplotlib.patches import Patch
 
 from stickslip_ros.arrays import FloatArray
 from stickslip_ros.physics.measures.cycle_measures import Measures, measures_of
-from stickslip_ros.physics.model.disturbance import DisturbanceKind
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.plots.panes import (
     LEAST_SPAN,
@@ -155,7 +154,7 @@ def simulated_run_figure(
     scenario: Scenario, history: RunHistory, measures: Measures, *, style: FigureStyle = SCREEN
 ) -> Figure:
     """Return the figure of a simulated run of a scenario."""
-    disturbed = scenario.plant.disturbance.kind is not DisturbanceKind.NONE
+    disturbed = scenario.plant.disturbance.kind != "none"
     title = title_of("Simulated run", scenario)
     force = f"{_CONTROL_ONLY} and disturbance" if disturbed else _CONTROL_ONLY
     drive = scenario.plant.as_drive()

@@ -154,7 +154,7 @@ CONTROLLERS = LawFamily(
     ControlLaw,
     CONTROL_LAWS,
     reserved={
-        "law", "node", "reference", "as_law", "as_reference", "as_controller", "law_names",
+        "law", "node", "reference", "as_law", "reference_group", "as_controller", "law_names",
         "autostart", "wait_for", "use_sim_time",
         *dir(ParameterGroup),
     },

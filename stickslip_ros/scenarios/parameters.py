@@ -14,26 +14,24 @@ from pydantic import create_model, model_validator
 from typing_extensions import override
 
 from stickslip_ros.physics.loop.controller import Controller
-from stickslip_ros.physics.loop.reference import ReferenceCourse
 from stickslip_ros.physics.loop.sampled_loop import LOCKSTEP_START, SampledLoop
 from stickslip_ros.physics.measures.reading import SampleAssumptions, reading_of
 from stickslip_ros.physics.model.actuator import Actuator
 from stickslip_ros.physics.model.constants import constants_of
 from stickslip_ros.physics.model.control import CONTROL_LAWS, ControlLaw
-from stickslip_ros.physics.model.courses import CourseKind
-from stickslip_ros.physics.model.disturbance import Disturbance
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.sensor import Sensor
+from stickslip_ros.physics.model.signals import SignalKind
 from stickslip_ros.scenarios import Pace
-from stickslip_ros.scenarios.course_parameters import (
+from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
+from stickslip_ros.scenarios.friction_parameters import Friction
+from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field, field_of
+from stickslip_ros.scenarios.signal_parameters import (
     BeltParameters,
     DisturbanceParameters,
     LoadParameters,
     ReferenceParameters,
 )
-from stickslip_ros.scenarios.foreign_laws import CONTROLLERS
-from stickslip_ros.scenarios.friction_parameters import Friction
-from stickslip_ros.scenarios.parameter_field import SMALLEST, Fixed, field, field_of
 from stickslip_ros.scenarios.validation import ParameterGroup
 from stickslip_ros.text import shown
 
@@ -216,9 +214,9 @@ class PlantParameters(NodeParameters):
     @model_validator(mode="after")
     def _slide_stays_on_the_belt(self) -> Self:
         """Refuse a load that would lift the slide off the belt."""
-        lowest, _ = self.load.as_course(1.0 / self.rate).bounds
+        lowest, _ = self.load.signal(self.period).bounds
         if self.normal_force + lowest < 0.0:
-            load = "file" if self.load.kind is CourseKind.TABLE else "amplitude"
+            load = "file" if self.load.kind is SignalKind.TABLE else "amplitude"
             raise ValueError(
                 f"load.{load} = {shown(getattr(self.load, load))} is refused: must leave a normal "
                 f"force of at least 0 N, with normal_force = {self.normal_force} N and a load down "
@@ -233,6 +231,11 @@ class PlantParameters(NodeParameters):
         yield from super().not_used()
 
     @property
+    def period(self) -> float:
+        """Sample period, s."""
+        return 1.0 / self.rate
+
+    @property
     def last_sample(self) -> int | None:
         """Number of the sample at which the plant pauses; None without `duration`."""
         samples = self.duration * self.rate
@@ -241,12 +244,11 @@ class PlantParameters(NodeParameters):
     def as_drive(self) -> Drive:
         """Return the drive."""
         values = {name: getattr(self, name) for name in _OF_DRIVE}
-        period = 1.0 / self.rate
         return Drive(
             **values,
             friction=self.friction.as_law(),
-            belt=self.belt.as_course(period),
-            load=self.load.as_course(period),
+            belt=self.belt.signal(self.period),
+            load=self.load.signal(self.period),
             actuator=self.as_actuator(),
         )
 
@@ -265,18 +267,6 @@ class PlantParameters(NodeParameters):
         """
         own = [name for name in _OF_DRIVE if getattr(self, name) != _DEFAULTS.get(name)]
         return [*own, "friction.law", *(f"friction.{name}" for name in self.friction.names())]
-
-    def as_disturbance(self) -> Disturbance:
-        """Return the disturbance of the scenario."""
-        given = self.disturbance
-        return Disturbance(
-            given.kind,
-            given.amplitude,
-            given.start,
-            given.duration,
-            given.frequency,
-            given.table,
-        )
 
     def as_loop(
         self,
@@ -298,7 +288,7 @@ class PlantParameters(NodeParameters):
             force_timeout=self.force_timeout,
             hold_late=hold_late,
             expects_control=self.expects_control,
-            disturbance=self.as_disturbance(),
+            disturbance=self.disturbance.signal(self.period),
             sensor=self.as_sensor(),
             overtaken=overtaken,
             advance=advance,
@@ -329,14 +319,14 @@ class ControllerParameters(NodeParameters):
         law = CONTROL_LAWS[self.law]
         return law(**{name: getattr(self, name) for name in law.constants() if name in known})
 
-    def as_reference(self) -> ReferenceCourse:
-        """Return the reference; of kind NONE for a law that follows none."""
-        given: ReferenceParameters | None = getattr(self, "reference", None)
-        return ReferenceCourse() if given is None else ReferenceCourse(**dict(given))
+    @property
+    def reference_group(self) -> ReferenceParameters:
+        """The reference; of kind none for a law that follows none."""
+        return getattr(self, "reference", ReferenceParameters())
 
     def as_controller(self, state: tuple[float, ...] | None = None) -> Controller:
         """Return the controller, with the state of its law at the first sample."""
-        return Controller(self.as_law(), self.as_reference(), state)
+        return Controller(self.as_law(), self.reference_group.signal(period=0.0).reference, state)
 
     def law_names(self) -> list[str]:
         """Return the names of the constants of the control law."""

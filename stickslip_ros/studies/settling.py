@@ -15,7 +15,6 @@ from stickslip_ros.physics.loop.controller import (
     answer,
     no_reference,
 )
-from stickslip_ros.physics.loop.reference import ReferenceKind
 from stickslip_ros.physics.loop.simulation import measure_block, simulate_sampled
 from stickslip_ros.physics.measures.cycle_measures import (
     LEAST_CYCLES,
@@ -96,7 +95,7 @@ class ControlledDrive:
         reference: ReferenceSource = no_reference
         if law is not None and law.follows_reference:
             check_reference(scenario)
-            reference = scenario.controller.as_reference()
+            reference = scenario.controller.reference_group.signal(period=0.0).reference
         loop = plant if sampled else None
         return cls(drive, law, loop, reference, plant.duration, scenario.cycle_meter)
 
@@ -123,8 +122,8 @@ def unit_period(drive: Drive, duration: float) -> float:
 
 def check_reference(scenario: Scenario) -> None:
     """Raise InvalidInputError if the controller needs a reference from a topic."""
-    kind = scenario.controller.as_reference().kind
-    if scenario.plant.expects_control and kind is ReferenceKind.TOPIC:
+    kind = scenario.controller.reference_group.kind
+    if scenario.plant.expects_control and kind == "topic":
         raise InvalidInputError(
             f"{scenario.controller.node}.reference.kind = {kind} is refused: without nodes there "
             "are no topics"

@@ -67,7 +67,7 @@ _SAMPLED_LOOP = ("spectral_radius", "stable", "decay_rate", "settling_time", *_S
 def stability(scenario: Scenario) -> tuple[Section, Notes]:
     """Return the theoretical quantities of the scenario, in SI units, and notes on them.
 
-    Raises InvalidInputError if belt or load follow a course.
+    Raises InvalidInputError if belt or load follow a signal.
     """
     plant = scenario.plant
     drive = plant.as_drive()

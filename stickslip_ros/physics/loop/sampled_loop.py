@@ -12,10 +12,9 @@ from math import floor, isfinite
 from random import Random
 from typing import TYPE_CHECKING
 
-from stickslip_ros.physics.model.course import NO_COURSE
-from stickslip_ros.physics.model.disturbance import Disturbance
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.sensor import EXACT_SENSOR, Sensor
+from stickslip_ros.physics.model.signals import NO_SIGNAL, Signal
 from stickslip_ros.samples import Sample
 from stickslip_ros.stamps import NANOSECONDS
 
@@ -57,7 +56,7 @@ class SampledLoop:
     Parameters
     ----------
     motion : Motion
-        Motion to sample and to drive; sample 0 is its present state, and the courses of belt and
+        Motion to sample and to drive; sample 0 is its present state, and the signals of belt and
         load start with it.
     rate : float
         Samples per second, Hz.
@@ -75,7 +74,7 @@ class SampledLoop:
         Whether the newest force is held while a force is missing. By default the force is zero.
     expects_control : bool, optional
         Whether a controller is expected: then missing forces count as late.
-    disturbance : Disturbance, optional
+    disturbance : Signal, optional
         Disturbance force of the scenario. By default there is none.
     sensor : Sensor, optional
         Sensor that measures the samples. By default it is exact.
@@ -117,7 +116,7 @@ class SampledLoop:
         force_timeout: float = float("inf"),
         hold_late: bool = False,
         expects_control: bool = True,
-        disturbance: Disturbance | None = None,
+        disturbance: Signal = NO_SIGNAL,
         sensor: Sensor = EXACT_SENSOR,
         overtaken: Callable[[int, float], None] = lambda stamp, force: None,
         advance: Callable[[float], None] | None = None,
@@ -153,8 +152,7 @@ class SampledLoop:
         self._newest: tuple[int, float] = (-1, 0.0)
         self._sent_number = -1
         self._overtaken = overtaken
-        self.scenario_disturbance = disturbance or Disturbance()
-        """Disturbance of the scenario; a new one acts from the next sample on."""
+        self.follow_disturbance(disturbance)
         self.asked_disturbance = 0.0
         """Disturbance force set by `disturb`, N; acts from the next sample on."""
         self.disturbance = 0.0
@@ -164,7 +162,7 @@ class SampledLoop:
         self._limiter = motion.drive.actuator.limiter
         self._sensor = sensor
         self._measure = sensor.start(self.period)
-        motion.restart_courses()
+        motion.restart_signals()
         self.sample_number = 0
         """Number of the present sample."""
         self.sample = self._take_sample(0.0)
@@ -239,6 +237,16 @@ class SampledLoop:
             self.controller_present = self._expects_control
         return refusal
 
+    def follow_disturbance(self, signal: Signal) -> None:
+        """Take another disturbance of the scenario from the next sample on.
+
+        Parameters
+        ----------
+        signal : Signal
+            Disturbance force, N, held from sample to sample.
+        """
+        self._scenario_disturbance = signal.held(self.period)
+
     def disturb(self, force: float) -> None:
         """Add a disturbance force from the next sample on, until you set it again.
 
@@ -300,7 +308,7 @@ class SampledLoop:
         self._advance((1.0 - now) * period)
         drive = motion.drive
         belt_position = self.sample.belt_position + drive.belt_speed * period
-        if drive.belt is not NO_COURSE:
+        if drive.belt.pieces:
             number = self.sample_number
             belt_position += drive.belt.integral(number * period, (number + 1) * period)
         self.sample_number += 1
@@ -356,8 +364,8 @@ class SampledLoop:
             motion.restart(*start)
             self._measure = self._sensor.start(self.period)
             friction_force = motion.friction_force
-        scenario = self.scenario_disturbance.force(number, self.period)
-        self.disturbance = scenario + self.asked_disturbance
+        self.disturbance = self._scenario_disturbance.at(number * self.period)
+        self.disturbance += self.asked_disturbance
         stamp, belt_speed = self.stamp(number), motion.belt_speed
         position, velocity = self._true = motion.position, motion.velocity
         if self._measure is not None:

@@ -11,7 +11,6 @@ from stickslip_ros.physics.measures.cycle_measures import CycleMeter, Measures
 from stickslip_ros.physics.measures.run_meter import RunObserver
 from stickslip_ros.physics.measures.sample_meter import MeasuredMotion, MotionObserver, SampleMeter
 from stickslip_ros.physics.model.control import ControlLaw
-from stickslip_ros.physics.model.course import NO_COURSE
 from stickslip_ros.physics.motion import Motion, RecordedMotion
 from stickslip_ros.progress import Progress
 from stickslip_ros.samples import SampleColumns
@@ -62,8 +61,8 @@ def measure_block(
     meter.drift.feed_cycles(meter.ends, cycles)
     if observer is not None:
         belt_velocity = np.full(len(breakpoints), drive.belt_speed)
-        if drive.belt is not NO_COURSE:
-            belt_velocity += [drive.belt.at(t) for t in motion.course_times(breakpoints.time)]
+        if drive.belt.pieces:
+            belt_velocity += [drive.belt.at(t) for t in motion.signal_times(breakpoints.time)]
         observer.take_motion(MeasuredMotion(breakpoints, belt_velocity, cycles, meter.ends))
 
 

@@ -12,17 +12,16 @@ _Part = TypeVar("_Part")
 
 _KEY = "constant"
 
-_BASE_UNITS: Mapping[str, tuple[int, int, int, int]] = {
-    "m": (1, 0, 0, 0),
-    "s": (0, 1, 0, 0),
-    "N": (0, 0, 1, 0),
-    "kg": (-1, 2, 1, 0),
-    "Hz": (0, -1, 0, 0),
-    "rad": (0, 0, 0, 0),
-    "1": (0, 0, 0, 0),
-    "value": (0, 0, 0, 1),
+_BASE_UNITS: Mapping[str, tuple[int, int, int]] = {
+    "m": (1, 0, 0),
+    "s": (0, 1, 0),
+    "N": (0, 0, 1),
+    "kg": (-1, 2, 1),
+    "Hz": (0, -1, 0),
+    "rad": (0, 0, 0),
+    "1": (0, 0, 0),
 }
-"""Powers of length, time, force and, for a course, of what it gives in each unit."""
+"""Powers of length, time and force in each unit."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +82,7 @@ def constant(
         Meaning, as a sentence; shown in help texts and in the documentation.
     unit : str, optional
         Unit of m, s, N, kg, Hz and rad, such as "N s/m" or "N/(m s)"; the scaling derives from it.
-        In a course `value` is the unit of what the course gives. By default the constant is a pure
-        number.
+        By default the constant is a pure number.
     at_least : float, optional
         Smallest allowed value.
     positive : bool, optional
@@ -153,23 +151,18 @@ class Scales:
     force: float = 1.0
     """Unit of force, N."""
 
-    def factor(self, unit: str | None, value: str | None = None) -> float:
-        """Return the factor from SI units to dimensionless values; `value` as in `unit_powers`."""
-        length, time, force, values = unit_powers(unit)
-        more = unit_powers(value)
-        length, time, force = (
-            power + values * further
-            for power, further in zip((length, time, force), more[:3], strict=True)
-        )
+    def factor(self, unit: str | None) -> float:
+        """Return the factor from SI units to dimensionless values."""
+        length, time, force = unit_powers(unit)
         if length == -time:  # a power of a speed
             return self.speed**-length * self.force**-force
         return self.length ** (-length - time) * self.speed**time * self.force**-force
 
 
-def scaled(part: _Part, scales: Scales, value: str | None = None) -> _Part:
-    """Return a part with its constants in units of `scales`; `value` is the unit of a course."""
+def scaled(part: _Part, scales: Scales) -> _Part:
+    """Return a part with its constants in units of `scales`."""
     changes = {
-        name: _times(getattr(part, name), scales.factor(described.unit, value))
+        name: _times(getattr(part, name), scales.factor(described.unit))
         for name, described in constants_of(type(part)).items()
         if described.unit is not None
     }
@@ -181,15 +174,15 @@ def _times(value: Any, factor: float) -> Any:
 
 
 @cache
-def unit_powers(unit: str | None) -> tuple[int, int, int, int]:
-    """Return the powers of length, time, force and of what a course gives, in a unit."""
-    total = [0, 0, 0, 0]
+def unit_powers(unit: str | None) -> tuple[int, int, int]:
+    """Return the powers of length, time and force in a unit."""
+    total = [0, 0, 0]
     for sign, name, power in _factors(unit or "1"):
         if name not in _BASE_UNITS:
             raise ValueError(f"unit {unit!r}: {name!r} is none of {', '.join(_BASE_UNITS)}")
         for axis, base in enumerate(_BASE_UNITS[name]):
             total[axis] += sign * power * base
-    return total[0], total[1], total[2], total[3]
+    return total[0], total[1], total[2]
 
 
 def _factors(unit: str) -> Iterator[tuple[int, str, int]]:

@@ -171,7 +171,7 @@ class CreepingDrive(DriveSystem):
         return self._slowed(super().reach_belt(mode, instant), instant)
 
     def switch_inputs(self, mode: Mode, instant: Instant) -> Mode:
-        """Return the mode after the corners and steps of the courses up to an instant."""
+        """Return the mode after the corners and steps of the signals up to an instant."""
         return self._slowed(super().switch_inputs(mode, instant), instant)
 
     def settled(self, mode: Mode | None, instant: Instant) -> Mode:

@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf, isfinite, pi, sqrt
+from math import inf, pi, sqrt
 from typing import Self
 
 from stickslip_ros.errors import InvalidInputError
 from stickslip_ros.physics.model.actuator import IDEAL_ACTUATOR, Actuator
 from stickslip_ros.physics.model.constants import Scales, scaled
-from stickslip_ros.physics.model.course import NO_COURSE, Course
 from stickslip_ros.physics.model.friction import FrictionLaw
+from stickslip_ros.physics.model.signals import NO_SIGNAL, Signal
 
 
 @dataclass(frozen=True)
@@ -46,10 +46,10 @@ class Drive:
     """Belt (feed) speed v_belt, m/s; positive, negative or zero."""
     friction: FrictionLaw
     """Friction law; its speeds are in m/s."""
-    belt: Course = NO_COURSE
-    """Course added to the belt speed, m/s."""
-    load: Course = NO_COURSE
-    """Course added to the normal force, N."""
+    belt: Signal = NO_SIGNAL
+    """Signal added to the belt speed, m/s."""
+    load: Signal = NO_SIGNAL
+    """Signal added to the normal force, N."""
     actuator: Actuator = IDEAL_ACTUATOR
     """Actuator that exerts the control force."""
     bias_force: float = 0.0
@@ -82,10 +82,8 @@ class Drive:
 
     @cached_property
     def fastest_belt(self) -> float:
-        """Largest absolute speed of the belt, m/s; without its course where that has no bounds."""
-        low, high = self.belt.bounds
-        ends = [self.belt_speed + each for each in (low, high) if isfinite(each)]
-        return max(map(abs, ends), default=abs(self.belt_speed))
+        """Largest absolute speed of the belt, m/s."""
+        return max(abs(self.belt_speed + end) for end in self.belt.bounds)
 
     @cached_property
     def length_scale(self) -> float:
@@ -119,8 +117,8 @@ class Drive:
             normal_force=1.0,
             belt_speed=self.belt_speed / self.speed_scale,
             friction=self.friction.scaled(self.speed_scale, self.length_scale),
-            belt=scaled(self.belt, scales, "m/s"),
-            load=scaled(self.load, scales, "N"),
+            belt=self.belt.scaled(scales, "m/s"),
+            load=self.load.scaled(scales, "N"),
             actuator=scaled(self.actuator, scales),
             bias_force=self.bias_force / self.normal_force,
         )

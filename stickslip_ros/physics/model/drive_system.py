@@ -1,4 +1,4 @@
-"""A drive as a hybrid system: slip and stick of the slide, and the modes of its law and courses."""
+"""A drive as a hybrid system: slip and stick of the slide, and the modes of its law and signals."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +13,6 @@ from stickslip_ros.errors import RunError
 from stickslip_ros.physics.model import equations
 from stickslip_ros.physics.model.constants import numbers, structure, with_symbols
 from stickslip_ros.physics.model.control import ContinuousControl
-from stickslip_ros.physics.model.course import Course, NoCourse
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.friction import FrictionLaw
 from stickslip_ros.physics.model.hybrid import (
@@ -25,6 +24,7 @@ from stickslip_ros.physics.model.hybrid import (
     structure_number,
     with_switches,
 )
+from stickslip_ros.physics.model.signals import Signal
 
 POSITION, SPEED, MEMORY = 0, 1, 2
 """Indices of X and Y in a state, and of the first state of the law's memory."""
@@ -150,18 +150,18 @@ class DriveSystem(HybridSystem):
         """The states of the controller, in a state."""
         self.actuator_states = slice(self.control_states.stop, len(self.states))
         """The states of the actuator, in a state."""
-        belt, load = self.drive.belt.equations, self.drive.load.equations
+        signals = self.drive.belt, self.drive.load
         # Whether the normal force may fall below zero: then a guard ends the motion.
         self._may_lift = 1.0 + self.drive.load.bounds[0] < -_LIFT_ROUNDING
-        parts = (law, belt, load, self.drive.actuator, self.control)
         has_bias = self.drive.bias_force != 0.0
         self.structure = structure_number(
             (
                 *(type(self), self.states, self._may_lift, drive.has_spring, has_bias),
-                *map(structure, parts),
+                *((each.switches, each.has_sine) for each in signals),
+                *map(structure, (law, self.drive.actuator, self.control)),
             )
         )
-        self._steady = isinstance(self.drive.belt, NoCourse)
+        self._steady = not self.drive.belt.pieces
         self._limits_by_series = law.characteristic_speed != inf and not law.sticks
         self._frequency, self._stiffness = drive.angular_frequency, self.drive.stiffness
         self.constants = {
@@ -169,8 +169,6 @@ class DriveSystem(HybridSystem):
             "belt_speed": self.drive.belt_speed,
             **({"bias_force": self.drive.bias_force} if has_bias else {}),
             **numbers(law, "friction"),
-            **numbers(belt, "belt"),
-            **numbers(load, "load"),
             **numbers(self.drive.actuator, "actuator"),
             **(numbers(self.control, "control") if self.control is not None else {}),
             # Of a slide with a memory that counts as sticking; it has no part in the motion.
@@ -185,11 +183,9 @@ class DriveSystem(HybridSystem):
         self.sticks = law.sticks
         self.many_steps = not law.sticks or self.has_actuator
         self.forward_limit, self.backward_limit = map(float, law.limits)
-        # Where a bound is not known, the course is taken to change less than the state does.
-        heaviest, steepest = 1.0 + self.drive.load.bounds[1], self.drive.belt.steepest
         self._largest_friction = max(self.forward_limit, self.backward_limit)
-        self._largest_friction *= heaviest if heaviest < inf else 1.0
-        self._steepest, self._belt_acceleration = steepest, steepest if steepest < inf else 0.0
+        self._largest_friction *= 1.0 + self.drive.load.bounds[1]
+        self._largest_belt_acceleration = self.drive.belt.steepest
         # Time at which the speed of the belt was last asked for, and that speed.
         self._seen_at = self._seen_belt_speed = inf
         self._characteristic_speed = law.characteristic_speed
@@ -198,7 +194,7 @@ class DriveSystem(HybridSystem):
     @cached_property
     def autonomous(self) -> bool:
         """Whether belt speed and load are constant."""
-        return self._steady and isinstance(self.drive.load, NoCourse)
+        return self._steady and not self.drive.load.pieces
 
     def flow(self, name: str) -> Flow:
         """Return the flow `SLIP` or `STICK`.
@@ -319,14 +315,14 @@ class DriveSystem(HybridSystem):
         )
 
     def next_switch_time(self, mode: Mode) -> float:
-        """Return the time of the next corner of the courses."""
+        """Return the time of the next corner of the signals."""
         own = self._by_part(mode.switches)
         return min(
             self.drive.belt.next_switch_time(own.belt), self.drive.load.next_switch_time(own.load)
         )
 
     def switch_inputs(self, mode: Mode, instant: Instant) -> Mode:
-        """Return the mode after the corners and steps of the courses up to an instant."""
+        """Return the mode after the corners and steps of the signals up to an instant."""
         time, own = instant.time, self._by_part(mode.switches)
         before = self.belt_speed(mode, time)
         belt = _after(self.drive.belt, own.belt, time)
@@ -354,9 +350,9 @@ class DriveSystem(HybridSystem):
         elif self.has_parts:
             if (following := self.apply_pending_guards(mode, instant)) is not mode:
                 return following
-        elif not sticks and self._steepest < inf:
+        elif not sticks:
             # The belt has changed its speed by so much at most.
-            change = self._steepest * (time - self._seen_at)
+            change = self._largest_belt_acceleration * (time - self._seen_at)
             if mode.switches[0] * (state[SPEED] - self._seen_belt_speed) > change + _SMALLEST_STEP:
                 return mode
         belt_speed = self.belt_speed(mode, time)
@@ -430,14 +426,14 @@ class DriveSystem(HybridSystem):
     def longest_step(self, instant: Instant) -> float:
         """Return a time in which the speed changes by the law's characteristic speed at most.
 
-        The relative speed, that is: courses change normal force and belt speed. heyoka chooses a
+        The relative speed, that is: signals change normal force and belt speed. heyoka chooses a
         step from the series at its start. It would miss an exponential that is negligible there and
         rises before the step ends.
         """
         state = instant.state
         acceleration = (
             abs(self.reaction(instant)) + self._stiffness * abs(state[POSITION]) + abs(state[SPEED])
-            + self._largest_friction + self._belt_acceleration
+            + self._largest_friction + self._largest_belt_acceleration
         )  # fmt: skip
         return self._characteristic_speed / acceleration if acceleration > 0.0 else inf
 
@@ -460,11 +456,11 @@ class DriveSystem(HybridSystem):
 
     def belt_speed(self, mode: Mode, time: float) -> float:
         """Return the speed of the belt."""
-        return float(equations.belt_speed(self._shared, time, mode.switches[self._belt]))
+        return float(equations.belt_speed(self.drive, time, mode.switches[self._belt]))
 
     def normal_force(self, mode: Mode, time: float) -> float:
         """Return the normal force."""
-        return float(equations.normal_force(self._shared, time, mode.switches[self._load]))
+        return float(equations.normal_force(self.drive, time, mode.switches[self._load]))
 
     def control_force(self, instant: Instant) -> float:
         """Return the force on the slide: held, with the actuator, or continuous control."""
@@ -488,7 +484,7 @@ class DriveSystem(HybridSystem):
             return self.reaction(instant)
         tiny = 1e-30j  # imaginary, so that nothing cancels
         switches = mode.switches[self._belt]
-        speed: Any = equations.belt_speed(self._shared, instant.time + tiny, switches)
+        speed: Any = equations.belt_speed(self.drive, instant.time + tiny, switches)
         return self.reaction(instant) + self.drive.mass * (speed.imag / tiny.imag)
 
     def friction_force(self, mode: Mode, instant: Instant) -> float:
@@ -500,12 +496,6 @@ class DriveSystem(HybridSystem):
         memory = self._memory(instant)
         coefficient = self._friction(relative_speed, sign, memory, mode.switches[self._law])
         return self.normal_force(mode, instant.time) * float(coefficient)
-
-    @cached_property
-    def _shared(self) -> Drive:
-        """The drive with the equations of its courses, which are quicker than the courses."""
-        drive = self.drive
-        return replace(drive, belt=drive.belt.equations, load=drive.load.equations)
 
     @cached_property
     def _expressions(self) -> "_Expressions":
@@ -552,8 +542,6 @@ class DriveSystem(HybridSystem):
             belt_speed=constants["belt_speed"],
             bias_force=constants.get("bias_force", 0.0),
             friction=with_symbols(drive.friction, "friction", constants),
-            belt=with_symbols(drive.belt.equations, "belt", constants),
-            load=with_symbols(drive.load.equations, "load", constants),
             actuator=with_symbols(drive.actuator, "actuator", constants),
         )
         control = self.control
@@ -569,21 +557,21 @@ class DriveSystem(HybridSystem):
         return _Parts(switches[first:belt], switches[belt:load], switches[load:])
 
     def _starting(self, instant: Instant) -> Mode:
-        """Return stick, with the switches that the courses have at an instant."""
+        """Return stick, with the switches that the signals have at an instant."""
         belt = self.drive.belt.switches_at(instant.time)
         load = self.drive.load.switches_at(instant.time)
         law = (0.0,) * len(self.drive.friction.switches)
         return Mode(STICK, (0.0, *law, *belt, *load))
 
     def _slip(self, mode: Mode, sign: float, instant: Instant) -> Mode:
-        """Return slip in a direction; the courses stay in their modes."""
+        """Return slip in a direction; the signals stay in their pieces."""
         law, state = self.drive.friction, instant.state
         switches: Sequence[float] = ()
         if law.switches:
             relative_speed = state[SPEED] - self.belt_speed(mode, instant.time)
             switches = law.switches_at(relative_speed, sign, self._memory(instant))
-        _, *courses = self._by_part(mode.switches)
-        return Mode(SLIP, (sign, *switches, *courses[0], *courses[1]))
+        own = self._by_part(mode.switches)
+        return Mode(SLIP, (sign, *switches, *own.belt, *own.load))
 
     def _resting(self, mode: Mode, instant: Instant) -> Mode:
         """Return the mode of a slide that has the speed of the belt."""
@@ -610,16 +598,16 @@ def _guards(margins: Sequence[Any], transition: Callable[..., Mode]) -> list[Gua
     ]
 
 
-def _after(course: Course, switches: Sequence[float], time: float) -> Sequence[float]:
-    """Return the switches of a course after its corners up to a time, or within its rounding."""
-    while (corner := course.next_switch_time(switches)) <= time * (1.0 + TIME_ROUNDING):
-        switches = course.switches_at(corner)
+def _after(signal: Signal, switches: Sequence[float], time: float) -> Sequence[float]:
+    """Return the switches of a signal after its corners up to a time, or within its rounding."""
+    while (corner := signal.next_switch_time(switches)) <= time * (1.0 + TIME_ROUNDING):
+        switches = signal.switches_at(corner)
     return switches
 
 
 def _by_time(drive: Drive, time: Any, switches: Sequence[Any], zero: Any) -> Any:
     """Return the acceleration of the belt as an expression; `zero` if its speed is constant."""
-    instant = hy.expression("time_of_course")
+    instant = hy.expression("time_of_signal")
     speed = drive.belt.value(instant, switches)
     if not isinstance(speed, hy.expression):
         return zero

@@ -5,7 +5,6 @@ from math import copysign, ulp
 
 from stickslip_ros.physics.model import equations
 from stickslip_ros.physics.model.control import ContinuousControl
-from stickslip_ros.physics.model.course import NoCourse
 from stickslip_ros.physics.model.creeping_drive import CreepingDrive
 from stickslip_ros.physics.model.drive import Drive
 from stickslip_ros.physics.model.drive_system import (
@@ -23,7 +22,7 @@ _STUCK, _FORWARD, _BACKWARD = Mode(STICK, (0.0,)), Mode(SLIP, (1.0,)), Mode(SLIP
 
 
 class PlainDriveSystem(DriveSystem):
-    """Drive whose law and courses have no states and no modes: a motion takes half the time.
+    """Drive whose law and signals have no states and no modes: a motion takes half the time.
 
     Under a held force a slide that sticks moves in a straight line, which is not integrated.
     """
@@ -147,9 +146,8 @@ def drive_system(drive: Drive, control: ContinuousControl | None = None) -> Driv
     """Return the dimensionless system of a drive and its continuous control, both in SI units."""
     if isinstance(drive, ScaledDrive):
         return FreeDriveSystem(drive, control)
-    law, courses = drive.friction, (drive.belt, drive.load)
-    constant = all(isinstance(course, NoCourse) for course in courses)
-    plain = constant and not law.states and not law.switches and not drive.actuator.states
+    law, moves = drive.friction, drive.belt.pieces or drive.load.pieces
+    plain = not moves and not law.states and not law.switches and not drive.actuator.states
     if plain:
         return PlainDriveSystem(drive, control)
     return (CreepingDrive if law.rate_sensitivity else DriveSystem)(drive, control)

@@ -49,8 +49,8 @@ class ScaledDrive(Drive):
             normal_force=self.normal_force / scales.force,
             belt_speed=self.belt_speed / scales.speed,
             friction=self.friction.scaled(scales.speed, scales.length),
-            belt=scaled(self.belt, scales, "m/s"),
-            load=scaled(self.load, scales, "N"),
+            belt=self.belt.scaled(scales, "m/s"),
+            load=self.load.scaled(scales, "N"),
             actuator=scaled(self.actuator, scales),
             bias_force=self.bias_force / scales.force,
         )

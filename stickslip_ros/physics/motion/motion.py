@@ -74,7 +74,7 @@ class Motion(HybridMotion):
     ) -> None:
         self._drive, self._control = drive, control
         self._time = 0.0
-        # What the sum of the durations has lost by rounding, and the start of the courses.
+        # What the sum of the durations has lost by rounding, and the start of the signals.
         self._lost = self._origin = 0.0
         system = drive_system(drive, control)
         state = system.initial_state(position / drive.length_scale, velocity / drive.speed_scale)
@@ -85,7 +85,7 @@ class Motion(HybridMotion):
     ) -> None:
         """Set the state of the slide; forces and gains are kept, the controller is at rest.
 
-        An actuator with states gives no force. The courses of belt and load continue.
+        An actuator with states gives no force. The signals of belt and load continue.
 
         Parameters
         ----------
@@ -118,9 +118,9 @@ class Motion(HybridMotion):
         drive = self._drive
         return [1.0 / drive.scales.factor(unit) for unit in drive.friction.states.values()]
 
-    def restart_courses(self) -> None:
-        """Start the courses of belt and load again, at their time zero; the slide moves on."""
-        if self.course_time == 0.0:
+    def restart_signals(self) -> None:
+        """Start the signals of belt and load again, at their time zero; the slide moves on."""
+        if self.signal_time == 0.0:
             return
         self._origin, self._lost = self._time, 0.0
         if not self._system.autonomous:
@@ -128,12 +128,12 @@ class Motion(HybridMotion):
             self._set_state(list(self._instant.state))
 
     @property
-    def course_time(self) -> float:
-        """Time of the courses of belt and load, s."""
+    def signal_time(self) -> float:
+        """Time of the signals of belt and load, s."""
         return self._time - self._origin
 
-    def course_times(self, times: FloatArray) -> Sequence[float]:
-        """Return the times of the courses at times of the motion.
+    def signal_times(self, times: FloatArray) -> Sequence[float]:
+        """Return the times of the signals at times of the motion.
 
         Parameters
         ----------
@@ -143,7 +143,7 @@ class Motion(HybridMotion):
         Returns
         -------
         sequence of float
-            Times since the courses started, s.
+            Times since the signals started, s.
         """
         return (times - self._origin).tolist()
 
@@ -298,7 +298,7 @@ class Motion(HybridMotion):
             self._enter(self._system.switch_inputs(self._mode, self._instant))
 
     def _set_clock(self) -> None:
-        """Set the time of the courses: sums of the scaled durations would drift."""
+        """Set the time of the signals: sums of the scaled durations would drift."""
         self._instant.time = (self._time - self._origin) * self._drive.angular_frequency
 
     def _change(self, drive: Drive, control: ContinuousControl | None) -> None:

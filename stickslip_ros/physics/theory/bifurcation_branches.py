@@ -110,7 +110,7 @@ class BifurcationBranches:
         Raises
         ------
         NotCoveredError
-            If friction differs between the directions, belt or load follow a course, or the drive
+            If friction differs between the directions, belt or load follow a signal, or the drive
             has no spring.
         """
         require("the bifurcation diagram", drive, SPRING, AUTONOMOUS, SYMMETRIC)
@@ -137,7 +137,7 @@ class BifurcationBranches:
         Raises
         ------
         InvalidInputError
-            If friction differs between the directions, belt or load follow a course, the drive has
+            If friction differs between the directions, belt or load follow a signal, the drive has
             no spring, or the belt speeds are not as described.
         RunError
             If the motion is too stiff to follow.

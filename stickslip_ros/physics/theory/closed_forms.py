@@ -62,7 +62,7 @@ class CubicLoop:
         Raises
         ------
         InvalidInputError
-            If belt or load follow a course, or the drive has no spring.
+            If belt or load follow a signal, or the drive has no spring.
         """
         require("the closed form", drive, SPRING, AUTONOMOUS)
         law = drive.dimensionless.friction

@@ -59,7 +59,7 @@ def critical_gains(drive: Drive, gains: ContinuousControl) -> CriticalGains | No
     Raises
     ------
     InvalidInputError
-        If belt or load follow a course, or the drive has no spring.
+        If belt or load follow a signal, or the drive has no spring.
 
     Examples
     --------

@@ -186,7 +186,7 @@ def averaged_growth(drive: Drive, belt_speed: Any, amplitude: Any) -> FloatArray
     may be arrays. The trapezoidal rule is exact to rounding while A <= v0, where the slide does not
     overtake the belt, if the law's characteristic speed is not much below v0 / 10,000. A result
     that cannot be distinguished from rounding is zero. Raises InvalidInputError for a friction law
-    that has a memory or differs between the directions, for a belt or load with a course, and
+    that has a memory or differs between the directions, for a belt or load with a signal, and
     without a spring.
     """
     require("averaging", drive, SPRING, AUTONOMOUS, STATIC, SYMMETRIC)

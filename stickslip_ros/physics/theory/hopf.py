@@ -102,7 +102,7 @@ def hopf_points(drive: Drive, gains: ContinuousControl | None = None) -> list[Ho
     Raises
     ------
     InvalidInputError
-        If belt or load follow a course, or the drive has no spring.
+        If belt or load follow a signal, or the drive has no spring.
 
     Examples
     --------

@@ -120,7 +120,7 @@ def shoot(
     Raises
     ------
     InvalidInputError
-        If belt or load follow a course, or the drive has no spring.
+        If belt or load follow a signal, or the drive has no spring.
 
     Examples
     --------
@@ -180,7 +180,7 @@ def limit_cycle_of_run(
     Raises
     ------
     InvalidInputError
-        If friction differs between the directions, belt or load follow a course, or the drive has
+        If friction differs between the directions, belt or load follow a signal, or the drive has
         no spring.
     """
     require("the limit cycle of a run", drive, SPRING, AUTONOMOUS, SYMMETRIC)
@@ -221,7 +221,7 @@ def limit_cycles(drive: Drive) -> list[LimitCycle]:
     Raises
     ------
     InvalidInputError
-        If friction differs between the directions, belt or load follow a course, or the drive has
+        If friction differs between the directions, belt or load follow a signal, or the drive has
         no spring.
 
     Examples

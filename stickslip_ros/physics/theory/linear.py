@@ -84,7 +84,7 @@ def expand(drive: Drive, gains: ContinuousControl | None = None) -> Expansion | 
     Raises
     ------
     InvalidInputError
-        If belt or load follow a course, or the drive has no spring.
+        If belt or load follow a signal, or the drive has no spring.
     RunError
         If the equilibrium of a law with a memory is not found.
 

@@ -128,7 +128,7 @@ class LinearSampledLoop:
         Raises
         ------
         InvalidInputError
-            If belt or load follow a course, or the drive has no spring.
+            If belt or load follow a signal, or the drive has no spring.
         """
         require("the theory of the sampled loop", drive, SPRING, AUTONOMOUS)
         expansion = expand(drive)

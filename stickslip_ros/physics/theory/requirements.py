@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from stickslip_ros.errors import InvalidInputError
-from stickslip_ros.physics.model.course import NO_COURSE
 from stickslip_ros.physics.model.drive import Drive
 
 
@@ -36,9 +35,9 @@ def _no_spring(drive: Drive) -> str | None:
     return None if drive.has_spring else "the drive has stiffness = 0 N/m"
 
 
-def _courses(drive: Drive) -> str | None:
-    moving = [f"its {name}" for name in ("belt", "load") if getattr(drive, name) != NO_COURSE]
-    return f"the drive has a course of {' and '.join(moving)}" if moving else None
+def _signals(drive: Drive) -> str | None:
+    moving = [f"its {name}" for name in ("belt", "load") if getattr(drive, name).pieces]
+    return f"the drive has a signal of {' and '.join(moving)}" if moving else None
 
 
 def _memory(drive: Drive) -> str | None:
@@ -66,7 +65,7 @@ def _asymmetry(drive: Drive) -> str | None:
 SPRING = Requirement("a spring", _no_spring)
 """The stiffness is above zero: the drive has a natural frequency."""
 
-AUTONOMOUS = Requirement("a constant belt speed and a constant normal force", _courses)
+AUTONOMOUS = Requirement("a constant belt speed and a constant normal force", _signals)
 """Belt speed and load are constant."""
 
 STATIC = Requirement("a friction law without memory", _memory)

@@ -83,7 +83,7 @@ def sticking_onset(drive: Drive) -> StickingOnset:
     ------
     InvalidInputError
         If the friction law has a memory or differs between the directions, belt or load follow a
-        course, or the drive has no spring.
+        signal, or the drive has no spring.
     RunError
         If the motion is too stiff to follow.
 
