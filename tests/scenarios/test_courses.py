@@ -130,3 +130,6 @@ def test_when_they_can_be_changed() -> None:
         assert known[f"{part}.amplitude"].fixed is Fixed.NEVER
     assert known["belt.kind"].fixed is known["load.kind"].fixed is Fixed.ACTIVE
     assert known["disturbance.kind"].fixed is Fixed.NEVER
+    for name in ("friction.file", "friction.reverse.file"):
+        assert known[name].fixed is Fixed.RUNNING
+        assert known[name].file
