@@ -114,24 +114,6 @@ def test_a_curve_in_a_bag_that_is_none_makes_no_drive(tmp_path: Path) -> None:
         assert recorded_drive(tmp_path / f"bag_{number}") is None
 
 
-def test_it_listens_only_while_it_is_active(graph: Graph) -> None:
-    """A plant that waits for it must not take it for ready before it is."""
-    analyzer = graph.add(AnalyzerNode, autostart=False)
-
-    def readers() -> int:
-        return analyzer.count_subscribers(JOINT_STATES.name)
-
-    analyzer.trigger_configure()
-    plant = graph.add(PlantNode, wait_for=["analyzer"], expects_control=False, pace="realtime")
-    assert readers() == 0
-    analyzer.trigger_activate()
-    graph.wait_until(lambda: plant.active, "plant active")
-    assert readers() == 1
-    graph.deactivate("plant")
-    graph.deactivate("analyzer")
-    graph.wait_until(lambda: readers() == 0, "it listens no more")
-
-
 def test_a_timer_that_is_due_when_it_stops_does_nothing(graph: Graph) -> None:
     analyzer = graph.add(AnalyzerNode, autostart=False)
     analyzer.trigger_configure()

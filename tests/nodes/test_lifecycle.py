@@ -112,3 +112,25 @@ def test_a_node_says_once_what_it_is_and_whom_it_waits_for(
     graph.wait_until(lambda: logged("paused"), "its second is over")
     assert said[-3:] == ["active", "finished: the last sample was reached", "paused"]
     assert len([line for line in said if line.startswith("waiting")]) == 1
+
+
+def test_who_is_waited_for_listens_only_while_it_is_active(graph: Graph) -> None:
+    """A plant must not take it for ready before it is."""
+    names = ["washout_controller", "analyzer"]
+    listeners = [graph.add(NODES[name], autostart=False) for name in names]
+    for node in listeners:
+        node.trigger_configure()
+    plant = graph.add(PlantNode, wait_for=names, duration=1.0)
+
+    def readers() -> int:
+        return plant.count_subscribers(JOINT_STATES.name)
+
+    assert readers() == 0
+    for node in listeners:
+        node.trigger_activate()
+    graph.wait_until(lambda: listeners[0]._answered == 101, "each sample is answered")
+    assert plant.diagnose()[2]["late_forces"] == 0
+    assert readers() == 2
+    for number, name in enumerate(names):
+        graph.deactivate(name)
+        graph.wait_until(lambda number=number: readers() == 1 - number, "it listens no more")
