@@ -18,6 +18,7 @@ from stickslip_ros.scenarios.parameters import (
     NodeParameters,
     PlantParameters,
 )
+from tests.examples import examples
 
 # Only while a node is not active; every physical parameter and gain can be set at any time.
 FIXED: dict[str, set[str]] = {
@@ -124,6 +125,7 @@ def values_of(draw: st.DrawFn, model: type[NodeParameters]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("node", NODE_PARAMETERS)
+@examples(quick=10, thorough=100)
 @given(data=st.data())
 def test_flat_values_give_the_parameters_again(node: str, data: st.DataObject) -> None:
     model = NODE_PARAMETERS[node]
