@@ -5,7 +5,6 @@ import signal
 import subprocess
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack, contextmanager
-from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -161,7 +160,7 @@ def test_a_killed_node_is_replaced(trio: Trio, processes: Processes) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("order", list(permutations(NODES)))
+@pytest.mark.parametrize("order", [NODES, NODES[::-1], (NODES[1], NODES[2], NODES[0])])
 def test_every_order_of_start_loses_nothing(trio: Trio, order: tuple[str, ...]) -> None:
     for node in order:
         trio.start(node)
@@ -208,7 +207,7 @@ def test_in_real_time_what_a_stop_costs_is_counted(trio: Trio) -> None:
 def test_a_monkey_among_them(trio: Trio, pace: str) -> None:
     chance = random.Random(6)
     trio.plant |= {"pace": pace, "reply_timeout": 1.0}
-    for _ in range(12):
+    for _ in range(9):
         for node in chance.sample(NODES, chance.choice([1, 1, 1, 2, 3])):
             if trio.is_there(node):
                 trio.send(node, chance.choice([signal.SIGKILL, signal.SIGSTOP, signal.SIGCONT]))

@@ -1,6 +1,5 @@
 """Repeated external life cycle transitions while the loop runs."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,6 @@ from stickslip_ros.nodes.base.managed import ManagedNode
 from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from tests.nodes.graph import Graph
-from tests.nodes.processes import Processes
 
 ROUND = {
     Transition.TRANSITION_DEACTIVATE: "inactive",
@@ -56,20 +54,19 @@ def ends(graph: Graph) -> dict[object, tuple[int, int]]:
     }
 
 
-@pytest.fixture(params=["composed", pytest.param("processes", marks=pytest.mark.long)])
-def bring(request: pytest.FixtureRequest, graph: Graph) -> Callable[..., None]:
-    """Start a node in this process, or in one of its own."""
-    if request.param == "composed":
-        return lambda name, **parameters: graph.add(NODES[name], **parameters)
-    processes: Processes = request.getfixturevalue("processes")
-    return processes.node
-
-
-@pytest.mark.parametrize("rounds", [2, pytest.param(10, marks=pytest.mark.long)])
+@pytest.mark.parametrize("rounds", [2, pytest.param(5, marks=pytest.mark.long)])
 @pytest.mark.parametrize("pace", ["lockstep", "realtime"])
 def test_repeated_life_cycles_leave_one_of_each_and_time_continues(
-    graph: Graph, tmp_path: Path, bring: Callable[..., None], pace: str, rounds: int
+    request: pytest.FixtureRequest, graph: Graph, tmp_path: Path, pace: str, rounds: int
 ) -> None:
+    """Two in this process, or five of nodes in processes of their own."""
+
+    def bring(name: str, **parameters: object) -> None:
+        if rounds == 2:
+            graph.add(NODES[name], **parameters)
+        else:
+            request.getfixturevalue("processes").node(name, **parameters)
+
     bring("analyzer", bag=str(tmp_path / "bag"))
     bring("washout_controller", wait_for=["analyzer"])
     bring("plant", pace=pace, wait_for=["analyzer", "washout_controller"], reply_timeout=0.2)
