@@ -1,5 +1,8 @@
 """Bags with exactly known content."""
 
+import resource
+from contextlib import contextmanager
+
 import numpy as np
 
 from stickslip_ros.bags.recorder import QosProfile, Recorder
@@ -50,6 +53,17 @@ def write_bag(directory, messages, *, topics=(), flush_every=0):
             recorder.write(channel(topic), data, stamp)
             if flush_every and number % flush_every == 0:
                 recorder.flush()
+
+
+@contextmanager
+def full_disk(size):
+    """Let no file grow beyond so many bytes: what fails is what fails on a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def record(directory, states=STAMPS, forces=STAMPS):

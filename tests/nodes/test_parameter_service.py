@@ -1,7 +1,6 @@
 """Parameters set over the network while the nodes run: refused by name or applied exactly."""
 
 import random
-import struct
 from collections.abc import Iterator
 from math import inf, isfinite
 from pathlib import Path
@@ -29,9 +28,9 @@ from stickslip_ros.nodes.plant import PlantNode
 from stickslip_ros.nodes.replay import ReplayNode
 from stickslip_ros.nodes.washout_controller import WashoutControllerNode
 from stickslip_ros.scenarios.parameter_field import parameters_of
-from stickslip_ros.scenarios.parameters import NODE_PARAMETERS, ReplayParameters
 from tests.nodes.graph import Graph
-from tests.scenarios.values import UNKNOWN, bad_values, good_values
+from tests.scenarios import values
+from tests.scenarios.values import CONFLICTS, MODELS, UNKNOWN, bad_values, good_values
 
 SECOND = 1_000_000_000
 LEFT_OPEN = {
@@ -40,7 +39,6 @@ LEFT_OPEN = {
     "active": ("",),
 }
 """By state: what is fixed from which state on may still be set."""
-MODELS = {**NODE_PARAMETERS, "replay": ReplayParameters}
 NODES: dict[str, type[ManagedNode[Any]]] = {
     "plant": PlantNode,
     "washout_controller": WashoutControllerNode,
@@ -78,9 +76,8 @@ def told(graph: Graph, node: str) -> dict[str, Any]:
     return dict(zip(names, found, strict=True))
 
 
-def bits(values: dict[str, Any]) -> dict[str, Any]:
-    """What tells -0.0 from 0.0."""
-    return {n: struct.pack("d", v) if isinstance(v, float) else v for n, v in values.items()}
+def bits(parameters: dict[str, Any]) -> dict[str, Any]:
+    return {name: values.bits(value) for name, value in parameters.items()}
 
 
 def in_turn(node: Any) -> Iterator[str]:
@@ -114,17 +111,6 @@ def test_bad_values_are_refused_in_every_state_and_change_nothing(graph: Graph, 
     assert node.active
 
 
-REFUSALS = (
-    "must not exceed",
-    "at least a thousandth",
-    "must be the path of a CSV file",
-    "must be above 0 and finite for a ",
-    "must be at least friction.",
-    "must be 0 with velocity = difference",
-)
-"""Of values that are good, but not with the others."""
-
-
 @pytest.mark.parametrize("name", NODES)
 def test_good_values_are_taken_exactly_in_every_state(graph: Graph, name: str) -> None:
     node = graph.add(NODES[name], autostart=False)
@@ -139,7 +125,7 @@ def test_good_values_are_taken_exactly_in_every_state(graph: Graph, name: str) -
         assert now == bits(node.parameters.flat())
         for (parameter, value), reason in zip(changes, reasons, strict=True):
             assert now[parameter] == bits(start if reason else {parameter: value})[parameter]
-            allowed = REFUSALS if reason else ("",)
+            allowed = CONFLICTS if reason else ("",)
             if parameter not in settable and value != start[parameter]:
                 allowed += (f"{parameter} cannot be changed while the node is ",)
                 assert reason

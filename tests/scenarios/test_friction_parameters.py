@@ -4,7 +4,6 @@ import json
 import os
 from math import inf, isnan, nan
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -16,15 +15,10 @@ from stickslip_ros.scenarios.parameter_field import known_parameters
 from stickslip_ros.scenarios.parameters import PlantParameters
 from stickslip_ros.scenarios.schema import scenario_schema
 from stickslip_ros.scenarios.template import commented_file
-from tests.scenarios.files import refusal, scenario_file, section
+from tests.scenarios.files import plant, refusal, scenario_file, section
 
 CURVE = "0,0.4\n0.1,0.3\n0.5,0.25\n"
 POINTS = ((0.0, 0.4), (0.1, 0.3), (0.5, 0.25))
-
-
-def plant(**values: Any) -> PlantParameters:
-    flat = {name.replace("__", "."): value for name, value in values.items()}
-    return PlantParameters.validated(flat, "test")
 
 
 @pytest.fixture
