@@ -483,11 +483,3 @@ def test_a_bag_that_fails_to_open_leaves_nothing_behind(tmp_path):
         with pytest.raises(BagError, match="cannot be created"):
             Recorder(path)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_parent_that_may_not_be_written_to_is_refused(tmp_path):
-    tmp_path.chmod(0o500)
-    for refuse in (check_new_bag, Recorder):
-        with pytest.raises(BagError, match="cannot be written to"):
-            refuse(tmp_path / "bag")

@@ -135,35 +135,31 @@ def test_a_pause_is_no_end_and_does_not_count_as_duration_and_the_motion_goes_on
         assert columns.position[first] == columns.position[first - 1]
 
 
-def test_reset_returns_to_the_initial_state_and_time_goes_on(graph: Graph) -> None:
+def test_what_comes_between_two_samples_acts_from_the_next_one(graph: Graph) -> None:
+    """A disturbance, which is told, parameters that change at once, and a reset; time goes on."""
     heard = graph.listen(JOINT_STATES, raw=True)
-    parameters = {"initial.position": 0.1, "wait_for": ["observer"]}
-    graph.add(PlantNode, **parameters)
-    force = answers(graph)
+    applied = graph.listen(APPLIED_DISTURBANCE, raw=True)
+    plant = graph.add(PlantNode, wait_for=["observer"], **{"initial.position": 0.1})
+    force, tap = answers(graph), graph.publisher(DISTURBANCE_FORCE, 1)
     graph.wait_until(lambda: len(heard) == 1, "sample 0")
+    tap.publish(pack_wrench(0, 0.5))
+    graph.wait_until(lambda: plant._loop.asked_disturbance == 0.5, "the disturbance came")
+    alone = {"friction.minimum": 0.5}
+    together = {"belt_speed": 1, "friction.static": 0.5, "friction.minimum": 0.45}
+    for values, taken in ((alone, False), (together, True)):
+        changes = [Parameter(name, value=value) for name, value in values.items()]
+        assert plant.set_parameters_atomically(changes).successful == taken
     force.publish(pack_wrench(SECOND, 0.0))
-    graph.wait_until(lambda: len(heard) == 2, "sample 1")
+    graph.wait_until(lambda: applied and len(heard) == 2, "sample 1, and the disturbance is told")
+    assert unpack_wrench(applied[0]) == (SECOND + SECOND // 100, 0.5)
     assert graph.call(Trigger, "/test/plant/reset", Trigger.Request()).success
     force.publish(pack_wrench(SECOND + SECOND // 100, 0.0))
     graph.wait_until(lambda: len(heard) == 3, "sample 2")
     columns, _ = joint_state_columns(heard)
+    assert columns.belt_velocity.tolist() == [0.4, 1.0, 1.0]
     assert columns.position[1] != 0.1
     assert columns.position[2] == 0.1
     assert columns.stamp[2] == SECOND + 2 * SECOND // 100
-
-
-def test_a_disturbance_acts_from_the_next_sample_and_is_told(graph: Graph) -> None:
-    heard = graph.listen(JOINT_STATES, raw=True)
-    applied = graph.listen(APPLIED_DISTURBANCE, raw=True)
-    plant = graph.add(PlantNode, wait_for=["observer"])
-    force = answers(graph)
-    tap = graph.publisher(DISTURBANCE_FORCE, 1)
-    graph.wait_until(lambda: len(heard) == 1, "sample 0")
-    tap.publish(pack_wrench(0, 0.5))
-    graph.wait_until(lambda: plant._loop.asked_disturbance == 0.5, "the disturbance came")
-    force.publish(pack_wrench(SECOND, 0.0))
-    graph.wait_until(lambda: applied, "the disturbance is told")
-    assert unpack_wrench(applied[0]) == (SECOND + SECOND // 100, 0.5)
 
 
 def test_the_truth_is_told_if_asked(graph: Graph) -> None:
@@ -188,22 +184,6 @@ def test_the_truth_is_told_if_asked(graph: Graph) -> None:
     stamps, forces = zip(*map(unpack_wrench, applied), strict=True)
     assert list(stamps) == told.stamp.tolist()
     assert forces == (0.0, 0.2)
-
-
-def test_parameters_that_change_at_once_act_from_the_next_sample(graph: Graph) -> None:
-    plant = graph.add(PlantNode, wait_for=["observer"])
-    heard = graph.listen(JOINT_STATES, raw=True)
-    force = answers(graph)
-    graph.wait_until(lambda: len(heard) == 1, "sample 0")
-    alone = {"friction.minimum": 0.5}
-    together = {"belt_speed": 1, "friction.static": 0.5, "friction.minimum": 0.45}
-    for values, taken in ((alone, False), (together, True)):
-        changes = [Parameter(name, value=value) for name, value in values.items()]
-        assert plant.set_parameters_atomically(changes).successful == taken
-    force.publish(pack_wrench(SECOND, 0.0))
-    graph.wait_until(lambda: len(heard) == 2, "sample 1")
-    columns, _ = joint_state_columns(heard)
-    assert columns.belt_velocity.tolist() == [0.4, 1.0]
 
 
 def test_a_motion_that_runs_away_deactivates_the_plant(graph: Graph) -> None:
