@@ -4,6 +4,7 @@ import resource
 from contextlib import contextmanager
 
 import numpy as np
+from mcap.writer import Writer
 
 from stickslip_ros.bags.recorder import QosProfile, Recorder
 from stickslip_ros.messages.codec import pack_joint_state, pack_wrench
@@ -64,6 +65,16 @@ def full_disk(size):
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@contextmanager
+def foreign_file(path, **options):
+    """Write a file as another recorder does."""
+    with path.open("wb") as stream:
+        writer = Writer(stream, **options)
+        writer.start(profile="ros2")
+        yield writer
+        writer.finish()
 
 
 def record(directory, states=STAMPS, forces=STAMPS):

@@ -279,7 +279,7 @@ def wait_for_bag(directory: Path, run: subprocess.Popen[str]) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("command", [RUN, [*RUN, "--composed"], ["-c", LOOP]])
+@pytest.mark.parametrize("command", [RUN, ["-c", LOOP]])
 def test_a_run_is_seen_by_local_tools_and_by_no_stranger(
     start: Start, namespaces: Namespaces, tmp_path: Path, domain: int, command: list[str]
 ) -> None:

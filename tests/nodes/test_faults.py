@@ -199,7 +199,7 @@ def test_in_real_time_what_a_stop_costs_is_counted(trio: Trio) -> None:
 def test_a_monkey_among_them(trio: Trio, pace: str) -> None:
     chance = random.Random(6)
     trio.plant |= {"pace": pace, "reply_timeout": 1.0}
-    for _ in range(9):
+    for _ in range(6):
         for node in chance.sample(NODES, chance.choice([1, 1, 1, 2, 3])):
             if trio.is_there(node):
                 trio.send(node, chance.choice([signal.SIGKILL, signal.SIGSTOP, signal.SIGCONT]))

@@ -1,7 +1,6 @@
 """Friction as parameters: constants by direction, and measured curves from files."""
 
 import json
-import os
 from math import inf, isnan, nan
 from pathlib import Path
 
@@ -173,15 +172,11 @@ def test_a_file_that_cannot_be_read_is_refused(curve: Path, tmp_path: Path) -> N
     )
     assert refused(tmp_path).endswith("it is not a regular file")
     assert refused(Path("/dev/zero")).endswith("it is not a regular file")
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    assert refused(pipe).endswith("it is not a regular file")
     curve.write_bytes(b"\xff\xfe\x00")
     assert refused(curve).endswith("is refused: the file cannot be read: it is not UTF-8 text")
     curve.write_text("0,0.4\n" * 200_000)
     assert refused(curve).endswith("must have at most 1000000 bytes")
 
-
-def test_a_bad_file_for_backward_slip_is_refused_by_its_name(curve: Path, tmp_path: Path) -> None:
+    curve.write_text(CURVE)
     files = f"plant.friction.file={curve}", f"plant.friction.reverse.file={tmp_path / 'none.csv'}"
     assert "friction.reverse.file = " in refusal("paper", "plant.friction.law=table", *files)
