@@ -201,16 +201,3 @@ def measure_or_refuse(tmp_path_factory: pytest.TempPathFactory, kind: str, seed:
     with suppress(InvalidInputError):
         report = report_of_table(path, COLUMNS, slips=SlipThreshold(1e-5, within=1e7))
         assert report["samples"] <= len(TIME)
-
-
-@pytest.mark.process
-def test_a_mat_file_of_more_numbers_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "log.mat"
-    savemat(path, SOUND)
-    monkeypatch.setattr("stickslip_ros.bags.table_file._MOST_NUMBERS", 3 * len(TIME))
-    assert len(table_of(path)["t"]) == len(TIME)
-    monkeypatch.setattr("stickslip_ros.bags.table_file._MOST_NUMBERS", 3 * len(TIME) - 1)
-    with pytest.raises(BagError, match="it has more than 899 numbers"):
-        table_of(path)

@@ -87,12 +87,12 @@ def test_messages_that_no_bag_can_hold_are_left_out_and_counted(tmp_path):
         assert recording.joint_states.stamp.tolist() == [0, 3]
 
 
-@pytest.mark.parametrize("bag", ["bag", "bag/bag_0.mcap"])
-def test_nothing_is_written_into_the_original(tmp_path, bag):
+def test_nothing_is_written_into_the_original(tmp_path):
     record(tmp_path / "bag")
     before = sorted((tmp_path / "bag").iterdir())
-    with pytest.raises(BagError, match="would lie within"):
-        repair(tmp_path / bag, tmp_path / "bag" / "out")
+    for bag in ("bag", "bag/bag_0.mcap"):
+        with pytest.raises(BagError, match="would lie within"):
+            repair(tmp_path / bag, tmp_path / "bag" / "out")
     assert sorted((tmp_path / "bag").iterdir()) == before
 
 

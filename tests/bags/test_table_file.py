@@ -42,13 +42,20 @@ def test_a_csv_file_is_read_to_the_last_digit(tmp_path: Path, separator: str) ->
 
 
 @pytest.mark.process
-def test_a_mat_file_gives_the_same(tmp_path: Path) -> None:
+def test_a_mat_file_gives_the_same_up_to_a_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    most = 4 * len(TIME) + 1
+    monkeypatch.setattr("stickslip_ros.bags.table_file._MOST_NUMBERS", most)
     path = tmp_path / "log.mat"
     table = {"t": TIME[:, None], "x": POSITION[None, :], "v": VELOCITY, "u": POSITION, "gain": 1e6}
     savemat(path, {**table, "name": "a machine", "other": np.eye(3)})
     recording = read_table(path, {**COLUMNS, "force": "u*gain*2.5"})
     assert recording.samples.position.tolist() == POSITION.tolist()
     assert recording.forces.force == pytest.approx(POSITION * 2.5e6, rel=1e-15)
+    monkeypatch.setattr("stickslip_ros.bags.table_file._MOST_NUMBERS", most - 1)
+    with pytest.raises(BagError, match=f"it has more than {most - 1} numbers"):
+        read_table(path, COLUMNS)
 
 
 def test_a_report_of_a_table_has_the_measures(tmp_path: Path) -> None:

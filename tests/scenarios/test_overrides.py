@@ -59,8 +59,6 @@ def test_a_bad_override_is_refused() -> None:
         ("motor.mass=1", "motor.mass=1", "unknown node motor", "washout_controller"),
         ("plant.mass=[", "plant.mass=[", "not YAML"),
         ("plant.beltspeed=1", "parameter beltspeed; did you mean plant.belt_speed?"),
-        ("plant.static=1", "parameter static; did you mean plant.friction.static?"),
-        ("plant.linear_gain=1", "; did you mean washout_controller.linear_gain?"),
         ("plant.colour=1", "parameter colour; plant has actuator.limit,"),
         ("plant.mass=", "plant.mass=", "plant: mass = None", "a finite number above 0 kg"),
         ("plant.belt_speed=fast", "plant: belt_speed = 'fast'", "in m/s, not text"),
